@@ -47,7 +47,7 @@ output = Path("output/rubber_seal")
 # ## Seal
 #
 # The right half of it; its plane of symmetry is x = 0. Parts of its surface get names: what may meet the
-# floor, the lid and the wall, and the two halves of the bore.
+# floor, the lid and the wall.
 
 outer, inner, gap = 4.0, 2.6, 0.6  # mm: radii, and how far the wall is away
 flat = rectangle((inner, -np.pi / 2), (outer, np.pi / 2), (5, 48))
@@ -57,9 +57,9 @@ points[abs(points) < 1e-12] = 0.0
 ring = flat.moved(points)
 
 
-def where(side: str, condition) -> np.ndarray:
-    """Return the facets of a side whose height meets a condition."""
-    facets = ring.surfaces[side]
+def outside(condition) -> np.ndarray:
+    """Return the facets of the outside whose height meets a condition."""
+    facets = ring.surfaces["x1"]
     return facets[condition(points[facets, 1].mean(axis=1))]
 
 
@@ -67,27 +67,26 @@ seal = replace(
     ring,
     surfaces={
         **ring.surfaces,
-        "under": where("x1", lambda y: y < 0.3 * outer),
-        "upper": where("x1", lambda y: y > -0.3 * outer),
-        "beside": where("x1", lambda y: abs(y) < 0.8 * outer),
-        "ceiling": where("x0", lambda y: y > 0.05 * inner),
-        "bottom": where("x0", lambda y: y < -0.05 * inner),
+        "under": outside(lambda y: y < 0.3 * outer),
+        "upper": outside(lambda y: y > -0.3 * outer),
+        "beside": outside(lambda y: abs(y) < 0.8 * outer),
     },
 )
 
 # ## Groove
 #
-# Floor and wall stand still, the lid comes down as time goes by. The two halves of the bore are a contact
-# pair of one body with itself.
+# Floor and wall stand still, the lid comes down as time goes by. The bore folds: its surface is slave and
+# master at once.
 
 rubber = NeoHooke(young_modulus=6.0, poisson_ratio=0.45)  # N/mm²
 greased = Coulomb(0.2)
+bore = Surface("seal", "x0")
 lid = MovingObstacle(RigidPlane((0.0, outer), (0.0, -1.0)), lambda time: (None, (0.0, -time)))
 faces = {
     "floor": ContactPair(Surface("seal", "under"), RigidPlane((0.0, -outer), (0.0, 1.0)), greased),
     "lid": ContactPair(Surface("seal", "upper"), lid, greased),
     "wall": ContactPair(Surface("seal", "beside"), RigidPlane((outer + gap, 0.0), (-1.0, 0.0)), greased),
-    "bore": ContactPair(Surface("seal", "ceiling"), Surface("seal", "bottom"), greased),
+    "bore": ContactPair(bore, bore, greased),
 }
 symmetry = [Support("seal", side, (0.0, None)) for side in ("y0", "y1")]
 scene = Scene({"seal": Body(seal, rubber)}, symmetry, contacts=list(faces.values()))

@@ -218,7 +218,7 @@ class MovingContact:
     ) -> Meeting:
         """Search for the points at a displacement. Collective."""
         known = None if last is None else last.points
-        found = self._sliding.at(self._coordinates(load, displacement), known, load.time)
+        found = self._sliding.at(self._coordinates(load, displacement), known, load.time, start)
         here = found.material_points()
         start = here if start is None else start.extended(here)
         return Meeting(meeting_at(load.torn, found.points, load.prescribed), found, start, load.prescribed)

@@ -1,4 +1,4 @@
-"""Contact pairs that a scene finds itself: surfaces of different bodies that may meet."""
+"""Contact pairs that a scene finds itself: surfaces of bodies that may meet others or themselves."""
 
 from __future__ import annotations
 
@@ -34,7 +34,8 @@ class Automatic(Sequence[ContactPair]):
     The scene looks for facets that face another body within a distance, names them "near B" on A and "near
     A" on B, and makes a pair of them; look at ``scene.contacts`` and at pictures before trusting it. The
     slave is the side with the smaller facets; between facets alike to a tenth, that of the softer body. A
-    side whose nodes are all held is the master. Where a body meets itself, name the pair.
+    side whose nodes are all held is the master. Bodies named in ``self_contact`` may meet themselves wherever
+    they fold.
 
     Attributes:
         friction: The law of all pairs, see `ContactPair`.
@@ -43,9 +44,12 @@ class Automatic(Sequence[ContactPair]):
             Bodies that loads move farther need more.
         discretisation: As in `ContactPair`.
         geometry: As in `ContactPair`.
+        self_contact: Bodies of materials for large deformations that may meet themselves, by nodes. Each gets
+            a surface "boundary", all of its facets, that is slave and master at once.
 
     Raises:
-        InvalidInputError: If the distance is not positive; when the scene is made, if it finds no pair.
+        InvalidInputError: If the distance is not positive; when the scene is made, if it finds no pair, or
+            has no body of a name in ``self_contact``.
 
     Example:
         >>> from fenics_contact.gallery import block
@@ -64,6 +68,7 @@ class Automatic(Sequence[ContactPair]):
     distance: float | None = None
     discretisation: Discretisation = "node"
     geometry: Geometry = "best"
+    self_contact: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Reject a distance that is none."""
@@ -95,14 +100,33 @@ class Automatic(Sequence[ContactPair]):
         size, motion = max(map(_facet_size, meshes.values())), _largest_motion(scene)
         distance = size + motion if self.distance is None else self.distance
         named, near = near_surfaces(meshes, distance, along=distance)
-        if not near:
+        if not near and not self.self_contact:
             raise InvalidInputError(_nothing_found(meshes, distance))
+        named |= {name: self._with_boundary(named, name) for name in self.self_contact}
         bodies = {name: replace(body, mesh=named[name]) for name, body in scene.bodies.items()}
         with_surfaces = replace(scene, bodies=bodies, contacts=())
         pairs = tuple(self._pair(with_surfaces, *names) for names in near)
+        for whole in (Surface(name, "boundary") for name in self.self_contact):
+            pairs += (ContactPair(whole, whole, self.friction, geometry=self.geometry),)
         words = "%d contact pairs are found within a distance of %.4g: %s"
         tell(_LOG.info, words, len(pairs), distance, "; ".join(pair.place for pair in pairs))
         return bodies, pairs
+
+    def _with_boundary(self, meshes: dict[str, BodyMesh], name: str) -> BodyMesh:
+        """Return a body that has a surface "boundary"."""
+        if name not in meshes:
+            raise InvalidInputError(
+                f"Automatic.self_contact needs names of bodies of the scene, {', '.join(meshes)}, got "
+                f"{name!r}: correct or remove it"
+            )
+        mesh = meshes[name]
+        if "boundary" in mesh.surfaces:
+            raise InvalidInputError(
+                f"body {name!r} must have no surface 'boundary' yet, as Automatic.self_contact names all of "
+                "its facets so: rename it"
+            )
+        facets, _ = boundary_faces(mesh.cells, mesh.dim)
+        return replace(mesh, surfaces={**mesh.surfaces, "boundary": facets})
 
     def _pair(self, scene: SceneParts, one: str, other: str) -> ContactPair:
         """Return the pair of two bodies with the better slave."""
@@ -145,7 +169,7 @@ def _nothing_found(meshes: dict[str, BodyMesh], distance: float) -> str:
     if len(meshes) < 2:
         return (
             "Automatic contact needs two bodies, the scene has one: name the pairs in which it meets "
-            "obstacles or itself"
+            "obstacles, or the body in self_contact if it may meet itself"
         )
     names, gaps = list(meshes), []
     for n, name in enumerate(names):

@@ -134,11 +134,6 @@ class SceneParts:
 
     def _require_deforming(self, pair: ContactPair) -> None:
         """Reject contact of a body with itself unless it may deform much."""
-        if pair.slave == pair.master:
-            raise InvalidInputError(
-                f"surface {pair.slave.name!r} of body {pair.slave.body!r} cannot be its own master, as its "
-                "nodes would be kept out twice: name the two parts of it that may meet"
-            )
         deforming = (is_nonlinear(m) and getattr(m, "finite", True) for m in self._materials(pair.slave))
         if pair.discretisation == "mortar" or pair.given_gap or not any(deforming):
             raise InvalidInputError(

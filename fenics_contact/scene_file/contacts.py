@@ -125,7 +125,7 @@ class ContactPart(Part):
 
 @keys_of(scene.Automatic)
 class AutomaticPart(Part):
-    """Contact wherever boundaries of different bodies face each other."""
+    """Contact wherever boundaries of different bodies face each other, or those of a body that folds."""
 
     friction: AnyFriction | None
     distance: PositiveFloat | None

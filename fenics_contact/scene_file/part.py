@@ -15,6 +15,7 @@ from fenics_contact.scene import ScalarValue, VectorValue
 from fenics_contact.scene_file.values import (
     CountPair,
     CountTriple,
+    Names,
     Pair,
     ScalarField,
     Triple,
@@ -33,6 +34,7 @@ IN_FILES: list[tuple[Any, Any, str]] = [
     (tuple[float, float] | None, Pair | None, ""),
     (tuple[float, float, float], Triple, ""),
     (tuple[float, float, float] | None, Triple | None, ""),
+    (tuple[str, ...], Names, ""),
     (tuple[int, int], CountPair, ""),
     (tuple[int, int, int], CountTriple, ""),
     (ScalarValue, ScalarField, _FORMULAS),

@@ -158,6 +158,7 @@ Net: TypeAlias = Annotated[
     said(f"an integer from 1 to {MOST} for a curve, or two in brackets for a surface"),
 ]
 CountTriple: TypeAlias = Annotated[tuple[int, int, int], _row(_COUNT, 3, 3, f"three {_COUNTS}")]
+Names: TypeAlias = Annotated[tuple[str, ...], _row(str, 0, None, "names in quotes, in brackets")]
 Row: TypeAlias = Annotated[
     tuple[float, ...], _row(float, 1, None, "finite numbers in brackets, one for each design variable")
 ]

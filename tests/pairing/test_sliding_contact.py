@@ -11,6 +11,8 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.pairing import find_contact_points, movable, sliding_contact
 from fenics_contact.pairing.sliding.closest import ClosestPoints
 from fenics_contact.pairing.sliding.patches import SmoothPatches
+from fenics_contact.pairing.sliding.points import SlidingPoints
+from fenics_contact.pairing.sliding.roles import LEANING
 from fenics_contact.scene import Body, ContactPair, MovingObstacle, RigidCylinder, RigidPlane, Scene, Surface
 from fenics_contact.surfaces import Projection, faceted_surface
 from tests.pairing.sliding_scenes import (
@@ -29,6 +31,21 @@ from tests.pairing.sliding_scenes import (
 RADIUS = 1.5
 #: Largest jump of the normal at an edge, in radians, where facets turn by 0.17.
 JUMPS = {"hexahedron": 1e-8, "tetrahedron": 3e-4, "quadrilateral": 1e-8, "triangle": 1e-8}
+
+
+#: A surface that is its own master, and its parts.
+ROOF_AND_FLOOR = (("inner", "inner"), ("roof", "floor"), ("floor", "roof"))
+
+
+def squashed_and_turned(kind: str, sides: tuple[str, str], angle: float) -> SlidingPoints:
+    """The points of a ring squashed to a fifth, which had been turned before."""
+    scene = ring(kind, sides)
+    turn, body = rotation(scene.dim, angle), scene.bodies["ring"]
+    mesh = replace(body.mesh, points=body.mesh.points @ turn.T)
+    factors = np.ones(scene.dim)
+    factors[0], factors[-1] = 1.2, 0.2
+    turned = replace(scene, bodies={"ring": replace(body, mesh=mesh)})
+    return sliding(turned).at(scene.points * factors @ turn.T)
 
 
 def slid_over(kind: str, cells: int, geometry: str = "best") -> tuple[Projection, np.ndarray]:
@@ -229,8 +246,41 @@ def test_a_squashed_ring_meets_itself_inside_and_never_through_its_wall(kind: st
     through = contact.at(pushed, now)
     crown = np.abs(pushed[through.points.slave, 0]) < 0.1
     assert through.points.gap[crown] == pytest.approx(0.36 - 0.38, abs=0.01)
+    again = contact.at(pushed, start=now.material_points())  # from no facets, but known to have met
+    assert np.array_equal(again.key, through.key)
+    assert again.points.gap == pytest.approx(through.points.gap, rel=1e-6)
+    assert not np.any(np.abs(pushed[contact.at(pushed).points.slave, 0]) < 0.1)
     for sides in (("inner", "outer"), ("outer", "inner"), ("crown", "base"), ("base", "crown")):
         assert sliding(ring(kind, sides)).at(flat).points.count == 0
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.6, np.arctan2(LEANING[1], LEANING[0]), 2.3])
+@pytest.mark.parametrize("kind", ["quadrilateral", "hexahedron"])
+def test_one_of_two_places_of_a_surface_that_meets_itself_is_the_slave(kind: str, angle: float) -> None:
+    # Squashed from any direction, also square to the one that decides where ways do not.
+    whole, *halves = (squashed_and_turned(kind, sides, angle) for sides in ROOF_AND_FLOOR)
+    up = ring(kind).points[whole.points.slave, -1] > 0.0
+    assert np.count_nonzero(up) in (0, whole.points.count)
+    half = halves[0 if up.any() else 1]
+    _, here, there = np.intersect1d(whole.points.slave, half.points.slave, return_indices=True)
+    assert len(here) > 0.9 * half.points.count
+    middle = np.abs(ring(kind).points[half.points.slave[there], 0]) < 0.7
+    assert np.count_nonzero(middle) > 4
+    assert whole.points.gap[here[middle]] == pytest.approx(half.points.gap[there[middle]], rel=1e-9)
+
+
+def test_roles_stay_where_a_surface_met_itself_before() -> None:
+    scene = ring("quadrilateral", ("inner", "inner"))
+    contact, flat = sliding(scene), scene.points * [1.2, 0.2]
+    first = contact.at(flat)
+    sheared = flat + 0.3 * flat[:, [1, 0]] * [1.0, 0.0]
+    beside = contact.at(sheared, first)
+    stay = np.isin(first.points.slave, beside.points.slave)
+    assert stay.mean() > 0.9
+    # Whatever comes new is on the same side, and no slave is the master of another one.
+    assert np.ptp(np.sign(scene.points[beside.points.slave, 1])) == 0.0
+    master = np.abs(beside.points.master[:, beside.points.slave]).max()
+    assert master == 0.0
 
 
 def on_obstacle(obstacle: RigidPlane | RigidCylinder | MovingObstacle) -> Scene:

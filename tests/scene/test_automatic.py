@@ -18,6 +18,7 @@ from fenics_contact.scene import (
     ContactPair,
     Coulomb,
     IsotropicElasticity,
+    NeoHooke,
     PlaneStrain,
     Scene,
     Support,
@@ -99,6 +100,28 @@ def test_three_plane_bodies_meet_in_two_pairs(caplog: pytest.LogCaptureFixture) 
         frozenset("ab"), frozenset("bc"),
     }  # fmt: skip
     assert "2 contact pairs are found within a distance of 0.1" in caplog.text
+
+
+def test_bodies_that_may_fold_are_their_own_masters() -> None:
+    rubber = {"seal": Body(LOW, NeoHooke(10.0, 0.3))}
+    found = Scene(rubber, contacts=Automatic(Coulomb(0.1), self_contact=("seal",)))
+    (pair,) = found.contacts
+    assert pair.slave == pair.master == Surface("seal", "boundary")
+    assert pair.friction == Coulomb(0.1)
+    assert len(found.facets(pair.slave)) == 2 * (9 + 3 + 3)
+    above = Body(block((0.0, 0.0, 1.1), (3.0, 3.0, 2.1), (3, 3, 1)), STEEL)
+    automatic = Automatic(distance=0.2, self_contact=("seal",))
+    both = Scene({**rubber, "plate": above}, contacts=automatic)
+    assert [each.place for each in both.contacts] == [
+        "seal near plate on plate near seal", "seal boundary on seal boundary",
+    ]  # fmt: skip
+    with pytest.raises(InvalidInputError, match=r"needs names of bodies of the scene, seal, got 'sael'"):
+        Scene(rubber, contacts=Automatic(self_contact=("sael",)))
+    named = {"seal": Body(found.bodies["seal"].mesh, NeoHooke(10.0, 0.3))}
+    with pytest.raises(InvalidInputError, match="must have no surface 'boundary' yet"):
+        Scene(named, contacts=Automatic(self_contact=("seal",)))
+    with pytest.raises(InvalidInputError, match="with itself needs a material for large deformations"):
+        Scene({"plate": Body(LOW, STEEL)}, contacts=Automatic(self_contact=("plate",)))
 
 
 def test_one_body_and_distances_that_are_none_are_refused() -> None:

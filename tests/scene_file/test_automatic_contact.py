@@ -31,6 +31,12 @@ def test_pairs_are_found_in_place_of_those_of_the_file(tmp_path: Path) -> None:
     assert file.partitions.keys() == {"lower", "upper"}
 
 
+def test_files_name_bodies_that_may_meet_themselves(tmp_path: Path) -> None:
+    contact = '[automatic_contact]\nself_contact = ["lower"]\n\n'
+    with pytest.raises(SceneFileError, match="of body 'lower' with itself needs a material for large"):
+        _ = read(PAIR.sub(contact, GOOD), tmp_path).scene
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

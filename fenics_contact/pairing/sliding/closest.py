@@ -84,7 +84,12 @@ class ClosestPoints:
     hold: float = 1e-6
 
     def find(
-        self, targets: np.ndarray, normals: np.ndarray, facet: np.ndarray, local: np.ndarray
+        self,
+        targets: np.ndarray,
+        normals: np.ndarray,
+        facet: np.ndarray,
+        local: np.ndarray,
+        met: np.ndarray | None = None,
     ) -> Projection:
         """Return the closest points of targets that face the surface.
 
@@ -96,6 +101,8 @@ class ClosestPoints:
             normals: Outward unit normals there, shape (n, dim).
             facet: Their last facets, −1 where there is none, shape (n,).
             local: Last local coordinates, shape (n, dim − 1).
+            met: Whether they may lie behind facets where a body meets itself, shape (n,); by default those
+                that have a last facet.
         """
         known = np.flatnonzero(facet >= 0)
         kept = self._solve(targets, normals, known, facet[known], local[known])
@@ -103,7 +110,7 @@ class ClosestPoints:
         waiting = np.setdiff1d(np.arange(len(targets)), kept.point)
         if len(waiting) == 0:
             return replace(kept, lost=waiting)
-        found = self._searched(targets, normals, waiting, facet >= 0)
+        found = self._searched(targets, normals, waiting, facet >= 0 if met is None else met)
         found = join([kept, found.part(np.abs(found.gap) <= self.reach)])
         return replace(found, lost=np.setdiff1d(found.lost, found.point))
 
@@ -112,7 +119,7 @@ class ClosestPoints:
     ) -> Projection:
         """Return the closest points among the facets nearest to the waiting targets.
 
-        Where a body meets itself, only targets that had a point, ``met``, may lie behind a facet: others are
+        Where a body meets itself, only targets that ``met`` it before may lie behind a facet: others are
         apart from it by walls of the body.
         """
         corners = self.points[self.patches.facets]

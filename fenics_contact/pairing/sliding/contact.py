@@ -93,7 +93,11 @@ class SlidingContact:
         return cls(scene, fixed, comm, reach, meetings_of(scene, fixed, comm))
 
     def at(
-        self, coordinates: np.ndarray, last: SlidingPoints | LastPoints | None = None, time: float = 0.0
+        self,
+        coordinates: np.ndarray,
+        last: SlidingPoints | LastPoints | None = None,
+        time: float = 0.0,
+        start: MaterialPoints | None = None,
     ) -> SlidingPoints:
         """Return the contact points of the bodies where they lie now. Collective.
 
@@ -101,6 +105,8 @@ class SlidingContact:
             coordinates: Present coordinates of the nodes of all bodies, shape (n_nodes, dim), [length].
             last: Points at nearby coordinates: nodes stay on the facets that they had as long as they can.
             time: Time at which moving obstacles are asked.
+            start: All points since the start of the load step: where a body meets itself, nodes that had one
+                are known to be on the side from which they came.
 
         Raises:
             InvalidInputError: If the coordinates have another shape or are not finite.
@@ -119,7 +125,7 @@ class SlidingContact:
                 for each in self.meetings
             )
         known = last.points if isinstance(last, SlidingPoints) else last
-        parts = [self._pair(index, coordinates, known, time) for index in range(len(self.meetings))]
+        parts = [self._pair(index, coordinates, known, time, start) for index in range(len(self.meetings))]
         points = join_points([part.points for part in parts], self.scene.dim, len(coordinates))
         differential = join_differentials(
             [part.differential for part in parts], self.scene.dim, len(coordinates)
@@ -141,7 +147,14 @@ class SlidingContact:
         found = self.at(coordinates, LastPoints.of(stored), time)
         return found, MaterialPoints.of(stored, len(coordinates))
 
-    def _pair(self, index: int, coordinates: np.ndarray, last: Known | None, time: float) -> _Found:
+    def _pair(
+        self,
+        index: int,
+        coordinates: np.ndarray,
+        last: Known | None,
+        time: float,
+        start: MaterialPoints | None,
+    ) -> _Found:
         """Return the points of one pair. Collective."""
         meeting, lost, means = self.meetings[index], np.zeros(0, dtype=np.int64), None
         if meeting.obstacle is not None:
@@ -152,7 +165,7 @@ class SlidingContact:
         elif meeting.facets is not None:
             points, differential, means = self._on_means(meeting, coordinates)
         else:
-            points, differential, lost = self._on_patches(index, meeting, coordinates, last)
+            points, differential, lost = self._on_patches(index, meeting, coordinates, last, start)
         points = replace(points, pair=np.full(points.count, index))
         axes = points.axes if last is None else _kept_axes(points, last, index)
         points = replace(points, axes=axes, tangents=tangent_frames(points.normal, axes))
@@ -189,12 +202,21 @@ class SlidingContact:
         return points, without_patches(bent, len(coordinates)), means
 
     def _on_patches(
-        self, index: int, meeting: Meeting, coordinates: np.ndarray, last: Known | None
+        self,
+        index: int,
+        meeting: Meeting,
+        coordinates: np.ndarray,
+        last: Known | None,
+        start: MaterialPoints | None,
     ) -> tuple[ContactPoints, Differential, np.ndarray]:
         patches = meeting.patches
         assert patches is not None
         known = _last_facets(meeting, index, last, self.scene.dim - 1)
-        hit = meeting.closest(coordinates, known, self.reach, self.comm)
+        met = known[0] >= 0
+        if start is not None:
+            mine = start.pair == index
+            met[np.searchsorted(meeting.nodes, start.key[mine] - index * len(coordinates))] = True
+        hit = meeting.closest(coordinates, known, met, self.reach, self.comm)
         own = coordinates[meeting.master_nodes]
         at = patch_points(patches, patches.coefficients(own)[hit.facet], hit.local)
         count = len(coordinates), len(meeting.master_nodes)

@@ -15,6 +15,7 @@ from fenics_contact.pairing.node_numbers import NodeNumbers
 from fenics_contact.pairing.sliding.closest import ClosestPoints
 from fenics_contact.pairing.sliding.moved_surface import moved_surface
 from fenics_contact.pairing.sliding.patches import SmoothPatches
+from fenics_contact.pairing.sliding.roles import Roles
 from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, surface_of
 from fenics_contact.surfaces import FacetedSurface, Projection, join
 
@@ -38,6 +39,7 @@ class Meeting:
         apart: Facets on which each candidate never has a point, where a body meets itself, shape
             (n_candidates, n_facets); None where bodies meet others.
         reach: Distance beyond which no candidate needs a point, [length].
+        roles: Which candidates are slaves, where a surface meets itself; None where all are.
     """
 
     slave: FacetedSurface
@@ -52,6 +54,7 @@ class Meeting:
     obstacle: RigidObstacle | None
     apart: sp.csr_matrix | None = None
     reach: float = np.inf
+    roles: Roles | None = None
 
     @property
     def nodes(self) -> np.ndarray:
@@ -63,13 +66,19 @@ class Meeting:
         return moved_surface(self.slave, coordinates[self.slave_nodes]).averaged[self.candidates]
 
     def closest(
-        self, coordinates: np.ndarray, last: tuple[np.ndarray, np.ndarray], reach: float, comm: MPI.Comm
+        self,
+        coordinates: np.ndarray,
+        last: tuple[np.ndarray, np.ndarray],
+        met: np.ndarray,
+        reach: float,
+        comm: MPI.Comm,
     ) -> Projection:
         """Return the closest points of the candidates on the master. Collective.
 
         Args:
             coordinates: Of all nodes, shape (n_nodes, dim), [length].
             last: Last facets, −1 where there is none, shape (n_candidates,), and local coordinates.
+            met: Whether candidates are known to be on the side of their points, shape (n_candidates,).
             reach: Distance beyond which no point is wanted, [length].
             comm: Communicator of the ranks, each of which projects a share.
         """
@@ -82,9 +91,11 @@ class Meeting:
             reach = min(reach, self.reach)
             search = ClosestPoints(self.patches, points, self.patches.coefficients(points), reach, apart)
             normals, (facet, local) = self.normals(coordinates), last
-            hit = search.find(coordinates[self.nodes[mine]], normals[mine], facet[mine], local[mine])
+            at = coordinates[self.nodes[mine]]
+            hit = search.find(at, normals[mine], facet[mine], local[mine], met[mine])
             found = replace(hit, point=mine[hit.point], lost=mine[hit.lost])
-        return join([part for part in comm.allgather(found) if part is not None])
+        joined = join([part for part in comm.allgather(found) if part is not None])
+        return joined if self.roles is None else joined.part(self.roles.are_slaves(joined, facet))
 
 
 def meetings_of(scene: Scene, fixed: np.ndarray, comm: MPI.Comm) -> tuple[Meeting, ...]:
@@ -152,11 +163,21 @@ def _within_body(meeting: Meeting, master: FacetedSurface, facets: float = 3.0) 
     behind = np.einsum("nd,nd->n", centres[column] - place[row], normals) < 0.0
     shape = len(place), len(centres)
     behind_it = sp.csr_matrix((np.ones(behind.sum()), (row[behind], column[behind])), shape=shape)
-    carried = meeting.patches.control.tocoo()
-    facet = carried.row // (meeting.patches.control.shape[0] // len(centres))
-    own = sp.csr_matrix(
-        (np.ones(len(facet)), (facet, meeting.master_nodes[carried.col])),
-        shape=(len(centres), int(max(meeting.slave_nodes.max(), meeting.master_nodes.max())) + 1),
-    )
-    apart = ((behind_it + own[:, meeting.nodes].T) > 0).tocsr()
-    return replace(meeting, apart=apart, reach=reach)
+    touched = _carried(meeting.patches, meeting.slave_nodes, meeting.master_nodes)[:, meeting.candidates]
+    apart = ((behind_it + touched.T) > 0).tocsr()
+    roles = None
+    if np.array_equal(meeting.slave_nodes, meeting.master_nodes):
+        roles = Roles(meeting.patches, master.points, meeting.candidates, touched)
+    return replace(meeting, apart=apart, reach=reach, roles=roles)
+
+
+def _carried(patches: SmoothPatches, slave_nodes: np.ndarray, master_nodes: np.ndarray) -> sp.csr_matrix:
+    """Return which nodes of the slave move each patch of the master, shape (n_facets, n_slave)."""
+    weights = patches.control.tocoo()
+    facet = weights.row // (patches.control.shape[0] // len(patches.facets))
+    _, slave, master = np.intersect1d(slave_nodes, master_nodes, return_indices=True)
+    place = np.full(len(master_nodes), -1)
+    place[master] = slave
+    known = place[weights.col] >= 0
+    entries = np.ones(known.sum()), (facet[known], place[weights.col[known]])
+    return sp.csr_matrix(entries, shape=(len(patches.facets), len(slave_nodes)))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fenics_contact.gallery import rectangle
 from fenics_contact.mesh import BodyMesh, boundary_faces
 from fenics_contact.scene import (
+    Automatic,
     Body,
     ContactPair,
     Coulomb,
@@ -21,7 +24,7 @@ from fenics_contact.scene import (
     Surface,
     Traction,
 )
-from tests.hard.deformed.case import Case, States, case, reaction, times, ways
+from tests.hard.deformed.case import Case, States, case, last_of, reaction, times, ways
 
 RUBBER = NeoHooke(1.0, 0.3)
 
@@ -111,26 +114,30 @@ def an_arch_that_snaps_onto_a_floor() -> Case:
 
 
 def slotted() -> BodyMesh:
-    """A block with a slot from above, 0.4 wide."""
+    """A block with a slot from above, 0.4 wide; its sides are also one surface with its bottom."""
     whole = rectangle((0.0, 0.0), (4.0, 2.0), (20, 10))
     x, y = whole.points[whole.cells].mean(axis=1).T
-    cells = whole.cells[(np.abs(x - 2.0) > 0.2) | (y < 0.8)]
-    used, cells = np.unique(cells, return_inverse=True)
-    cells = cells.reshape(-1, 4)
-    points = whole.points[used]
-    facets, _ = boundary_faces(cells, 2)
-    at = points[facets]
-    sides = {
-        name: facets[np.all(np.abs(at[:, :, axis] - value) < 1e-9, axis=1)]
-        for name, axis, value in (
-            ("x0", 0, 0.0), ("x1", 0, 4.0), ("y0", 1, 0.0), ("left", 0, 1.8), ("right", 0, 2.2)
-        )
-    }  # fmt: skip
-    return BodyMesh(points, cells, sides)
+    mesh = without(whole, (np.abs(x - 2.0) < 0.2) & (y > 0.8))
+    facets, _ = boundary_faces(mesh.cells, 2)
+    at = mesh.points[facets]
+    inside = (np.abs(at[:, :, 0] - 2.0) < 0.2 + 1e-9) & (at[:, :, 1] > 0.8 - 1e-9)
+    sides = {"slot": facets[inside.all(axis=1)]}
+    for name, x_there in (("left", 1.8), ("right", 2.2)):
+        sides[name] = facets[np.all(np.abs(at[:, :, 0] - x_there) < 1e-9, axis=1)]
+    return replace(mesh, surfaces={**mesh.surfaces, **sides})
 
 
-@case
-def a_slot_that_closes_on_itself() -> Case:
+def without(whole: BodyMesh, removed: np.ndarray) -> BodyMesh:
+    """A mesh without some of its cells, none of which is at its surfaces x0, x1, y0."""
+    used, cells = np.unique(whole.cells[~removed], return_inverse=True)
+    number = np.full(len(whole.points), -1)
+    number[used] = np.arange(len(used))
+    sides = {name: number[facets] for name, facets in whole.surfaces.items()}
+    sides = {name: facets[(facets >= 0).all(axis=1)] for name, facets in sides.items()}
+    return BodyMesh(whole.points[used], cells.reshape(-1, 4), sides)
+
+
+def slot_closes(slave: str, master: str) -> Case:
     mesh = slotted()
 
     def pressed(depth: float) -> list[Support]:
@@ -143,6 +150,48 @@ def a_slot_that_closes_on_itself() -> Case:
         left, right = (reaction(states[-1], number) for number in (0, 1))
         assert abs(left[0] + right[0]) < 1e-8 * abs(left[0])
 
-    pair = ContactPair(Surface("block", "left"), Surface("block", "right"), Coulomb(0.3))
+    pair = ContactPair(Surface("block", slave), Surface("block", master), Coulomb(0.3))
     scene = Scene({"block": Body(mesh, RUBBER)}, pressed(0.0), contacts=[pair])
     return Case(scene, ways(*map(pressed, (0.1, 0.3, 0.5))), checks=closed)
+
+
+@case
+def a_slot_that_closes_on_itself() -> Case:
+    return slot_closes("left", "right")
+
+
+@case
+def a_slot_whose_surface_is_its_own_master() -> Case:
+    whole = slot_closes("slot", "slot")
+    return replace(whole, twins={"two sides": last_of(a_slot_that_closes_on_itself)})
+
+
+@case
+def bellows_that_close_on_themselves() -> Case:
+    # Slots 0.4 high from the right, the left and the right again; only the body is named. It is wider above,
+    # so that no lips meet corner on corner.
+    whole = rectangle((0.0, 0.0), (4.0, 6.0), (16, 30))
+    x, y = whole.points[whole.cells].mean(axis=1).T
+    right, left = (x > 1.0) & (np.abs(np.abs(y - 3.0) - 1.8) < 0.2), (x < 3.0) & (np.abs(y - 3.0) < 0.2)
+    mesh = without(whole, right | left)
+    x, y = mesh.points.T
+    mesh = replace(mesh, points=np.column_stack([2.0 + (x - 2.0) * (1.0 + 0.05 * y), y]))
+
+    def pressed(way: float) -> list[Support]:
+        return [Support("bellows", "y0"), Support("bellows", "y1", (0.0, -way))]
+
+    def closed(states: States) -> None:
+        assert states[0].contact.normal_force.max() == 0.0
+        force = [state.contact.normal_force for state in states]
+        height = states[-1].scene.points[states[-1].contact.points.slave, 1]
+        bearing = height[force[-1] > 0.0]
+        assert [np.count_nonzero(np.abs(bearing - y) < 0.3) > 5 for y in (1.2, 3.0, 4.8)] == [True] * 3
+        under, over = (reaction(states[-1], number) for number in (0, 1))
+        assert abs(under[1] + over[1]) < 1e-8 * abs(under[1])
+
+    scene = Scene(
+        {"bellows": Body(mesh, RUBBER)},
+        pressed(0.0),
+        contacts=Automatic(Coulomb(0.3), self_contact=("bellows",)),
+    )
+    return Case(scene, ways(*map(pressed, (0.2, 0.6, 1.0, 1.4))), checks=closed)
