@@ -6,6 +6,7 @@ elastoplastic contact problems, Int. J. Numer. Methods Eng. 105 (2016); tutorial
 
 from __future__ import annotations
 
+from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
@@ -36,8 +37,13 @@ def metal() -> J2Plasticity:
     return J2Plasticity(modulus, ratio, np.sqrt(1.5) * bound, isotropic_hardening=slope)
 
 
-def pressed(quarter: BodyMesh) -> Scene:
-    """Return a quarter of the unit cube, lifted by 0.01 against the ball above the corner (0.5, 0.5)."""
+def pressed(quarter: BodyMesh, means: bool = False) -> Scene:
+    """Return a quarter of the unit cube, lifted by 0.01 against the ball above the corner (0.5, 0.5).
+
+    Args:
+        quarter: Its mesh.
+        means: Whether dilatations are means over cells.
+    """
     supports = [
         Support("cube", "z0", (0.0, 0.0, 0.01)),
         *(Support("cube", side, (0.0, 0.0, None)) for side in ("x0", "y0")),
@@ -46,7 +52,8 @@ def pressed(quarter: BodyMesh) -> Scene:
     ]
     plane = RigidPlane((0, 0, 1), (0, 0, -1))
     pair = ContactPair(Surface("cube", "z1"), plane, gap=above_the_pole)
-    return Scene({"cube": Body(quarter, metal())}, supports, contacts=[pair])
+    material = replace(metal(), mean_dilatation=means)
+    return Scene({"cube": Body(quarter, material)}, supports, contacts=[pair])
 
 
 def graded(cells: int, order: int) -> BodyMesh:
@@ -67,15 +74,16 @@ def graded(cells: int, order: int) -> BodyMesh:
     return quadratic(mesh) if order == 2 else mesh
 
 
-def measured(comm: MPI.Comm, cells: int, order: int) -> dict[str, Any]:
-    """Return the force of the whole ball on one mesh."""
-    scene = pressed(graded(cells, order))
+def measured(comm: MPI.Comm, cells: int, order: int, means: bool = False) -> dict[str, Any]:
+    """Return the force of the whole ball on one mesh; arguments as for `graded` and `pressed`."""
+    scene = pressed(graded(cells, order), means)
     began = perf_counter()
     state = solve_scene(scene, comm)
     force = state.contact.force[:, 2]
     return {
         "cells": cells,
         "order": order,
+        "dilatations": "means" if means else "points",
         "dofs": 3 * scene.bodies["cube"].mesh.n_nodes,
         "closed": int(np.count_nonzero(force)),
         "force": round(-4.0 * float(force.sum()), 5),

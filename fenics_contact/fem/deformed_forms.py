@@ -28,9 +28,14 @@ Density = Callable[[Any, Expr, Expr, Constants], "Expr | None"]
 
 def prepare_forms(templates: Templates, materials: tuple[Material, ...], cell_type: str) -> None:
     """Compile the missing forms of a set of materials, one of them nonlinear. Collective."""
-    for kind in FORMS | (MEAN_FORMS if any(map(has_mean_dilatation, materials)) else {}):
+    for kind in FORMS | (MEAN_FORMS if have_mean_energy(materials) else {}):
         name = (kind, *(type(material) for material in materials), cell_type)
         templates.get((kind, materials, cell_type), name, partial(_written, kind, materials, cell_type))
+
+
+def have_mean_energy(materials: tuple[Material, ...]) -> bool:
+    """Return whether some material has an energy of the mean dilatation of each cell."""
+    return any(has_mean_dilatation(each) and not isinstance(each, HistoryMaterial) for each in materials)
 
 
 def _written(kind: str, materials: tuple[Material, ...], cell_type: str) -> Written:

@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact import _dolfinx
+from fenics_contact.fem.mean_strain import MeanStrain
 from fenics_contact.fem.templates import quadrature_degree
 from fenics_contact.mesh import CELL_TYPES, determinants, quadrature, shape_gradients
 
@@ -60,12 +61,19 @@ class GaussPoints:
         nodal = (self._gradients[cells] @ weighted.swapaxes(2, 3)).sum(axis=1)
         return np.bincount(self._dofs[cells].ravel(), nodal.ravel(), minlength=int(np.prod(self._shape)))
 
-    def stiffness(self, tangent: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    def mean_strain(self, cells: np.ndarray) -> MeanStrain:
+        """Return the means of changes of volume in some cells."""
+        return MeanStrain(self._gradients[cells], self._weights[cells])
+
+    def stiffness(
+        self, tangent: np.ndarray, cells: np.ndarray, means: MeanStrain | None = None
+    ) -> np.ndarray:
         """Return ∫ ∇v : A : ∇u over some cells: entries of the matrix of `assembled`.
 
         Args:
             tangent: A at their points, shape (n_cells, n_gauss, 3, 3, 3, 3), [force / length²].
             cells: Numbers of the cells.
+            means: Means of changes of volume in these cells, where A is the tangent by them.
         """
         dim, (_, m) = self._shape[1], self.shape
         G, weights = self._gradients[cells], self._weights[cells]
@@ -75,6 +83,8 @@ class GaussPoints:
         left = G.swapaxes(1, 2).reshape(len(cells), -1, m * dim)
         blocks = (left @ half).reshape(len(cells), left.shape[1], dim, dim, left.shape[1])
         entries = blocks.swapaxes(3, 4).ravel()
+        if means is not None:
+            entries = entries + means.blocks(tangent).ravel()
         _, _, places = self._pattern
         return np.bincount(places[cells].ravel(), entries, minlength=self.entries)
 

@@ -11,7 +11,7 @@ from fenics_contact.fem.deformation import Dilatation
 from fenics_contact.fem.gauss_points import GaussPoints
 from fenics_contact.fem.mechanics import Mechanics, Response
 from fenics_contact.mesh import determinants
-from fenics_contact.scene import HistoryMaterial
+from fenics_contact.scene import HistoryMaterial, has_mean_dilatation
 
 
 class HistoryMechanics:
@@ -73,14 +73,16 @@ class HistoryMechanics:
             if not len(cells):
                 continue
             shape, size = (len(cells), gradient.shape[1]), material.history_size
+            means = self._gauss.mean_strain(cells) if has_mean_dilatation(material) else None
+            given = gradient[cells] if means is None else means.gradient(gradient[cells])
             end = material.answer(
-                gradient[cells].reshape(-1, 3, 3), before[cells, :, :size].reshape(-1, size), duration
+                given.reshape(-1, 3, 3), before[cells, :, :size].reshape(-1, size), duration
             )
             after[cells, :, :size] = end.history.reshape(*shape, size)
             nominal = end.stress.reshape(*shape, 3, 3)
             stress[cells] = cauchy(nominal, gradient[cells]) if material.finite else nominal
-            force += self._gauss.force(nominal, cells)
-            entries += self._gauss.stiffness(end.tangent.reshape(*shape, 3, 3, 3, 3), cells)
+            force += self._gauss.force(nominal if means is None else means.stress(nominal), cells)
+            entries += self._gauss.stiffness(end.tangent.reshape(*shape, 3, 3, 3, 3), cells, means)
         rest = None if self._others is None else self._others.at(displacement, origin=origin)
         return Response(
             force=force if rest is None else force + rest.force,

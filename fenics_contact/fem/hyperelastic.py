@@ -10,11 +10,11 @@ import scipy.sparse as sp
 from fenics_contact import _dolfinx
 from fenics_contact.fem.composition import Composition, material_sets
 from fenics_contact.fem.deformation import Dilatation
-from fenics_contact.fem.deformed_forms import FORMS, prepare_forms
+from fenics_contact.fem.deformed_forms import FORMS, have_mean_energy, prepare_forms
 from fenics_contact.fem.mean_dilatation import MeanDilatation, assembled
 from fenics_contact.fem.mechanics import Response
 from fenics_contact.fem.templates import Templates
-from fenics_contact.scene import HistoryMaterial, Scene, has_mean_dilatation, is_nonlinear
+from fenics_contact.scene import HistoryMaterial, Scene, is_nonlinear
 
 
 class HyperelasticMechanics:
@@ -44,7 +44,7 @@ class HyperelasticMechanics:
             for number, kind in enumerate(FORMS)
         )
         self._mean: MeanDilatation | None = None
-        if any(map(has_mean_dilatation, parts.materials)):
+        if have_mean_energy(parts.materials):
             self._mean = MeanDilatation(templates, parts, cell_type, fields, self._dilatation)
 
     def at(

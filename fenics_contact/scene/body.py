@@ -11,7 +11,7 @@ from fenics_contact.checks import checked
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import CELL_TYPES, BodyMesh
-from fenics_contact.scene.materials import Material, has_mean_dilatation, is_finite_strain
+from fenics_contact.scene.materials import HistoryMaterial, Material, has_mean_dilatation, is_finite_strain
 
 
 @displayed
@@ -104,6 +104,11 @@ def _check_material(material: Material, dim: int) -> None:
 
 
 def _check_mean_dilatation(material: Material, mesh: BodyMesh) -> None:
+    if has_mean_dilatation(material) and isinstance(material, HistoryMaterial) and material.finite:
+        raise InvalidInputError(
+            f"mean_dilatation of a material with a history needs small strain, {type(material).__name__} is "
+            "for large ones: leave it out, and use quadratic cells, fenics_contact.mesh.quadratic"
+        )
     if has_mean_dilatation(material) and CELL_TYPES[mesh.cell_type].is_affine:
         cells = CELL_TYPES[mesh.cell_type].plural
         raise InvalidInputError(

@@ -27,15 +27,19 @@ from tests.models.deformed import Patch, patch_of, skew_patch, smooth_field
 CELLS = ("triangle6", "quadrilateral", "tetrahedron", "hexahedron", "tetrahedron10")
 SMALL = J2Plasticity(200.0, 0.3, 1.0, 2.0, 5.0)
 LARGE = FinitePlasticity(200.0, 0.3, 1.0, 2.0)
+MEAN = replace(SMALL, mean_dilatation=True)
+BY_MEANS = ("triangle6", "quadrilateral", "hexahedron", "tetrahedron10")
 
 
 def answer(patch: Patch, u: np.ndarray, history: np.ndarray | None = None) -> Response:
     return patch.mechanics.at(np.asarray(u).ravel(), history)
 
 
-@pytest.mark.parametrize("cell", CELLS)
-@pytest.mark.parametrize("material", [SMALL, LARGE], ids=["small", "large"])
-def test_stiffness_is_the_derivative_of_the_force(cell: str, material: HistoryMaterial) -> None:
+@pytest.mark.parametrize(
+    ("material", "cell"),
+    [*((m, cell) for m in (SMALL, LARGE) for cell in CELLS), *((MEAN, cell) for cell in BY_MEANS)],
+)
+def test_stiffness_is_the_derivative_of_the_force(material: HistoryMaterial, cell: str) -> None:
     patch = patch_of(Body(skew_patch(cell), material))
     u = smooth_field(patch.points, 0.1)
     history = answer(patch, u).history
@@ -59,6 +63,29 @@ def test_the_unloaded_body_is_linearly_elastic_of_one_pattern(cell: str) -> None
     later = answer(patch, smooth_field(patch.points))
     np.testing.assert_array_equal(later.stiffness.indices, first.stiffness.indices)
     assert np.abs(later.stiffness.toarray() - linear).max() > 0.1 * np.abs(linear).max()
+
+
+@pytest.mark.parametrize("cell", BY_MEANS)
+def test_points_of_a_cell_feel_its_mean_change_of_volume(cell: str) -> None:
+    whole, mean = (patch_of(Body(skew_patch(cell), material)) for material in (SMALL, MEAN))
+    u = smooth_field(whole.points, 0.02)
+    pressures = [np.trace(answer(patch, u).stress, axis1=2, axis2=3) for patch in (whole, mean)]
+    assert np.ptp(pressures[0], axis=1).min() > 0.01 * np.abs(pressures[0]).max()
+    assert np.ptp(pressures[1], axis=1).max() < 1e-12 * np.abs(pressures[1]).max()
+    # Where the strain is the same everywhere, it is its own mean.
+    even = whole.points @ np.full((whole.points.shape[1],) * 2, 0.01)
+    forces = [answer(patch, even).force for patch in (whole, mean)]
+    np.testing.assert_allclose(forces[1], forces[0], atol=1e-12 * np.abs(forces[0]).max())
+
+
+def test_means_of_large_strain_and_of_cells_without_variation_are_refused() -> None:
+    class Soft(J2Plasticity):
+        finite = True
+
+    with pytest.raises(InvalidInputError, match="needs small strain, Soft is for large ones"):
+        Body(skew_patch("hexahedron"), Soft(200.0, 0.3, 1.0, mean_dilatation=True))
+    with pytest.raises(InvalidInputError, match="got a mesh of tetrahedra"):
+        Body(skew_patch("tetrahedron"), MEAN)
 
 
 def test_forces_are_in_equilibrium_and_turn_with_the_body() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -14,7 +15,15 @@ from fenics_contact.fem import as_tractions
 from fenics_contact.feti.subdomain import assemble
 from fenics_contact.gallery import rectangle
 from fenics_contact.mesh import quadratic
-from fenics_contact.scene import Body, FinitePlasticity, HistoryMaterial, J2Plasticity, Pressure, Scene
+from fenics_contact.scene import (
+    Body,
+    FinitePlasticity,
+    HistoryMaterial,
+    J2Plasticity,
+    Pressure,
+    Scene,
+    Traction,
+)
 from tests.models.bodies import box
 from tests.models.deformed import Patch, patch_of
 from tests.models.monolithic import Equilibrium, dofs_at, equilibrium
@@ -26,18 +35,18 @@ METAL = J2Plasticity(210.0, 0.3, 0.24)
 PRESSURES = (0.1, 0.12, 0.14, 0.16, 0.18)
 
 
-def quarter_of_a_tube(cells: int, order: int) -> Patch:
+def quarter_of_a_tube(cells: int, order: int, metal: J2Plasticity) -> Patch:
     mesh = rectangle((0, 0), (1, 1), (cells, cells))
     mesh = mesh if order == 1 else quadratic(mesh)
     radius, angle = INNER + (OUTER - INNER) * mesh.points[:, 0], np.pi / 2 * mesh.points[:, 1]
     points = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    return patch_of(Body(mesh.moved(points), METAL))
+    return patch_of(Body(mesh.moved(points), metal))
 
 
 @cache
-def expansions(cells: int, order: int) -> tuple[np.ndarray, Equilibrium | None]:
+def expansions(cells: int, order: int, metal: J2Plasticity = METAL) -> tuple[np.ndarray, Equilibrium | None]:
     """Radial displacement of the outer surface under each of the pressures, in succession."""
-    patch = quarter_of_a_tube(cells, order)
+    patch = quarter_of_a_tube(cells, order, metal)
     surfaces = patch.body.mesh.surfaces
     scene = Scene({"body": patch.body}, loads=[Pressure("body", "x0", 1.0)])
     patch.forms.prepare(scene)
@@ -114,6 +123,37 @@ def test_the_expansion_of_the_tube_converges_with_order_two() -> None:
     assert errors[0] < 0.08
     assert np.log2(errors[0] / errors[2]) / 2 > 1.7
     assert np.abs(expansions(8, 2)[0] / exact - 1).max() < 1e-3
+
+
+def cook(material: HistoryMaterial, cells: int, order: int = 1) -> float:
+    """How far the upper corner of Cook's membrane moves under a shear force of 1."""
+    mesh = rectangle((0, 0), (1, 1), (cells, cells))
+    x, y = mesh.points.T
+    mesh = mesh.moved(np.column_stack([48 * x, 44 * x + y * (44 - 28 * x)]))
+    patch = patch_of(Body(mesh if order == 1 else quadratic(mesh), material))
+    scene = Scene({"body": patch.body}, loads=[Traction("body", "x1", (0.0, 1 / 16))])
+    patch.forms.prepare(scene)
+    load = assemble(patch.mesh, patch.body, as_tractions(scene), patch.forms).load
+    held = {int(dof): 0.0 for c in (0, 1) for dof in dofs_at(patch, patch.body.mesh.surfaces["x0"], c)}
+    tip = 2 * int(np.argmin(np.linalg.norm(patch.points - [48.0, 60.0], axis=1))) + 1
+    return float(equilibrium(patch, held, load).displacement[tip])
+
+
+def test_mean_dilatations_do_not_lock() -> None:
+    stiff = J2Plasticity(1.0, 0.4999, 1e9)
+    means = replace(stiff, mean_dilatation=True)
+    expected = cook(stiff, 16, 2)
+    assert cook(stiff, 16) < 0.35 * expected
+    errors = [1 - cook(means, cells) / expected for cells in (4, 8, 16)]
+    assert errors[0] < 0.15
+    assert errors[1] < 0.04
+    assert abs(errors[2]) < 0.01
+
+
+def test_mean_dilatations_halve_the_error_of_plastic_flow() -> None:
+    metal, exact = replace(METAL, mean_dilatation=True), radial()
+    points, means = (np.abs(expansions(8, 1, each)[0] / exact - 1).max() for each in (METAL, metal))
+    assert means < 0.6 * points
 
 
 def test_newton_converges_quadratically_on_the_consistent_tangent() -> None:

@@ -47,7 +47,8 @@ class HistoryMaterial(Elasticity):
     linear part (`parameters`, `stress`, `stiffness`): small-strain elasticity.
 
     `finite` tells whether `respond` uses the whole displacement gradient, rotations included, or its
-    symmetric part alone (small strain).
+    symmetric part alone (small strain). With `mean_dilatation`, in small strain, it gets the mean change of
+    volume of each cell at all of its points, against locking where flow keeps the volume.
 
     Example:
         A Maxwell fluid: a spring that a damper relaxes, with its stress as history.
@@ -77,6 +78,7 @@ class HistoryMaterial(Elasticity):
 
     nonlinear: ClassVar[bool] = True
     finite: ClassVar[bool] = False
+    mean_dilatation: bool = False
 
     @property
     @abstractmethod

@@ -34,6 +34,8 @@ class J2Plasticity(VonMisesMetal):
         saturation_stress: Yield stress σ_∞ ≥ σ_0 that is approached exponentially, [force / length²]. None
             for none.
         saturation_rate: How fast it is approached, δ ≥ 0, per plastic strain.
+        mean_dilatation: Whether changes of volume are the means of cells: plastic flow keeps the volume, and
+            linear hexahedra and quadrilaterals lock without it.
 
     Example:
         Half the strain beyond yield is plastic where H = E:
@@ -51,6 +53,7 @@ class J2Plasticity(VonMisesMetal):
     kinematic_hardening: float = 0.0
     saturation_stress: float | None = None
     saturation_rate: float = 0.0
+    mean_dilatation: bool = False
 
     @property
     def _back_slope(self) -> float:

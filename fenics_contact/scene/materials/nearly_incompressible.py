@@ -79,5 +79,5 @@ def volume_change(u: Expr, v: Expr) -> Expr:
 
 
 def has_mean_dilatation(material: object) -> bool:
-    """Return whether the volume energy of a material is that of the mean dilatation of each cell."""
+    """Return whether a material feels the mean change of volume of each cell, not that of each point."""
     return bool(getattr(material, "mean_dilatation", False))
