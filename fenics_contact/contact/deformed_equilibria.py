@@ -27,6 +27,7 @@ from fenics_contact.nonlinear import (
     Evaluation,
     FollowingPressures,
     Loading,
+    Meeting,
     MovingContact,
     NonlinearEquilibrium,
     Path,
@@ -40,7 +41,7 @@ from fenics_contact.scene import HistoryMaterial, LoadStep, RigidSurface, Scene
 from fenics_contact.timing import PhaseTimer
 
 if TYPE_CHECKING:
-    from fenics_contact.pairing import MaterialPoints, SlidingPoints
+    from fenics_contact.pairing import MaterialPoints
 
 
 class DeformedEquilibria:
@@ -223,8 +224,8 @@ def _state_after(
     )
     with timer.phase("state"):
         contact = contact_result(system, solution, at.displacement)
-        if (points := evaluation.meeting.points) is not None and path.start is not None:
-            contact = _with_slip(contact, points, path.start, origin)
+        if evaluation.meeting.points is not None and path.start is not None:
+            contact = _with_slip(contact, evaluation.meeting, path.start, origin)
         if known is not None:
             contact = replace(contact, slip=known[0], slip_before=known[1])
         energies = _energies(evaluation, contact)
@@ -236,10 +237,11 @@ def _state_after(
 
 
 def _with_slip(
-    contact: ContactResult, points: SlidingPoints, start: MaterialPoints, origin: State | None
+    contact: ContactResult, meeting: Meeting, start: MaterialPoints, origin: State | None
 ) -> ContactResult:
     """Return the contact of moved bodies with the slip of its load step and of all before."""
-    slip = points.slip(start)
+    slip, points = meeting.slip(start), meeting.points
+    assert points is not None
     before = np.zeros_like(slip)
     if isinstance(origin, DeformedState) and (stood := origin.equilibrium.evaluation.meeting.points):
         before = points.carry_tangential(origin.contact.slip + origin.contact.slip_before, stood)

@@ -30,8 +30,9 @@ if TYPE_CHECKING:
 class DeformedState(State):
     """An equilibrium of large deformations or nonlinear materials.
 
-    Forces, gaps, balance and stresses (Cauchy's) are those of the deformed bodies. `energies` has the stored
-    energy, NaN where materials dissipate, and no dual value.
+    Forces, gaps, balance and stresses (Cauchy's) are those of the deformed bodies, where no material is made
+    for that those of the undeformed ones, as in linear elasticity. `energies` has the stored energy, NaN
+    where materials dissipate, and no dual value.
 
     Attributes:
         equilibrium: Displacement, forces and history of the materials.
@@ -120,10 +121,12 @@ class DeformedState(State):
         forces = nodal_forces(
             self.system, self.solution.multiplier, self.torn_displacement, self.contact.force
         )
+        places = forces.places
+        if any(body.deforms_much for body in self.scene.bodies.values()):
+            places = self.scene.points + self._displacement_everywhere
         return NodalForces(
-            self.scene.points + self._displacement_everywhere, forces.load, forces.reaction, forces.contact,
-            forces.tie, np.zeros_like(forces.bed),
-        )  # fmt: skip
+            places, forces.load, forces.reaction, forces.contact, forces.tie, np.zeros_like(forces.bed)
+        )
 
     @cached_property
     def _least_force(self) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -53,7 +54,24 @@ class Meeting:
         lacking = self.torn.right - self.torn.jump(displacement)
         if self.points is None or self.start is None:
             return lacking
-        return self._placed(lacking, self.points.points.gap, -self.points.slip(self.start))
+        return self._placed(lacking, self.points.points.gap, -self.slip(self.start))
+
+    def slip(self, start: MaterialPoints) -> np.ndarray:
+        """Return the slip since nodes stood there, none across planes of symmetry, shape (n, dim − 1)."""
+        assert self.points is not None
+        return np.where(self._across, 0.0, self.points.slip(start))
+
+    @cached_property
+    def _across(self) -> np.ndarray:
+        """Marks tangents across planes of symmetry, which supports hold, shape (n, dim − 1).
+
+        Means over the master that change along it would slip, and friction act on nothing but supports.
+        """
+        torn, points = self.torn, self.torn.points
+        across = np.einsum("nad,nd->na", points.tangents**2, points.symmetric) > 0.5
+        held = np.zeros_like(across)
+        held[torn.frictional] = torn.relations[2].held(torn.decomposition.fixed).reshape(-1, torn.dim - 1)
+        return np.asarray(across & held)
 
     def turning(self, multiplier: Vector, pressure: UnevenStiffness | None) -> TurningForces | None:
         """Return the stiffness of forces that turn with their surfaces; None without any. Collective.
@@ -75,7 +93,8 @@ class Meeting:
         width, frictional = self.torn.dim - 1, self.torn.frictional
         rubbed = (width * frictional[:, None] + np.arange(width)).ravel()
         # In the order of the rows of contact, of which those of gaps measure −n·[u].
-        rows = sp.vstack([-means.gap, means.slip[rubbed]], "csr")
+        slips = sp.diags(1.0 - self._across.ravel()) @ means.slip
+        rows = sp.vstack([-means.gap, slips[rubbed]], "csr")
         lacking = LackingRows.of(rows, slave[np.concatenate([np.arange(len(slave)), rubbed // width])])
         return TurningForces.of(stiffness, further, slave[stiffness.point], lacking)
 
@@ -96,6 +115,7 @@ class Meeting:
         else:
             normal = self.points.carry(normal, other.points)
             friction = self.points.carry_tangential(friction, other.points)
+            friction[self._across] = 0.0
         result = np.empty(len(torn.numbering.owned))
         equality = torn.numbering.owned < torn.n_equality
         result[equality] = values[before.numbering.owned < before.n_equality]

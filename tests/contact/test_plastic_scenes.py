@@ -28,6 +28,7 @@ from fenics_contact.scene import (
     Scene,
     Support,
     Surface,
+    Traction,
 )
 from tests.models.bodies import in_halves
 from tests.scene.material_points import in_tension
@@ -99,6 +100,19 @@ def test_a_plastic_body_in_contact_does_not_depend_on_how_it_is_cut() -> None:
     assert np.count_nonzero(remembered) > 50
     assert stress[left].max() < 0.1 + 0.5 * remembered.max() + 1e-9
     assert np.isnan(one.gather_nodal_stress("base")[0]).any(), "materials keep their own nodal stresses"
+
+
+def test_moments_of_small_strain_are_those_of_the_undeformed_bodies() -> None:
+    load = [Traction("bar", "x1", (0.08, 0.0, 0.02))]
+    bent = [
+        solve_scene(Scene({"bar": Body(BAR, material)}, [Support("bar", "x0")], load), MPI.COMM_SELF)
+        for material in (SMALL, IsotropicElasticity(200.0, 0.3))
+    ]
+    assert isinstance(bent[0], DeformedState)
+    assert bent[0].history.values["bar"][..., 6].max() > 0
+    assert bent[0].balance().imbalance < 1e-8
+    moments = [state.reactions(about=(0.0, 0.5, 0.5))[0].moment[1] for state in bent]
+    assert moments == pytest.approx([4 * 0.02] * 2, rel=1e-8)
 
 
 def test_steps_of_plastic_bodies_go_on_from_a_checkpoint(tmp_path: Path) -> None:

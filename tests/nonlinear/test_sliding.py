@@ -9,12 +9,13 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, DeformedState, solve_scene, solve_steps
-from fenics_contact.gallery import rectangle
+from fenics_contact.gallery import half_disc, rectangle
 from fenics_contact.nonlinear import AutomaticSteps
 from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
     ContactPair,
+    Coulomb,
     LoadStep,
     MovingObstacle,
     RigidSphere,
@@ -104,3 +105,31 @@ def test_a_rigid_disc_deep_in_rubber() -> None:
     depth = -state.gather_displacement("block")[:, 1].min()
     assert abs(depth - 0.5) < 1e-8, "the lowest point of the disc carries a node with it"
     assert state.balance().imbalance < 1e-9
+
+
+@pytest.mark.parametrize("discretisation", ["node", "mortar"])
+@pytest.mark.parametrize("slave", ["plate", "roller"])
+def test_friction_does_not_act_across_a_plane_of_symmetry(discretisation: str, slave: str) -> None:
+    """Half of a roller on a plate: nodes in the plane do not slip, their friction would only load supports."""
+    plate, roller = rectangle((0, -4), (6, 0), (12, 8)), half_disc(5.0, 4, grading=1.0)
+    sides = {"plate": "y1", "roller": "contact"}
+    (master,) = set(sides) - {slave}
+    pair = ContactPair(
+        Surface(slave, sides[slave]), Surface(master, sides[master]), Coulomb(0.2), discretisation
+    )
+    scene = Scene(
+        {"plate": Body(plate, RUBBER), "roller": Body(roller, RUBBER)},
+        [
+            *[Support(name, "x0", (0.0, None)) for name in sides],
+            Support("plate", "y0", (None, 0.0)),
+            Support("roller", "top", (None, -0.05)),
+        ],
+        contacts=[pair],
+    )
+    state = solve_scene(scene, MPI.COMM_SELF)
+    contact = state.contact
+    (cut,) = np.flatnonzero(np.abs(scene.points[contact.points.slave, 0]) < 1e-12)
+    assert contact.normal_force[cut] > 1e-3
+    assert contact.slip[cut] == 0.0
+    assert np.linalg.norm(contact.force[cut]) == pytest.approx(contact.normal_force[cut], rel=1e-12)
+    assert state.balance().imbalance < 1e-8
