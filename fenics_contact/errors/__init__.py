@@ -4,6 +4,7 @@ from fenics_contact.errors.agreement import agree, collective, collectively, tog
 from fenics_contact.errors.kinds import (
     ConvergenceError,
     FenicsContactError,
+    FoldedFacetsError,
     ForkedProcessError,
     InfeasibleError,
     InvalidDesignError,
@@ -19,6 +20,7 @@ from fenics_contact.errors.user_code import calling, running
 __all__ = [
     "ConvergenceError",
     "FenicsContactError",
+    "FoldedFacetsError",
     "ForkedProcessError",
     "InfeasibleError",
     "InvalidDesignError",

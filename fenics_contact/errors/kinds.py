@@ -21,6 +21,13 @@ class InvalidDesignError(InvalidInputError):
     """
 
 
+class FoldedFacetsError(InvalidInputError):
+    """Facets that contact needs convex are not.
+
+    Where bodies deform much a Newton step may fold them, and a shorter load step is tried.
+    """
+
+
 class InfeasibleError(FenicsContactError):
     """No equilibrium exists: some motion of some body is not resisted."""
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact.display import displayed
-from fenics_contact.errors import ConvergenceError, InfeasibleError
+from fenics_contact.errors import ConvergenceError, FoldedFacetsError, InfeasibleError
 from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation
 from fenics_contact.nonlinear.loading import Loading
-from fenics_contact.nonlinear.meeting import Contact
+from fenics_contact.nonlinear.meeting import Contact, Meeting
 from fenics_contact.nonlinear.tangent_step import TangentStep, tangent_step
 from fenics_contact.nonlinear.tangent_system import TangentSystem
 from fenics_contact.qp import (
@@ -194,12 +194,23 @@ class _Run:
     ) -> Evaluation:
         """Return the equations at a configuration, with its contact points. Collective."""
         with self._timer.phase("assemble"):
-            meeting = self._contact.at(self._load, at.displacement, self._start, at.meeting)
+            meeting = self._meeting(at)
             self._start, at = meeting.start, at.meeting_at(meeting)
             step: Vector = np.zeros(meeting.torn.layout.size)
             if near is not None:
                 step = near.natural_step(meeting, self._caution)
             return self._equations.evaluate(meeting, meeting.torn.law, at, step, self._load, origin)
+
+    def _meeting(self, at: Configuration) -> Meeting:
+        """Return the contact points at a configuration; one with folded facets ends the load step. Collective."""
+        try:
+            return self._contact.at(self._load, at.displacement, self._start, at.meeting)
+        except FoldedFacetsError as folded:
+            raise ConvergenceError(
+                f"a Newton step must not fold facets that meet, but after {len(self.history)} steps {folded}; or "
+                "take smaller load steps",
+                self.history,
+            ) from folded
 
     def _require_progress(self, evaluation: Evaluation) -> None:
         """Adapt the forcing term and ρ. Collective.

@@ -10,6 +10,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import Status
+from fenics_contact.errors import FoldedFacetsError
 from tests.conftest import run_on_ranks
 from tests.nonlinear.ironing import WAY, ironing
 from tests.nonlinear.mortar_scenes import by_mortar, followed, pressed_and_pushed, stacked
@@ -43,6 +44,21 @@ def test_ironing_converges_quadratically() -> None:
         worst = [line.residuals.worst for line in state.solution.history]
         assert worst[-1] < max(10 * worst[-2] ** 1.8, 1e-10), "quadratic down to rounding"
         assert any(new < 10 * old**1.8 < 1e-5 for old, new in pairwise(worst))
+
+
+def test_a_newton_step_that_folds_facets_cuts_the_load_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = 0
+
+    def folded_once(*_: object) -> None:
+        nonlocal calls
+        calls += 1
+        if calls == 3:
+            raise FoldedFacetsError("1 are folded")
+
+    monkeypatch.setattr("fenics_contact.pairing.mortar.coupling.check_convex", folded_once)
+    (state,) = followed([stacked("hexahedron", 0.3, held=True, friction=0.0)], MPI.COMM_SELF)
+    assert calls > 3
+    assert state.fractions == (0.5, 1.0)
 
 
 def test_two_blocks_turned_in_space_give_the_turned_answer() -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import FoldedFacetsError
 from fenics_contact.pairing.mortar.sums import SumsBy
 from fenics_contact.surfaces import FacetedSurface, corner_products
 
@@ -142,7 +142,7 @@ def check_convex(planes: Planes, chosen: np.ndarray) -> None:
     """Check that the flat facets are convex, as required of clipping windows.
 
     Raises:
-        InvalidInputError: If a quadrilateral is folded or has a re-entrant corner.
+        FoldedFacetsError: If a quadrilateral is folded or has a re-entrant corner.
     """
     if planes.flat.shape[1] != 4:
         return
@@ -150,7 +150,7 @@ def check_convex(planes: Planes, chosen: np.ndarray) -> None:
     corner = turned[0][:, :, 0] * turned[1][:, :, 1] - turned[0][:, :, 1] * turned[1][:, :, 0]
     bad = np.flatnonzero(~(corner.min(axis=1) >= CONVEX * planes.area))
     if len(bad):
-        raise InvalidInputError(
+        raise FoldedFacetsError(
             f"mortar coupling needs convex facets on the slave surface, but {len(bad)} are folded or have a "
             f"re-entrant corner, among them facet {chosen[bad[0]]}: improve the mesh there or take that side "
             "for the master"
