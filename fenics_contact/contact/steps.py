@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from fenics_contact.checkpoint import Checkpoint, reporting_what_is_stored, safe_point
+from fenics_contact.checks import brief
 from fenics_contact.contact.problem import ContactProblem
 from fenics_contact.contact.state import State
 from fenics_contact.contact.step_checkpoint import StepCheckpoint
 from fenics_contact.display import displayed
-from fenics_contact.errors import collectively, together
+from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.progress import Task
 from fenics_contact.scene import LoadStep
@@ -80,11 +81,13 @@ class LoadSequence:
         """Compute the state at the end of the next step. Collective.
 
         Raises:
-            InvalidInputError: If the step's supports hold other components than before.
+            InvalidInputError: If it is no `LoadStep`, or its supports hold other components than before.
             InfeasibleError: If nothing holds some body against the new load.
             ConvergenceError: If the solver does not reach its tolerance.
             CheckpointError: If the checkpoint cannot be written.
         """
+        with together(self._comm):
+            _require_step(step)
         if self._number == 0 or self._count is None:
             self._task.begin(self._number)
         self._task.step(self._number, words=step.name)
@@ -144,7 +147,21 @@ def solve_steps(
         >>> push = [LoadStep(f"push {s}", loads=[weight, pull(s)]) for s in (0.5, 1.0, 0.0)]  # doctest: +SKIP
         >>> states = solve_steps(ContactProblem(scene, comm), push)  # doctest: +SKIP
     """
+    with together(problem.comm):
+        if not isinstance(steps, Sequence):
+            raise InvalidInputError(
+                f"steps must be a sequence, got {type(steps).__name__}: write [step] for one"
+            )
+        for step in steps:
+            _require_step(step)
     sequence = LoadSequence(problem, checkpoint=checkpoint, count=len(steps))
     states = tuple(sequence.advance(step) for step in steps)
     sequence.finish()
     return states
+
+
+def _require_step(step: object) -> None:
+    if not isinstance(step, LoadStep):
+        raise InvalidInputError(
+            f"each load step must be a LoadStep, got {brief(step)}: write LoadStep(name, loads=...)"
+        )

@@ -38,8 +38,9 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
         bind: Binds its stiffness form.
 
     Raises:
-        InvalidInputError: If the stiffness is not finite, not symmetric or has a negative energy, the kernel
-            has the wrong shape, dependent modes or modes with energy, or a mode without energy is missing.
+        InvalidInputError: If the stiffness is zero, not finite, not symmetric or has a negative energy, the
+            kernel has the wrong shape, dependent modes or modes with energy, or a mode without energy is
+            missing.
     """
     name = type(material).__name__
     K, points = stiffness_of_cell(skewed(CELL_TYPES[cell_type].nodes), cell_type, bind)
@@ -49,6 +50,10 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
             "material parameters"
         )
     size = np.abs(K).max()
+    if size == 0.0:
+        raise InvalidInputError(
+            f"a material must resist strain, the stiffness of {name} is zero: check parameters and tangent"
+        )
     unsymmetric = np.abs(K - K.T).max()
     if unsymmetric > ROUNDING * size:
         raise InvalidInputError(

@@ -110,7 +110,8 @@ class Templates:
             write: Returns form, constants and coefficients.
 
         Raises:
-            InvalidInputError: If ranks write different forms, or a number in it is not finite.
+            InvalidInputError: If ranks write different forms, a number in it is not finite, or it cannot be
+                compiled.
         """
         if key not in self._by_key:
             what = f"the form of {', '.join(map(_called, name))}"
@@ -120,10 +121,25 @@ class Templates:
                 text = _text(form, constants, coefficients)
             require_alike(self._comm, {what: hashlib.sha256(repr(text).encode()).hexdigest()[:16]})
             if text not in self._by_text:
-                self._by_text[text] = Template(self._comm, form, constants, coefficients)
+                self._by_text[text] = self._compiled(what, form, constants, coefficients)
                 self._names.append(name)
             self._by_key[key] = self._by_text[text]
         return self._by_key[key]
+
+    def _compiled(
+        self,
+        what: str,
+        form: ufl.Form,
+        constants: Sequence[ufl.Constant],
+        coefficients: Sequence[ufl.Coefficient],
+    ) -> Template:
+        try:
+            return Template(self._comm, form, constants, coefficients)
+        except Exception as error:  # on all ranks
+            raise InvalidInputError(
+                f"{what} must be UFL that compiles, got {type(error).__name__}: {error}: check quotients, "
+                "roots and logarithms in it, also at rest (F = I), and that the C compiler works"
+            ) from error
 
 
 def _check_numbers(form: ufl.Form, what: str) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fenics_contact.checks import checked
 from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError, InvalidInputError, tell
 from fenics_contact.feti import TornSystem
@@ -76,6 +77,7 @@ class PathEndsError(ConvergenceError):
 
 @displayed
 @dataclass(frozen=True)
+@checked()
 class AutomaticSteps:
     """Load steps that are halved where Newton's method fails, and doubled after easy ones.
 

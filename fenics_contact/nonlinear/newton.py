@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fenics_contact.checks import check_count, checked
 from fenics_contact.display import displayed
-from fenics_contact.errors import ConvergenceError, FoldedFacetsError, InfeasibleError
+from fenics_contact.errors import ConvergenceError, FoldedFacetsError, InfeasibleError, InvalidInputError
 from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation
 from fenics_contact.nonlinear.loading import Loading
 from fenics_contact.nonlinear.meeting import Contact, Meeting
@@ -87,6 +88,7 @@ class NonlinearEquilibrium:
 
 @displayed
 @dataclass(frozen=True)
+@checked()
 class TangentNewton:
     """Newton's method with exact tangents; every step solves one face of the linearised contact problem.
 
@@ -109,6 +111,21 @@ class TangentNewton:
     max_steps: int = 25
     max_products: int = 400
     forcing: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            InvalidInputError: If tolerance or forcing are not between 0 and 1, or a count is not positive.
+        """
+        for name in ("tolerance", "forcing"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise InvalidInputError(
+                    f"{name} of TangentNewton must lie between 0 and 1, got {getattr(self, name)!r}: it is a "
+                    f"relative residual, by default {getattr(TangentNewton, name)}"
+                )
+        for name in ("max_steps", "max_products"):
+            check_count(getattr(self, name), f"{name} of TangentNewton")
 
     def solve(
         self,
@@ -202,13 +219,13 @@ class _Run:
             return self._equations.evaluate(meeting, meeting.torn.law, at, step, self._load, origin)
 
     def _meeting(self, at: Configuration) -> Meeting:
-        """Return the contact points at a configuration; one with folded facets ends the load step. Collective."""
+        """Return the contact points at a configuration, which must not fold facets. Collective."""
         try:
             return self._contact.at(self._load, at.displacement, self._start, at.meeting)
         except FoldedFacetsError as folded:
             raise ConvergenceError(
-                f"a Newton step must not fold facets that meet, but after {len(self.history)} steps {folded}; or "
-                "take smaller load steps",
+                f"a Newton step must not fold facets that meet, but after {len(self.history)} steps "
+                f"{folded}; or take smaller load steps",
                 self.history,
             ) from folded
 

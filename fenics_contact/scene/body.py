@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.checks import checked
+from fenics_contact.checks import brief, checked
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import CELL_TYPES, BodyMesh
@@ -87,6 +87,11 @@ def _check_material(material: Material, dim: int) -> None:
         raise InvalidInputError(
             f"a material must have dims, parameters, stress, stiffness and kernel, {name} lacks {missing}: "
             "derive it from Elasticity or EnergyModel"
+        )
+    if not isinstance(material.parameters, Sequence | np.ndarray):
+        raise InvalidInputError(
+            f"parameters of {name} must be a sequence of numbers, got {brief(material.parameters)}: "
+            "return a tuple, with a comma behind a single one"
         )
     if dim not in material.dims:
         raise InvalidInputError(

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
+import numpy as np
+
 from fenics_contact.checks import checked
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, calling
@@ -37,7 +39,7 @@ class LoadStep:
             and materials that creep; None: the number of the step, from 1.
 
     Raises:
-        InvalidInputError: If there are functions of time, and no time.
+        InvalidInputError: If there are functions of time, and no time, or it is not finite.
 
     Example:
         >>> def turned(t):
@@ -51,7 +53,12 @@ class LoadStep:
     time: float | None = None
 
     def __post_init__(self) -> None:
-        """Reject functions of time without a time."""
+        """Reject functions of time without a time, and a time that is none."""
+        if self.time is not None and not np.isfinite(self.time):
+            raise InvalidInputError(
+                f"time of LoadStep {self.name!r} must be a finite number or None, got {self.time!r}: give "
+                "the time at its end"
+            )
         if self.time is None and (callable(self.loads) or callable(self.supports)):
             raise InvalidInputError(
                 f"LoadStep {self.name!r} must have the time at its end, its loads or supports are functions "

@@ -164,6 +164,20 @@ def test_loads_may_come_and_go() -> None:
     assert left != pytest.approx(start, rel=1e-3), "the push leaves locked friction behind"
 
 
+def test_steps_must_be_load_steps() -> None:
+    problem = ContactProblem(sheared_block(Coulomb(0.3)), MPI.COMM_SELF)
+    with pytest.raises(InvalidInputError, match=r"each load step must be a LoadStep, got 'press': write"):
+        solve_steps(problem, ["press"])  # type: ignore[list-item]
+    with pytest.raises(InvalidInputError, match=r"steps must be a sequence, got LoadStep: write \[step\]"):
+        solve_steps(problem, LoadStep("press"))  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match=r"each load step must be a LoadStep, got 3: write"):
+        LoadSequence(problem).advance(3)  # type: ignore[arg-type]
+    with pytest.raises(
+        InvalidInputError, match=r"time of LoadStep 'a' must be a finite number or None, got nan"
+    ):
+        LoadStep("a", time=float("nan"))
+
+
 def test_steps_may_not_change_what_supports_hold() -> None:
     sequence = LoadSequence(ContactProblem(sheared_block(Coulomb(0.3)), MPI.COMM_SELF))
     sequence.advance(shears((0.0,))[0])

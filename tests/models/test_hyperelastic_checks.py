@@ -7,10 +7,13 @@ from typing import Any
 
 import pytest
 import ufl
+from mpi4py import MPI
 
 from fenics_contact.errors import InvalidInputError, UserCodeError
 from fenics_contact.fem import check_hyperelastic
-from fenics_contact.scene import Body, Hyperelasticity, MooneyRivlin, Ogden
+from fenics_contact.fem.forms import FormLibrary
+from fenics_contact.gallery import rectangle
+from fenics_contact.scene import Body, Hyperelasticity, MooneyRivlin, Ogden, Scene
 from tests.models.deformed import patch_of, skew_patch
 
 
@@ -88,6 +91,19 @@ def test_scenes_check_their_models_when_forms_are_prepared() -> None:
 )
 def test_models_of_the_package_pass_whatever_their_constants(material: Hyperelasticity) -> None:
     check_hyperelastic(material, "quadrilateral")
+
+
+def test_an_energy_without_a_value_at_rest_is_named() -> None:
+    @dataclass(frozen=True)
+    class Singular(Own):
+        def energy(self, F: Any, parameters: Any) -> Any:
+            return parameters[0] / (ufl.det(F) - 1)
+
+    body = Body(rectangle((0, 0), (1, 1), (1, 1)), Singular())
+    with pytest.raises(
+        InvalidInputError, match=r"stiffness, Singular, quadrilateral must be UFL.*Division by"
+    ):
+        FormLibrary(MPI.COMM_SELF).prepare(Scene({"body": body}))
 
 
 def test_an_energy_that_raises_is_named() -> None:

@@ -19,8 +19,10 @@ from fenics_contact.scene import (
     Body,
     Elasticity,
     EnergyModel,
+    HistoryMaterial,
     IsotropicElasticity,
     Material,
+    MaterialResponse,
     OrthotropicElasticity,
     PlaneStrain,
     Scene,
@@ -147,6 +149,32 @@ def test_a_motion_that_the_material_does_not_resist_must_be_in_the_kernel(cell: 
         InvalidInputError, match=r"must hold every motion without energy, that of Model has [36]"
     ):
         prepare(Model(shear=0.0), cell)
+
+
+def test_a_material_without_stiffness_is_refused() -> None:
+    @dataclass(frozen=True)
+    class Limp(HistoryMaterial):
+        history_size = 1
+
+        def respond(self, gradient: Any, history: Any, duration: float) -> MaterialResponse:
+            return MaterialResponse(gradient * 0.0, np.zeros((len(gradient), 3, 3, 3, 3)), history)
+
+    bar = Body(block((0, 0, 0), (1, 1, 1), (1, 1, 1)), Limp())
+    with pytest.raises(InvalidInputError, match="must resist strain, the stiffness of Limp is zero: check"):
+        FormLibrary(MPI.COMM_SELF).prepare(Scene({"bar": bar}))
+
+
+def test_parameters_must_be_a_sequence() -> None:
+    @dataclass(frozen=True)
+    class Single(PlaneStrain):
+        @property
+        def parameters(self) -> Any:
+            return 1.0
+
+    with pytest.raises(
+        InvalidInputError, match=r"parameters of Single must be a sequence .* got 1.0: return a"
+    ):
+        Body(rectangle((0, 0), (1, 1), (1, 1)), Single(1.0, 0.3))
 
 
 def test_an_infinite_stiffness_is_refused() -> None:

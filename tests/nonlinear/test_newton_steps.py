@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, LoadSequence, NewtonSteps, State, solve_scene
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.fem.hyperelastic import HyperelasticMechanics
 from fenics_contact.gallery import block
+from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
 from fenics_contact.scene import Body, LoadStep, NeoHooke, Scene
 from tests.models.deformed import patch_of
 from tests.nonlinear.scenes import cut, pressed, rounded
@@ -34,6 +37,25 @@ def dragged() -> list[list[State]]:
             [sequence.advance(LoadStep(str(n), supports=scene.supports)) for n, scene in enumerate(scenes)]
         )
     return found
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"tolerance": 2.0}, "tolerance of TangentNewton must lie between 0 and 1, got 2.0: .* 1e-08"),
+        ({"forcing": 0.0}, "forcing of TangentNewton must lie between 0 and 1, got 0.0"),
+        ({"max_steps": 0}, "max_steps of TangentNewton must be an integer of at least 1, got 0"),
+        ({"max_products": 2.5}, r"TangentNewton.max_products must be an integer, got 2.5"),
+    ],
+)
+def test_numbers_of_newtons_method_are_checked(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        TangentNewton(**given)
+
+
+def test_settings_of_load_steps_are_checked() -> None:
+    with pytest.raises(InvalidInputError, match=r"AutomaticSteps.snaps must be True or False, got 'no'"):
+        AutomaticSteps(snaps="no")  # type: ignore[arg-type]
 
 
 def test_nearly_incompressible_bodies_take_hardly_more_steps_than_others(

@@ -110,7 +110,7 @@ def test_a_rigid_disc_deep_in_rubber() -> None:
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
 @pytest.mark.parametrize("slave", ["plate", "roller"])
 def test_friction_does_not_act_across_a_plane_of_symmetry(discretisation: str, slave: str) -> None:
-    """Half of a roller on a plate: nodes in the plane do not slip, their friction would only load supports."""
+    """Half of a roller on a plate: friction of nodes that cannot slip would only load supports."""
     plate, roller = rectangle((0, -4), (6, 0), (12, 8)), half_disc(5.0, 4, grading=1.0)
     sides = {"plate": "y1", "roller": "contact"}
     (master,) = set(sides) - {slave}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene.materials.constants import check_isotropic
 from fenics_contact.scene.materials.history_material import HistoryMaterial
 from fenics_contact.scene.materials.return_mapping import Hardening, check_plastic
@@ -23,6 +24,11 @@ class VonMisesMetal(HistoryMaterial):
         law = self.hardening
         saturation = law.saturation_stress, law.saturation_rate
         check_plastic(self.young_modulus, law.yield_stress, law.slope, self._back_slope, saturation)
+        if (self.saturation_stress is None) != (self.saturation_rate == 0.0):
+            raise InvalidInputError(
+                f"saturation_stress and saturation_rate must be given together, got "
+                f"{self.saturation_stress!r} and {self.saturation_rate!r}: one without the other has no effect"
+            )
 
     @property
     def _back_slope(self) -> float:
