@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def state_facts(state: State, units: UnitNames) -> dict[str, str]:
-    """Return a summary of a state as text. Collective."""
+    """Return a summary of a state as text, without energies that are not known. Collective."""
     counts, energy = state.counts, f"{units.force} {units.length}"
     rows = {
         "unknowns": f"{counts['torn_unknowns']} in {counts['subdomains']} subdomains",
@@ -37,7 +37,7 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
     if state.known_errors is not None:
         rows |= {f"error, {name}": words for name, words in state.known_errors.in_words.items()}
     rows["seconds"] = ", ".join(f"{name} {spent:.2f}" for name, spent in state.seconds.items())
-    return rows
+    return {name: words for name, words in rows.items() if not words.startswith("nan")}
 
 
 def step_row(number: int, name: str, state: State) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -35,7 +36,7 @@ def put_history_stress(
         if mesh.body == name and response.stress is not None:
             known[mesh.cells] = _means(body.mesh, mesh.cells, quantity(response.stress))
     number = cells_of_body(field.function_space.mesh, body.mesh.cells)
-    mine = known[number].reshape(len(number), -1)
+    mine = known[number].reshape(len(number), math.prod(shape))  # a rank may have no cells
     here = ~np.isnan(mine[:, 0])
     own = _dolfinx.cell_dofs(field.function_space).ravel()[: len(number)]
     field.x.array.reshape(-1, mine.shape[1])[own[here]] = mine[here]

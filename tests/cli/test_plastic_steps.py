@@ -51,6 +51,8 @@ def test_a_bar_that_was_stretched_and_put_back_presses(
     assert cli.main(MPI.COMM_SELF, ["run", str(path), "-o", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
     assert "nonlinear material (1 body deforms much or yields)" in printed
+    assert "up to 0" in printed
+    assert "nan" not in printed, "energies that are not known"
     result = read_result(tmp_path / "result.json")
     assert result["energies"]["strain"] is None
     pushed = next(each for each in result["forces"]["reactions"] if each["surface"] == "x0")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -100,6 +101,31 @@ def test_a_plastic_body_in_contact_does_not_depend_on_how_it_is_cut() -> None:
     assert np.count_nonzero(remembered) > 50
     assert stress[left].max() < 0.1 + 0.5 * remembered.max() + 1e-9
     assert np.isnan(one.gather_nodal_stress("base")[0]).any(), "materials keep their own nodal stresses"
+
+
+ON_RANKS = '''
+from mpi4py import MPI
+from fenics_contact.contact import solve_scene
+from fenics_contact.gallery import block
+from fenics_contact.scene import Body, FinitePlasticity, Scene, Support
+bodies = {
+    name: Body(block((z, 0, 0), (z + 1, 1, 1), (2, 2, 2)), FinitePlasticity(200.0, 0.3, 0.2, 2.0))
+    for z, name in enumerate("ab")
+}
+supports = [Support(name, *side) for name in bodies for side in (("x0",), ("x1", (0.01, 0.0, 0.0)))]
+state = solve_scene(Scene(bodies, supports), MPI.COMM_WORLD)
+mises = [state.gather_von_mises(name).max() for name in bodies]
+means = [abs(state.gather_stress(name)).max() for name in bodies]
+if MPI.COMM_WORLD.rank == 0:
+    print(*mises, *means)
+'''
+
+
+def test_stresses_of_a_body_are_known_to_ranks_without_its_cells(mpirun: Callable[..., str]) -> None:
+    first, second, one, other = map(float, mpirun(ON_RANKS, 2).split())
+    assert first > 0.2
+    assert one > 0.2
+    assert (second, other) == pytest.approx((first, one), rel=1e-8)
 
 
 def test_moments_of_small_strain_are_those_of_the_undeformed_bodies() -> None:

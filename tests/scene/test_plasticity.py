@@ -177,7 +177,7 @@ def test_turned_inside_out_there_is_no_stress() -> None:
             {"saturation_stress": 300.0},
             "saturation_stress and saturation_rate must be given together, got 300",
         ),
-        ({"saturation_rate": 9.0}, "must be given together, got None and 9.0: one without the other has no"),
+        ({"saturation_rate": 9.0}, "must be given together, got None and 9.0: one alone has no"),
         ({"young_modulus": -1.0}, "young_modulus must be a positive number"),
         ({"poisson_ratio": 0.5}, "poisson_ratio must lie between"),
     ],

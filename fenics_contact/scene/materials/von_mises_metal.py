@@ -26,8 +26,8 @@ class VonMisesMetal(HistoryMaterial):
         check_plastic(self.young_modulus, law.yield_stress, law.slope, self._back_slope, saturation)
         if (self.saturation_stress is None) != (self.saturation_rate == 0.0):
             raise InvalidInputError(
-                f"saturation_stress and saturation_rate must be given together, got "
-                f"{self.saturation_stress!r} and {self.saturation_rate!r}: one without the other has no effect"
+                "saturation_stress and saturation_rate must be given together, got "
+                f"{self.saturation_stress!r} and {self.saturation_rate!r}: one alone has no effect"
             )
 
     @property
