@@ -103,7 +103,7 @@ def test_a_plastic_body_in_contact_does_not_depend_on_how_it_is_cut() -> None:
     assert np.isnan(one.gather_nodal_stress("base")[0]).any(), "materials keep their own nodal stresses"
 
 
-ON_RANKS = '''
+ON_RANKS = """
 from mpi4py import MPI
 from fenics_contact.contact import solve_scene
 from fenics_contact.gallery import block
@@ -118,7 +118,7 @@ mises = [state.gather_von_mises(name).max() for name in bodies]
 means = [abs(state.gather_stress(name)).max() for name in bodies]
 if MPI.COMM_WORLD.rank == 0:
     print(*mises, *means)
-'''
+"""
 
 
 def test_stresses_of_a_body_are_known_to_ranks_without_its_cells(mpirun: Callable[..., str]) -> None:
