@@ -18,6 +18,7 @@ from fenics_contact.contact.static_admissibility import check_held
 from fenics_contact.contact.stored_deformed import stored_configuration
 from fenics_contact.contact.stored_rows import Stored
 from fenics_contact.contact.tolerance import Tolerance
+from fenics_contact.contact.turned_bodies import tell_of_turned_bodies
 from fenics_contact.errors import InvalidInputError, LoadStepError, together
 from fenics_contact.feti import Decomposition, TornSystem, build_torn_system, prescribed_displacements
 from fenics_contact.nonlinear import (
@@ -125,8 +126,11 @@ class DeformedEquilibria:
             path = steps.follow(equations, self._contact, before, load, start, timer, known)
         except PathEndsError as failure:
             last = None if failure.path is None else _state_after(failure.path, origin, timer)
-            raise LoadStepError(str(failure), failure.history, last) from failure
-        return _state_after(path, origin, timer)
+            where = "" if step is None else f"load step {step.name!r}: "
+            raise LoadStepError(f"{where}{failure}", failure.history, last) from failure
+        state = _state_after(path, origin, timer)
+        tell_of_turned_bodies(state)
+        return state
 
     def restored(self, stored: Stored, scene: Scene) -> DeformedState:
         """Build a state from what `stored_deformed` returned, with one factorisation. Collective.
