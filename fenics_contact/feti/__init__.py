@@ -6,13 +6,22 @@ from fenics_contact.feti.decomposition import Decomposition, decompose
 from fenics_contact.feti.direct import DirectSolution, DirectSystem
 from fenics_contact.feti.dirichlet import DirichletPreconditioner
 from fenics_contact.feti.dual import DualSystem
-from fenics_contact.feti.factor import FIXING_NODES, Factor, fixing_motions, fixing_nodes, held_by
+from fenics_contact.feti.factor import (
+    FIXING_NODES,
+    Factor,
+    fixing_dofs,
+    fixing_nodes,
+    held_by,
+    motions_at,
+    symmetric_matrix,
+)
 from fenics_contact.feti.gluing import prescribed_displacements
 from fenics_contact.feti.implicit import FactoredOperator, dofs_inside
 from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
 from fenics_contact.feti.local import LocalOperator
 from fenics_contact.feti.nodal_mean import nodal_mean, nodal_mean_at, nodal_mean_transposed
 from fenics_contact.feti.nodal_sum import nodal_sum
+from fenics_contact.feti.petsc_calls import petsc_call
 from fenics_contact.feti.rows import Rows
 from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.sharing import Sharing
@@ -42,15 +51,18 @@ __all__ = [
     "common_kernel",
     "decompose",
     "dofs_inside",
-    "fixing_motions",
+    "fixing_dofs",
     "fixing_nodes",
     "held_by",
     "kernel_matrix",
     "meeting_at",
+    "motions_at",
     "nodal_mean",
     "nodal_mean_at",
     "nodal_mean_transposed",
     "nodal_sum",
     "on_copies",
+    "petsc_call",
     "prescribed_displacements",
+    "symmetric_matrix",
 ]

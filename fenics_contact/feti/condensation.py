@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import ctypes
 from collections import OrderedDict
-from functools import lru_cache
 
 import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._libraries import PETSc
 from fenics_contact.feti.factor import symmetric_matrix
+from fenics_contact.feti.petsc_calls import petsc_call
 from fenics_contact.linalg import dispose_with
 
 #: Number of cached symbolic factorisations. Each also holds the values of its last matrix: a few MB.
@@ -43,7 +43,7 @@ class Condensation:
         self._factor = self._pc.getFactorMatrix()
         self._factor.setMumpsIcntl(ORDERING, METIS)
         self._rows = PETSc.IS().createGeneral(interface.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
-        _call("MatFactorSetSchurIS", self._factor.handle, self._rows.handle)
+        petsc_call("MatFactorSetSchurIS", self._factor.handle, self._rows.handle)
         dispose_with(self, self._rows, self._factor, self._pc, self._matrix)
 
     def __call__(self, stiffness: sp.csr_matrix) -> np.ndarray:
@@ -61,11 +61,11 @@ class Condensation:
         matrix, status = ctypes.c_void_p(), ctypes.c_int()
         values = ctypes.POINTER(ctypes.c_double)()
         factor = self._factor.handle
-        _call("MatFactorGetSchurComplement", factor, ctypes.byref(matrix), ctypes.byref(status))
-        _call("MatDenseGetArrayRead", matrix, ctypes.byref(values))
+        petsc_call("MatFactorGetSchurComplement", factor, ctypes.byref(matrix), ctypes.byref(status))
+        petsc_call("MatDenseGetArrayRead", matrix, ctypes.byref(values))
         schur = np.array(np.ctypeslib.as_array(values, shape=(self._size, self._size))).T
-        _call("MatDenseRestoreArrayRead", matrix, ctypes.byref(values))
-        _call("MatFactorRestoreSchurComplement", factor, ctypes.byref(matrix), status)
+        petsc_call("MatDenseRestoreArrayRead", matrix, ctypes.byref(values))
+        petsc_call("MatFactorRestoreSchurComplement", factor, ctypes.byref(matrix), status)
         return schur
 
 
@@ -96,17 +96,3 @@ class Condensations:
         if len(self._recent) > CACHED:
             self._recent.popitem(last=False)
         return self._recent[key](stiffness)
-
-
-@lru_cache(maxsize=1)
-def _petsc() -> ctypes.CDLL:
-    # The symbols of libpetsc are resolved through the extension module that is linked with it.
-    return ctypes.CDLL(PETSc.__file__)
-
-
-def _call(name: str, *arguments: object) -> None:
-    """Call a function of PETSc's C interface."""
-    wrapped = [ctypes.c_void_p(a) if isinstance(a, int) else a for a in arguments]
-    code = getattr(_petsc(), name)(*wrapped)
-    if code:
-        raise PETSc.Error(code)

@@ -23,14 +23,14 @@ class Factor:
     def __init__(self, matrix: sp.csr_matrix) -> None:
         """Factor ``matrix``, shape (n, n)."""
         self.size = matrix.shape[0]
-        given = symmetric_matrix(matrix)
+        given = symmetric_matrix(matrix, shared=True)
         pc = PETSc.PC().create(PETSc.COMM_SELF)
         pc.setOperators(given)
         pc.setType(PETSc.PC.Type.CHOLESKY)
         self._set_up(pc, given)
         self._factor = pc.getFactorMatrix()
         self._right, self._left = given.createVecs()
-        # Only the factor is stored: the copy of the matrix would take another third of its memory.
+        # Only the factor is stored: the matrix would take another third of its memory.
         pc.destroy()
         given.destroy()
         dispose_with(self, self._factor, self._right, self._left)
@@ -64,10 +64,20 @@ class Factor:
         return solution
 
 
-def symmetric_matrix(matrix: sp.csr_matrix) -> PETSc.Mat:
-    """Return a symmetric positive definite matrix on one rank in PETSc's format."""
-    csr = (matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data)
-    given = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=PETSc.COMM_SELF)
+def symmetric_matrix(matrix: sp.csr_matrix, *, shared: bool = False) -> PETSc.Mat:
+    """Return a symmetric positive definite matrix on one rank in PETSc's format.
+
+    Args:
+        matrix: The matrix, shape (n, n).
+        shared: Whether both may have the same entries in memory.
+    """
+    if shared and not matrix.has_canonical_format:
+        matrix = matrix.copy()
+        matrix.sum_duplicates()
+    indices = (part.astype(PETSc.IntType, copy=False) for part in (matrix.indptr, matrix.indices))
+    csr = (*indices, matrix.data)
+    make = PETSc.Mat().createAIJWithArrays if shared else PETSc.Mat().createAIJ
+    given = make(matrix.shape, csr=csr, comm=PETSc.COMM_SELF)
     given.setOption(PETSc.Mat.Option.SPD, True)
     given.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     return given
@@ -126,26 +136,20 @@ def regularised(stiffness: sp.csr_matrix, kernel: np.ndarray, points: np.ndarray
         stable computation of a generalized inverse of the stiffness matrix of a floating structure.
         Int. J. Numer. Meth. Engng 88 (2011) 493-509.
     """
-    return held_by(stiffness, *fixing_motions(kernel, points), float(stiffness.diagonal().max()))
+    dofs = fixing_dofs(points)
+    return held_by(stiffness, dofs, motions_at(dofs, kernel), float(stiffness.diagonal().max()))
 
 
-def fixing_motions(
-    kernel: np.ndarray, points: np.ndarray, count: int = FIXING_NODES
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the dofs of well-spread nodes and orthonormal rigid motions on them.
-
-    Args:
-        kernel: Rigid motions, shape (dim n, n_modes).
-        points: Coordinates by block of dofs, shape (n, dim).
-        count: Number of nodes.
-
-    Returns:
-        Dofs, ascending, shape (n_dofs,), and motions, shape (n_dofs, n_modes).
-    """
+def fixing_dofs(points: np.ndarray, count: int = FIXING_NODES) -> np.ndarray:
+    """Return the dofs of well-spread nodes, ascending, shape (n_dofs,); see `fixing_nodes`."""
     nodes, dim = np.sort(fixing_nodes(points, count)), points.shape[1]
-    dofs = (dim * nodes[:, None] + np.arange(dim)).ravel()
+    return np.asarray((dim * nodes[:, None] + np.arange(dim)).ravel())
+
+
+def motions_at(dofs: np.ndarray, kernel: np.ndarray) -> np.ndarray:
+    """Return orthonormal rigid motions on some dofs, (n_dofs, n_modes), from those of all, (n, n_modes)."""
     basis, _ = np.linalg.qr(kernel[dofs])
-    return dofs, basis
+    return np.asarray(basis)
 
 
 def held_by(stiffness: sp.csr_matrix, dofs: np.ndarray, motions: np.ndarray, weight: float) -> sp.csr_matrix:

@@ -189,6 +189,11 @@ class Linearisation:
     meeting: Meeting
     further: FurtherRows
 
+    def spend(self) -> None:
+        """Leave the factors to the linearisation that comes next: this one is not applied any more."""
+        for operator in self.system.inverse.tangents:
+            operator.spend()
+
     @property
     def diagonal(self) -> Vector:
         """Of F on the rows of the meeting, owned."""

@@ -183,6 +183,8 @@ class _Run:
             evaluation = self._evaluated(evaluation.at, near)  # which tells of gaps only now
         while near is None or not evaluation.residuals.within(self._method.tolerance):
             self._require_progress(evaluation)
+            if near is not None and near is not known:
+                near.spend()
             near = evaluation.linearised(self._timer, near)
             self.factorisations += 1
             following = self._advanced(evaluation, earlier, near)

@@ -11,10 +11,11 @@ from fenics_contact.feti import (
     FactoredOperator,
     Subdomain,
     dofs_inside,
-    fixing_motions,
+    fixing_dofs,
     held_by,
+    motions_at,
 )
-from fenics_contact.nonlinear.indefinite_factor import IndefiniteFactor
+from fenics_contact.nonlinear.indefinite_factor import IndefiniteFactor, factored
 
 #: Fixing nodes relative to the cube root of the number of nodes: held at its corners alone, a body under
 #: stress buckles around them.
@@ -46,6 +47,7 @@ class TangentOperator(FactoredOperator):
 
     _searched: np.ndarray
     _softest: float
+    _spent: tuple[IndefiniteFactor | None, IndefiniteFactor | None] = (None, None)
 
     def __init__(self, subdomain: Subdomain, interface: np.ndarray, earlier: TangentOperator | None) -> None:
         """Factor a subdomain.
@@ -57,11 +59,11 @@ class TangentOperator(FactoredOperator):
         """
         K, size = subdomain.stiffness, subdomain.mesh.size
         typical = float(np.abs(K.diagonal()).max())
-        points = subdomain.points
-        count = max(FIXING_NODES, round(SPREAD * len(points) ** (1.0 / subdomain.mesh.dim)))
-        dofs, basis = fixing_motions(subdomain.kernel, points, count)
+        self._fixing = _well_spread(subdomain.points) if earlier is None else earlier._fixing
+        spent, inner = (None, None) if earlier is None else earlier._spent
+        dofs, basis = self._fixing, motions_at(self._fixing, subdomain.kernel)
         held = held_by(K, dofs, basis, typical)
-        factor = IndefiniteFactor(held)
+        factor = factored(held, spent)
         columns = np.zeros((size, basis.shape[1]))
         columns[dofs] = basis
         weights = np.full(basis.shape[1], typical)
@@ -75,10 +77,14 @@ class TangentOperator(FactoredOperator):
         self._relief = -_symmetric(self.stiffness @ np.linalg.inv(columns.T @ self.modes))
         rest = dofs_inside(K, interface)
         self._at_interface, self._at_rest = columns[interface], columns[rest]
-        inside = None
-        if len(rest):
-            inside = _Updated(IndefiniteFactor(K[rest][:, rest].tocsr()), self._at_rest, self._relief)
+        inner = factored(K[rest][:, rest].tocsr(), inner) if len(rest) else None
+        inside = None if inner is None else _Updated(inner, self._at_rest, self._relief)
+        self._factors = factor, inner
         super().__init__(K, interface, whole, inside)
+
+    def spend(self) -> None:
+        """Leave the factors to the operator of the next shape: this one is not applied any more."""
+        self._spent = self._factors
 
     def _soft_motions(
         self, held: sp.csr_matrix, factor: IndefiniteFactor, earlier: TangentOperator | None, typical: float
@@ -105,6 +111,11 @@ class TangentOperator(FactoredOperator):
     def _forces_from_inside(self, displacement: np.ndarray) -> np.ndarray:
         moved = self._relief @ (self._at_rest.T @ displacement)
         return super()._forces_from_inside(displacement) + self._at_interface @ moved
+
+
+def _well_spread(points: np.ndarray) -> np.ndarray:
+    """Return the dofs of nodes by which a subdomain is held, ascending, shape (n_dofs,)."""
+    return fixing_dofs(points, max(FIXING_NODES, round(SPREAD * len(points) ** (1.0 / 3.0))))
 
 
 class _Updated:
