@@ -53,7 +53,7 @@ class Overlaps:
     """Pairs of facets that overlap, and the simplices into which their intersections are cut.
 
     Attributes:
-        facets: Slave facets of the pairs, ascending, shape (n_facets,).
+        facets: Slave facets of the pairs, shape (n_facets,).
         facet: Which of them each pair has, shape (n_pairs,).
         master: Master facet of each pair, shape (n_pairs,).
         subject: Corners of the master facets in the slave facets' planes, shape (n_pairs, corners, dim − 1).
@@ -76,6 +76,20 @@ class Overlaps:
     def slave(self) -> np.ndarray:
         """Slave facet of each pair, shape (n_pairs,)."""
         return self.facets[self.facet]
+
+    def repeated(self, times: int) -> Overlaps:
+        """Return the overlaps several times one after the other, as those of different facets."""
+
+        def shifted(number: np.ndarray, count: int) -> np.ndarray:
+            return (count * np.arange(times)[:, None] + number).ravel()
+
+        alike = {
+            each.name: np.concatenate([getattr(self, each.name)] * times)
+            for each in fields(self)
+            if each.name not in {"facet", "pair"}
+        }
+        facet, pair = shifted(self.facet, len(self.facets)), shifted(self.pair, len(self.master))
+        return Overlaps(facet=facet, pair=pair, **alike)
 
 
 def overlaps_of(

@@ -18,6 +18,9 @@ from fenics_contact.pairing.mortar.dual_basis_derivative import integrals_pulled
 from fenics_contact.pairing.mortar.planes import Planes, planes_of, planes_pulled_back
 from fenics_contact.surfaces import FacetedSurface
 
+#: Pairs of facets up to which reverse mode runs for several corners and nodes at once.
+AT_ONCE = 2000
+
 
 @dataclass(frozen=True)
 class WeightDerivatives:
@@ -117,50 +120,61 @@ def _of_facets(
     """Return the same of some overlaps that have all pairs of their slave facets.
 
     The dual functions of a facet depend on all that covers it. So reverse mode runs once for each corner and
-    each node of the master over a facet, in all facets at the same time.
+    each node of the master over a facet, in all facets at the same time; where these are few, several times
+    at once.
     """
+    over, count = _over_facets(overlaps.facet, master.facets[overlaps.master]), len(overlaps.master)
+    corner, number = (part.ravel() for part in np.indices((slave.facets.shape[1], over.shape[1])))
+    parts, width = [], max(1, AT_ONCE // count)
+    for begin in range(0, len(corner), width):
+        some = slice(begin, begin + width)
+        repeated = overlaps.repeated(len(corner[some]))
+        node = over[overlaps.facet][:, number[some]].T.ravel()
+        parts.append(_of_nodes(repeated, planes, slave, chosen, master, np.repeat(corner[some], count), node))
+    return _summed(*(list(column) for column in zip(*parts, strict=True)))
+
+
+def _of_nodes(
+    overlaps: Overlaps,
+    planes: Planes,
+    slave: FacetedSurface,
+    chosen: np.ndarray,
+    master: FacetedSurface,
+    corner: np.ndarray,
+    node: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
+    """Return the same for one corner and one node of the master of each pair's slave facet, −1 for none."""
     dim, n_slave, n_master = slave.dim, len(slave.nodes), len(master.nodes)
     nodes, opposite = slave.facets[chosen[overlaps.slave]], master.facets[overlaps.master]
     cells, each = cells_of(overlaps), np.arange(len(nodes))
     basis, own = DualBasis.on(cells), planes.part(overlaps.slave)
-    over, place = _over_facets(overlaps.facet, opposite)
-    corners, places = slave.points[nodes], master.points[opposite]
-    nothing, integrals = np.zeros_like(own.normal), basis.integrals(cells.master)
-    met = np.concatenate([nodes, n_slave + opposite], axis=1)
-    column = (dim * met[:, :, None] + np.arange(dim)).reshape(len(met), -1)
-    keys, values, rows = [np.zeros(0, dtype=np.int64)], [np.zeros(0)], []
-    for corner, number in np.ndindex(nodes.shape[1], over.shape[1]):
-        seed = np.zeros((*integrals.shape[:2], integrals.shape[2] + 1))
-        seed[:, corner, :-1] = place == number
-        by, _ = integrals_pulled_back(basis, np.zeros_like(cells.weight), np.zeros_like(basis.coverage), seed)
-        by_subject, by_window = cells_pulled_back(overlaps, cells, by)
-        both = planes_pulled_back(own, corners, by_window, nothing, (places, each, by_subject))
-        slopes = np.concatenate(both, axis=1).reshape(len(nodes), -1)
-        felt = np.flatnonzero(slopes.any(axis=1))
-        start = slopes.shape[1] * np.arange(len(felt) + 1)
-        entries = slopes[felt].ravel(), column[felt].ravel(), start
-        rows.append(sp.csr_matrix(entries, shape=(len(felt), dim * (n_slave + n_master))))
-        keys.append(nodes[felt, corner] * n_master + over[overlaps.facet[felt], number])
-        values.append((integrals[felt, corner] * (place[felt] == number)).sum(axis=1))
-    return _summed(keys, values, rows)
+    integrals, meant = basis.integrals(cells.master), opposite == node[:, None]
+    seed = np.zeros((*integrals.shape[:2], integrals.shape[2] + 1))
+    seed[each, corner, :-1] = meant
+    by, _ = integrals_pulled_back(basis, np.zeros_like(cells.weight), np.zeros_like(basis.coverage), seed)
+    by_subject, by_window = cells_pulled_back(overlaps, cells, by)
+    places = master.points[opposite], each, by_subject
+    both = planes_pulled_back(own, slave.points[nodes], by_window, np.zeros_like(own.normal), places)
+    slopes = np.concatenate(both, axis=1).reshape(len(nodes), -1)
+    felt = np.flatnonzero(slopes.any(axis=1))
+    met = np.concatenate([nodes, n_slave + opposite], axis=1)[felt]
+    column = (dim * met[:, :, None] + np.arange(dim)).reshape(len(felt), slopes.shape[1])
+    entries = slopes[felt].ravel(), column.ravel(), slopes.shape[1] * np.arange(len(felt) + 1)
+    rows = sp.csr_matrix(entries, shape=(len(felt), dim * (n_slave + n_master)))
+    corner, node = corner[felt], node[felt]
+    return nodes[felt, corner] * n_master + node, (integrals[felt, corner] * meant[felt]).sum(axis=1), rows
 
 
-def _over_facets(facet: np.ndarray, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Number the nodes of the master over each slave facet.
+def _over_facets(facet: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Return the nodes of the master over each slave facet, −1 beyond their number, (n_facets, most).
 
     Args:
         facet: Slave facet of each pair, shape (n_pairs,).
         nodes: Nodes of the master's facet, shape (n_pairs, master corners).
-
-    Returns:
-        The nodes over each facet, −1 beyond their number, shape (n_facets, most), and the number of each of
-        the pairs' nodes, in the shape of ``nodes``.
     """
     count = int(nodes.max()) + 1
-    key, place = np.unique((facet[:, None] * count + nodes).ravel(), return_inverse=True)
-    which, node = np.divmod(key, count)
-    first = np.searchsorted(which, which)
-    number = np.arange(len(key)) - first
+    which, node = np.divmod(np.unique(facet[:, None] * count + nodes), count)
+    number = np.arange(len(which)) - np.searchsorted(which, which)
     over = np.full((int(facet.max()) + 1, int(number.max()) + 1), -1)
     over[which, number] = node
-    return over, number[place.ravel()].reshape(nodes.shape)
+    return over
