@@ -57,11 +57,12 @@ class Relations:
         Args:
             fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         """
-        left = self._left(self.directions, fixed)
+        free = movable(self.points, fixed)[self.which]
+        left = np.where(free, self.directions, 0.0)
         mine = np.einsum("rd,rd->r", left, left)
         if self.resting is None:
             return np.asarray(mine <= HELD**2)
-        normal = self._left(self.points.normal[self.which], fixed)
+        normal = np.where(free, self.points.normal[self.which], 0.0)
         other = np.einsum("rd,rd->r", normal, normal)
         across = mine * other - np.einsum("rd,rd->r", left, normal) ** 2
         tilted = (across <= PARALLEL**2 * mine * other) & (mine < other)
@@ -69,10 +70,8 @@ class Relations:
 
     def freedom(self, fixed: np.ndarray) -> np.ndarray:
         """Return the length of the free part of each direction, from 0 to 1, shape (n_rows,)."""
-        return np.asarray(np.linalg.norm(self._left(self.directions, fixed), axis=1))
-
-    def _left(self, directions: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-        return np.where(movable(self.points, fixed)[self.which], directions, 0.0)
+        free = movable(self.points, fixed)[self.which]
+        return np.asarray(np.linalg.norm(np.where(free, self.directions, 0.0), axis=1))
 
     def rows(self, tearing: Tearing, fixed: np.ndarray) -> Rows:
         """Return the part of these rows of B that acts on free components, with an empty right side.
@@ -85,10 +84,11 @@ class Relations:
             tearing: Node numbering and copies.
             fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         """
-        jump = self.points.jump[self.which].tocoo()
+        jump = self.points.jump[self.which]
+        row = np.repeat(np.arange(self.count), np.diff(jump.indptr))
         # Sorted by row: every rank builds the same rows, and the owner's copy is that of the slave node.
-        order = np.lexsort((jump.col, jump.row))
-        row, node = jump.row[order], jump.col[order]
+        order = np.lexsort((jump.indices, row))
+        row, node = row[order], jump.indices[order]
         value = jump.data[order, None] * self.directions[row]
         # Directions along an axis have no entries in other components: the preconditioner depends on the
         # pattern.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -124,17 +125,21 @@ class _ContactBlock:
         gram: sp.csr_matrix,
         basis: sp.csr_matrix | None = None,
     ) -> None:
-        """Factor the matrix, or its part on the columns of a basis, shape (n_rows, n_face)."""
+        """Take the matrix, or its part on the columns of a basis, shape (n_rows, n_face)."""
         self._numbering, self._n_gluing, self._gram, self._basis = numbering, n_gluing, gram, basis
         self._owned = np.flatnonzero(numbering.owned >= n_gluing)
         self._place = numbering.owned[self._owned] - n_gluing
         matrix = gram if basis is None else (basis.T @ gram @ basis).tocsr()
-        self._size = matrix.shape[0]
-        if self._size:
-            diagonal = matrix.diagonal()
-            # Rows that supports alone determine are empty.
-            share = np.where(diagonal > 0.0, REGULARISATION * diagonal, 1.0)
-            self._factor = Factor((matrix + sp.diags(share)).tocsr())
+        self._size, self._matrix = matrix.shape[0], matrix
+        self._transposed = None if basis is None else basis.T.tocsr()
+
+    @cached_property
+    def _factor(self) -> Factor:
+        """Factors, on first use."""
+        diagonal = self._matrix.diagonal()
+        # Rows that supports alone determine are empty.
+        share = np.where(diagonal > 0.0, REGULARISATION * diagonal, 1.0)
+        return Factor((self._matrix + sp.diags(share)).tocsr())
 
     @classmethod
     def of_rows(
@@ -170,7 +175,7 @@ class _ContactBlock:
         right = np.zeros(self._gram.shape[0])
         right[self._place] = x[self._owned]
         right = global_sum(self._numbering.comm, right)
-        right = right if self._basis is None else self._basis.T @ right
+        right = right if self._transposed is None else self._transposed @ right
         solution = np.empty(self._size)
         if self._size:
             self._factor.solve(right, solution)

@@ -23,7 +23,6 @@ from fenics_contact.qp import (
     Face,
     FacePreconditioner,
     FaceSystem,
-    FaceSystems,
     Kept,
     ObliqueProjector,
     Stop,
@@ -237,11 +236,11 @@ class _StiffFace:
         if oblique is None:
             return None
         own = face.restrict(at.compliance)
-        system = FaceSystems(problem, operator).build(face)
-        if isinstance(problem.preconditioner, FacePreconditioner):
+        preconditioner = problem.preconditioner
+        if isinstance(preconditioner, FacePreconditioner):
             # The other rows are nearly combinations of contact rows: the preconditioner is that of these.
-            usual = basis[:, shared[own[shared] == 0.0]]
-            system = replace(system, preconditioner=problem.preconditioner.on_face(usual))
+            preconditioner = preconditioner.on_face(basis[:, shared[own[shared] == 0.0]])
+        system = FaceSystem(problem.comm, face, operator, coarse.restricted(basis), preconditioner)
         compliance = np.concatenate([(face.curvature + own)[shared], at.share])
         return cls(at, system, shared, tested, moving, compliance, oblique, operator)
 
@@ -272,16 +271,16 @@ class _StiffFace:
         # From λ onto the face, into the equilibrium of β = 0.
         load = problem.coarse.load + problem.coarse.apply(self.at.multiplier - fixed)
         y = np.concatenate([self.system.face.restrict(self.at.multiplier)[self.shared], self._nothing])
-        y = y - oblique.tested.T @ oblique.solve(oblique.moving.apply(y) - load)
+        y = y - oblique.transposed @ oblique.solve(oblique.moving.apply(y) - load)
         change = fixed + self.moving @ y - self.at.multiplier
         product = apply_unless_zero(problem, self.operator, change)
-        gradient = self.tested.T @ (product - problem.rhs) + self.compliance * y
+        gradient = self._testing @ (product - problem.rhs) + self.compliance * y
         weights = self._weights
 
         def expand(vector: Vector) -> tuple[Vector, Kept]:
             step, motions = self._direction(vector / weights)
-            image = self.tested.T @ self.operator(self.moving @ step) + self.compliance * step
-            return weights * (image - oblique.tested.T @ motions), (step, motions)
+            image = self._testing @ self.operator(self.moving @ step) + self.compliance * step
+            return weights * (image - oblique.transposed @ motions), (step, motions)
 
         across, gradient = weights * oblique(gradient), weights * gradient
         # Rigid motions that close the jumps of the last step must not make the tolerance larger, nor may an
@@ -291,6 +290,11 @@ class _StiffFace:
         found = gmres(comm, -gradient, expand, tolerance, max_products, self.system.patience)
         change = change + self.moving @ found.combined(0, len(gradient))
         return np.asarray(change, dtype=np.float64), found.combined(1, problem.coarse.m), found.stop
+
+    @cached_property
+    def _testing(self) -> sp.csr_matrix:
+        """Wᵀ."""
+        return self.tested.T.tocsr()
 
     @property
     def _weights(self) -> Vector:
@@ -316,7 +320,7 @@ class _StiffFace:
         residual[self.shared] = across[: len(self.shared)]
         step = np.concatenate([self.system.precondition(residual)[self.shared], self._nothing])
         step[self._further] = across[self._further] / self.compliance[self._further]
-        borne = oblique.tested.T @ oblique.solve(self.at.stiffness @ motions)
+        borne = oblique.transposed @ oblique.solve(self.at.stiffness @ motions)
         return np.asarray(oblique.moving.project(step) - borne, dtype=np.float64), motions
 
     @cached_property

@@ -60,7 +60,7 @@ class LackingRows:
             rows: What each row of contact lacks, zero where it is the derivative, shape (n, n_dofs).
             owner: Node whose rank owns each row, shape (n,).
         """
-        completed = np.flatnonzero(_lengths(rows.T) > ROUNDING)
+        completed = np.flatnonzero(_lengths(rows.T.tocsr()) > ROUNDING)
         return cls(rows[completed].T.tocsr(), completed, owner[completed])
 
 
@@ -124,7 +124,7 @@ class TurningForces:
 
 
 def _lengths(columns: sp.csr_matrix) -> np.ndarray:
-    return np.sqrt(np.asarray(columns.multiply(columns).sum(axis=0)).ravel())
+    return np.sqrt(np.bincount(columns.indices, columns.data**2, columns.shape[1]))
 
 
 def unsymmetric_at(

@@ -107,7 +107,8 @@ def movable(points: ContactPoints, fixed: np.ndarray) -> np.ndarray:
         points: The points.
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
     """
-    squares = points.jump.multiply(points.jump).tocsr()
+    jump = points.jump
+    squares = sp.csr_matrix((jump.data**2, jump.indices, jump.indptr), shape=jump.shape)
     free, every = squares @ (~fixed).astype(float), squares @ np.ones(fixed.shape)
     return np.asarray((free > HELD**2 * every) & ~points.symmetric)
 

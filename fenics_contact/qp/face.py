@@ -54,6 +54,11 @@ class Face:
         """Z with orthonormal columns, shape (size, n_face), owned rows and columns."""
         return face_basis(self.layout, self.closed, self.stick, self._turning, self.direction)
 
+    @cached_property
+    def _transposed(self) -> sp.csr_matrix:
+        """Zᵀ."""
+        return self.restriction.T.tocsr()
+
     @property
     def n_face(self) -> int:
         """Number of degrees of freedom of the face on this rank."""
@@ -85,7 +90,7 @@ class Face:
 
     def restrict(self, x: Vector) -> Vector:
         """Return Zᵀ x for an owned vector x."""
-        return self.restriction.T @ x
+        return self._transposed @ x
 
     def prolong(self, y: Vector) -> Vector:
         """Return Z y, owned, for y of shape (n_face,)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -132,9 +133,14 @@ class ObliqueProjector:
         """Return (G_u G_sᵀ)⁻¹ G_u v, replicated. Collective."""
         return self.solve(self.moving.apply(v))
 
+    @cached_property
+    def transposed(self) -> sp.csr_matrix:
+        """G_sᵀ, shape (n_face, m)."""
+        return self.tested.T.tocsr()
+
     def __call__(self, v: Vector) -> Vector:
         """Project. Collective."""
-        return v - self.tested.T @ self.coefficients(v)
+        return v - self.transposed @ self.coefficients(v)
 
 
 @dataclass(frozen=True, eq=False)

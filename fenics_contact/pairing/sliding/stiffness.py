@@ -127,8 +127,12 @@ def friction_stiffness(points: ContactPoints, differential: Differential, fricti
         differential: Their differential.
         friction: τ in the points' tangents, shape (n, dim − 1), [force].
     """
-    rubbed = np.flatnonzero(friction.any(axis=1))
-    motion, jump = point_motion(points, differential), points.jump
+    rubbed, jump = np.flatnonzero(friction.any(axis=1)), points.jump
+    if not (differential.tangents[rubbed].any() or differential.curvature[rubbed].any()):
+        # Means over facets move, too, but not as closest points do.
+        nothing = sp.csr_matrix((jump.shape[1] * points.normal.shape[1], 0))
+        return LowRank(nothing, nothing, rubbed[:0])
+    motion = point_motion(points, differential)
     turned = frame_changes(points.normal, points.axes, motion.directions)
     turning = np.einsum("nc,ncad->nad", friction, turned)
     force = np.einsum("nc,ncd->nd", friction, points.tangents)
