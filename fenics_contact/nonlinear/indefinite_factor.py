@@ -8,19 +8,19 @@ import scipy.sparse as sp
 from fenics_contact._libraries import PETSc
 from fenics_contact.feti import Factor, petsc_call, symmetric_matrix
 
+#: Largest residual of a solution with factors that are used, relative to its right side.
+WRONG = 1e-8
 
-class IndefiniteFactor(Factor):
-    """LDLᵀ factors of a sparse symmetric matrix on one rank, by MUMPS, with the number of negative pivots."""
+
+class RefillableFactor(Factor):
+    """Cholesky factors that may take other matrices with the same pattern."""
+
+    positive = True
 
     def __init__(self, matrix: sp.csr_matrix) -> None:
         """Factor ``matrix``, shape (n, n)."""
         self._pattern = matrix.indptr, matrix.indices
         super().__init__(matrix)
-
-    @property
-    def negative(self) -> int:
-        """Number of negative eigenvalues."""
-        return int(self._factor.getInertia()[0])
 
     def refill(self, matrix: sp.csr_matrix) -> bool:
         """Factor another matrix instead, without a new analysis; False where its pattern is another one.
@@ -30,10 +30,28 @@ class IndefiniteFactor(Factor):
         pattern = matrix.indptr, matrix.indices
         if not all(np.array_equal(mine, other) for mine, other in zip(self._pattern, pattern, strict=True)):
             return False
-        given = _symmetric(matrix)
+        given = symmetric_matrix(matrix, shared=True)
+        given.setOption(PETSc.Mat.Option.SPD, self.positive)
         petsc_call("MatCholeskyFactorNumeric", self._factor.handle, given.handle, None)
         given.destroy()
         return True
+
+    def fits(self, matrix: sp.csr_matrix) -> bool:
+        """Return whether a solution satisfies its equations: without pivoting it may not."""
+        right = np.random.default_rng(0).standard_normal(self.size)
+        self.solve(right, solution := np.empty_like(right))
+        return bool(np.linalg.norm(matrix @ solution - right) <= WRONG * np.linalg.norm(right))
+
+
+class IndefiniteFactor(RefillableFactor):
+    """LDLᵀ factors of a sparse symmetric matrix on one rank, by MUMPS, with the number of negative pivots."""
+
+    positive = False
+
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues."""
+        return int(self._factor.getInertia()[0])
 
     def _set_up(self, pc: PETSc.PC, given: PETSc.Mat) -> None:
         given.setOption(PETSc.Mat.Option.SPD, False)
@@ -46,12 +64,26 @@ class IndefiniteFactor(Factor):
         pc.setUp()
 
 
-def factored(matrix: sp.csr_matrix, spent: IndefiniteFactor | None) -> IndefiniteFactor:
-    """Return factors of a matrix, in place of others that nothing uses any more where they fit."""
-    return spent if spent is not None and spent.refill(matrix) else IndefiniteFactor(matrix)
+def with_inertia(matrix: sp.csr_matrix, spent: RefillableFactor | None) -> IndefiniteFactor:
+    """Return factors of a matrix that know its negative eigenvalues.
+
+    Args:
+        matrix: The matrix, shape (n, n).
+        spent: Factors that nothing uses any more, to be refilled where they fit; None without any.
+    """
+    if isinstance(spent, IndefiniteFactor) and spent.refill(matrix):
+        return spent
+    return IndefiniteFactor(matrix)
 
 
-def _symmetric(matrix: sp.csr_matrix) -> PETSc.Mat:
-    given = symmetric_matrix(matrix, shared=True)
-    given.setOption(PETSc.Mat.Option.SPD, False)
-    return given
+def mostly_positive(matrix: sp.csr_matrix, spent: RefillableFactor | None) -> RefillableFactor:
+    """Return factors of a matrix that is positive definite but for few exceptions; see `with_inertia`.
+
+    Cholesky factors, which are much faster in small problems, unless their solutions are wrong.
+    """
+    try:
+        if spent is None or isinstance(spent, IndefiniteFactor) or not spent.refill(matrix):
+            spent = RefillableFactor(matrix)
+    except PETSc.Error:  # as later versions say that it is not positive definite
+        return with_inertia(matrix, None)
+    return spent if spent.fits(matrix) else with_inertia(matrix, None)

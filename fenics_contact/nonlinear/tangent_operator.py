@@ -15,7 +15,12 @@ from fenics_contact.feti import (
     held_by,
     motions_at,
 )
-from fenics_contact.nonlinear.indefinite_factor import IndefiniteFactor, factored
+from fenics_contact.nonlinear.indefinite_factor import (
+    IndefiniteFactor,
+    RefillableFactor,
+    mostly_positive,
+    with_inertia,
+)
 
 #: Fixing nodes relative to the cube root of the number of nodes: held at its corners alone, a body under
 #: stress buckles around them.
@@ -45,9 +50,10 @@ class TangentOperator(FactoredOperator):
         softened: Number of columns for motions that stress has softened.
     """
 
+    _fixing: np.ndarray
     _searched: np.ndarray
     _softest: float
-    _spent: tuple[IndefiniteFactor | None, IndefiniteFactor | None] = (None, None)
+    _spent: tuple[RefillableFactor | None, RefillableFactor | None] = (None, None)
 
     def __init__(self, subdomain: Subdomain, interface: np.ndarray, earlier: TangentOperator | None) -> None:
         """Factor a subdomain.
@@ -63,7 +69,7 @@ class TangentOperator(FactoredOperator):
         spent, inner = (None, None) if earlier is None else earlier._spent
         dofs, basis = self._fixing, motions_at(self._fixing, subdomain.kernel)
         held = held_by(K, dofs, basis, typical)
-        factor = factored(held, spent)
+        factor = with_inertia(held, spent)
         columns = np.zeros((size, basis.shape[1]))
         columns[dofs] = basis
         weights = np.full(basis.shape[1], typical)
@@ -77,7 +83,7 @@ class TangentOperator(FactoredOperator):
         self._relief = -_symmetric(self.stiffness @ np.linalg.inv(columns.T @ self.modes))
         rest = dofs_inside(K, interface)
         self._at_interface, self._at_rest = columns[interface], columns[rest]
-        inner = factored(K[rest][:, rest].tocsr(), inner) if len(rest) else None
+        inner = mostly_positive(K[rest][:, rest].tocsr(), inner) if len(rest) else None
         inside = None if inner is None else _Updated(inner, self._at_rest, self._relief)
         self._factors = factor, inner
         super().__init__(K, interface, whole, inside)
@@ -121,7 +127,7 @@ def _well_spread(points: np.ndarray) -> np.ndarray:
 class _Updated:
     """The inverse of A + V D Vᵀ with factors of A, by Woodbury's formula."""
 
-    def __init__(self, factor: IndefiniteFactor, columns: np.ndarray, added: np.ndarray) -> None:
+    def __init__(self, factor: RefillableFactor, columns: np.ndarray, added: np.ndarray) -> None:
         """Prepare for V, shape (n, k), and D, symmetric and maybe singular, shape (k, k)."""
         self._factor, self._columns = factor, columns
         self._moved = factor.solve_many(columns)

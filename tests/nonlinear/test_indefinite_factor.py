@@ -1,0 +1,47 @@
+"""Factors of tangents: they take over analyses, and find out where a matrix is not positive definite."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from fenics_contact.nonlinear.indefinite_factor import IndefiniteFactor, mostly_positive, with_inertia
+
+
+def stiffness(shift: float) -> sp.csr_matrix:
+    """Return the Laplacian of a square of 20 by 20 points less a shift; its least eigenvalue is 0.0447."""
+    line = sp.diags([-np.ones(19), np.full(20, 2.0), -np.ones(19)], [-1, 0, 1])
+    whole = sp.kron(line, sp.identity(20)) + sp.kron(sp.identity(20), line)
+    return (whole - shift * sp.identity(400)).tocsr()
+
+
+@pytest.mark.parametrize("factored", [with_inertia, mostly_positive])
+@pytest.mark.parametrize("shift", [0.0, 0.03, 1.0])
+def test_spent_factors_solve_with_another_matrix(factored, shift):
+    spent = factored(stiffness(0.01), None)
+    matrix, right = stiffness(shift), np.linspace(1.0, 2.0, 400)
+    factor = factored(matrix, spent)
+    factor.solve(right, solution := np.empty(400))
+    assert np.abs(solution).max() > 0.1
+    np.testing.assert_allclose(matrix @ solution, right, rtol=1e-9)
+
+
+def test_refilled_factors_count_negative_eigenvalues_anew():
+    spent = with_inertia(stiffness(0.0), None)
+    assert spent.negative == 0
+    factor = with_inertia(matrix := stiffness(1.0), spent)
+    assert factor is spent
+    assert factor.negative == np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0.0) > 0
+
+
+def test_factors_of_another_pattern_are_not_refilled():
+    spent = with_inertia(stiffness(0.0), None)
+    matrix = sp.identity(400, format="csr") * 2.0
+    factor = with_inertia(matrix, spent)
+    assert factor is not spent
+    factor.solve(np.ones(400), solution := np.empty(400))
+    np.testing.assert_allclose(solution, 0.5)
+
+
+def test_cholesky_factors_that_do_not_fit_are_replaced(monkeypatch):
+    monkeypatch.setattr("fenics_contact.nonlinear.indefinite_factor.WRONG", 0.0)
+    assert isinstance(mostly_positive(stiffness(0.0), None), IndefiniteFactor)
