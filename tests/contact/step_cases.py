@@ -51,7 +51,7 @@ def sequence(checkpoint: Checkpoint | None, comm: MPI.Comm) -> LoadSequence:
     scene = sheared_block()
     cut = {"block": box_partition(scene.bodies["block"].mesh, (2, 1, 1))}
     return LoadSequence(
-        ContactProblem(scene, comm, partitions=cut, solver=FaceNewton(tolerance=1e-8)), checkpoint=checkpoint
+        ContactProblem(scene, comm, partitions=cut, solver=FaceNewton(tolerance=1e-11)), checkpoint=checkpoint
     )
 
 
