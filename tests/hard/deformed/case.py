@@ -34,6 +34,7 @@ class Case:
         remembers: Whether forces depend on the way there or on loads, and are not recomputed from the last
             displacement.
         snaps: Whether bodies snap through where no equilibrium is near.
+        most: Newton steps after which a part of a load step is given up.
         error: Class of the error that is expected instead.
         match: Pattern of its message.
     """
@@ -47,6 +48,7 @@ class Case:
     agreement: float = 1e-6
     remembers: bool = False
     snaps: bool = False
+    most: int = 25
     error: type[Exception] | None = None
     match: str = ""
 
@@ -57,7 +59,7 @@ class Case:
             name: bisection_partition(body.mesh, min(number, body.mesh.n_cells))
             for name, body in self.scene.bodies.items()
         }
-        newton = AutomaticSteps(TangentNewton(TOLERANCE), snaps=self.snaps)
+        newton = AutomaticSteps(TangentNewton(TOLERANCE, max_steps=self.most), snaps=self.snaps)
         problem = ContactProblem(self.scene, comm, partitions=cut, steps=newton)
         states = solve_steps(problem, self.steps)
         assert all(isinstance(state, DeformedState) for state in states)

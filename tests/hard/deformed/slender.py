@@ -91,11 +91,11 @@ def a_strip_blown_against_a_ceiling() -> Case:
 def an_arch_that_snaps_onto_a_floor() -> Case:
     """The floor carries what the arch cannot, once it has snapped.
 
-    In larger load steps Newton's method jumps to the floor by itself, and no snap is told. Where nodes stick
-    on the floor depends on the way they fell.
+    With more Newton steps, or in larger load steps, some of them jump to the floor by themselves, and no snap
+    is told. The floor is smooth: where nodes stuck on it would depend on the way they fell, to 2e-3.
     """
     mesh = strip(4.0, 0.1, (40, 2), 0.4)
-    pair = ContactPair(Surface("strip", "y0"), RigidPlane((0.0, -0.3), (0.0, 1.0)), Coulomb(0.3))
+    pair = ContactPair(Surface("strip", "y0"), RigidPlane((0.0, -0.3), (0.0, 1.0)))
     scene = Scene({"strip": Body(mesh, RUBBER)}, clamped(), contacts=[pair])
 
     def fallen(states: States) -> None:
@@ -103,14 +103,14 @@ def an_arch_that_snaps_onto_a_floor() -> Case:
         assert above.contact.normal_force.max() == 0.0
         assert not above.snaps
         assert below.snaps
-        assert below.contact.count(1) + below.contact.count(2) > 0
+        assert below.contact.normal_force.max() > 0.0
         up = sum(reaction(below, number)[1] for number in (0, 1)) + below.contact.force.sum(axis=0)[1]
         over = mesh.points[mesh.surfaces["y1"]]
         assert abs(up - loads[-1] * np.linalg.norm(over[:, 1] - over[:, 0], axis=1).sum()) < 1e-8 * up
 
     loads = 2e-5 * np.arange(1, 10)
     steps = [LoadStep(f"to {q}", loads=[Traction("strip", "y1", (0.0, -q))]) for q in loads]
-    return Case(scene, steps, checks=fallen, agreement=1e-3, remembers=True, snaps=True)
+    return Case(scene, steps, checks=fallen, remembers=True, snaps=True, most=8)
 
 
 def slotted() -> BodyMesh:
