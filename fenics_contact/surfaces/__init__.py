@@ -36,8 +36,8 @@ from fenics_contact.surfaces.projection import (
     newton_matrix,
     project,
 )
-from fenics_contact.surfaces.reconstruction import tangent_weights
 from fenics_contact.surfaces.relief import corner_normals, edges_at_corners, height_functions, heights, slopes
+from fenics_contact.surfaces.tangents import SurfaceTangents, surface_tangents
 from fenics_contact.surfaces.true_surface import Geometry, height_over, true_surface
 
 __all__ = [
@@ -47,6 +47,7 @@ __all__ = [
     "Projection",
     "Relief",
     "SurfaceMoments",
+    "SurfaceTangents",
     "bearing_pulled_back",
     "bears_on_midpoints",
     "best_projections",
@@ -76,6 +77,6 @@ __all__ = [
     "share_areas",
     "slopes",
     "surface_moments",
-    "tangent_weights",
+    "surface_tangents",
     "true_surface",
 ]

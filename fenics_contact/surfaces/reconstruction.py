@@ -48,7 +48,7 @@ def reconstructed(surface: FacetedSurface, order: int = 2) -> FacetedSurface:
         Nagata, T.: Simple local interpolation of surfaces using normal vectors. Computer Aided Geometric
         Design 22 (2005).
     """
-    wedges = _wedges(surface)
+    wedges = wedges_of(surface)
     normals, bends = _fitted(surface, wedges, order)
     corners = normals[wedges.of_corner] - surface.averaged[surface.facets]
     rest = np.zeros((len(surface.facets), 1 if surface.corners == 2 else surface.corners + 1))
@@ -105,7 +105,7 @@ class _Joints:
 
 
 @dataclass(frozen=True)
-class _Wedges:
+class Wedges:
     """Corners of facets that meet at a node without a crease in between.
 
     Attributes:
@@ -119,7 +119,7 @@ class _Wedges:
     mirrored: np.ndarray
 
 
-def _wedges(surface: FacetedSurface) -> _Wedges:
+def wedges_of(surface: FacetedSurface) -> Wedges:
     """Group the corners of facets."""
     joints, images = _joints(surface), _joints_with_images(surface)
     every = _Joints(
@@ -138,7 +138,7 @@ def _wedges(surface: FacetedSurface) -> _Wedges:
         stop = start + len(image.angle)
         mirrored[wedge[image.corners[smooth[start:stop], 0].ravel()], axis] = True
         start = stop
-    return _Wedges(wedge.reshape(surface.facets.shape), node, mirrored)
+    return Wedges(wedge.reshape(surface.facets.shape), node, mirrored)
 
 
 def _joints_with_images(surface: FacetedSurface) -> list[_Joints]:
@@ -230,7 +230,7 @@ def _crossed(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return (one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])[:, None]
 
 
-def _fitted(surface: FacetedSurface, wedges: _Wedges, order: int) -> tuple[np.ndarray, np.ndarray]:
+def _fitted(surface: FacetedSurface, wedges: Wedges, order: int) -> tuple[np.ndarray, np.ndarray]:
     """Fit polynomials around all wedges.
 
     Returns:
@@ -243,7 +243,7 @@ def _fitted(surface: FacetedSurface, wedges: _Wedges, order: int) -> tuple[np.nd
     np.add.at(summed, wedges.of_corner, corner_products(surface.points, surface.facets))
     summed[mirrored] = 0.0
     mean = summed / np.linalg.norm(summed, axis=1)[:, None]
-    centre, around = _rings(wedges.of_corner, count, order)
+    centre, around = rings_of(wedges.of_corner, count, order)
     away = surface.points[node[around]] - surface.points[node[centre]]
     away, centre = _with_mirror_images(away, centre, mirrored)
     size = np.zeros(count)
@@ -252,7 +252,7 @@ def _fitted(surface: FacetedSurface, wedges: _Wedges, order: int) -> tuple[np.nd
     axes = tangent_bases(mean)
     place = np.einsum("nad,nd->na", axes[centre], away) / size[centre][:, None]
     height = np.einsum("nd,nd->n", mean[centre], away) / size[centre]
-    powers = _powers(dim - 1, order)
+    powers = powers_of(dim - 1, order)
     coefficients = _coefficients(place, height, centre, count, powers)
     slope, bend = coefficients[:, : dim - 1], np.zeros((count, dim - 1, dim - 1))
     for power, coefficient in zip(powers, coefficients.T, strict=True):
@@ -266,14 +266,14 @@ def _fitted(surface: FacetedSurface, wedges: _Wedges, order: int) -> tuple[np.nd
     return normal / np.linalg.norm(normal, axis=1)[:, None], in_space
 
 
-def _powers(dim: int, order: int) -> list[tuple[int, ...]]:
+def powers_of(dim: int, order: int) -> list[tuple[int, ...]]:
     """List the powers of the coordinates in a polynomial without constant, those of degree one first."""
     if dim == 1:
         return [(k,) for k in range(1, order + 1)]
     return [(k - second, second) for k in range(1, order + 1) for second in range(k + 1)]
 
 
-def _rings(wedge: np.ndarray, count: int, rings: int) -> tuple[np.ndarray, np.ndarray]:
+def rings_of(wedge: np.ndarray, count: int, rings: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the wedges within a number of rings of facets around each, as pairs without itself."""
     facet = np.repeat(np.arange(len(wedge)), wedge.shape[1])
     of_facet = sp.csr_matrix((np.ones(wedge.size), (wedge.ravel(), facet)), shape=(count, len(wedge)))
@@ -312,82 +312,3 @@ def _coefficients(
     known = values > UNKNOWN * values[:, -1:]
     inverse = np.where(known, 1.0 / np.where(known, values, 1.0), 0.0)
     return np.asarray(np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, right))
-
-
-def tangent_weights(surface: FacetedSurface, order: int = 2, steepest: float = 0.5) -> sp.csr_matrix:
-    """Return by which weights of the nodes the tangents of a smooth surface differ from the facets' edges.
-
-    Positions themselves are fitted by polynomials over the tangent planes, as heights are in `reconstructed`:
-    the derivative along an edge is then a fixed linear combination of nodes, whatever becomes of them. It
-    gets the length with which Hermite's cubic follows an arc of a circle.
-
-    Args:
-        surface: The surface in its reference configuration.
-        order: Degree of the polynomials.
-        steepest: Cosine of the angle between edge and tangent plane below which the edge stays straight.
-
-    Returns:
-        Shape (n_facets · corners · 2, n_nodes): at every corner along the edges to the next corner and to the
-        one before. Rows sum to zero.
-    """
-    wedges = _wedges(surface)
-    axes, derivatives = _tangent_operators(surface, wedges, order)
-    of_corner, width = wedges.of_corner[:, :, None], surface.dim - 1
-    edges = edges_at_corners(surface.points[surface.facets])
-    along = np.einsum("nkad,nked->nkea", axes[wedges.of_corner], edges)
-    tangents = (derivatives @ surface.points).reshape(len(wedges.node), width, surface.dim)
-    tangent = np.einsum("nkea,nkad->nked", along, tangents[wedges.of_corner])
-    length, chord = np.linalg.norm(tangent, axis=3), np.linalg.norm(edges, axis=3)
-    cosine = np.einsum("nked,nked->nke", tangent, edges) / np.maximum(length * chord, np.finfo(float).tiny)
-    smooth = cosine > steepest
-    scale = np.where(smooth, chord / np.where(smooth, length * (1 + cosine) / 2, 1.0), 0.0)
-    column = width * np.broadcast_to(of_corner[..., None], along.shape) + np.arange(width)
-    row = np.broadcast_to(np.arange(chord.size).reshape(chord.shape)[..., None], along.shape)
-    shape = (chord.size, width * len(wedges.node))
-    spread = sp.csr_matrix(((scale[..., None] * along).ravel(), (row.ravel(), column.ravel())), shape=shape)
-    ends = np.stack([np.roll(surface.facets, -1, axis=1), np.roll(surface.facets, 1, axis=1)], axis=2)
-    starts = np.broadcast_to(surface.facets[:, :, None], ends.shape)
-    at, value = np.arange(chord.size), smooth.ravel().astype(np.float64)
-    entries = (np.concatenate([value, -value]), (np.tile(at, 2), np.concatenate([ends, starts]).ravel()))
-    straight = sp.csr_matrix(entries, shape=(chord.size, len(surface.points)))
-    return (spread @ derivatives - straight).tocsr()
-
-
-def _tangent_operators(
-    surface: FacetedSurface, wedges: _Wedges, order: int, ridge: float = 1e-9
-) -> tuple[np.ndarray, sp.csr_matrix]:
-    """Return axes of the tangent plane of each wedge and the derivatives of positions along them.
-
-    Args:
-        surface: The surface.
-        wedges: Its wedges.
-        order: Degree of the polynomials.
-        ridge: Weight of higher degrees: where nodes are too few, linear functions remain exact.
-
-    Returns:
-        Axes, shape (n_wedges, dim − 1, dim), and weights of the nodes, shape (n_wedges · (dim − 1), n_nodes).
-    """
-    node, count, dim = wedges.node, len(wedges.node), surface.dim
-    summed = np.zeros((count, dim))
-    np.add.at(summed, wedges.of_corner, corner_products(surface.points, surface.facets))
-    axes = tangent_bases(summed / np.linalg.norm(summed, axis=1)[:, None])
-    centre, around = _rings(wedges.of_corner, count, order)
-    away = surface.points[node[around]] - surface.points[node[centre]]
-    size = np.zeros(count)
-    np.maximum.at(size, centre, np.linalg.norm(away, axis=1))
-    place = np.einsum("nad,nd->na", axes[centre], away) / size[centre][:, None]
-    powers = _powers(dim - 1, order)
-    terms = np.column_stack([np.prod(place**power, axis=1) for power in powers])
-    weighted = terms / np.maximum((place**2).sum(axis=1), 1e-12)[:, None]
-    products = (weighted[:, :, None] * terms[:, None]).reshape(len(centre), -1)
-    sums = sp.csr_matrix((np.ones(len(centre)), (centre, np.arange(len(centre)))), shape=(count, len(centre)))
-    matrix = (sums @ products).reshape(count, len(powers), -1)
-    higher = np.array([float(sum(power) > 1) for power in powers])
-    matrix += ridge * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.diag(higher)
-    unit = np.eye(len(powers))[:, : dim - 1]
-    first = np.linalg.solve(matrix, np.broadcast_to(unit, (count, *unit.shape)))
-    value = np.einsum("npa,np->na", first[centre], weighted) / size[centre][:, None]
-    row = ((dim - 1) * centre[:, None] + np.arange(dim - 1)).ravel()
-    ends = (np.repeat(node[around], dim - 1), np.repeat(node[centre], dim - 1))
-    entries = (np.concatenate([value.ravel(), -value.ravel()]), (np.tile(row, 2), np.concatenate(ends)))
-    return axes, sp.csr_matrix(entries, shape=((dim - 1) * count, len(surface.points)))

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 
+from fenics_contact.pairing.sliding.turning_functions import turning_functions
 from fenics_contact.surfaces import facet_shape_values, height_functions
 
 
@@ -15,7 +16,7 @@ class PatchValues:
     """Basis functions at some points.
 
     Attributes:
-        value: Of positions and of tangents at the corners, shape (n, n_functions).
+        value: Of positions and of tangents at the corners, then of turns about edges, shape (n, n_functions).
         first: Derivatives, shape (n, n_functions, dim − 1).
         second: Second derivatives, shape (n, n_functions, dim − 1, dim − 1).
     """
@@ -26,18 +27,33 @@ class PatchValues:
 
 
 def n_functions(corners: int) -> int:
-    """Return the number of functions: one for each corner and two for the edges that meet there."""
-    return 3 * corners
+    """Return the number of functions: for each corner, the edges that meet there, and turns about edges."""
+    return 5 * corners if corners > 2 else 3 * corners
 
 
 def patch_functions(local: np.ndarray, corners: int) -> PatchValues:
-    """Evaluate the functions of patches with 4, 3 or 2 corners.
-
-    Along edges they are Hermite's cubics, over triangles cubic, over quadrilaterals blended bilinearly.
+    """Evaluate the functions of patches with 4, 3 or 2 corners: `edge_functions`, `turning_functions`.
 
     Args:
         local: Local coordinates as for `fenics_contact.surfaces.shape_functions`, shape (n, dim − 1).
         corners: 4, 3 or 2.
+    """
+    edges = edge_functions(local, corners)
+    if corners == 2:
+        return edges
+    before = edges.value, edges.first, edges.second
+    turns = turning_functions(local, corners)
+    return PatchValues(*(np.concatenate(parts, axis=1) for parts in zip(before, turns, strict=True)))
+
+
+def edge_functions(local: np.ndarray, corners: int) -> PatchValues:
+    """Evaluate the functions that make edges: of positions and of tangents at the corners.
+
+    Along edges they are Hermite's cubics, over triangles cubic, over quadrilaterals blended bilinearly.
+
+    Args:
+        local: As for `patch_functions`.
+        corners: As there.
     """
     powers, coefficients = _polynomials(corners)
     width = local.shape[1]

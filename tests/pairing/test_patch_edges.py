@@ -1,0 +1,94 @@
+"""Smooth patches meet in one tangent plane along their edges, whatever becomes of the nodes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fenics_contact.pairing.sliding.closest import patch_points
+from fenics_contact.pairing.sliding.patch_functions import patch_functions
+from fenics_contact.pairing.sliding.patches import SmoothPatches
+from fenics_contact.pairing.sliding.turning_functions import CORNERS, turning_functions
+from tests.pairing.sliding_scenes import on_arch, shaken, sliding
+
+CELLS = ("hexahedron", "tetrahedron")
+#: Places along an edge.
+ALONG = np.array([0.0, 0.01, 0.3, 0.5, 0.8, 1.0])
+
+
+def shaken_patches(kind: str) -> tuple[SmoothPatches, np.ndarray]:
+    """Return the patches of an arch and its nodes out of shape, unevenly."""
+    scene = on_arch(kind)
+    meeting = sliding(scene).meetings[0]
+    assert meeting.patches is not None
+    x = shaken(scene)[meeting.master_nodes]
+    return meeting.patches, x + 0.03 * np.sin(9.0 * x[:, ::-1]) * np.cos(7.0 * x)
+
+
+def shared_edges(patches: SmoothPatches) -> tuple[np.ndarray, np.ndarray]:
+    """Return facets and places of the edges that two facets share, shape (n, 2) each."""
+    ends = np.stack([patches.facets, np.roll(patches.facets, -1, axis=1)], axis=2).reshape(-1, 2)
+    _, edge = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
+    order = np.argsort(edge.ravel(), kind="stable")
+    both = np.flatnonzero(np.diff(edge.ravel()[order]) == 0)
+    pairs = np.stack([order[both], order[both + 1]], axis=1)
+    return np.divmod(pairs, patches.corners)
+
+
+def on_edge(patches: SmoothPatches, place: np.ndarray, t: float) -> np.ndarray:
+    """Return local coordinates at t of edges."""
+    corners = CORNERS[patches.corners]
+    return (1 - t) * corners[place] + t * corners[(place + 1) % patches.corners]
+
+
+def largest_jump(patches: SmoothPatches, x: np.ndarray) -> float:
+    """Return how far normals on both sides of edges are apart, in radians."""
+    (one, other), (here, there) = (each.T for each in shared_edges(patches))
+    assert len(one) > 40
+    coefficients, jump = patches.coefficients(x), 0.0
+    for t in ALONG:
+        a = patch_points(patches, coefficients[one], on_edge(patches, here, t))
+        b = patch_points(patches, coefficients[other], on_edge(patches, there, 1 - t))
+        assert a.place == pytest.approx(b.place, abs=1e-12)
+        jump = max(jump, np.linalg.norm(a.normal - b.normal, axis=1).max())
+    return jump
+
+
+@pytest.mark.parametrize("kind", CELLS)
+def test_normals_agree_on_both_sides_of_edges_out_of_shape(kind: str) -> None:
+    patches, x = shaken_patches(kind)
+    assert largest_jump(patches, x) < 1e-11
+    size = 5 * patches.corners
+    edges_alone = np.arange(patches.control.shape[0]) % size < 3 * patches.corners
+    without = patches.control.multiply(edges_alone[:, None]).tocsr()
+    assert largest_jump(replace(patches, control=without), x) > 0.01
+
+
+@pytest.mark.parametrize("corners", [3, 4])
+def test_a_turning_function_turns_its_own_edge_alone(corners: int) -> None:
+    place, t = CORNERS[corners], np.linspace(0.0, 1.0, 7)
+    wanted = np.stack([3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t)], axis=1)
+    for edge in range(corners):
+        after, across = np.roll(place, -1, axis=0)[edge], np.roll(place, 1, axis=0)[edge] - place[edge]
+        local = (1 - t[:, None]) * place[edge] + t[:, None] * after
+        value, first, _ = turning_functions(local, corners)
+        assert np.abs(value).max() < 1e-14
+        turn = np.einsum("nka,a->nk", first, across)
+        assert turn[:, 2 * edge : 2 * edge + 2] == pytest.approx(wanted, abs=1e-13)
+        assert np.abs(np.delete(turn, [2 * edge, 2 * edge + 1], axis=1)).max() < 1e-13
+
+
+@pytest.mark.parametrize("corners", [3, 4])
+def test_derivatives_of_patch_functions_are_those_of_difference_quotients(corners: int) -> None:
+    local = np.random.default_rng(3).uniform(0.1, 0.4, (6, 2)) - (0.9 if corners == 4 else 0.0)
+    step, at = 1e-6, patch_functions(local, corners)
+    for axis in range(2):
+        ahead, behind = (patch_functions(local + s * step * np.eye(2)[axis], corners) for s in (1, -1))
+        value, first = (
+            (f - g) / (2 * step) for f, g in ((ahead.value, behind.value), (ahead.first, behind.first))
+        )
+        assert at.first[:, :, axis] == pytest.approx(value, abs=1e-8)
+        assert at.second[:, :, :, axis] == pytest.approx(first, abs=1e-8)
+    assert np.abs(at.second[:, 3 * corners :]).max() > 0.1
