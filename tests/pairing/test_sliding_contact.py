@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.pairing import find_contact_points, movable, sliding_contact
@@ -281,6 +282,30 @@ def test_roles_stay_where_a_surface_met_itself_before() -> None:
     assert np.ptp(np.sign(scene.points[beside.points.slave, 1])) == 0.0
     master = np.abs(beside.points.master[:, beside.points.slave]).max()
     assert master == 0.0
+
+
+def test_a_node_is_no_slave_where_it_is_the_master_of_one() -> None:
+    # Three slaves of the roof on the left, more of the floor on the right, whose ways count.
+    scene = ring("quadrilateral", ("inner", "inner"))
+    meeting, flat = sliding(scene).meetings[0], scene.points * [1.2, 0.2]
+    none = np.full(len(meeting.candidates), -1), np.zeros((len(meeting.candidates), 1))
+    both = replace(meeting, roles=None).closest(flat, none, none[0] >= 0, np.inf, MPI.COMM_SELF)
+    x, y = scene.points[meeting.nodes[both.point]].T
+    left = (y > 0.0) & (x < -0.3) & (x > -0.6)
+    right = (y < 0.0) & (x > 0.2)
+    assert 1 < np.count_nonzero(left) < np.count_nonzero(right)
+    last = none[0].copy()
+    last[both.point[left | right]] = both.facet[left | right]
+    roles = meeting.roles
+    assert roles is not None
+    slaves = roles.are_slaves(both, last)
+    below = (y < 0.0) & (x < -0.3) & (x > -0.6)
+    assert slaves[left | right].all()
+    assert np.count_nonzero(below) > 1
+    assert not slaves[below].any()
+    beside = (y < 0.0) & (x > 0.0) & (x < 0.2)
+    assert np.count_nonzero(beside) > 0
+    assert slaves[beside].all()
 
 
 def on_obstacle(obstacle: RigidPlane | RigidCylinder | MovingObstacle) -> Scene:
