@@ -96,11 +96,11 @@ def posed(seed: int, *, convex: bool) -> Problem:
     return Problem(objective, limits, [surface] * (seed % 3 == 0), start, 10.0 ** rng.uniform(-3.0, 3.0))
 
 
-def checked(problem: Problem) -> Result:
+def checked(problem: Problem, most: int = 300) -> Result:
     result = problem.minimised()
     assert result.reason.success
     assert result.violation <= 1e-6
-    assert result.evaluations < 300
+    assert result.evaluations < most
     return result
 
 
@@ -117,7 +117,9 @@ def test_minima_of_convex_functions_are_those_of_quadratic_programming(seed: int
 @pytest.mark.parametrize("seed", range(16))
 def test_quadratic_programming_finds_nothing_lower_near_minima_of_nonconvex_functions(seed: int) -> None:
     problem = posed(seed, convex=False)
-    result = checked(problem)
+    # Rounding decides how such a walk goes: one takes less than 300 evaluations on one processor, 579 on
+    # another.
+    result = checked(problem, most=800)
     value, least = result.value / problem.size, problem.programmed(result.x)
     assert value - least < 2e-4 * (1 + abs(least))
     violated = [max(0.0, float(one.values(problem.start).max())) for one in problem.limits]
