@@ -81,7 +81,8 @@ def assert_holds(found: Violations, tolerance: float, amplification: float) -> N
     assert found.cone <= tolerance, found
     assert found.gluing <= 10 * tolerance, found
     assert found.balance <= 10 * tolerance, found
-    assert found.imbalance <= 1e-12, found
+    # Rounding of sums, in which stiff parts beside soft ones weigh as much more as in the nodes' balance.
+    assert found.imbalance <= max(1e-12, 1e-15 * amplification), found
     nodal = found.nodal, found.reaction
     for value in (*nodal, found.penetration, found.complementarity, found.friction):
         assert value <= amplification * tolerance, found
