@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact.errors import tell
+from fenics_contact.scene import rigid_body_modes
 
 if TYPE_CHECKING:
     from fenics_contact.contact.deformed_state import DeformedState
@@ -38,11 +39,7 @@ def mean_rotation(points: np.ndarray, displacement: np.ndarray) -> float:
         points: Shape (n, dim), [length].
         displacement: Shape (n, dim), [length].
     """
-    arms, moved = (each - each.mean(axis=0) for each in (points, displacement))
-    spins = arms.T @ moved - moved.T @ arms  # twice the antisymmetric part of the moments
-    moments = arms.T @ arms
-    total = np.trace(moments)
-    if points.shape[1] == 2:
-        return float(abs(spins[0, 1]) / total)
-    axial = np.array([spins[1, 2], spins[2, 0], spins[0, 1]])
-    return float(np.linalg.norm(np.linalg.lstsq(total * np.eye(3) - moments, axial, rcond=None)[0]))
+    dim, size = points.shape[1], np.abs(points - points.mean(axis=0)).max()
+    modes = rigid_body_modes(points / size).reshape(displacement.size, -1)
+    motion = np.linalg.lstsq(modes, (displacement / size).ravel(), rcond=None)[0]
+    return float(np.linalg.norm(motion[dim:]))

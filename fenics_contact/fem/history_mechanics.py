@@ -74,14 +74,14 @@ class HistoryMechanics:
                 continue
             shape, size = (len(cells), gradient.shape[1]), material.history_size
             means = self._gauss.mean_strain(cells) if has_mean_dilatation(material) else None
-            given = gradient[cells] if means is None else means.gradient(gradient[cells])
+            given = gradient[cells] if means is None else means.averaged(gradient[cells])
             end = material.answer(
                 given.reshape(-1, 3, 3), before[cells, :, :size].reshape(-1, size), duration
             )
             after[cells, :, :size] = end.history.reshape(*shape, size)
             nominal = end.stress.reshape(*shape, 3, 3)
             stress[cells] = cauchy(nominal, gradient[cells]) if material.finite else nominal
-            force += self._gauss.force(nominal if means is None else means.stress(nominal), cells)
+            force += self._gauss.force(nominal if means is None else means.averaged(nominal), cells)
             entries += self._gauss.stiffness(end.tangent.reshape(*shape, 3, 3, 3, 3), cells, means)
         rest = None if self._others is None else self._others.at(displacement, origin=origin)
         return Response(

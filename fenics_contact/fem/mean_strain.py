@@ -27,13 +27,15 @@ class MeanStrain:
         self._gradients, self._weights = gradients, weights
         self._shares = weights / weights.sum(axis=1, keepdims=True)
 
-    def gradient(self, gradient: np.ndarray) -> np.ndarray:
-        """Return H̄, shape (n_cells, n_gauss, 3, 3)."""
-        return self._averaged(gradient)
+    def averaged(self, tensors: np.ndarray) -> np.ndarray:
+        """Return H̄ of H; of the stress on H̄ that which does the same work on H.
 
-    def stress(self, stress: np.ndarray) -> np.ndarray:
-        """Return the stress whose work on H is that of the given one on H̄, shape (n_cells, n_gauss, 3, 3)."""
-        return self._averaged(stress)
+        Args:
+            tensors: H, or the stress, shape (n_cells, n_gauss, 3, 3).
+        """
+        trace = np.einsum("cqii->cq", tensors)
+        apart = (self._shares * trace).sum(axis=1, keepdims=True) - trace
+        return np.asarray(tensors + apart[..., None, None] * np.eye(3) / 3.0)
 
     def blocks(self, tangent: np.ndarray) -> np.ndarray:
         """Return what ∫ ∇v̄ : A : ∇ū has beside ∫ ∇v : A : ∇u, shape (n_cells, dim nodes, dim nodes).
@@ -52,8 +54,3 @@ class MeanStrain:
         w = self._weights[..., None]
         outer = (w * left).swapaxes(1, 2) @ apart
         return np.asarray(outer + (w * apart).swapaxes(1, 2) @ right)
-
-    def _averaged(self, tensors: np.ndarray) -> np.ndarray:
-        trace = np.einsum("cqii->cq", tensors)
-        apart = (self._shares * trace).sum(axis=1, keepdims=True) - trace
-        return np.asarray(tensors + apart[..., None, None] * np.eye(3) / 3.0)

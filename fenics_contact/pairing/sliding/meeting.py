@@ -163,21 +163,15 @@ def _within_body(meeting: Meeting, master: FacetedSurface, facets: float = 3.0) 
     behind = np.einsum("nd,nd->n", centres[column] - place[row], normals) < 0.0
     shape = len(place), len(centres)
     behind_it = sp.csr_matrix((np.ones(behind.sum()), (row[behind], column[behind])), shape=shape)
-    touched = _carried(meeting.patches, meeting.slave_nodes, meeting.master_nodes)[:, meeting.candidates]
+    carried = meeting.patches.control.tocoo()
+    facet = carried.row // (meeting.patches.control.shape[0] // len(centres))
+    own = sp.csr_matrix(
+        (np.ones(len(facet)), (facet, meeting.master_nodes[carried.col])),
+        shape=(len(centres), int(max(meeting.slave_nodes.max(), meeting.master_nodes.max())) + 1),
+    )
+    touched = own[:, meeting.nodes]
     apart = ((behind_it + touched.T) > 0).tocsr()
     roles = None
     if np.array_equal(meeting.slave_nodes, meeting.master_nodes):
         roles = Roles(meeting.patches, master.points, meeting.candidates, touched)
     return replace(meeting, apart=apart, reach=reach, roles=roles)
-
-
-def _carried(patches: SmoothPatches, slave_nodes: np.ndarray, master_nodes: np.ndarray) -> sp.csr_matrix:
-    """Return which nodes of the slave move each patch of the master, shape (n_facets, n_slave)."""
-    weights = patches.control.tocoo()
-    facet = weights.row // (patches.control.shape[0] // len(patches.facets))
-    _, slave, master = np.intersect1d(slave_nodes, master_nodes, return_indices=True)
-    place = np.full(len(master_nodes), -1)
-    place[master] = slave
-    known = place[weights.col] >= 0
-    entries = np.ones(known.sum()), (facet[known], place[weights.col[known]])
-    return sp.csr_matrix(entries, shape=(len(patches.facets), len(slave_nodes)))
