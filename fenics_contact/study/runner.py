@@ -78,8 +78,14 @@ def measure(job: Job, *, first: bool = True) -> Record:
         words = json.dumps({"function": job.function, "arguments": arguments, "file": str(file)})
         program = PROGRAM if job.ranks else WITHOUT_MPI
         command = [*launcher(max(1, job.ranks)), sys.executable, "-c", program, words]
-        ending = finished(command, job.limit, environment=_environment(job.threads))
+        environment = _environment(job.threads)
+        ending = finished(command, job.limit, environment=environment)
         record = _read(file)
+        if record is None and ending.status and not ending.output + ending.errors:
+            # The start of MPI itself ends so, rarely; what a run raises is always printed.
+            logger.warning("%s ended with status %d, without a word: once more", job.name, ending.status)
+            ending = finished(command, job.limit, environment=environment)
+            record = _read(file)
     if not isinstance(record, dict):
         record = {"failed": _failure(command, ending, job.limit)}
     return {**record, "load_average": load}

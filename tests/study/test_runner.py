@@ -64,6 +64,30 @@ def test_a_launcher_that_says_nothing_is_told_with_its_command(monkeypatch: pyte
     assert "`false 2 " in message
 
 
+@pytest.mark.parametrize(("words", "starts"), [("", 2), ("out of memory", 1)])
+def test_only_a_process_that_ends_without_a_word_is_started_once_more(
+    words: str,
+    starts: int,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    tmp_path: Path,
+) -> None:
+    count = tmp_path / "count"
+    code = (
+        "import json, sys; from pathlib import Path\n"
+        f"count = Path({str(count)!r}); starts = count.read_text() + '.' if count.exists() else '.'\n"
+        f"count.write_text(starts)\n"
+        f"if len(starts) == 1: print({words!r}, end=''); sys.exit(1)\n"
+        "Path(json.loads(sys.argv[1])['file']).write_text('{\"seconds\": 2.0}')"
+    )
+    monkeypatch.setattr(runner, "PROGRAM", code)
+    with caplog.at_level(logging.WARNING):
+        record = measure(JOB)
+    assert len(count.read_text()) == starts
+    assert record.get("seconds") == (2.0 if starts == 2 else None)
+    assert ("nothing ended with status 1, without a word: once more" in caplog.text) == (starts == 2)
+
+
 def test_a_function_is_called_with_its_arguments_and_its_memory_is_told(tmp_path: Path) -> None:
     code = "def known(comm, size, more=0):\n    return {'counts': {'ranks': comm.size, 'n': size + more}}\n"
     (tmp_path / "a_case.py").write_text(code)
