@@ -98,7 +98,7 @@ def oblique_view(points: np.ndarray) -> View:
     """
     extent = np.ptp(points, axis=0)
     front = np.array([-0.30, -1.0, 0.72])
-    if extent[1] > extent[0]:
+    if extent[1] > 1.01 * extent[0]:  # what is as long as wide is seen alike, however its points are rounded
         return looking_along(np.array([1.0, -0.30, 0.72]), np.array([0.0, 1.0, 0.0]))
     return looking_along(front, np.array([1.0, 0.0, 0.0]))
 

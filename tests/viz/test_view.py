@@ -30,6 +30,12 @@ def test_the_longest_horizontal_direction_is_horizontal_in_the_picture() -> None
         assert shown[2, 1] > 0.5, "z points up"
 
 
+def test_what_is_as_long_as_wide_is_seen_alike_whatever_its_rounding() -> None:
+    square = np.array([[0.0, 0.0, 0.0], [4.0, 4.0, 3.0]])
+    rounded = square + np.outer([0.0, 1e-7], [0.0, 1.0, 0.0])
+    np.testing.assert_allclose(oblique_view(rounded).right, oblique_view(square).right, atol=1e-14)
+
+
 def test_frame_holds_all_points_and_its_margin() -> None:
     points = box(4.0, 2.0, 3.0)
     view = oblique_view(points)
