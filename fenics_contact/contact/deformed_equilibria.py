@@ -38,7 +38,7 @@ from fenics_contact.nonlinear import (
     TurnedSurface,
 )
 from fenics_contact.qp import DualSolution, Vector
-from fenics_contact.scene import HistoryMaterial, LoadStep, RigidSurface, Scene
+from fenics_contact.scene import ContactPair, HistoryMaterial, LoadStep, RigidSurface, Scene, Surface
 from fenics_contact.timing import PhaseTimer
 
 if TYPE_CHECKING:
@@ -127,7 +127,8 @@ class DeformedEquilibria:
         except PathEndsError as failure:
             last = None if failure.path is None else _state_after(failure.path, origin, timer)
             where = "" if step is None else f"load step {step.name!r}: "
-            raise LoadStepError(f"{where}{failure}", failure.history, last) from failure
+            advice = _advice_on_contact(scene)
+            raise LoadStepError(f"{where}{failure}{advice}", failure.history, last) from failure
         state = _state_after(path, origin, timer)
         tell_of_turned_bodies(state)
         return state
@@ -194,6 +195,23 @@ class _Course:
         with together(self._comm):
             scene = self._step.at(self._scene, time)
         return self._loading(scene, time)
+
+
+def _advice_on_contact(scene: Scene) -> str:
+    """Return words on surfaces that meet by nodes and could meet by mortar, empty if there are none.
+
+    Slave nodes rest in hollows between nodes of the master; where they leave them together, as two bodies
+    that are pressed in perfect symmetry, no equilibrium may be near that mortar has.
+    """
+
+    def by_nodes(pair: ContactPair) -> bool:
+        if pair.discretisation == "mortar" or pair.within_body or not isinstance(pair.master, Surface):
+            return False
+        return all(scene.bodies[side.body].mesh.order == 1 for side in (pair.slave, pair.master))
+
+    if not any(map(by_nodes, scene.contacts)):
+        return ""
+    return "; surfaces of bodies meet more smoothly with discretisation='mortar' than by nodes"
 
 
 def _state_after(

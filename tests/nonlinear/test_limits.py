@@ -19,6 +19,7 @@ from fenics_contact.scene import (
     Body,
     ContactPair,
     Coulomb,
+    Discretisation,
     Elasticity,
     IsotropicElasticity,
     LoadStep,
@@ -154,3 +155,15 @@ def test_a_body_that_may_slide_freely_is_told_to_be_held(friction: Coulomb | Non
         return
     with pytest.raises(LoadStepError, match="turns freely a support in that direction, or its contacts fric"):
         solve_scene(scene, MPI.COMM_SELF, steps=steps)
+
+
+@pytest.mark.parametrize(("way", "told"), [("node", True), ("mortar", False)])
+def test_a_path_by_nodes_that_ends_is_told_of_mortar(way: Discretisation, told: bool) -> None:
+    bodies = {"low": Body(rectangle((0, 0), (1, 1), (3, 3)), RUBBER)}
+    bodies["high"] = Body(rectangle((0, 1), (1, 2), (4, 4)), RUBBER)
+    supports = [Support("low", "y0"), Support("high", "y1", (0.0, -0.3))]
+    pair = ContactPair(Surface("high", "y0"), Surface("low", "y1"), discretisation=way)
+    steps = AutomaticSteps(TangentNewton(max_steps=1), smallest=1.0)
+    with pytest.raises(LoadStepError) as ended:
+        solve_scene(Scene(bodies, supports, contacts=[pair]), MPI.COMM_SELF, steps=steps)
+    assert ("discretisation='mortar'" in str(ended.value)) == told
