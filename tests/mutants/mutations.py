@@ -279,4 +279,62 @@ MUTATIONS = (
             "tests/shape/test_chain_sensitivity.py::test_the_adjoint_agrees_with_central_differences",
         ),
     ),
+    Mutation(
+        "pressures that follow are three percent softer than their forces say",
+        "nonlinear/loading.py",
+        "blocks[number] = blocks[number] + softening",
+        "blocks[number] = blocks[number] + 0.97 * softening",
+        (
+            "tests/nonlinear/test_following_pressure.py::test_newton_is_quadratic_where_rims_slide_in_planes_of"
+            "_symmetry_and_neighbours_pass_forces_on",
+        ),
+    ),
+    Mutation(
+        "surfaces that slide have no curvature",
+        "pairing/sliding/contact.py",
+        'bend = np.einsum("nabd,nd->nab", at.second, at.normal)',
+        'bend = 0.0 * np.einsum("nabd,nd->nab", at.second, at.normal)',
+        ("tests/pairing/test_sliding_derivatives.py::test_stiffness_is_the_derivative_of_the_normal_forces",),
+    ),
+    Mutation(
+        "directions of friction do not turn with normals",
+        "pairing/sliding/differential.py",
+        "other = np.cross(change, unit) + np.cross(normal[:, None], turned)",
+        "other = np.cross(change, unit)",
+        (
+            "tests/pairing/test_sliding_derivatives.py::test_friction_stiffness_is_the_derivative_of_the_friction"
+            "_forces",
+        ),
+    ),
+    Mutation(
+        "nodes of a fold are slaves that are masters already",
+        "pairing/sliding/roles.py",
+        "& ~self._are_masters(found, last)",
+        "& (found.point >= 0)",
+        ("tests/pairing/test_sliding_contact.py::test_a_node_is_no_slave_where_it_is_the_master_of_one",),
+    ),
+    Mutation(
+        "the tangent of plastic flow forgets that its direction turns",
+        "scene/materials/return_mapping.py",
+        "slope) - 1 + theta, 0.0)",
+        "slope), 0.0)",
+        (
+            "tests/scene/test_plasticity.py::test_the_tangent_is_that_of_the_stress_when_loading_unloading_and"
+            "_reversing",
+        ),
+    ),
+    Mutation(
+        "kinematic hardening is too weak by a percent",
+        "scene/materials/j2_plasticity.py",
+        "back = 2 / 3 * self.kinematic_hardening * plastic",
+        "back = 0.66 * self.kinematic_hardening * plastic",
+        ("tests/scene/test_plasticity.py::test_kinematic_hardening_yields_earlier_in_the_other_direction",),
+    ),
+    Mutation(
+        "points of a metal feel half of their own change of volume",
+        "fem/mean_strain.py",
+        "return np.asarray(tensors + apart[..., None, None] * np.eye(3) / 3.0)",
+        "return np.asarray(tensors + 0.5 * apart[..., None, None] * np.eye(3) / 3.0)",
+        ("tests/models/test_history_mechanics.py::test_points_of_a_cell_feel_its_mean_change_of_volume",),
+    ),
 )

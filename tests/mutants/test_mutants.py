@@ -46,6 +46,7 @@ def test_the_tests_that_shall_find_a_mistake_are_quick_ones_that_exist() -> None
 
 
 @pytest.mark.slow
+@pytest.mark.claim
 def test_the_tests_pass_without_a_mistake(copy: Copy) -> None:
     killers = sorted({killer for mutation in MUTATIONS for killer in mutation.killers})
     found = copy.run(["-m", "not slow and not hard", *killers])
@@ -53,6 +54,7 @@ def test_the_tests_pass_without_a_mistake(copy: Copy) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.claim
 def test_a_mistake_that_is_none_survives(copy: Copy) -> None:
     harmless = Mutation(
         "none", "errors/kinds.py", "Base of every error", "The base of every error", MUTATIONS[0].killers
@@ -62,6 +64,7 @@ def test_a_mistake_that_is_none_survives(copy: Copy) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.claim
 @pytest.mark.parametrize("mutation", MUTATIONS, ids=lambda mutation: mutation.mistake)
 def test_the_quick_tests_find(mutation: Mutation, copy: Copy) -> None:
     with copy.mutated(mutation):

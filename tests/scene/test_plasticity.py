@@ -95,15 +95,16 @@ def test_large_tension_follows_the_law_in_logarithmic_strain() -> None:
 def test_kinematic_hardening_yields_earlier_in_the_other_direction() -> None:
     path = np.concatenate([np.linspace(0, 0.01, 11)[1:], np.linspace(0.01, -0.01, 201)[1:]])
 
-    def yields_back_at(material: J2Plasticity) -> tuple[float, float]:
+    def yields_back_at(material: J2Plasticity) -> tuple[float, float, float]:
         stress, history = in_tension(material, path)
         flows = np.flatnonzero(np.diff(history[9:, 6]) > 1e-12)
-        return stress[9], stress[9 + flows[0]]
+        return stress[9], stress[9 + flows[0]], stress[-1]
 
-    peak, back = yields_back_at(J2Plasticity(E, NU, YIELD, kinematic_hardening=1e4))
+    peak, back, last = yields_back_at(J2Plasticity(E, NU, YIELD, kinematic_hardening=1e4))
     assert peak > YIELD + 80
     assert back == pytest.approx(peak - 2 * YIELD, abs=20.0)  # a step
-    peak, back = yields_back_at(J2Plasticity(E, NU, YIELD, isotropic_hardening=1e4))
+    assert last == pytest.approx((1e4 * path[-1] - YIELD) / (1 + 1e4 / E), rel=1e-10)
+    peak, back, _ = yields_back_at(J2Plasticity(E, NU, YIELD, isotropic_hardening=1e4))
     assert back == pytest.approx(-peak, abs=20.0)  # a step
 
 

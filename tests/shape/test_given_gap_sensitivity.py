@@ -20,9 +20,6 @@ from tests.shape.moved_blocks import DRAG, PUSH
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Line, check_adjoint, check_statuses
 
-#: Many states: what claims rest on.
-pytestmark = [pytest.mark.slow, pytest.mark.claim]
-
 
 def bowl(points: np.ndarray) -> np.ndarray:
     """A gap that is small in the middle."""
