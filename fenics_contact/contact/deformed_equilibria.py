@@ -127,7 +127,7 @@ class DeformedEquilibria:
         except PathEndsError as failure:
             last = None if failure.path is None else _state_after(failure.path, origin, timer)
             where = "" if step is None else f"load step {step.name!r}: "
-            advice = _advice_on_contact(scene)
+            advice = _advice_on_contact(scene) if isinstance(self._contact, MovingContact) else ""
             raise LoadStepError(f"{where}{failure}{advice}", failure.history, last) from failure
         state = _state_after(path, origin, timer)
         tell_of_turned_bodies(state)
@@ -198,7 +198,7 @@ class _Course:
 
 
 def _advice_on_contact(scene: Scene) -> str:
-    """Return words on surfaces that meet by nodes and could meet by mortar, empty if there are none.
+    """Return words on surfaces that slide by nodes and could by mortar, empty if there are none.
 
     Slave nodes rest in hollows between nodes of the master; where they leave them together, as two bodies
     that are pressed in perfect symmetry, no equilibrium may be near that mortar has.

@@ -81,8 +81,9 @@ def measure(job: Job, *, first: bool = True) -> Record:
         environment = _environment(job.threads)
         ending = finished(command, job.limit, environment=environment)
         record = _read(file)
-        if record is None and ending.status and not ending.output + ending.errors:
-            # The start of MPI itself ends so, rarely; what a run raises is always printed.
+        if record is None and (ending.status or 0) > 0 and not ending.output + ending.errors:
+            # The start of MPI itself ends so, rarely; what a run raises is always printed. A signal, as for
+            # want of memory, has a negative status and would end the run again.
             logger.warning("%s ended with status %d, without a word: once more", job.name, ending.status)
             ending = finished(command, job.limit, environment=environment)
             record = _read(file)

@@ -22,7 +22,9 @@ from fenics_contact.scene import (
     Discretisation,
     Elasticity,
     IsotropicElasticity,
+    J2Plasticity,
     LoadStep,
+    Material,
     NeoHooke,
     PlaneStrain,
     RigidPlane,
@@ -157,10 +159,15 @@ def test_a_body_that_may_slide_freely_is_told_to_be_held(friction: Coulomb | Non
         solve_scene(scene, MPI.COMM_SELF, steps=steps)
 
 
-@pytest.mark.parametrize(("way", "told"), [("node", True), ("mortar", False)])
-def test_a_path_by_nodes_that_ends_is_told_of_mortar(way: Discretisation, told: bool) -> None:
-    bodies = {"low": Body(rectangle((0, 0), (1, 1), (3, 3)), RUBBER)}
-    bodies["high"] = Body(rectangle((0, 1), (1, 2), (4, 4)), RUBBER)
+@pytest.mark.parametrize(
+    ("material", "way", "told"),
+    [(RUBBER, "node", True), (RUBBER, "mortar", False), (J2Plasticity(1.0, 0.3, 0.01), "node", False)],
+)
+def test_a_path_by_nodes_of_bodies_that_slide_is_told_of_mortar(
+    material: Material, way: Discretisation, told: bool
+) -> None:
+    bodies = {"low": Body(rectangle((0, 0), (1, 1), (3, 3)), material)}
+    bodies["high"] = Body(rectangle((0, 1), (1, 2), (4, 4)), material)
     supports = [Support("low", "y0"), Support("high", "y1", (0.0, -0.3))]
     pair = ContactPair(Surface("high", "y0"), Surface("low", "y1"), discretisation=way)
     steps = AutomaticSteps(TangentNewton(max_steps=1), smallest=1.0)

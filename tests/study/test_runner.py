@@ -64,9 +64,12 @@ def test_a_launcher_that_says_nothing_is_told_with_its_command(monkeypatch: pyte
     assert "`false 2 " in message
 
 
-@pytest.mark.parametrize(("words", "starts"), [("", 2), ("out of memory", 1)])
-def test_only_a_process_that_ends_without_a_word_is_started_once_more(
-    words: str,
+@pytest.mark.parametrize(
+    ("last", "starts"),
+    [("sys.exit(1)", 2), ("sys.exit('out of memory')", 1), ("os.kill(os.getpid(), 9)", 1)],
+)
+def test_only_a_process_that_ends_by_itself_without_a_word_is_started_once_more(
+    last: str,
     starts: int,
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
@@ -74,10 +77,10 @@ def test_only_a_process_that_ends_without_a_word_is_started_once_more(
 ) -> None:
     count = tmp_path / "count"
     code = (
-        "import json, sys; from pathlib import Path\n"
+        "import json, os, sys; from pathlib import Path\n"
         f"count = Path({str(count)!r}); starts = count.read_text() + '.' if count.exists() else '.'\n"
-        f"count.write_text(starts)\n"
-        f"if len(starts) == 1: print({words!r}, end=''); sys.exit(1)\n"
+        "count.write_text(starts)\n"
+        f"if len(starts) == 1: {last}\n"
         "Path(json.loads(sys.argv[1])['file']).write_text('{\"seconds\": 2.0}')"
     )
     monkeypatch.setattr(runner, "PROGRAM", code)
