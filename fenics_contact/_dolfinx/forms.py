@@ -10,6 +10,7 @@ from ufl.algorithms import expand_derivatives
 from ufl.algorithms.analysis import extract_type
 from ufl.differentiation import CoefficientDerivative
 
+from fenics_contact._dolfinx.cache import compiled_once
 from fenics_contact._dolfinx.loading import cpp, dolfinx, old, side_effects_undone
 from fenics_contact._dolfinx.numbering import cell_count, table
 from fenics_contact._libraries import MPI
@@ -26,7 +27,7 @@ class CompiledForm:
     def __init__(self, comm: MPI.Comm, form: ufl.Form) -> None:
         """Compile ``form``. Collective on ``comm``: one rank compiles, the others read its cache."""
         self.form = _expanded(form)
-        with Task("compile forms"), side_effects_undone():
+        with Task("compile forms"), side_effects_undone(), compiled_once():
             build = dolfinx.jit.ffcx_jit if old() else dolfinx.fem.compile_form
             self._compiled = build(comm, self.form, {}, {})
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import ufl
 
+from fenics_contact._dolfinx.cache import compiled_once
 from fenics_contact._dolfinx.cells import NODE_ORDER, cell_type_named, facet_vertices
 from fenics_contact._dolfinx.loading import cpp, dolfinx, old, side_effects_undone
 from fenics_contact._dolfinx.templates import cellwise_element, scalar_element, vector_element
@@ -13,7 +14,7 @@ from fenics_contact._dolfinx.templates import cellwise_element, scalar_element, 
 def _space(
     mesh: dolfinx.mesh.Mesh, element: ufl.finiteelement.AbstractFiniteElement
 ) -> dolfinx.fem.FunctionSpace:
-    with side_effects_undone():  # the element is compiled
+    with side_effects_undone(), compiled_once():  # the element is compiled
         return dolfinx.fem.FunctionSpace(mesh, element) if old() else dolfinx.fem.functionspace(mesh, element)
 
 

@@ -138,7 +138,8 @@ class Templates:
         except Exception as error:  # on all ranks
             raise InvalidInputError(
                 f"{what} must be UFL that compiles, got {type(error).__name__}: {error}: check quotients, "
-                "roots and logarithms in it, also at rest (F = I), and that the C compiler works"
+                "roots and logarithms in it, also at rest (F = I), that the C compiler works, and that the "
+                "directory of compiled forms, $XDG_CACHE_HOME/fenics or ~/.cache/fenics, can be written"
             ) from error
 
 
