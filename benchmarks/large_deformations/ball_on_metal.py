@@ -78,7 +78,7 @@ def graded(cells: int, order: int) -> BodyMesh:
 def measured(comm: MPI.Comm, cells: int, order: int, means: bool = False) -> dict[str, Any]:
     """Return the force of the whole ball on one mesh; arguments as for `graded` and `pressed`.
 
-    The load comes at once, as published: in parts the metal flows along another way.
+    The load comes at once, as published: in several load steps the metal flows along another way.
     """
     scene = pressed(graded(cells, order), means)
     began = perf_counter()

@@ -159,7 +159,8 @@ class DeformedEquilibria:
         fractions = tuple(map(float, stored["parts"]))
         rows = stored.get("snaps", ())
         snaps = tuple(Snap(fraction, way, work, int(stages)) for fraction, way, work, stages in rows)
-        path = Path(whole, end, None, None, fractions, snaps, (), 0, 1)
+        since = float(stored.get("since", 0.0))
+        path = Path(whole, end, None, None, fractions, since, snaps, (), 0, 1)
         return _state_after(path, None, timer, stored.get("slip"))
 
     def _require_later(self, scene: Scene, before: float, time: float) -> None:
@@ -253,7 +254,7 @@ def _state_after(
         energies = _energies(evaluation, contact)
     return DeformedState(
         system, solution, at.displacement, contact, energies, dict(timer.seconds), equilibrium=end,
-        load=path.load, begun=path.begun, fractions=path.fractions, snaps=path.snaps,
+        load=path.load, begun=path.begun, fractions=path.fractions, since=path.since, snaps=path.snaps,
         factorisations=path.factorisations,
     )  # fmt: skip
 

@@ -39,6 +39,8 @@ class DeformedState(State):
         load: What acts.
         begun: Where bodies met at the start of the load step; None where a checkpoint was read.
         fractions: Parts of the last load step at which equilibria were found.
+        since: The part from which slip and the histories of materials are one step up to the end: 0, unless
+            `AutomaticSteps.finer_history` made each part a step of its own, or bodies snapped.
         snaps: Where bodies snapped within it.
         factorisations: Factored tangents of the last load step, counting all subdomains as one.
     """
@@ -47,6 +49,7 @@ class DeformedState(State):
     load: Loading = field(kw_only=True)
     begun: Meeting | None = field(kw_only=True)
     fractions: tuple[float, ...] = field(kw_only=True)
+    since: float = field(kw_only=True)
     snaps: tuple[Snap, ...] = field(kw_only=True)
     factorisations: int = field(kw_only=True)
 
@@ -54,8 +57,9 @@ class DeformedState(State):
         facts = super()._facts()
         residuals = self.dual_solution.residuals
         up_to = "" if self.reached == 1.0 else f", up to {self.reached:.3g}"
+        anew = "" if self.since == 0.0 else f"; slip and histories begin anew at {self.since:.3g}"
         further = {
-            "parts": f"{len(self.fractions)}{up_to} of the load step",
+            "parts": f"{len(self.fractions)}{up_to} of the load step{anew}",
             "residuals": f"{facts['residuals']}, out of balance {residuals.coarse:.1e}",
             "snaps": "; ".join(map(str, self.snaps)) or "nan",
             "errors": "not estimated where materials are nonlinear: compare two meshes",

@@ -24,8 +24,8 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
 
     Returns:
         ``displacement`` of all copies of the nodes, shape (n_copies, dim), ``multiplier`` λ of all rows, the
-        ``history`` of materials of each body, with the time and the largest displacement, before the last
-        part of the load step, and the ``parts`` and ``snaps``; of moved bodies the facets on which nodes
+        ``history`` of materials of each body, with the time and the largest displacement, before the step of
+        histories, and the ``parts`` and ``snaps``; of moved bodies the facets on which nodes
         stand, where they stood, and the slip; else ``origin`` and ``slid``, from which slip is measured. All
         replicated.
     """
@@ -40,6 +40,7 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
         "multiplier": numbering.gather(at.multiplier, rows),
         "times": np.array([at.time, state.equilibrium.time, at.largest]),
         "parts": np.array(state.fractions),
+        "since": np.array(state.since),
         "snaps": np.array([astuple(snap) for snap in state.snaps]),
     }
     pairs = zip(decomposition.meshes, at.history, strict=True)

@@ -45,6 +45,8 @@ class Path:
         start: Where nodes stood on their masters then, or where they were first found; None where contact is
             that of the undeformed bodies.
         fractions: Parts of the load at which equilibria were found, the last one being 1.
+        since: The part from which slip and the histories of materials are one step up to the end: 0, unless
+            parts are steps of their own or bodies snapped.
         snaps: Where bodies snapped.
         history: One line for each Newton step of all parts, those of parts that were cut included.
         products: Applications of F.
@@ -56,6 +58,7 @@ class Path:
     begun: Meeting | None
     start: MaterialPoints | None
     fractions: tuple[float, ...]
+    since: float
     snaps: tuple[Snap, ...]
     history: tuple[SolverStep, ...]
     products: int
@@ -81,6 +84,10 @@ class PathEndsError(ConvergenceError):
 class AutomaticSteps:
     """Load steps that are halved where Newton's method fails, and doubled after easy ones.
 
+    Parts only help Newton's method to the end of a load step: slip, plastic strain and every other history
+    are those of one step of backward Euler from its start to its end, whatever its parts were. So results do
+    not depend on how it was cut, which meshes, tolerances and computers decide.
+
     Attributes:
         newton: Solves each of them.
         first: First part of the load that is tried, in (0, 1].
@@ -88,13 +95,17 @@ class AutomaticSteps:
         snaps: Whether bodies that have no equilibrium near, as where structures snap through or an edge jumps
             over another one, move on through a viscous medium to the next one; `DeformedState.snaps` tells.
             The medium takes the work that inertia and radiation would, and like them may decide where bodies
-            come to rest.
+            come to rest. Histories begin anew at each stage of that motion.
+        finer_history: Whether each part is a step of its own for slip and the histories of materials. A path
+            that turns within a load step is then followed more closely, and results depend on the parts, see
+            `DeformedState.fractions`; more load steps do the same for certain.
     """
 
     newton: TangentNewton = field(default_factory=TangentNewton)
     first: float = 1.0
     smallest: float = 1.0 / 256
     snaps: bool = False
+    finer_history: bool = False
 
     def __post_init__(self) -> None:
         """Check the parts.
@@ -135,7 +146,7 @@ class AutomaticSteps:
         first = target.removed() if before is None else before
         # Slip begins where bodies are before supports and obstacles move.
         at = start if start.meeting else start.meeting_at(contact.at(first, start.displacement, None, None))
-        walk = _Walk(self.newton, equations, contact, first, target, at, timer, known)
+        walk = _Walk(self, equations, contact, first, target, at, timer, known)
         part, longest = self.first, contact.longest_part(first, target)
         smallest = max(self.smallest, SNAPPING) if self.snaps else self.smallest
         while walk.reached < 1.0:
@@ -167,7 +178,7 @@ class _Walk:
 
     def __init__(
         self,
-        newton: TangentNewton,
+        steps: AutomaticSteps,
         equations: Equations,
         contact: Contact,
         first: Loading,
@@ -177,18 +188,21 @@ class _Walk:
         known: Linearisation | None,
     ) -> None:
         assert at.meeting is not None
-        self._newton, self._equations, self._contact, self._timer = newton, equations, contact, timer
+        self._newton, self._finer = steps.newton, steps.finer_history
+        self._equations, self._contact, self._timer = equations, contact, timer
         self._first, self._target, self._at, self._known = first, target, at, known
         self._torn, self._begun, self._stood = first.torn, at.meeting, at.meeting.stood
         self._end: NonlinearEquilibrium | None = None
         self._fractions, self._snaps, self._history = list[float](), list[Snap](), list[SolverStep]()
         self._products = self._factorisations = 0
+        # Where the step of histories begins, with the system of then.
+        self._origin, self._since = (at, first.torn), 0.0
         self.reached = 0.0
 
     def advance(self, fraction: float) -> int:
         """Go on to a part of the load; return the number of Newton steps. Collective."""
         try:
-            load = self._load(fraction, self._at, self._torn)
+            load = self._load(fraction, *self._origin)
             assert self._at.meeting is not None
             moved = self._equations.rigid_start.moved(
                 self._at.meeting.prescribed, load, self._at.displacement
@@ -209,14 +223,15 @@ class _Walk:
         snapping = Snapping(self._newton, self._equations, self._contact, load, self._timer)
         before = self._at.displacement
         try:
-            found = snapping.to_rest(self._at, self._torn, self._known)
+            at = self._at if self._end is None else self._end.configuration
+            found = snapping.to_rest(at, self._torn, self._known)
         finally:
             self._count(snapping.history, snapping.products, snapping.factorisations)
         moved = (found.evaluation.at.displacement - before).reshape(-1, self._torn.dim)
         way = global_max(self._torn.numbering.comm, np.linalg.norm(moved, axis=1).max(initial=0.0))
         self._snaps.append(Snap(fraction, float(way), snapping.dissipated, snapping.stages))
         tell(_LOG.info, "%s", self._snaps[-1])
-        return self._reach(fraction, found)
+        return self._reach(fraction, found, anew=True)
 
     def _load(self, fraction: float, at: Configuration, before: TornSystem) -> Loading:
         """Return the load at a part of the way, with slip that begins at a configuration. Collective."""
@@ -226,9 +241,19 @@ class _Walk:
         slipped = before.relative(at.displacement), before.sliding(at.displacement)
         return replace(load, torn=load.torn.with_slip_from(*slipped))
 
-    def _reach(self, fraction: float, found: NonlinearEquilibrium) -> int:
+    def _reach(self, fraction: float, found: NonlinearEquilibrium, anew: bool = False) -> int:
+        """Go on from an equilibrium, where histories begin anew or go on; return its Newton steps."""
+        if anew:
+            self._since = fraction
+        elif self._finer:
+            self._since = self.reached
         self._fractions.append(fraction)
-        self._at, self._torn, self._end = found.configuration, found.evaluation.torn, found
+        self._torn, self._end = found.evaluation.torn, found
+        if anew or self._finer:
+            self._at = found.configuration
+            self._origin = self._at, self._torn
+        else:
+            self._at = found.continued(self._origin[0])
         self._known, self.reached = found.linearisation, fraction
         new = found.evaluation.meeting.start
         self._stood = new if self._stood is None or new is None else self._stood.extended(new)
@@ -248,6 +273,7 @@ class _Walk:
             self._begun,
             self._stood,
             tuple(self._fractions),
+            self._since,
             tuple(self._snaps),
             tuple(self._history),
             self._products,

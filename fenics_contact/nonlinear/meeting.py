@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
@@ -16,7 +16,7 @@ from fenics_contact.nonlinear.loading import Loading
 from fenics_contact.nonlinear.turning import LackingRows, TurningForces, UnevenStiffness
 from fenics_contact.pairing import sliding_contact
 from fenics_contact.qp import Vector
-from fenics_contact.scene import MovingObstacle, Scene, Surface
+from fenics_contact.scene import MovingObstacle, RigidObstacle, RigidPlane, Scene, Surface
 from fenics_contact.surfaces import share_areas
 
 if TYPE_CHECKING:
@@ -48,6 +48,10 @@ class Meeting:
     def stood(self) -> MaterialPoints | None:
         """Where nodes stand on their masters; None where contact is that of the undeformed bodies."""
         return None if self.points is None else self.points.material_points()
+
+    def from_here(self) -> Meeting:
+        """Return the meeting with slip that begins where nodes stand now."""
+        return replace(self, start=self.stood)
 
     def lacking(self, displacement: Vector) -> Vector:
         """Return c − B u, owned, [length]: gaps, minus the slip, and openings of glued rows. Collective."""
@@ -217,11 +221,16 @@ class MovingContact:
         ]
         numbers = [decomposition.tearing.global_nodes(s.body, np.unique(scene.facets(s))) for s in surfaces]
         self._nodes = np.unique(np.concatenate(numbers))
-        self._obstacles = [pair.master for pair in scene.contacts if isinstance(pair.master, MovingObstacle)]
-        self._facet = min(_facet_size(scene, side) for side in surfaces)
+        # No node passes through a half space: it is known everywhere on which side of a plane a node lies.
+        searched = [pair for pair in scene.contacts if not isinstance(_shape(pair.master), RigidPlane)]
+        sides = [side for pair in searched for side in (pair.slave, pair.master) if isinstance(side, Surface)]
+        self._obstacles = [pair.master for pair in searched if isinstance(pair.master, MovingObstacle)]
+        self._facet = min((_facet_size(scene, side) for side in sides), default=np.inf)
 
     def longest_part(self, first: Loading, last: Loading) -> float:
-        """Return the part in which supports and obstacles move by a few facets."""
+        """Return the part in which supports and obstacles that nodes may pass move by a few facets."""
+        if np.isinf(self._facet):
+            return 1.0
         way = np.nan_to_num(last.prescribed - first.prescribed)
         moved = float(np.linalg.norm(way, axis=1).max(initial=0.0))
         corners = np.array([self._places[self._nodes].min(axis=0), self._places[self._nodes].max(axis=0)])
@@ -255,6 +264,11 @@ class MovingContact:
         coordinates[self._nodes] += nodal_mean_at(load.torn.decomposition, displacement, self._nodes)
         # Prescribed components reach their values within the step: gaps are those after it.
         return np.where(np.isnan(load.prescribed), coordinates, self._places + load.prescribed)
+
+
+def _shape(master: Surface | RigidObstacle) -> Surface | RigidObstacle:
+    """Return the obstacle that moves, where one does, else the master itself."""
+    return master.obstacle if isinstance(master, MovingObstacle) else master
 
 
 def _facet_size(scene: Scene, side: Surface) -> float:

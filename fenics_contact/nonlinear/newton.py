@@ -81,9 +81,15 @@ class NonlinearEquilibrium:
 
     @property
     def configuration(self) -> Configuration:
-        """The configuration, with the history of its materials and the time up to date."""
+        """The configuration, with histories up to date: the next load step begins here."""
         found = self.evaluation
-        return replace(found.at, history=found.history, time=self.time, largest=found.residuals.gluing_scale)
+        at = replace(found.at, history=found.history, meeting=found.meeting.from_here())
+        return replace(at, time=self.time, largest=found.residuals.gluing_scale)
+
+    def continued(self, origin: Configuration) -> Configuration:
+        """Return the configuration within a step of histories that began at another one."""
+        largest = self.evaluation.residuals.gluing_scale
+        return replace(self.evaluation.at, history=origin.history, time=origin.time, largest=largest)
 
 
 @displayed
@@ -143,7 +149,8 @@ class TangentNewton:
             equations: Internal forces.
             contact: How the bodies meet.
             load: What acts, with the origin of slip where bodies do not move far.
-            start: The configuration before, with the history of its materials.
+            start: Where Newton's method starts, with where nodes stood and with the history of materials
+                before the load step.
             timer: Collects the wall time.
             known: A linearisation near the start, or None.
             moved: Displacement from which to start instead where bodies do not come into contact there,
@@ -174,7 +181,7 @@ class _Run:
     def to_equilibrium(
         self, at: Configuration, known: Linearisation | None, moved: Vector | None
     ) -> NonlinearEquilibrium:
-        self._start = None if at.meeting is None else at.meeting.stood
+        self._start = None if at.meeting is None else at.meeting.start
         near, evaluation, earlier = known, self._first(at, known, moved), None
         first = evaluation.residuals
         if near is None and first.force_scale > 0.0 and first.within(self._method.tolerance):

@@ -37,6 +37,8 @@ class Surface:
 class Coulomb:
     """Coulomb friction: ‖τ‖ ≤ friction_coefficient · λ_N.
 
+    Slip is that of the whole load step, of points that were open at its start as well, see `LoadStep`.
+
     Attributes:
         friction_coefficient: Friction coefficient μ ≥ 0, dimensionless. Zero is frictionless contact. A
             function receives points of the slave, shape (n, dim), and returns μ there, shape (n,).

@@ -26,9 +26,14 @@ SupportsInTime: TypeAlias = Callable[[float], Sequence[AnySupport]]
 class LoadStep:
     """Loads and supports at the end of a step; what is not given stays as it was.
 
+    Friction and histories of materials are those of one step, by backward Euler: slip counts from the start
+    of the step to its end, also the way of points before they touch, so that a step ends best where bodies
+    touch, turn back or change their direction.
+
     Where a step is followed in parts, as large deformations are, values change in proportion to the time,
     rotations of rigid surfaces by their angles. Functions of time have their values at every part: ramps and
-    cycles are steps with the same function.
+    cycles are steps with the same function. Parts are no finer history, unless
+    `AutomaticSteps.finer_history` says so.
 
     Attributes:
         name: What the step does, for records.

@@ -29,6 +29,11 @@ class NewtonPart(Part):
         description="whether bodies without an equilibrium near move on through a viscous medium to the next "
         "one, false by default",
     )
+    finer_history: bool | None = Field(
+        default=None,
+        description="whether each part is a step of its own for slip and histories of materials, false by "
+        "default: a load step is one step of them, however it is followed",
+    )
     max_steps: PositiveInt | None = Field(
         default=None, description="Newton steps after which a part is halved"
     )
@@ -41,5 +46,6 @@ class NewtonPart(Part):
         from fenics_contact.nonlinear import AutomaticSteps, TangentNewton  # not for linear materials
 
         given = self.model_dump(exclude_none=True)
-        parts = {name: given.pop(name) for name in ("first", "smallest", "snaps") if name in given}
+        of_parts = ("first", "smallest", "snaps", "finer_history")
+        parts = {name: given.pop(name) for name in of_parts if name in given}
         return AutomaticSteps(TangentNewton(**given), **parts)

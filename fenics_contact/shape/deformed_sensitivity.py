@@ -73,14 +73,15 @@ def solve_deformed_adjoint(
 def _require_whole_step(state: DeformedState) -> None:
     """Reject friction whose derivative needs more than the start of the load step."""
     torn, points = state.torn, state.equilibrium.evaluation.meeting.points
-    if len(torn.frictional) == 0 or points is None:
+    if len(torn.frictional) == 0:
         return
-    if len(state.fractions) > 1:
+    if state.since > 0.0:
         raise InvalidInputError(
-            "derivatives of large deformations with friction need a load step done at once, this one took "
-            f"{len(state.fractions)} parts: prescribe less, or solve without friction"
+            "derivatives of nonlinear scenes with friction need slip that is one step from the start of the "
+            f"load step, here it begins at {state.since:.3g} of it: leave out finer_history=True, or "
+            "prescribe less where bodies snap"
         )
-    if state.begun is None:
+    if points is not None and state.begun is None:
         raise InvalidInputError(
             "derivatives of large deformations with friction need the start of the load step, this state was "
             "read from a checkpoint, which does not keep it: solve the scene again"

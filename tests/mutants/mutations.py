@@ -8,6 +8,10 @@ CONIC = "tests/contact/test_conic.py::test_energies_and_contact_forces_equal_tho
 
 PARTS = "tests/accuracy/test_certificate_parts.py"
 GIVEN = "tests/shape/test_given_gap_sensitivity.py"
+ONE_STEP = (
+    "tests/nonlinear/test_parts.py::"
+    "test_friction_and_plastic_flow_do_not_depend_on_how_a_load_step_is_cut"
+)
 RIGID = "tests/contact/test_rigid_surfaces.py"
 
 MUTATIONS = (
@@ -288,6 +292,41 @@ MUTATIONS = (
             "tests/nonlinear/test_following_pressure.py::test_newton_is_quadratic_where_rims_slide_in_planes_of"
             "_symmetry_and_neighbours_pass_forces_on",
         ),
+    ),
+    Mutation(
+        "slip of bodies that move far begins anew in every part of a load step",
+        "nonlinear/newton.py",
+        "None if at.meeting is None else at.meeting.start",
+        "None if at.meeting is None else at.meeting.stood",
+        (f"{ONE_STEP}[plane]",),
+    ),
+    Mutation(
+        "slip of bodies that do not move far begins anew in every part of a load step",
+        "nonlinear/load_steps.py",
+        "load = self._load(fraction, *self._origin)",
+        "load = self._load(fraction, self._at, self._torn)",
+        (f"{ONE_STEP}[metal]",),
+    ),
+    Mutation(
+        "plastic strain goes on from every part of a load step",
+        "nonlinear/newton.py",
+        "history=origin.history, time=origin.time",
+        "history=self.evaluation.history, time=origin.time",
+        (f"{ONE_STEP}[metal]",),
+    ),
+    Mutation(
+        "pressures that followed before stay whole while others take their place",
+        "nonlinear/loading.py",
+        "[((1.0 - part) * weight, each) for weight, each in first.following]",
+        "[(weight, each) for weight, each in first.following]",
+        ("tests/nonlinear/test_parts.py::test_on_the_way_to_another_pressure_the_old_one_goes_as_the_new_one_comes",),
+    ),
+    Mutation(
+        "pressures that follow and are functions of time grow in proportion to it",
+        "nonlinear/loading.py",
+        "mixed = replace(mixed, torn=torn, following=now.following)",
+        "mixed = replace(mixed, torn=torn)",
+        ("tests/nonlinear/test_parts.py::test_a_pressure_that_is_a_function_of_time_has_its_value_at_every_part",),
     ),
     Mutation(
         "surfaces that slide have no curvature",

@@ -70,14 +70,12 @@ def test_relaxation_follows_the_closed_form_in_the_first_order() -> None:
     assert coarse / fine == pytest.approx(2.0, rel=0.05)
 
 
-def test_parts_of_a_load_step_have_parts_of_its_duration() -> None:
-    for first, parts in (
-        (1.0, (1.0,)),
-        (0.25, (0.25, 0.375, 0.375)),
-    ):  # an easy part is followed by longer ones
-        decay = 1.0 / np.prod([1.0 + part / TIME for part in parts])
-        force = relaxed(1, AutomaticSteps(first=first))
-        assert force == pytest.approx((SPRING + DAMPED * decay) * 0.01, rel=1e-9)
+@pytest.mark.parametrize("finer", [False, True])
+def test_a_load_step_has_its_duration_whole_and_in_parts_if_asked_for(finer: bool) -> None:
+    parts = (0.25, 0.375, 0.375) if finer else (1.0,)  # an easy part is followed by longer ones
+    decay = 1.0 / np.prod([1.0 + part / TIME for part in parts])
+    force = relaxed(1, AutomaticSteps(first=0.25, finer_history=finer))
+    assert force == pytest.approx((SPRING + DAMPED * decay) * 0.01, rel=1e-9)
 
 
 def test_time_must_not_run_backwards() -> None:

@@ -8,6 +8,7 @@ from mpi4py import MPI
 from fenics_contact.contact import ContactProblem
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import BodyMesh
+from fenics_contact.nonlinear import AutomaticSteps
 from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
@@ -64,10 +65,15 @@ def pressed(master: str, friction: float, pushed: float, dim: int = 2) -> Scene:
 
 
 def design_problem(
-    scene: Scene, objective: Objective, *, tolerance: float | None = None, comm: MPI.Comm = MPI.COMM_SELF
+    scene: Scene,
+    objective: Objective,
+    *,
+    tolerance: float | None = None,
+    comm: MPI.Comm = MPI.COMM_SELF,
+    steps: AutomaticSteps | None = None,
 ) -> Remembering:
     """The design of the block's lower side, with the block cut in pieces."""
     low, net = ("y0", (4,)) if scene.dim == 2 else ("z0", (3, 3))
     pieces = {name: box_partition(body.mesh, (2,) * scene.dim) for name, body in scene.bodies.items()}
-    contact = ContactProblem(scene, comm, partitions=pieces, tolerance=tolerance)
+    contact = ContactProblem(scene, comm, partitions=pieces, tolerance=tolerance, steps=steps)
     return Remembering(contact, SurfaceDesign("block", low, net=net), objective)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from fenics_contact.contact import Status
+from fenics_contact.contact import DeformedState, Status
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.nonlinear import AutomaticSteps
 from fenics_contact.pairing.sliding import points as sliding_points
 from fenics_contact.scene import LoadStep, MovingObstacle
 from fenics_contact.shape import (
@@ -101,6 +102,16 @@ def test_an_obstacle_that_turns() -> None:
     assert problem.last.state.contact.count(Status.STICK) > 1  # type: ignore[union-attr]
 
 
+def test_a_load_step_that_is_followed_in_parts() -> None:
+    scene, objective = pressed("block", 0.3, 0.1), PressureNorm()
+    problem = design_problem(scene, objective, steps=AutomaticSteps(first=0.3))
+    assert miss(problem, design_problem(scene, objective, tolerance=1e-12)) < 1e-5
+    state = problem.last.state  # type: ignore[union-attr]
+    assert isinstance(state, DeformedState)
+    assert len(state.fractions) > 1
+    assert state.contact.count(Status.SLIP) > 0
+
+
 def without_the_start_of_slip(patch: Patch) -> None:
     def none(points: sliding_points.SlidingPoints, start: sliding_points.SlidingPoints) -> sp.csr_matrix:
         return 0.0 * points.slip_rows(start.material_points())
@@ -139,8 +150,9 @@ def test_a_design_makes_rubber_press_more_evenly() -> None:
 def test_what_has_no_derivative_is_named() -> None:
     with pytest.raises(InvalidInputError, match="StrainEnergy needs linear materials"):
         design_problem(pressed("plane", 0.0, 0.0), StrainEnergy()).evaluate(np.zeros(4))
-    far = design_problem(pressed("block", 0.3, 1.5), PressureNorm())
-    with pytest.raises(InvalidInputError, match="load step done at once"):
+    finer = AutomaticSteps(first=0.5, finer_history=True)
+    far = design_problem(pressed("block", 0.3, 0.1), PressureNorm(), steps=finer)
+    with pytest.raises(InvalidInputError, match=r"one step from the start of .* begins at 0\.5 of it"):
         far.evaluate(np.zeros(far.size))
     problem = design_problem(pressed("plane", 0.0, 0.0), PressureNorm())
     with pytest.raises(InvalidInputError, match="checkpoints of designs need linear materials"):
