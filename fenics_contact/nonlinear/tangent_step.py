@@ -17,6 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.display import displayed
+from fenics_contact.linalg import ROUNDING
 from fenics_contact.qp import (
     CountedOperator,
     DualProblem,
@@ -284,9 +285,9 @@ class _StiffFace:
 
         across, gradient = weights * oblique(gradient), weights * gradient
         # Rigid motions that close the jumps of the last step must not make the tolerance larger, nor may an
-        # oblique projection.
+        # oblique projection; what rounding leaves of them is small enough.
         size, seen = np.sqrt(global_sum(comm, gradient @ gradient, across @ across))
-        tolerance = max(forcing * float(min(size, seen)), floor, float(np.finfo(float).eps * size))
+        tolerance = max(forcing * float(min(size, seen)), floor, ROUNDING * float(size))
         found = gmres(comm, -gradient, expand, tolerance, max_products, self.system.patience)
         change = change + self.moving @ found.combined(0, len(gradient))
         return np.asarray(change, dtype=np.float64), found.combined(1, problem.coarse.m), found.stop

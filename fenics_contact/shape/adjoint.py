@@ -10,6 +10,7 @@ from fenics_contact.contact import State
 from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti import DualSystem
+from fenics_contact.linalg import ROUNDING
 from fenics_contact.progress import Task
 from fenics_contact.qp import (
     CountedOperator,
@@ -77,7 +78,8 @@ def solve_adjoint(
         state: A converged state.
         partials: Partial derivatives of the objective.
         linearised: Branch of the contact law.
-        tolerance: Residual relative to that of the objective alone.
+        tolerance: Residual relative to that of the objective alone; what rounding leaves of the sums that it
+            is projected from is small enough, as where the objective is stationary in the state.
         max_iterations: Largest number of F-products.
         start: Multiplier of an adjoint to start from, owned, in any scaling; that of the same objective at a
             less accurate state saves most products. By default the multiplier of the state.
@@ -106,11 +108,12 @@ def solve_adjoint(
     guess = state.solution.multiplier if start is None else start
     begin = _begin(problem, transposed, right, load, linearised.tested.T @ (guess / factor))
     weights = np.ones(len(right))
+    small = max(tolerance * begin.size, begin.rounding)
     with task:
-        solved = projected_gmres(transposed, begin.gradient, weights, tolerance * begin.size, max_iterations)
+        solved = projected_gmres(transposed, begin.gradient, weights, small, max_iterations)
     if solved.stop is not Stop.CONVERGED:
         raise ConvergenceError(
-            f"the adjoint needs a relative residual below {tolerance:.1e}, reached "
+            f"the adjoint needs a relative residual below {small / (begin.size or 1.0):.1e}, reached "
             f"{solved.measure / (begin.size or 1.0):.1e} after {solved.iterations} iterations "
             f"({solved.stop.value}): raise max_iterations or loosen the tolerance"
         )
@@ -129,11 +132,13 @@ class _Begin:
         point: z, shape (n_face,).
         gradient: Residual of the equations there, shape (n_face,).
         size: Norm of the projected residual due to the objective alone, independent of the guess.
+        rounding: Norm of what rounding leaves of a residual that the projection removes.
     """
 
     point: np.ndarray
     gradient: np.ndarray
     size: float
+    rounding: float
 
 
 def _begin(
@@ -150,12 +155,14 @@ def _begin(
 
     bearing = transposed.balanced(np.zeros_like(right), load)
     direction = transposed.balanced(guess, np.zeros_like(load))
-    gradient, turned = image(bearing) - right, image(direction)
+    borne, turned = image(bearing), image(direction)
+    gradient = borne - right
     rest, along = transposed.oblique(gradient), transposed.oblique(turned)
     slope, square = problem.dot(along, rest), problem.dot(along, along)
     share = -slope / square if square > 0.0 else 0.0
     size = max(problem.norm(transposed.oblique(right)), problem.norm(rest))
-    return _Begin(bearing + share * direction, gradient + share * turned, size)
+    rounding = ROUNDING * max(problem.norm(part) for part in (right, borne, share * turned))
+    return _Begin(bearing + share * direction, gradient + share * turned, size, rounding)
 
 
 def _require_held(system: DualSystem, by_displacement: np.ndarray) -> None:

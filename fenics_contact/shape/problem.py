@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -274,7 +274,7 @@ class ShapeProblem:
 
     def _recorded(self, point: DesignPoint) -> DesignPoint:
         if not self.evaluations and not point.weak.count:  # at a kink a branch may be flat
-            require_influence(self.objective, self.scene, point.value, point.gradient)
+            require_influence(self.objective, self.scene, point, self._beside_at(self._tightest))
         self.evaluations += 1
         self._memory.record_point(point)
         return point
@@ -296,12 +296,12 @@ class ShapeProblem:
             InvalidDesignError: If no design between them has an equilibrium.
         """
         known = self._memory.of_design(alpha)
-        tolerance = known.tolerance if known else self._tightest
-
-        def evaluate(near: np.ndarray) -> DesignPoint:
-            return self._point_at(near, self._solved(near, tolerance), tolerance, None)
-
+        evaluate = self._beside_at(known.tolerance if known else self._tightest)
         return with_fewest_weak_points(alpha, end, evaluate).gradient
+
+    def _beside_at(self, tolerance: float) -> Callable[[np.ndarray], DesignPoint]:
+        """Return what evaluates designs that are not recorded. Collective when called."""
+        return lambda near: self._point_at(near, self._solved(near, tolerance), tolerance, None)
 
     def _solved(
         self,

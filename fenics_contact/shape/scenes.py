@@ -2,13 +2,38 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Callable
+from typing import Protocol
+
 import numpy as np
 
 from fenics_contact.contact import ContactProblem
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidDesignError, InvalidInputError, tell
 from fenics_contact.linalg import LAST_PLACES
 from fenics_contact.scene import HistoryMaterial, Scene, has_mean_dilatation
 from fenics_contact.shape.objective import Objective
+
+#: How far beside the first design an objective without a gradient is evaluated, by the size of the scene.
+BESIDE = 1e-6
+
+_LOG = logging.getLogger(__name__)
+
+
+class Evaluated(Protocol):
+    """A design with objective and gradient."""
+
+    @property
+    def alpha(self) -> np.ndarray:
+        """Its variables."""
+
+    @property
+    def value(self) -> float:
+        """Its objective."""
+
+    @property
+    def gradient(self) -> np.ndarray:
+        """The gradient."""
 
 
 def checked_contact(contact: ContactProblem) -> ContactProblem:
@@ -48,25 +73,45 @@ def _check_differentiable(scene: Scene) -> None:
             )
 
 
-def require_influence(objective: Objective, scene: Scene, value: float, gradient: np.ndarray) -> None:
-    """Reject an objective that no design variable changes.
+def require_influence(
+    objective: Objective, scene: Scene, point: Evaluated, beside: Callable[[np.ndarray], Evaluated]
+) -> None:
+    """Reject an objective that no design variable changes, here or at a design beside. Collective.
+
+    Where the gradient is rounding the objective may be stationary, as a norm of the pressure is where that is
+    even: then it has a gradient beside.
 
     Args:
         objective: The objective.
         scene: The scene.
-        value: J.
-        gradient: Its gradient by the variables, shape (n,), by [length].
+        point: The first design.
+        beside: Evaluates another one.
 
     Raises:
-        InvalidInputError: If the gradient is zero, or rounding over the size of the scene.
+        InvalidInputError: If both gradients are zero, or rounding over the size of the scene.
     """
-    change = float(np.abs(gradient).max(initial=0.0) * np.ptp(scene.points))
-    if change <= LAST_PLACES * abs(value):
-        raise InvalidInputError(
-            f"an objective must change with the design, but {objective!r} is {value:.6g} and none of "
-            f"{len(gradient)} variables changes it: choose one that the moving surfaces affect (pressures "
-            "need a pair in contact, movements a body that they load), or start from another design"
-        )
+    size = float(np.ptp(scene.points))
+    if _is_felt(point, size):
+        return
+    number = len(point.gradient)
+    way = np.random.default_rng(0).standard_normal(number)
+    try:
+        if _is_felt(beside(point.alpha + BESIDE * size * way), size):
+            tell(_LOG.info, "the objective is stationary at the first design, to rounding")
+            return
+    except InvalidDesignError:
+        return  # not known
+    raise InvalidInputError(
+        f"an objective must change with the design, but {objective!r} is {point.value:.6g} and none of "
+        f"{number} variables changes it: choose one that the moving surfaces affect (pressures "
+        "need a pair in contact, movements a body that they load), or start from another design"
+    )
+
+
+def _is_felt(point: Evaluated, size: float) -> bool:
+    """Return whether a variable changes the objective over the size of the scene."""
+    change = float(np.abs(point.gradient).max(initial=0.0) * size)
+    return change > LAST_PLACES * abs(point.value)
 
 
 def check_case(first: Scene, scene: Scene) -> None:

@@ -7,10 +7,34 @@ from functools import cache
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
+from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import ConvergenceError
-from fenics_contact.scene import Coulomb
-from fenics_contact.shape import WeakChoice, linearise_face, solve_adjoint
+from fenics_contact.gallery import rectangle
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    Coulomb,
+    Material,
+    NeoHooke,
+    PlaneStrain,
+    RigidPlane,
+    Scene,
+    Support,
+    Surface,
+    Traction,
+)
+from fenics_contact.shape import (
+    Objective,
+    PressureNorm,
+    ShapeProblem,
+    StrainEnergy,
+    SurfaceDesign,
+    WeakChoice,
+    linearise_face,
+    solve_adjoint,
+)
 from fenics_contact.shape.adjoint import Adjoint
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.objective import Partials
@@ -118,3 +142,54 @@ def test_discs_that_are_next_to_rigid_across_their_force_cost_little(objective: 
     assert found.iterations < 4 * usual.iterations
     across = np.abs(rigid.face.restrict(found.multiplier)[rigid.face.curvature > 0.0])
     assert 0.0 < across.max() < 1e-3 * np.abs(found.multiplier).max()
+
+
+STEEL = PlaneStrain(1000.0, 0.3)
+
+
+def pad_on_floor(law: Coulomb | None, material: Material) -> Scene:
+    """A pad with an even pressure under it."""
+    pad = rectangle((0.0, 0.0), (2.0, 1.0), (4, 2))
+    supports, loads = [Support("pad", "x0", (0.0, None))], [Traction("pad", "y1", (0.0, -0.2))]
+    pair = ContactPair(Surface("pad", "y0"), RigidPlane((0.0, 0.0), (0.0, 1.0)), law)
+    return Scene({"pad": Body(pad, material)}, supports, loads, [pair])
+
+
+def two_pads() -> Scene:
+    """A narrow pad on a wide one, whose meshes do not match, without friction."""
+    bodies = {"pad": Body(rectangle((0.4, 1.0), (1.6, 2.0), (9, 4)), STEEL)}
+    bodies["lower"] = Body(rectangle((0.0, 0.0), (2.0, 1.0), (10, 4)), STEEL)
+    supports = [Support("pad", "x0", (0.0, None)), Support("lower", "y0")]
+    pair = ContactPair(Surface("pad", "y0"), Surface("lower", "y1"), discretisation="node")
+    return Scene(bodies, supports, [Traction("pad", "y1", (0.0, -10.0))], [pair])
+
+
+def lower_side(scene: Scene, objective: Objective) -> ShapeProblem:
+    contact = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-8)
+    return ShapeProblem(contact, SurfaceDesign("pad", "y0", net=4), objective)
+
+
+EVEN: dict[str, tuple[Material, Coulomb | None]] = {
+    "frictionless": (PlaneStrain(100.0, 0.0), None),
+    "friction": (PlaneStrain(100.0, 0.0), Coulomb(0.3)),
+    "rubber": (NeoHooke(1.0, 0.3), None),
+}
+
+
+@pytest.mark.parametrize("p", [2.0, 8.0])
+@pytest.mark.parametrize("case", EVEN)
+def test_a_norm_of_an_even_pressure_is_stationary(case: str, p: float) -> None:
+    material, law = EVEN[case]
+    value, gradient = lower_side(pad_on_floor(law, material), PressureNorm(0, p))(np.zeros(4))
+    assert value == pytest.approx(0.2, rel=1e-6)
+    assert np.abs(gradient).max() < 1e-6 * value
+
+
+def test_the_elastic_energy_of_bodies_pressed_together_has_a_gradient() -> None:
+    """Without friction the contact forces do no work: what the adjoint is solved for is rounding."""
+    scene = two_pads()
+    problem = lower_side(scene, StrainEnergy())
+    design, way, step = np.full(4, 1e-3), np.array([0.5, -1.0, 0.7, 0.3]), 1e-4
+    ahead, behind = (problem.value_of(design + sign * step * way) for sign in (1.0, -1.0))
+    _, gradient = problem(design)
+    assert gradient @ way == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-3)
