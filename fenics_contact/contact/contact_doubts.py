@@ -13,6 +13,9 @@ from fenics_contact.mesh import computed_rounding
 from fenics_contact.pairing import ContactPoints
 from fenics_contact.scene import ContactPair, Scene, Surface, surface_of
 
+#: Errors up to this share of what moves are small.
+SHARE = 0.1
+
 _LOG = logging.getLogger(__name__)
 
 
@@ -25,7 +28,12 @@ class ContactDoubts:
         self._finer = np.zeros(0)
         self._told: set[tuple[int, str]] = set()
 
-    def warn(self, state: State, share: float = 0.1) -> None:
+    @property
+    def asked(self) -> bool:
+        """Whether a state with contact points was judged."""
+        return self._points is not None
+
+    def warn(self, state: State, *, overlap: bool = False) -> None:
         """Warn of pairs that slide far, or whose measured gaps are not known well enough. Collective.
 
         The error of flat facets, or of surfaces reconstructed from nodes, is the difference to gaps between
@@ -35,11 +43,21 @@ class ContactDoubts:
 
         Args:
             state: The state.
-            share: Errors up to this share of what moves are small.
+            overlap: Whether surfaces may overlap before they are loaded, as those of a design do.
         """
-        torn, contact = state.torn, state.contact
+        for pair, kind, words in self._doubts(state):
+            if not (overlap and kind == "overlap"):
+                self._tell(state.torn, pair, kind, words)
+
+    def overlaps(self, state: State) -> tuple[str, ...]:
+        """Return words about the pairs whose surfaces overlap before they are loaded. Collective."""
+        return tuple(words for _, kind, words in self._doubts(state) if kind == "overlap")
+
+    def _doubts(self, state: State) -> list[tuple[int, str, str]]:
+        """Return pair, kind and words of all doubts about a state. Collective."""
+        torn, contact, found = state.torn, state.contact, list[tuple[int, str, str]]()
         if contact.points.count == 0:
-            return
+            return found
         if contact.points is not self._points:
             self._points, self._finer = contact.points, _finer_gap(torn)
         change, pressed_in = self._finer - contact.points.gap, _indentation(state)
@@ -47,7 +65,7 @@ class ContactDoubts:
             mine = contact.on_pair(number)
             slid, reach = _sliding(torn.scene, pair, contact.total_slip[mine])
             if slid > reach:
-                self._tell(torn, number, "sliding", _words_of_sliding(pair, slid, reach))
+                found.append((number, "sliding", _words_of_sliding(pair, slid, reach)))
             mine = mine[~contact.points.given[mine]]
             before, after = contact.points.gap[mine], contact.gap[mine]
             touching = contact.normal_force[mine] > 0.0
@@ -56,11 +74,12 @@ class ContactDoubts:
                 continue  # nothing moves
             nearest = np.minimum(before, after) + np.minimum(change[mine], 0.0)
             error = float(np.abs(change[mine][nearest <= moved]).max(initial=0.0))
-            if error > share * moved:
-                self._tell(torn, number, "facets", _words_of_facets(pair, error, moved))
+            if error > SHARE * moved:
+                found.append((number, "facets", _words_of_facets(pair, error, moved)))
             overlap = -float(before[touching].min(initial=0.0))
-            if overlap > max(error, share * moved):
-                self._tell(torn, number, "overlap", _words_of_overlap(pair, overlap, moved))
+            if overlap > max(error, SHARE * moved):
+                found.append((number, "overlap", _words_of_overlap(pair, overlap, moved)))
+        return found
 
     def _tell(self, torn: TornSystem, pair: int, kind: str, words: str) -> None:
         if (pair, kind) not in self._told and torn.decomposition.comm.rank == 0:

@@ -87,6 +87,8 @@ class DeformedEquilibria:
         tolerance: Tolerance,
         time: float,
         step: LoadStep | None = None,
+        *,
+        overlap: bool = False,
     ) -> DeformedState:
         """Compute the equilibrium of a scene. Collective.
 
@@ -96,6 +98,7 @@ class DeformedEquilibria:
             tolerance: Of all residuals; None for that of the solver.
             time: Time at the end, for obstacles that move and materials that creep.
             step: The load step, with its functions of time; None without any.
+            overlap: Whether bodies may overlap at the start, as those of a design do.
 
         Raises:
             InvalidInputError: If the tolerance is no number, or time runs backwards and materials remember.
@@ -116,7 +119,7 @@ class DeformedEquilibria:
             start = origin.equilibrium.configuration
         self._require_later(scene, start.time, time)
         with timer.phase("assemble"):
-            load = self._loading(scene, time)
+            load = self._loading(scene, time, overlap)
             if step is not None and (callable(step.loads) or callable(step.supports)):
                 course = _Course(step, scene, self._loading, self._decomposition.comm)
                 load = replace(load, course=course)
@@ -171,9 +174,11 @@ class DeformedEquilibria:
                 f"after {before:g}: give later times, or none"
             )
 
-    def _loading(self, scene: Scene, time: float) -> Loading:
+    def _loading(self, scene: Scene, time: float, overlap: bool = False) -> Loading:
         """Return what acts at a time. Collective."""
-        self._assembled = build_torn_system(scene, self._decomposition, previous=self._assembled)
+        self._assembled = build_torn_system(
+            scene, self._decomposition, overlap=overlap, previous=self._assembled
+        )
         prescribed = prescribed_displacements(scene, self._decomposition.tearing)
         following: tuple[tuple[float, FollowingPressures], ...] = ()
         if scene.following_pressures:

@@ -28,6 +28,7 @@ from fenics_contact.feti import (
     DualSystem,
     TornSystem,
     build_torn_system,
+    check_apart,
     check_same_input,
     decompose,
 )
@@ -124,16 +125,70 @@ class ContactProblem:
 
     @classmethod
     def following(
-        cls, state: State, *, solver: DualSolver | None = None, tolerance: Tolerance = None
+        cls,
+        state: State,
+        *,
+        solver: DualSolver | None = None,
+        tolerance: Tolerance = None,
+        steps: AutomaticSteps | None = None,
     ) -> ContactProblem:
         """Return the problem whose last solution is the given state, with its subdomains."""
         decomposition = state.torn.decomposition
         problem = cls(
             state.scene, decomposition.comm,
-            partitions=decomposition.partitions, solver=solver, tolerance=tolerance,
+            partitions=decomposition.partitions, solver=solver, tolerance=tolerance, steps=steps,
         )  # fmt: skip
         problem._decomposition, problem.state = decomposition, state
         return problem
+
+    def on(self, scene: Scene, partitions: Mapping[str, np.ndarray] | None = None) -> ContactProblem:
+        """Return the problem of a scene on other meshes, solved alike; what was told is not told again."""
+        other = ContactProblem(
+            scene, self.comm,
+            partitions=partitions, solver=self.solver, tolerance=self.tolerance, steps=self.steps,
+        )  # fmt: skip
+        other._contact_doubts = self._contact_doubts
+        return other
+
+    def number(self, scene: Scene | None = None) -> float:
+        """Return the tolerance as a number, for states that are differentiated or compared. Collective.
+
+        Where none is given, or `Balanced`, which leaves the status of points uncertain, it is that of the
+        solver: of the one given, of Newton's method, or of the one that the scene's plan names.
+
+        Args:
+            scene: As for `solve`.
+        """
+        scene = self.scene if scene is None else scene
+        with together(self.comm):
+            given = checked_tolerance(self.tolerance)
+        if isinstance(given, float):
+            return given
+        if scene.is_nonlinear:
+            from fenics_contact.nonlinear import AutomaticSteps
+
+            return (self.steps or AutomaticSteps()).newton.tolerance
+        if self.solver is not None:
+            return self.solver.tolerance
+        count = self._decomposed(scene).tearing.n_subdomains
+        return default_solver(choose_solver(scene, count, sensitivity=True)).tolerance
+
+    @collectively("ContactProblem.check_apart", lambda self, *_, **__: self.comm)
+    def check_apart(self, scene: Scene) -> None:
+        """Refuse a scene whose bodies overlap before they are loaded, unless a pair says so. Collective.
+
+        Raises:
+            InvalidInputError: Names the pair, the number of nodes and the depth.
+        """
+        check_apart(scene, self._decomposed(scene))
+
+    @collectively("ContactProblem.overlaps", lambda self, *_, **__: self.comm)
+    def overlaps(self, state: State) -> tuple[str, ...]:
+        """Return words about surfaces that overlap before they are loaded and are pressed apart. Collective.
+
+        Of nonlinear materials, none.
+        """
+        return () if state.scene.is_nonlinear else self._contact_doubts.overlaps(state)
 
     @collectively("ContactProblem.solve", lambda self, *_, **__: self.comm)
     def solve(
@@ -175,19 +230,20 @@ class ContactProblem:
         with together(self.comm):
             _require_obstacles_at(scene, time)
         wanted = self.tolerance if tolerance is None else tolerance
+        with together(self.comm):
+            wanted = checked_tolerance(wanted)
         if scene.is_nonlinear:
             if self.solver is not None:
                 raise InvalidInputError(
                     f"dual solvers are for linear materials, this scene has others, got {self.solver!r}: "
                     "give steps=AutomaticSteps(TangentNewton(...)) of fenics_contact.nonlinear instead"
                 )
-            self.state = self._deformed(scene, slip_from, wanted, time, step)
+            self.state = self._equilibria(scene).solve(scene, slip_from, wanted, time, step, overlap=overlap)
             return self.state
         previous = self.state if start == "last" else start
         decomposition = self._decomposed(scene)
         check_same_input(self.comm, scene, solver=self.solver, tolerance=wanted)
         with together(self.comm):
-            wanted = checked_tolerance(wanted)
             kind = choose_solver(scene, decomposition.tearing.n_subdomains, sensitivity=sensitivity)
         known = self._alike(scene, previous)
         with self.timer.phase("assemble"):
@@ -206,16 +262,10 @@ class ContactProblem:
         if wanted is None and (self.solver is not None or sensitivity):
             wanted = solver.tolerance
         self.state = dual_state(torn, previous, known, solver, wanted, self.timer)
-        if not overlap:  # designs differ little from the first one
+        if not (overlap and self._contact_doubts.asked):  # designs differ little from the first one
             with self.timer.phase("state"):
-                self._contact_doubts.warn(self.state)
+                self._contact_doubts.warn(self.state, overlap=overlap)
         return self.state
-
-    def _deformed(
-        self, scene: Scene, origin: State | None, tolerance: Tolerance, time: float, step: LoadStep | None
-    ) -> State:
-        """Compute an equilibrium of nonlinear materials. Collective."""
-        return self._equilibria(scene).solve(scene, origin, tolerance, time, step)
 
     def _equilibria(self, scene: Scene) -> DeformedEquilibria:
         """Return what finds equilibria of nonlinear materials. Collective on first use."""

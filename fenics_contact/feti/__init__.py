@@ -17,6 +17,7 @@ from fenics_contact.feti.factor import (
 )
 from fenics_contact.feti.gluing import prescribed_displacements
 from fenics_contact.feti.implicit import FactoredOperator, dofs_inside
+from fenics_contact.feti.initial_gap import check_apart
 from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
 from fenics_contact.feti.local import LocalOperator
 from fenics_contact.feti.nodal_mean import nodal_mean, nodal_mean_at, nodal_mean_transposed
@@ -47,6 +48,7 @@ __all__ = [
     "TornInverse",
     "TornSystem",
     "build_torn_system",
+    "check_apart",
     "check_same_input",
     "common_kernel",
     "decompose",

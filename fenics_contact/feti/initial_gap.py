@@ -6,7 +6,8 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.contact_rows import Relations
-from fenics_contact.pairing import HELD, ContactPoints
+from fenics_contact.feti.decomposition import Decomposition
+from fenics_contact.pairing import HELD, ContactPoints, find_contact_points
 from fenics_contact.scene import Scene
 
 #: Supports hold a point along its normal if the free fraction is no larger than this: normals of facets are
@@ -36,6 +37,16 @@ def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
             "ContactPair(interference='measured'), or give its amount, interference=0.05; adjust= puts "
             "points in touch without strain"
         )
+
+
+def check_apart(scene: Scene, decomposition: Decomposition) -> None:
+    """Search for contact and reject bodies that overlap at the start. Collective.
+
+    Raises:
+        InvalidInputError: As `check_no_penetration`.
+    """
+    if scene.contacts:
+        check_no_penetration(scene, find_contact_points(scene, decomposition.fixed, decomposition.comm))
 
 
 def gap_with_room(normal: Relations, fixed: np.ndarray, prescribed: np.ndarray) -> np.ndarray:

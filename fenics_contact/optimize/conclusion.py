@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import logging
+
+from fenics_contact.errors import tell
 from fenics_contact.optimize.nonlinear import ConstraintValue
+from fenics_contact.optimize.objective import Remarked
 from fenics_contact.optimize.problem import PosedProblem
 from fenics_contact.optimize.result import NotConvergedError, Reason, Result, StepKind
 from fenics_contact.optimize.state import MethodState
+
+_LOG = logging.getLogger(__name__)
 
 
 def conclude(problem: PosedProblem, state: MethodState, reason: Reason, *, raises: bool) -> Result:
@@ -32,6 +38,9 @@ def conclude(problem: PosedProblem, state: MethodState, reason: Reason, *, raise
         error=centre.error,
         constraints=_constraints(problem, state),
     )
+    if isinstance(problem.fun, Remarked):
+        for words in dict.fromkeys(problem.fun.remarks(centre.x.copy())):
+            tell(_LOG.warning, "at the end of the minimisation: %s", words)
     if reason.success or not raises:
         return result
     refusals = [record.note for record in state.history if record.kind is StepKind.REJECTED]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
@@ -62,6 +62,21 @@ class Kinked(Protocol):
         Args:
             x: Point, shape (n,).
             end: A feasible point near x, in a generic direction, shape (n,).
+        """
+
+
+@runtime_checkable
+class Remarked(Protocol):
+    """A function that has words about a point beside its value; those about the end are logged, once."""
+
+    def __call__(self, x: Array) -> tuple[float, ArrayLike]:
+        """Return value and subgradient."""
+
+    def remarks(self, x: Array) -> Sequence[str]:
+        """Return what to know about a point, in whole sentences; nothing if there is nothing.
+
+        Args:
+            x: Point, shape (n,).
         """
 
 

@@ -167,7 +167,7 @@ class SceneResponse(Response):
         *,
         partitions: Mapping[str, np.ndarray] | None = None,
         solver: DualSolver | None = None,
-        tolerance: float = 1e-6,
+        tolerance: float | None = None,
         failures: Failures = "raise",
         warm: bool = True,
     ) -> None:
@@ -180,7 +180,8 @@ class SceneResponse(Response):
             comm: Communicator over which the subdomains are spread.
             partitions: As for `solve_scene`.
             solver: As for `solve_scene`.
-            tolerance: Relative residual of every state.
+            tolerance: Relative residual of every state; None for that of the solver, see
+                `ContactProblem.number`.
             failures: Whether a state that does not exist or does not converge raises, or makes all quantities
                 nan with the reason in `Answer.failure`. Other errors always raise.
             warm: Whether a state starts from the one before; answers then depend on the order of evaluation,
@@ -196,6 +197,7 @@ class SceneResponse(Response):
                 "the state}"
             )
         self._build, self._of_state, self._warm = build, dict(quantities), warm
+        self._partitions = partitions
         self._problem_of = partial(
             ContactProblem, comm=comm, partitions=partitions, solver=solver, tolerance=tolerance
         )
@@ -215,9 +217,13 @@ class SceneResponse(Response):
         with together(self.comm), calling("the function that builds the scene of a response"):
             scene = self._build(**values)
         with together(self.comm):
-            if self._problem is None or not _alike(scene, self._problem.scene):
+            if self._problem is None:
                 self._problem = self._problem_of(scene)
-        state = self._problem.solve(scene, start="last" if self._warm else None)
+            elif not _alike(scene, self._problem.scene):
+                self._problem = self._problem.on(scene, self._partitions)
+        problem = self._problem
+        wanted = problem.number(scene) if problem.tolerance is None else problem.tolerance
+        state = problem.solve(scene, start="last" if self._warm else None, tolerance=wanted)
         return evaluated(self._of_state, state, self.comm), {}, state.solution.products
 
 

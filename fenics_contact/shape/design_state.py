@@ -26,7 +26,7 @@ def design_state(
     *,
     slip_from: State | None = None,
 ) -> State:
-    """Compute the equilibrium of a design. Collective.
+    """Compute the equilibrium of a design, whose surfaces may overlap before they are loaded. Collective.
 
     Args:
         contact: The problem that computes it.
@@ -44,9 +44,11 @@ def design_state(
         raise InvalidInputError(
             "designs of bodies that deform much have one load step, got a state before it: leave out LoadPath"
         )
-    solve = partial(contact.solve, scene, slip_from=slip_from, tolerance=tolerance, sensitivity=True)
+    solve = partial(
+        contact.solve, scene, slip_from=slip_from, tolerance=tolerance, sensitivity=True, overlap=True
+    )
     try:
-        return solve(start=start, overlap=start is not None)
+        return solve(start=start)
     except InfeasibleError as error:
         raise InvalidDesignError(f"the design has no equilibrium: {error}") from error
     except ConvergenceError as error:
@@ -54,6 +56,6 @@ def design_state(
             raise
         tell(logger.warning, "a warm start failed, a cold one follows: %s", error)
     try:
-        return solve(start=None, overlap=True)
+        return solve(start=None)
     except (ConvergenceError, InfeasibleError) as error:
         raise InvalidDesignError(f"no equilibrium of the design was found: {error}") from error

@@ -143,6 +143,10 @@ class LoadCases:
         """Return the equilibrium of every case. Collective."""
         return {name: problem.state_of(alpha) for name, problem in self.problems.items()}
 
+    def remarks(self, alpha: np.ndarray) -> tuple[str, ...]:
+        """Return what to know of a design beside its value, see `ShapeProblem.remarks`. Collective."""
+        return tuple(words for problem in self.problems.values() for words in problem.remarks(alpha))
+
     def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the volume of the designed bodies, in the plane the area, and its gradient. Collective."""
         return self._first.volume(alpha)

@@ -217,6 +217,10 @@ class LoadPath:
         other.evaluations, other._points = 0, PathPoints(other._point_at)
         return other
 
+    def remarks(self, alpha: np.ndarray) -> tuple[str, ...]:
+        """Return what to know of a design after the last step, see `ShapeProblem.remarks`. Collective."""
+        return self._final.contact.overlaps(self.states_of(alpha)[list(self.problems)[-1]])
+
     def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the volume of the designed bodies, in the plane the area, and its gradient. Collective."""
         return self._first.volume(alpha)

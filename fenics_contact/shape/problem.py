@@ -87,6 +87,7 @@ class ShapeProblem:
         self.evaluations, self.products = 0, 0
         self._memory = DesignMemory(self._restored)
         self._beside: ShapeProblem | None = None
+        self._apart = False
         with self._timer.phase("mesh motion"):
             given = (designs,) if isinstance(designs, SurfaceDesign) else designs
             self.geometry = DesignGeometry(self.scene, contact.decomposition, given)
@@ -201,7 +202,8 @@ class ShapeProblem:
 
         Raises:
             InvalidDesignError: If the design inverts a cell or has no equilibrium.
-            InvalidInputError: If no variable changes the objective at the first design.
+            InvalidInputError: If bodies of the reference shape overlap, or no variable changes the objective
+                at the first design.
         """
         known = self._memory.of_design(alpha) if self.inexact else None
         state = self._solved(alpha, self._tightest, known) if self.inexact else self.state_of(alpha)
@@ -241,6 +243,11 @@ class ShapeProblem:
     def at(self, alpha: np.ndarray) -> DesignPoint:
         """Return a design as evaluated, again unless it is `known`, such as the x of a result. Collective."""
         return self.known(alpha) or self.evaluate(alpha)
+
+    def remarks(self, alpha: np.ndarray) -> tuple[str, ...]:
+        """Return what to know of a design beside its value: overlaps before it is loaded. Collective."""
+        known = self.known(alpha)
+        return self.contact.overlaps(self.state_of(alpha) if known is None else known.state)
 
     @property
     def inexact(self) -> bool:
@@ -314,6 +321,9 @@ class ShapeProblem:
         previous = self._memory.state if known is None else known.state
         if previous is None and self._beside is not None:  # the first state of a load case
             previous = self._beside._memory.state
+        if not self._apart:  # the shape given, whichever design is the first
+            self.contact.check_apart(self.scene)
+            self._apart = True
         with self._timer.phase("mesh motion"):
             scene = self.scene_of(alpha) if known is None else known.state.scene
         state = design_state(self.contact, scene, previous, tolerance, slip_from=after)
@@ -369,7 +379,7 @@ class ShapeProblem:
         """
         check_case(self.scene, scene)
         other = aimed(self, objective or self.objective)
-        other.scene, other._beside = scene, self
+        other.scene, other._beside, other._apart = scene, self, False
         other.evaluations, other.products = 0, 0
         other._memory = DesignMemory(other._restored)
         return other

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact._libraries import MPI
-from fenics_contact.contact import ContactProblem, State
+from fenics_contact.contact import State
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidDesignError, InvalidInputError, calling, tell, together
 from fenics_contact.mesh import BodyMesh, jacobians
@@ -191,6 +191,11 @@ class Remeshed:
         problem, moved = self._on_mesh(alpha)
         return problem.scene_of(moved)
 
+    def remarks(self, alpha: np.ndarray) -> tuple[str, ...]:
+        """Return what to know of a design beside its value, see `ShapeProblem.remarks`. Collective."""
+        problem, moved = self._on_mesh(alpha)
+        return problem.remarks(moved)
+
     def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the volume of the designed bodies, in the plane the area, and its gradient. Collective."""
         problem, moved = self._on_mesh(alpha)
@@ -315,15 +320,10 @@ class Remeshed:
             partitions = problem.contact.partitions
         else:
             scene, designs = _meshed(scene, designs, self._mesher, self.comm)
-        old = problem.contact
-        contact = ContactProblem(
-            scene, self.comm, partitions=partitions, solver=old.solver, tolerance=old.tolerance
-        )
-        self.problems.append(
-            ShapeProblem(
-                contact, designs, problem.objective, choice=problem.choice, tolerance=problem.tolerance
-            )
-        )
+        contact, choice, tolerance = problem.contact.on(scene, partitions), problem.choice, problem.tolerance
+        made = ShapeProblem(contact, designs, problem.objective, choice=choice, tolerance=tolerance)
+        made._apart = True  # as on the first mesh: the shape in which this one is made is that of a design
+        self.problems.append(made)
         self.origins.append(np.array(origin, dtype=float))
         self._parents.append(k)
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.qp import FaceNewton
 
 #: Tolerance of a second attempt relative to the first: at most and at least.
 _TIGHTER = (0.3, 1e-3)
@@ -60,8 +59,7 @@ class AdaptiveTolerance:
 
 
 def tightest_of(contact: ContactProblem, given: float | AdaptiveTolerance | None) -> float:
-    """Return the smallest tolerance of states."""
+    """Return the smallest tolerance of states. Collective."""
     if isinstance(given, AdaptiveTolerance):
         return given.tightest
-    number = contact.tolerance if given is None else given
-    return float(number) if isinstance(number, float | int) else (contact.solver or FaceNewton()).tolerance
+    return contact.number() if given is None else float(given)
