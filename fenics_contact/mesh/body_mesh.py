@@ -236,6 +236,22 @@ class BodyMesh:
         result._set(_origin=self.origin)
         return result
 
+    def reshaped_from(self, points: np.ndarray, shapes: Mapping[str, SurfaceShape]) -> BodyMesh:
+        """Return the mesh as if it had been `reshaped` from other coordinates, where it had these shapes.
+
+        Only the surfaces matter there: cells behind them may be inverted.
+
+        Args:
+            points: The other coordinates, (n_nodes, 3 | 2).
+            shapes: Name of a surface -> its shape there.
+        """
+        origin, result = copy(self), copy(self)
+        for mesh in (origin, result):
+            mesh.__dict__.pop("linear", None)
+        origin._set(points=checked_points(points, self.points.shape))
+        result._set(_origin=origin.with_shapes(shapes))
+        return result
+
     def _at(self, points: np.ndarray) -> BodyMesh:
         new_points = checked_points(points, self.points.shape)
         check_jacobians(

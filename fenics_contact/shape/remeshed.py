@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from fenics_contact._libraries import MPI
 from fenics_contact.contact import State
 from fenics_contact.display import displayed
-from fenics_contact.errors import InvalidDesignError, InvalidInputError, calling, tell, together
+from fenics_contact.errors import InvalidDesignError, InvalidInputError, tell
 from fenics_contact.mesh import BodyMesh, jacobians
 from fenics_contact.scene import Scene
 from fenics_contact.shape.design import SurfaceDesign, checked_variables
 from fenics_contact.shape.design_function import DesignFunction, aimed
 from fenics_contact.shape.memory import DesignPoint, joined_memory, recall_joined
+from fenics_contact.shape.new_mesh import Mesher, meshed
 from fenics_contact.shape.objective import Objective
 from fenics_contact.shape.problem import ShapeProblem
-
-#: Takes the mesh of a body in the shape of a design; returns another one with the same named surfaces and
-#: the same nodes on its design surfaces.
-Mesher = Callable[[BodyMesh], BodyMesh]
 
 _OWN = "remeshed."
 
@@ -319,7 +315,7 @@ class Remeshed:
         if self._mesher is None:
             partitions = problem.contact.partitions
         else:
-            scene, designs = _meshed(scene, designs, self._mesher, self.comm)
+            scene, designs = meshed(scene, designs, self._mesher, self.comm)
         contact, choice, tolerance = problem.contact.on(scene, partitions), problem.choice, problem.tolerance
         made = ShapeProblem(contact, designs, problem.objective, choice=choice, tolerance=tolerance)
         made._apart = True  # as on the first mesh: the shape in which this one is made is that of a design
@@ -332,32 +328,3 @@ def _share(mesh: BodyMesh, points: np.ndarray) -> float:
     """Return the smallest Jacobian of a cell at new coordinates relative to that of the mesh."""
     new, old = (jacobians(at, mesh.cells).min(axis=1) for at in (points, mesh.points))
     return float((new / old).min())
-
-
-def _meshed(
-    scene: Scene, designs: tuple[SurfaceDesign, ...], mesher: Mesher, comm: MPI.Comm
-) -> tuple[Scene, tuple[SurfaceDesign, ...]]:
-    """Return the scene with new meshes of the designed bodies, made on rank 0, and the designs on them."""
-    names = sorted({design.body for design in designs})
-    made: dict[str, BodyMesh] = {}
-    with together(comm):
-        if comm.rank == 0:
-            with calling("the mesher of a design"):
-                made = {name: mesher(scene.bodies[name].mesh) for name in names}
-    made = comm.bcast(made)
-    bodies = {name: replace(scene.bodies[name], mesh=mesh) for name, mesh in made.items()}
-    found = tuple(_found(design, scene.bodies[design.body].mesh, made[design.body]) for design in designs)
-    return replace(scene, bodies={**scene.bodies, **bodies}), found
-
-
-def _found(design: SurfaceDesign, before: BodyMesh, after: BodyMesh) -> SurfaceDesign:
-    """Return a design with the numbers of its nodes in another mesh."""
-    places = before.points[design.lattice.nodes]
-    distance, nodes = cKDTree(after.points).query(places)
-    lost = int(np.count_nonzero(distance > 1e-9 * np.ptp(places, axis=0).max()))
-    if lost:
-        raise InvalidInputError(
-            f"a new mesh of {design.body!r} must keep the nodes of its design surface, {lost} of "
-            f"{len(places)} are gone: keep the facets of the surface, as mesh_io.refilled does"
-        )
-    return replace(design, surface=replace(design.lattice, nodes=np.asarray(nodes)))
