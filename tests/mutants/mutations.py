@@ -13,6 +13,7 @@ ONE_STEP = (
     "test_friction_and_plastic_flow_do_not_depend_on_how_a_load_step_is_cut"
 )
 RIGID = "tests/contact/test_rigid_surfaces.py"
+MERIT, NONLINEAR = "tests/optimize/test_merit.py", "tests/optimize/test_nonlinear.py"
 
 MUTATIONS = (
     Mutation(
@@ -67,8 +68,8 @@ MUTATIONS = (
     Mutation(
         "the error of facets is compared with ten times what moves",
         "contact/contact_doubts.py",
-        "if error > share * moved:",
-        "if error > 10.0 * share * moved:",
+        "if error > SHARE * moved:",
+        "if error > 10.0 * SHARE * moved:",
         ("tests/contact/test_contact_doubts.py::test_a_roller_is_told_of_by_facets_alone",),
     ),
     Mutation(
@@ -375,5 +376,61 @@ MUTATIONS = (
         "return np.asarray(tensors + apart[..., None, None] * np.eye(3) / 3.0)",
         "return np.asarray(tensors + 0.5 * apart[..., None, None] * np.eye(3) / 3.0)",
         ("tests/models/test_history_mechanics.py::test_points_of_a_cell_feel_its_mean_change_of_volume",),
+    ),
+    Mutation(
+        "multipliers of equalities forget what limits beside them push",
+        "optimize/merit.py",
+        "        found[here.equal] += share @ one.bundle.pushes",
+        "        pass",
+        (f"{NONLINEAR}::test_an_equality_and_a_limit_that_meet_at_an_angle_have_the_multipliers_that_balance_j",),
+    ),
+    Mutation(
+        "multipliers of equalities forget what is taken out of planes",
+        "optimize/merit.py",
+        "    found[here.equal] += step.weights @ state.bundle.pushes",
+        "",
+        (f"{NONLINEAR}::test_multipliers_are_those_of_the_limits",),
+    ),
+    Mutation(
+        "penalties are content with a ten thousandth of what is possible",
+        "optimize/merit.py",
+        "share: float = 0.1",
+        "share: float = 1e-4",
+        (f"{MERIT}::test_a_penalty_stays_that_takes_off_a_tenth_of_a_violation_and_grows_where_it_takes_off_less",),
+    ),
+    Mutation(
+        "rows of equalities are a thousand times too long",
+        "optimize/merit.py",
+        "np.vstack([rows, near.equality_rows])",
+        "np.vstack([1000.0 * rows, near.equality_rows])",
+        (f"{MERIT}::test_equalities_are_rows_of_length_one_whatever_their_units",),
+    ),
+    Mutation(
+        "violations of equalities count a thousand times",
+        "optimize/nonlinear.py",
+        "np.where(self.equal, np.abs(self.excess)",
+        "np.where(self.equal, 1000.0 * np.abs(self.excess)",
+        (f"{NONLINEAR}::test_violations_are_parts_of_the_sizes_of_limits_on_either_side",),
+    ),
+    Mutation(
+        "adjoints are solved below rounding",
+        "shape/adjoint.py",
+        "max(tolerance * begin.size, begin.rounding)",
+        "tolerance * begin.size",
+        ("tests/shape/test_adjoint.py::test_the_elastic_energy_of_bodies_pressed_together_has_a_gradient",),
+    ),
+    Mutation(
+        "new meshes forget what designs have added to given gaps",
+        "shape/new_mesh.py",
+        "    if name not in given:",
+        "    if name in given:",
+        ("tests/shape/test_remeshed_gaps.py::test_new_meshes_of_the_same_cells_have_the_same_objective[gap]",),
+    ),
+    Mutation(
+        "states of designs ignore the tolerance of Newton's method",
+        "contact/problem.py",
+        "return (self.steps or AutomaticSteps()).newton.tolerance",
+        "return 1e-6",
+        ("tests/shape/test_design_states.py::test_states_of_rubber_are_solved_to_newtons_tolerance",),
     ),
 )

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fenics_contact.optimize import NonlinearConstraint
 from fenics_contact.optimize.bundle import Bundle
 from fenics_contact.optimize.constraints import Surroundings, feasible_set
-from fenics_contact.optimize.merit import correcting_step, priced_step
+from fenics_contact.optimize.first_centre import first_centre
+from fenics_contact.optimize.merit import correcting_step, priced_step, surroundings
+from fenics_contact.optimize.problem import pose
 from fenics_contact.optimize.soft_constraint import SoftConstraint
 from fenics_contact.optimize.subproblem import solve_step
 
@@ -36,6 +39,22 @@ def test_a_penalty_grows_until_the_step_reduces_the_violation() -> None:
     step, (one,) = priced_step(DOWN, around(), 10.0, [soft([1.0, 0.0], 0.5, 0.1)], 1e-6)
     assert one.penalty == pytest.approx(10.0)
     assert step.violations[0] == pytest.approx(0.0, abs=1e-8)
+
+
+def test_a_penalty_stays_that_takes_off_a_tenth_of_a_violation_and_grows_where_it_takes_off_less() -> None:
+    # The step is t (ρ - 1) long, and all of the violation of 0.5 could be taken off.
+    for penalty, wanted in ((1.006, 1.006), (1.004, 10.04)):
+        _, (one,) = priced_step(DOWN, around(), 10.0, [soft([1.0, 0.0], 0.5, penalty)], 1e-6)
+        assert one.penalty == pytest.approx(wanted)
+
+
+def test_equalities_are_rows_of_length_one_whatever_their_units() -> None:
+    for size in (1e-3, 1.0, 1e3):
+        circle = NonlinearConstraint(lambda x, size=size: (size * float(x @ x), size * 2.0 * x), size, size)
+        problem = pose(lambda x: (float(x[0]), np.array([1.0, 0.0])), [0.6, 0.8], constraints=circle)
+        near = surroundings(problem, first_centre(problem, 0.01, 1e-6))
+        assert near.equality_rows == pytest.approx(np.array([[0.6, 0.8]]))
+        assert near.miss == pytest.approx([0.0])
 
 
 def test_a_penalty_does_not_grow_for_what_is_out_of_reach() -> None:

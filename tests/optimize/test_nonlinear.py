@@ -26,6 +26,7 @@ from fenics_contact.optimize import (
     StepKind,
     minimize,
 )
+from fenics_contact.optimize.nonlinear import scaled_constraints
 from tests.optimize.functions import Array, Fun, cb2, hs86, maxquad, mifflin1
 from tests.optimize.nonlinear_cases import CASES, NONLINEAR, Case, downhill, equal, square
 
@@ -122,6 +123,18 @@ def test_both_limits_of_a_constraint_hold() -> None:
     )
     assert other.value == pytest.approx(-2.0, abs=1e-6)
     assert other.constraints[0].multiplier == pytest.approx(1.0, rel=1e-3)
+
+
+def test_an_equality_and_a_limit_that_meet_at_an_angle_have_the_multipliers_that_balance_j() -> None:
+    rise: Fun = lambda x: (float(-x[1]), np.array([0.0, -1.0]))  # noqa: E731
+    line: Fun = lambda x: (float(x[1] - x[0]), np.array([-1.0, 1.0]))  # noqa: E731
+    both = [equal(square, 2.0, "circle"), NonlinearConstraint(line, 0.5, name="line")]
+    result = minimize(rise, [1.2, 0.5], METHOD, constraints=both, restore=True)
+    across = (np.sqrt(15.0) - 1.0) / 4.0
+    assert result.x == pytest.approx([across, across + 0.5], abs=1e-6)
+    on_circle = 0.5 / (2.0 * across + 0.5)
+    found = [one.multiplier for one in result.constraints]
+    assert found == pytest.approx([on_circle, 2.0 * on_circle * across], rel=1e-4)
 
 
 def test_linear_and_nonlinear_constraints_hold_together() -> None:
@@ -354,6 +367,12 @@ def no_pair(x: Array) -> Any:
 def test_constraints_that_are_none_are_refused(build: Callable[[], Any], text: str) -> None:
     with pytest.raises(InvalidInputError, match=text):
         build()
+
+
+def test_violations_are_parts_of_the_sizes_of_limits_on_either_side() -> None:
+    four = [equal(square, 4.0), NonlinearConstraint(square, 4.0), NonlinearConstraint(square, lower=4.0)]
+    assert scaled_constraints(four, np.full(3, 5.0)).violations == pytest.approx([0.25, 0.25, 0.0])
+    assert scaled_constraints(four, np.full(3, 3.0)).violations == pytest.approx([0.25, 0.0, 0.25])
 
 
 def test_sizes_of_constraints_follow_their_limits() -> None:
