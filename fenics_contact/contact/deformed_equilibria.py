@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact._libraries import MPI
+from fenics_contact.contact.advice import advice
 from fenics_contact.contact.deformed_state import DeformedState
 from fenics_contact.contact.dual_solve import contact_result
 from fenics_contact.contact.energies import Energies
@@ -19,7 +20,9 @@ from fenics_contact.contact.stored_deformed import stored_configuration
 from fenics_contact.contact.stored_rows import Stored
 from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.contact.turned_bodies import tell_of_turned_bodies
-from fenics_contact.errors import InvalidInputError, LoadStepError, together
+from fenics_contact.contact.unheld import UnheldMotion
+from fenics_contact.contact.unresisted import require_resisted, unresisted_in_words, unresisted_motions
+from fenics_contact.errors import InfeasibleError, InvalidInputError, LoadStepError, together
 from fenics_contact.feti import Decomposition, TornSystem, build_torn_system, prescribed_displacements
 from fenics_contact.nonlinear import (
     AutomaticSteps,
@@ -31,6 +34,7 @@ from fenics_contact.nonlinear import (
     Meeting,
     MovingContact,
     NonlinearEquilibrium,
+    NotHeldError,
     Path,
     PathEndsError,
     Snap,
@@ -38,7 +42,7 @@ from fenics_contact.nonlinear import (
     TurnedSurface,
 )
 from fenics_contact.qp import DualSolution, Vector
-from fenics_contact.scene import ContactPair, HistoryMaterial, LoadStep, RigidSurface, Scene, Surface
+from fenics_contact.scene import HistoryMaterial, LoadStep, RigidSurface, Scene
 from fenics_contact.timing import PhaseTimer
 
 if TYPE_CHECKING:
@@ -66,15 +70,12 @@ class DeformedEquilibria:
         Raises:
             InvalidInputError: If the scene has a rigid surface that is free to move.
         """
-        if any(isinstance(support, RigidSurface) and support.free.any() for support in scene.supports):
-            raise InvalidInputError(
-                "rigid surfaces need linear materials where they are free to move, this scene has others: "
-                "prescribe their displacement and rotation"
-            )
+        _require_prescribed(scene)
         self.scene, self._steps = scene, steps or AutomaticSteps()
         self._decomposition, self._timer = decomposition, timer
         self._equations = Equations(scene, decomposition)
         self._assembled: TornSystem | None = None
+        self._unresisted: tuple[UnheldMotion, ...] | None = None
         moves = any(body.deforms_much for body in scene.bodies.values())
         self._contact: Contact = StillContact()
         if scene.contacts and moves:
@@ -102,6 +103,7 @@ class DeformedEquilibria:
 
         Raises:
             InvalidInputError: If the tolerance is no number, or time runs backwards and materials remember.
+            InfeasibleError: If nothing holds some body.
             LoadStepError: If the load cannot be followed; has the last equilibrium.
         """
         steps = self._steps
@@ -125,13 +127,22 @@ class DeformedEquilibria:
                 load = replace(load, course=course)
             if before is None:
                 check_held(load.torn)
+            if self._unresisted is None:  # supports stay what they are in later steps
+                self._unresisted = unresisted_motions(load.torn)
+            require_resisted(self._unresisted, load.torn, load.prescribed)
         try:
-            path = steps.follow(equations, self._contact, before, load, start, timer, known)
+            path = steps.follow(
+                equations, self._contact, before, load, start, timer, known, held=not self._unresisted
+            )
+        except (InfeasibleError, NotHeldError) as failure:
+            if not self._unresisted:
+                raise
+            raise InfeasibleError(unresisted_in_words(self._unresisted)) from failure
         except PathEndsError as failure:
             last = None if failure.path is None else _state_after(failure.path, origin, timer)
             where = "" if step is None else f"load step {step.name!r}: "
-            advice = _advice_on_contact(scene) if isinstance(self._contact, MovingContact) else ""
-            raise LoadStepError(f"{where}{failure}{advice}", failure.history, last) from failure
+            words = f"{where}{failure}{advice(scene, moves=isinstance(self._contact, MovingContact))}"
+            raise LoadStepError(words, failure.history, last) from failure
         state = _state_after(path, origin, timer)
         tell_of_turned_bodies(state)
         return state
@@ -187,6 +198,21 @@ class DeformedEquilibria:
         return Loading(self._assembled, prescribed, time, following, turned)
 
 
+def _require_prescribed(scene: Scene) -> None:
+    """Reject rigid surfaces that forces move."""
+    for support in scene.supports:
+        if isinstance(support, RigidSurface) and support.free.any():
+            kinds = {type(each).__name__ for body in scene.bodies.values() for each in body.materials}
+            raise InvalidInputError(
+                "the whole motion of a RigidSurface must be prescribed where materials are nonlinear, but on "
+                f"surface {support.surface!r} of body {support.body!r} components are left free, with "
+                f"force {support.force!r} and moment {support.moment!r}, and the scene has {sorted(kinds)}: "
+                "prescribe displacement and rotation and read the force from the state's reactions(); or "
+                "apply the force by a TotalForce, which leaves the surface flexible, or to a stiff body that "
+                "is tied to the surface"
+            )
+
+
 class _Course:
     """The functions of time of a load step; a `Course`."""
 
@@ -201,23 +227,6 @@ class _Course:
         with together(self._comm):
             scene = self._step.at(self._scene, time)
         return self._loading(scene, time)
-
-
-def _advice_on_contact(scene: Scene) -> str:
-    """Return words on surfaces that slide by nodes and could by mortar, empty if there are none.
-
-    Slave nodes rest in hollows between nodes of the master; where they leave them together, as two bodies
-    that are pressed in perfect symmetry, no equilibrium may be near that mortar has.
-    """
-
-    def by_nodes(pair: ContactPair) -> bool:
-        if pair.discretisation == "mortar" or pair.within_body or not isinstance(pair.master, Surface):
-            return False
-        return all(scene.bodies[side.body].mesh.order == 1 for side in (pair.slave, pair.master))
-
-    if not any(map(by_nodes, scene.contacts)):
-        return ""
-    return "; surfaces of bodies meet more smoothly with discretisation='mortar' than by nodes"
 
 
 def _state_after(

@@ -48,7 +48,7 @@ def check_held(torn: TornSystem) -> None:
     """
     comm = torn.numbering.comm
     with together(comm):
-        bodies = [_RigidBody(torn, index) for index in range(len(torn.scene.bodies))]
+        bodies = [RigidBody(torn, index) for index in range(len(torn.scene.bodies))]
     loads = comm.allreduce(np.array([body.load_wrench(torn) for body in bodies]))
     loads[np.abs(loads) <= ROUNDING * comm.allreduce(np.abs(torn.load).sum())] = 0.0
     with together(comm):
@@ -57,7 +57,7 @@ def check_held(torn: TornSystem) -> None:
             _check_balance(torn, [bodies[index] for index in floating], loads[floating])
 
 
-def _check_balance(torn: TornSystem, bodies: list[_RigidBody], loads: np.ndarray) -> None:
+def _check_balance(torn: TornSystem, bodies: list[RigidBody], loads: np.ndarray) -> None:
     scale = float(np.abs(loads).max())
     if scale == 0.0:
         return
@@ -74,7 +74,7 @@ def _check_balance(torn: TornSystem, bodies: list[_RigidBody], loads: np.ndarray
     raise InfeasibleError(_describe(motion, bodies, loads, only_just=without_margin is None))
 
 
-class _RigidBody:
+class RigidBody:
     """A body regarded as rigid: its modes, and the wrenches of supports, ties, contacts and loads on it."""
 
     def __init__(self, torn: TornSystem, index: int) -> None:
@@ -225,7 +225,7 @@ def _admissible(
     return normal, sp.vstack([press, cone], format="csr"), limit, cones
 
 
-def _describe(motion: np.ndarray, bodies: list[_RigidBody], loads: np.ndarray, *, only_just: bool) -> str:
+def _describe(motion: np.ndarray, bodies: list[RigidBody], loads: np.ndarray, *, only_just: bool) -> str:
     # The certificate points against the right side, which is minus the load. The pushed body may take others
     # along: it is the one on which the load does most work.
     pushed = int(np.argmax(np.einsum("bm,bm->b", motion, loads)))

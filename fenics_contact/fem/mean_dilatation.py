@@ -13,6 +13,9 @@ from fenics_contact.fem.deformation import Dilatation
 from fenics_contact.fem.deformed_forms import MEAN_FORMS
 from fenics_contact.fem.templates import Templates
 
+#: Part of the mean dilatation that a step led to, below which a foreseen one says nothing.
+FLATTENED = 0.1
+
 
 def assembled(form: _dolfinx.fem.Form, shape: tuple[int, int]) -> sp.csr_matrix:
     """Assemble a bilinear form on one rank."""
@@ -66,12 +69,17 @@ class MeanDilatation:
     def foresee(self, origin: np.ndarray, displacement: np.ndarray) -> None:
         """Set the mean dilatations to those that a step was expected to lead to, θ_c + D δu / V_c.
 
+        Where that turns a cell inside out, or nearly so, to those that it led to.
+
         Args:
             origin: Displacement at the start of the step, that of the fields.
             displacement: That at its end.
         """
+        self.follow(displacement)
+        reached = self._means.x.array.copy()
         self.follow(origin)
-        self._means.x.array[:] += self._volume_changes() @ (displacement - origin) / self._volumes
+        foreseen = self._means.x.array + self._volume_changes() @ (displacement - origin) / self._volumes
+        self._means.x.array[:] = np.where(foreseen > FLATTENED * reached, foreseen, reached)
 
     def stiffness(self) -> sp.csr_matrix:
         """Return the growth of the mean dilatations' stresses, shape (dim n, dim n)."""

@@ -13,6 +13,7 @@ from fenics_contact.feti.factor import (
     fixing_nodes,
     held_by,
     motions_at,
+    require_factored,
     symmetric_matrix,
 )
 from fenics_contact.feti.gluing import prescribed_displacements
@@ -66,5 +67,6 @@ __all__ = [
     "on_copies",
     "petsc_call",
     "prescribed_displacements",
+    "require_factored",
     "symmetric_matrix",
 ]

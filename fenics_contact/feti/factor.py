@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 
 import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._libraries import PETSc, check_not_forked
+from fenics_contact.errors import ConvergenceError
 from fenics_contact.linalg import dispose_with
 
 #: Enough nodes to fix all rigid motions of a body that is not a line, few enough to keep the factor sparse.
@@ -21,13 +24,18 @@ class Factor:
     """
 
     def __init__(self, matrix: sp.csr_matrix) -> None:
-        """Factor ``matrix``, shape (n, n)."""
+        """Factor ``matrix``, shape (n, n).
+
+        Raises:
+            ConvergenceError: If it has no such factors.
+        """
         self.size = matrix.shape[0]
         given = symmetric_matrix(matrix, shared=True)
         pc = PETSc.PC().create(PETSc.COMM_SELF)
         pc.setOperators(given)
         pc.setType(PETSc.PC.Type.CHOLESKY)
-        self._set_up(pc, given)
+        with _silent_cholmod(), _named_failure():
+            self._set_up(pc, given)
         self._factor = pc.getFactorMatrix()
         self._right, self._left = given.createVecs()
         # Only the factor is stored: the matrix would take another third of its memory.
@@ -39,6 +47,8 @@ class Factor:
         """Choose a library and factor."""
         pc.setFactorSolverType(_solver())
         pc.setUp()
+        if _solver() == "mumps":
+            require_factored(pc.getFactorMatrix())
 
     def solve(self, right: np.ndarray, out: np.ndarray) -> None:
         """Write the solution for one right side, shape (n,), into ``out``."""
@@ -62,6 +72,46 @@ class Factor:
         given.destroy()
         solutions.destroy()
         return solution
+
+
+def require_factored(factor: PETSc.Mat) -> None:
+    """Reject factors that MUMPS could not complete: PETSc passes over that until they are used.
+
+    Raises:
+        ConvergenceError: With the code of MUMPS.
+    """
+    code = factor.getMumpsInfog(1)
+    if code < 0:
+        raise _failure(f"MUMPS ends with INFOG(1) = {code}")
+
+
+@contextmanager
+def _silent_cholmod() -> Iterator[None]:
+    """Have factors that begin inside print nothing: what is wrong with a matrix becomes an error."""
+    options, name = PETSc.Options(), "mat_cholmod_print"
+    if options.hasName(name):  # the user wants to see it
+        yield
+        return
+    options.setValue(name, 0)
+    try:
+        yield
+    finally:
+        options.delValue(name)
+
+
+@contextmanager
+def _named_failure() -> Iterator[None]:
+    try:
+        yield
+    except PETSc.Error as error:
+        raise _failure(str(error).strip().splitlines()[-1]) from error
+
+
+def _failure(reason: str) -> ConvergenceError:
+    return ConvergenceError(
+        f"matrices of subdomains must have factors, but {reason}: check the constants of materials, and that "
+        "no cell is flat and there is memory for them"
+    )
 
 
 def symmetric_matrix(matrix: sp.csr_matrix, *, shared: bool = False) -> PETSc.Mat:

@@ -4,7 +4,7 @@ from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluat
 from fenics_contact.nonlinear.load_steps import AutomaticSteps, Path, PathEndsError
 from fenics_contact.nonlinear.loading import Course, FollowingPressures, Loading, TurnedSurface
 from fenics_contact.nonlinear.meeting import Contact, Meeting, MovingContact, StillContact
-from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
+from fenics_contact.nonlinear.newton import NonlinearEquilibrium, NotHeldError, TangentNewton
 from fenics_contact.nonlinear.snapping import Snap
 from fenics_contact.nonlinear.tangent_step import tangent_adjoint
 
@@ -21,6 +21,7 @@ __all__ = [
     "Meeting",
     "MovingContact",
     "NonlinearEquilibrium",
+    "NotHeldError",
     "Path",
     "PathEndsError",
     "Snap",

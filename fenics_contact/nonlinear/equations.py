@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.display import displayed
-from fenics_contact.errors import together
+from fenics_contact.errors import ConvergenceError, together
 from fenics_contact.fem import Mechanics, Response, composition
 from fenics_contact.feti import Decomposition, TornSystem
 from fenics_contact.nonlinear.loading import Loading
@@ -123,6 +123,18 @@ class Evaluation:
             return tangents
         return with_added(self.torn.decomposition, tangents, (self.softening + self.softening.T) / 2)
 
+    def _require_finite_tangents(self) -> None:
+        """Reject tangents with NaN or infinity, which no factorisation survives. Collective."""
+        with together(self.torn.numbering.comm):
+            parts = zip(self.torn.subdomains, self.responses, strict=True)
+            bad = {s.mesh.body for s, response in parts if not np.isfinite(response.stiffness.data).all()}
+            if bad:
+                raise ConvergenceError(
+                    f"tangents must be finite, got NaN or infinity in body {min(bad)!r} at a smallest "
+                    f"det F of {self.least_jacobian:.2g}: take smaller load steps, or check where the "
+                    "energy or stress of its material has a derivative"
+                )
+
     def passed_on(self, moved: Vector) -> Vector:
         """Return what neighbours and supports take of the unsymmetric part of the loads' growth. Collective.
 
@@ -150,7 +162,11 @@ class Evaluation:
         Args:
             timer: Collects the wall time.
             known: That of a neighbouring configuration, or None.
+
+        Raises:
+            ConvergenceError: If the tangents are not finite, or have no factors.
         """
+        self._require_finite_tangents()
         uneven = None
         if self.softening is not None:
             uneven = unsymmetric_at(self.torn.decomposition, self.softening, self.rim)

@@ -6,10 +6,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._libraries import PETSc
-from fenics_contact.feti import Factor, petsc_call, symmetric_matrix
+from fenics_contact.errors import ConvergenceError
+from fenics_contact.feti import Factor, petsc_call, require_factored, symmetric_matrix
 
 #: Largest residual of a solution with factors that are used, relative to its right side.
 WRONG = 1e-8
+#: Further memory that MUMPS may take where its estimate was too small, in percent, and its words for that.
+ROOM, NO_ROOM = (100, 400), (-8, -9)
 
 
 class RefillableFactor(Factor):
@@ -23,7 +26,7 @@ class RefillableFactor(Factor):
         super().__init__(matrix)
 
     def refill(self, matrix: sp.csr_matrix) -> bool:
-        """Factor another matrix instead, without a new analysis; False where its pattern is another one.
+        """Factor another matrix instead, without a new analysis; False where that cannot be done.
 
         For small matrices the analysis takes most of the time.
         """
@@ -34,6 +37,9 @@ class RefillableFactor(Factor):
         given.setOption(PETSc.Mat.Option.SPD, self.positive)
         petsc_call("MatCholeskyFactorNumeric", self._factor.handle, given.handle, None)
         given.destroy()
+        return self._complete()
+
+    def _complete(self) -> bool:
         return True
 
     def fits(self, matrix: sp.csr_matrix) -> bool:
@@ -62,6 +68,14 @@ class IndefiniteFactor(RefillableFactor):
         factor.setMumpsIcntl(13, 1)
         factor.setMumpsIcntl(24, 1)
         pc.setUp()
+        for percent in ROOM:
+            if factor.getMumpsInfog(1) in NO_ROOM:
+                factor.setMumpsIcntl(14, percent)
+                petsc_call("MatCholeskyFactorNumeric", factor.handle, given.handle, None)
+        require_factored(factor)
+
+    def _complete(self) -> bool:
+        return bool(self._factor.getMumpsInfog(1) >= 0)
 
 
 def with_inertia(matrix: sp.csr_matrix, spent: RefillableFactor | None) -> IndefiniteFactor:
@@ -84,6 +98,6 @@ def mostly_positive(matrix: sp.csr_matrix, spent: RefillableFactor | None) -> Re
     try:
         if spent is None or isinstance(spent, IndefiniteFactor) or not spent.refill(matrix):
             spent = RefillableFactor(matrix)
-    except PETSc.Error:  # as later versions say that it is not positive definite
+    except (PETSc.Error, ConvergenceError):  # as later versions say that it is not positive definite
         return with_inertia(matrix, None)
     return spent if spent.fits(matrix) else with_inertia(matrix, None)

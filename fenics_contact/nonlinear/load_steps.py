@@ -17,7 +17,7 @@ from fenics_contact.feti import TornSystem
 from fenics_contact.nonlinear.equations import Configuration, Equations, Linearisation
 from fenics_contact.nonlinear.loading import Loading
 from fenics_contact.nonlinear.meeting import Contact, Meeting
-from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
+from fenics_contact.nonlinear.newton import NonlinearEquilibrium, NotHeldError, TangentNewton
 from fenics_contact.nonlinear.snapping import Snap, Snapping
 from fenics_contact.qp import SolverStep, global_max
 from fenics_contact.timing import PhaseTimer
@@ -128,6 +128,8 @@ class AutomaticSteps:
         start: Configuration,
         timer: PhaseTimer,
         known: Linearisation | None = None,
+        *,
+        held: bool = True,
     ) -> Path:
         """Return the equilibrium at a load, with the path to it. Collective.
 
@@ -139,9 +141,11 @@ class AutomaticSteps:
             start: The configuration at the start.
             timer: Collects the wall time.
             known: A linearisation near the start, or None.
+            held: Whether supports and contacts resist every motion of the bodies at rest.
 
         Raises:
             PathEndsError: The smallest step fails.
+            NotHeldError: They do not, and the first step fails for that.
         """
         first = target.removed() if before is None else before
         # Slip begins where bodies are before supports and obstacles move.
@@ -156,6 +160,8 @@ class AutomaticSteps:
             try:
                 steps = walk.advance(fraction)
             except ConvergenceError as failure:
+                if not held and isinstance(failure, NotHeldError) and walk.reached == 0.0:
+                    raise
                 part *= 0.5
                 if part >= smallest:
                     tell(_LOG.info, "load step cut to %.3g: %s", part, failure)

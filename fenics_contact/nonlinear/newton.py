@@ -58,6 +58,10 @@ HOLD = (
 )
 
 
+class NotHeldError(ConvergenceError):
+    """Contact could not be solved as a whole: perhaps nothing holds some body."""
+
+
 @displayed
 @dataclass(frozen=True, eq=False)
 class NonlinearEquilibrium:
@@ -328,11 +332,13 @@ class _Run:
         except InfeasibleError as reason:
             if not self._forces_known(evaluation):  # bodies at rest: nothing holds them from the start
                 raise
-            raise ConvergenceError(
+            raise NotHeldError(
                 f"Newton's method needs tangents that the rows of supports and contacts hold, got after "
                 f"{len(self.history)} steps: {reason}: {HOLD}",
                 self.history,
             ) from reason
+        except ConvergenceError as reason:
+            raise NotHeldError(str(reason), reason.history) from reason
 
     def _whole(self, system: TangentSystem, evaluation: Evaluation, step: Vector) -> TangentStep:
         """Solve the linearised contact problem as a whole, its rigid motions without stiffness. Collective.
@@ -383,14 +389,6 @@ class _Run:
         notes += [f"cut to {part:g} of the step"] if part < 1.0 else []
         notes += [taken.stop.value] if taken.stop is not Stop.CONVERGED else []
         notes += [f"{system.softened} soft motions held"] if system.softened else []
-        line = SolverStep(
-            "Newton",
-            len(self.history),
-            self.products,
-            evaluation.residuals,
-            closed,
-            stick,
-            slip,
-            ", ".join(notes),
-        )
+        residuals, words = evaluation.residuals, ", ".join(notes)
+        line = SolverStep("Newton", len(self.history), self.products, residuals, closed, stick, slip, words)
         self.history.append(line)

@@ -39,8 +39,11 @@ class Residuals:
 
     @property
     def worst(self) -> float:
-        """The largest residual, which controls the iteration: the natural one is at least the violation."""
-        return max(self.natural, self.gluing, self.coarse)
+        """The largest residual, which controls the iteration: the natural one is at least the violation.
+
+        NaN if one of them is.
+        """
+        return float(np.max((self.natural, self.gluing, self.coarse)))
 
     @property
     def size(self) -> float:

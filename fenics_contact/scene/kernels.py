@@ -5,21 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 
-def rigid_body_modes(points: np.ndarray) -> np.ndarray:
-    """Return the translations and the rotations about the centroid of ``points``.
+def rigid_body_modes(points: np.ndarray, at: np.ndarray | None = None) -> np.ndarray:
+    """Return the translations and the rotations about the centroid of ``points``, there or at other points.
 
     Rotations are divided by the largest distance from the centroid, so that all modes have about the same
     size whatever the unit of length.
 
     Args:
-        points: Coordinates, shape (n, dim), [length].
+        points: Coordinates of the nodes of a body, shape (m, dim), [length].
+        at: Where the modes are wanted, shape (n, dim), [length]; None for all of its nodes.
 
     Returns:
         Modes, dimensionless: shape (n, 3, 6) in space, (n, 2, 3) in the plane.
     """
     centre = points.mean(axis=0)
     size = max(float(np.abs(points - centre).max()), np.finfo(float).tiny)
-    return motions_about((points - centre) / size, np.zeros(points.shape[1]))
+    return motions_about(((points if at is None else at) - centre) / size, np.zeros(points.shape[1]))
 
 
 def motions_about(points: np.ndarray, centre: np.ndarray) -> np.ndarray:

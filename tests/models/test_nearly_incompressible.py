@@ -142,3 +142,12 @@ def test_a_torn_body_of_mean_dilatations_is_in_equilibrium_as_a_whole() -> None:
     assert np.abs(patch.at(0.0 * force).stiffness - patch.linear_stiffness()).max() > 1.0, (
         "not that of points"
     )
+
+
+def test_tangents_of_cells_that_turn_far_in_one_step_are_finite() -> None:
+    """To first order a turn by 120° would make the volume negative."""
+    patch = patch_of(Body(skew_patch("quadrilateral"), NeoHooke(10.0, 0.499, mean_dilatation=True)))
+    c, s = np.cos(2 * np.pi / 3), np.sin(2 * np.pi / 3)
+    turned = patch.deformed(np.array([[c, -s], [s, c]])).ravel()
+    found = patch.mechanics.at(turned, origin=np.zeros_like(turned)).stiffness
+    np.testing.assert_allclose(found.toarray(), patch.at(turned).stiffness.toarray(), rtol=1e-12)

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from fenics_contact.nonlinear.indefinite_factor import IndefiniteFactor, mostly_positive, with_inertia
+from fenics_contact.errors import ConvergenceError
+from fenics_contact.nonlinear.indefinite_factor import (
+    IndefiniteFactor,
+    RefillableFactor,
+    mostly_positive,
+    with_inertia,
+)
 
 
 def stiffness(shift: float) -> sp.csr_matrix:
@@ -45,3 +51,22 @@ def test_factors_of_another_pattern_are_not_refilled():
 def test_cholesky_factors_that_do_not_fit_are_replaced(monkeypatch):
     monkeypatch.setattr("fenics_contact.nonlinear.indefinite_factor.WRONG", 0.0)
     assert isinstance(mostly_positive(stiffness(0.0), None), IndefiniteFactor)
+
+
+def test_a_matrix_that_is_not_positive_definite_is_told_by_an_error_alone(capfd):
+    line = sp.diags([-np.ones(11), np.full(12, 2.0), -np.ones(11)], [-1, 0, 1])
+    one = sp.identity(12)
+    orders = ((line, one, one), (one, line, one), (one, one, line))
+    whole = sum(sp.kron(sp.kron(a, b), c) for a, b, c in orders)
+    matrix = (whole - 0.5 * sp.identity(12**3)).tocsr()
+    assert isinstance(mostly_positive(matrix, None), IndefiniteFactor)
+    with pytest.raises(ConvergenceError, match=r"must have factors, but .* not positive definite"):
+        RefillableFactor(matrix)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_factors_that_mumps_cannot_complete_are_refused():
+    matrix = stiffness(0.0)
+    matrix.data[:] = np.nan
+    with pytest.raises(ConvergenceError, match=r"must have factors, but MUMPS ends with INFOG\(1\) = -"):
+        with_inertia(matrix, None)
