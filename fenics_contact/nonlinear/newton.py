@@ -13,6 +13,7 @@ from fenics_contact.errors import ConvergenceError, FoldedFacetsError, Infeasibl
 from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation
 from fenics_contact.nonlinear.loading import Loading
 from fenics_contact.nonlinear.meeting import Contact, Meeting
+from fenics_contact.nonlinear.starts import starts
 from fenics_contact.nonlinear.tangent_step import TangentStep, tangent_step
 from fenics_contact.nonlinear.tangent_system import TangentSystem
 from fenics_contact.qp import (
@@ -157,8 +158,8 @@ class TangentNewton:
                 before the load step.
             timer: Collects the wall time.
             known: A linearisation near the start, or None.
-            moved: Displacement from which to start instead where bodies do not come into contact there,
-                torn, shape (torn_size,), [length]; None for that of the configuration.
+            moved: Displacement to which supports take bodies, see `starts`, torn, shape (torn_size,),
+                [length]; None for that of the configuration.
 
         Raises:
             ConvergenceError: With the history, which ends with the reason.
@@ -175,7 +176,7 @@ class _Run:
         self._method, self._equations, self._contact, self._load = method, equations, contact, load
         self._timer, self._comm = timer, load.torn.numbering.comm
         self._caution = self._care = 1.0
-        self._stalls, self._loose = 0, False
+        self._stalls, self._loose, self._whole_step = 0, False, False
         self._start: MaterialPoints | None = None
         self.history: list[SolverStep] = []
         self._residuals: list[float] = []
@@ -186,8 +187,8 @@ class _Run:
         self, at: Configuration, known: Linearisation | None, moved: Vector | None
     ) -> NonlinearEquilibrium:
         self._start = None if at.meeting is None else at.meeting.start
-        near, evaluation, earlier = known, self._first(at, known, moved), None
-        first = evaluation.residuals
+        evaluation, instead = starts(lambda at: self._evaluated(at, known), at, moved)
+        self._start, near, earlier, first = evaluation.meeting.start, known, None, evaluation.residuals
         if near is None and first.force_scale > 0.0 and first.within(self._method.tolerance):
             near = evaluation.linearised(self._timer, None)
             self.factorisations += 1
@@ -199,25 +200,22 @@ class _Run:
             near = evaluation.linearised(self._timer, near)
             self.factorisations += 1
             following = self._advanced(evaluation, earlier, near)
-            evaluation, earlier = following, evaluation.residuals
+            promising = self._whole_step and following.residuals.worst < evaluation.residuals.worst
+            if instead is not None and not promising:
+                evaluation = self._begins_again(instead)
+            else:
+                evaluation, earlier = following, evaluation.residuals
+            instead = None
         return NonlinearEquilibrium(
             evaluation, near, tuple(self.history), self._load.time, self.products, self.factorisations
         )
 
-    def _first(self, at: Configuration, known: Linearisation | None, moved: Vector | None) -> Evaluation:
-        """Return the equations where Newton's method starts. Collective."""
-        here, stood = self._evaluated(at, known), self._start
-        if moved is None or self._touches(here, here.at.multiplier):
-            return here
-        there = self._evaluated(replace(at, displacement=moved), known)
-        if not self._touches(there, there.law.feasible(there.at.multiplier).project(-there.lacking)):
-            return there
-        self._start = stood
-        return here
-
-    def _touches(self, evaluation: Evaluation, forces: Vector) -> bool:
-        touching = evaluation.torn.numbering.owned >= evaluation.torn.n_equality
-        return global_sum(self._comm, np.count_nonzero(forces[touching]))[0] > 0.0
+    def _begins_again(self, instead: Evaluation) -> Evaluation:
+        """Forget a first step that failed; return the equations to start from instead."""
+        self.history[-1] = replace(self.history[-1], note=f"{self.history[-1].note}, begun again")
+        self._caution, self._care, self._forcing, self._residuals = 1.0, 1.0, self._method.forcing, []
+        self._start = instead.meeting.start
+        return instead
 
     def _evaluated(
         self, at: Configuration, near: Linearisation | None, origin: Vector | None = None
@@ -319,6 +317,7 @@ class _Run:
             candidates = [(best, part), *((after(f * part), f * part) for f in FRACTIONS)]
             full = best.residuals.at_rows
             best, part = min(candidates, key=lambda c: c[0].residuals.at_rows.worst_beside(full))
+        self._whole_step = part == 1.0
         self._record(best, near.system, taken, part, whole)
         return best
 
