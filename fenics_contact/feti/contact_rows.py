@@ -84,6 +84,9 @@ class Relations:
             tearing: Node numbering and copies.
             fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         """
+        if self.count == 0:
+            none = np.zeros(0, dtype=np.int64)
+            return Rows(none, none, none, np.zeros(0), np.zeros(0), none)
         jump = self.points.jump[self.which]
         row = np.repeat(np.arange(self.count), np.diff(jump.indptr))
         # Sorted by row: every rank builds the same rows, and the owner's copy is that of the slave node.

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.inverse import TornInverse
 from fenics_contact.feti.numbering import DualNumbering
+from fenics_contact.linalg import scaled_columns
 from fenics_contact.qp import global_sum
 
 #: Fraction of its diagonal added to the contact block of B D⁻¹ Bᵀ. A node in two contact pairs has more rows
@@ -51,7 +52,7 @@ class DirichletPreconditioner:
             n_gluing: Number of gluing and Dirichlet rows; rows of ties and contacts have the higher numbers.
         """
         self._inverse, self._numbering = inverse, numbering
-        self._B = (B @ sp.diags(compliance)).tocsr()
+        self._B = scaled_columns(B, compliance)
         self._Bt = self._B.T.tocsr()
         diagonal = numbering.to_owned(np.asarray(B.multiply(self._B).sum(axis=1)).ravel())
         self._equality = 1.0 / np.where(numbering.owned < n_gluing, diagonal, 1.0)

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 
 from fenics_contact.display import displayed
 from fenics_contact.feti import Decomposition, TornSystem, meeting_at, nodal_mean_at, on_copies
+from fenics_contact.linalg import scaled_rows
 from fenics_contact.nonlinear.loading import Loading
 from fenics_contact.nonlinear.turning import LackingRows, TurningForces, UnevenStiffness
 from fenics_contact.pairing import sliding_contact
@@ -97,7 +98,7 @@ class Meeting:
         width, frictional = self.torn.dim - 1, self.torn.frictional
         rubbed = (width * frictional[:, None] + np.arange(width)).ravel()
         # In the order of the rows of contact, of which those of gaps measure −n·[u].
-        slips = sp.diags(1.0 - self._across.ravel()) @ means.slip
+        slips = scaled_rows(means.slip, 1.0 - self._across.ravel())
         rows = sp.vstack([-means.gap, slips[rubbed]], "csr")
         lacking = LackingRows.of(rows, slave[np.concatenate([np.arange(len(slave)), rubbed // width])])
         return TurningForces.of(stiffness, further, slave[stiffness.point], lacking)

@@ -186,9 +186,8 @@ class _Run:
     def to_equilibrium(
         self, at: Configuration, known: Linearisation | None, moved: Vector | None
     ) -> NonlinearEquilibrium:
-        self._start = None if at.meeting is None else at.meeting.start
-        evaluation, instead = starts(lambda at: self._evaluated(at, known), at, moved)
-        self._start, near, earlier, first = evaluation.meeting.start, known, None, evaluation.residuals
+        evaluation, instead = starts(lambda at: self._from(at, known), at, moved)
+        near, earlier, first = known, None, evaluation.residuals
         if near is None and first.force_scale > 0.0 and first.within(self._method.tolerance):
             near = evaluation.linearised(self._timer, None)
             self.factorisations += 1
@@ -202,7 +201,7 @@ class _Run:
             following = self._advanced(evaluation, earlier, near)
             promising = self._whole_step and following.residuals.worst < evaluation.residuals.worst
             if instead is not None and not promising:
-                evaluation = self._begins_again(instead)
+                evaluation = self._begins_again(instead, known)
             else:
                 evaluation, earlier = following, evaluation.residuals
             instead = None
@@ -210,12 +209,16 @@ class _Run:
             evaluation, near, tuple(self.history), self._load.time, self.products, self.factorisations
         )
 
-    def _begins_again(self, instead: Evaluation) -> Evaluation:
-        """Forget a first step that failed; return the equations to start from instead."""
+    def _from(self, at: Configuration, known: Linearisation | None) -> Evaluation:
+        """Return the equations at a configuration before the first step. Collective."""
+        self._start = None if at.meeting is None else at.meeting.start
+        return self._evaluated(at, known)
+
+    def _begins_again(self, instead: Configuration, known: Linearisation | None) -> Evaluation:
+        """Forget a first step that failed; return the equations to start from instead. Collective."""
         self.history[-1] = replace(self.history[-1], note=f"{self.history[-1].note}, begun again")
         self._caution, self._care, self._forcing, self._residuals = 1.0, 1.0, self._method.forcing, []
-        self._start = instead.meeting.start
-        return instead
+        return self._from(instead, known)
 
     def _evaluated(
         self, at: Configuration, near: Linearisation | None, origin: Vector | None = None

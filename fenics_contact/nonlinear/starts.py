@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fenics_contact.errors import ConvergenceError
+from fenics_contact.feti import TornSystem
 from fenics_contact.nonlinear.equations import Configuration, Evaluation
 from fenics_contact.qp import Vector, global_max, global_sum
 
@@ -17,7 +18,7 @@ SLIDING = 1e-2
 
 def starts(
     evaluated: Callable[[Configuration], Evaluation], at: Configuration, moved: Vector | None
-) -> tuple[Evaluation, Evaluation | None]:
+) -> tuple[Evaluation, Configuration | None]:
     """Return the equations where Newton's method starts, and where else if its first step fails. Collective.
 
     Bodies that touch nothing, there as here, start where their supports take them as rigid ones. So do bodies
@@ -29,33 +30,30 @@ def starts(
         at: Where bodies are.
         moved: The displacement to which supports take them, torn, shape (torn_size,); None without any.
     """
-    here = evaluated(at)
-    if moved is None:
-        return here, None
-    touching = _touches(here, here.at.multiplier)
-    if touching and not _slides(here):
-        return here, None
+    meeting = at.meeting
+    touching = meeting is not None and _acts(meeting.torn, at.multiplier)
+    if moved is None or (meeting is not None and touching and not _slides(meeting.torn, at.multiplier)):
+        return evaluated(at), None
     try:
         there = evaluated(replace(at, displacement=moved))
     except ConvergenceError:
-        return here, None
+        return evaluated(at), None
     if touching:
-        return there, here
-    touches = _touches(there, there.law.feasible(there.at.multiplier).project(-there.lacking))
-    return (here if touches else there), None
+        return there, at
+    if _acts(there.torn, there.law.feasible(there.at.multiplier).project(-there.lacking)):
+        return evaluated(at), None
+    return there, None
 
 
-def _touches(evaluation: Evaluation, forces: Vector) -> bool:
+def _acts(torn: TornSystem, forces: Vector) -> bool:
     """Return whether any row of contact has a force. Collective."""
-    numbering = evaluation.torn.numbering
-    touching = numbering.owned >= evaluation.torn.n_equality
-    return global_sum(numbering.comm, np.count_nonzero(forces[touching]))[0] > 0.0
+    touching = torn.numbering.owned >= torn.n_equality
+    return global_sum(torn.numbering.comm, np.count_nonzero(forces[touching]))[0] > 0.0
 
 
-def _slides(evaluation: Evaluation) -> bool:
+def _slides(torn: TornSystem, multiplier: Vector) -> bool:
     """Return whether all friction is at its bound. Collective."""
-    multiplier, comm = evaluation.at.multiplier, evaluation.torn.numbering.comm
-    bound = evaluation.law.bound(multiplier)
-    friction = np.linalg.norm(multiplier[evaluation.torn.layout.tangential], axis=1)
+    comm, bound = torn.numbering.comm, torn.law.bound(multiplier)
+    friction = np.linalg.norm(multiplier[torn.layout.tangential], axis=1)
     largest = global_max(comm, float(bound.max(initial=0.0)))
     return global_max(comm, float((bound - friction).max(initial=0.0))) <= SLIDING * largest

@@ -315,8 +315,8 @@ class _StiffFace:
 
     def _direction(self, vector: Vector) -> tuple[Vector, Vector]:
         """Return a step y and motions β with G Z y + S β = 0 for a residual. Collective."""
-        oblique, across = self.oblique, self.oblique(vector)
-        motions = -oblique.coefficients(vector)
+        oblique, motions = self.oblique, -self.oblique.coefficients(vector)
+        across = vector + oblique.transposed @ motions
         residual = np.zeros(self.system.face.n_face)
         residual[self.shared] = across[: len(self.shared)]
         step = np.concatenate([self.system.precondition(residual)[self.shared], self._nothing])

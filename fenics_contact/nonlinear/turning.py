@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from fenics_contact.display import displayed
 from fenics_contact.feti import Decomposition, TornSystem
-from fenics_contact.linalg import ROUNDING
+from fenics_contact.linalg import ROUNDING, scaled_columns
 from fenics_contact.qp import Vector
 
 if TYPE_CHECKING:
@@ -97,12 +97,13 @@ class TurningForces:
         lacking: LackingRows | None = None,
     ) -> TurningForces:
         """Return those of several stiffnesses, with at least one unsymmetric one."""
-        L, R = (sp.hstack([getattr(each, side) for each in others]).tocsr() for side in ("left", "right"))
+        others = [each for each in others if each.left.shape[1]] or others[:1]
+        L, R = (_beside([getattr(each, side) for each in others]) for side in ("left", "right"))
         owner = np.concatenate([each.owner for each in others])
         left, right = _lengths(L), _lengths(R)
         kept = np.flatnonzero(left * right > ROUNDING * (left * right).max(initial=0.0))
         acting, felt = (
-            (columns[:, kept] @ sp.diags(1.0 / lengths[kept])).tocsr()
+            scaled_columns(columns[:, kept], 1.0 / lengths[kept])
             for columns, lengths in ((L, left), (R, right))
         )
         return cls(normal, normal_owner, acting, felt, (left * right)[kept], owner[kept], lacking)
@@ -121,6 +122,10 @@ class TurningForces:
     def completed(self) -> np.ndarray:
         """Numbers of rows of contact that lack something, shape (m,)."""
         return _NONE if self.lacking is None else self.lacking.completed
+
+
+def _beside(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
+    return parts[0] if len(parts) == 1 else sp.hstack(parts, "csr")
 
 
 def _lengths(columns: sp.csr_matrix) -> np.ndarray:

@@ -69,9 +69,8 @@ class ContactPoints:
     @cached_property
     def jump(self) -> sp.csr_matrix:
         """Weights of the nodes in slave minus master displacement, shape (n, n_nodes)."""
-        shape = self.master.shape
-        slave = sp.csr_matrix((np.ones(self.count), (np.arange(self.count), self.slave)), shape=shape)
-        return (slave - self.master).tocsr()
+        entries = np.ones(self.count), self.slave, np.arange(self.count + 1)
+        return (sp.csr_matrix(entries, shape=self.master.shape) - self.master).tocsr()
 
 
 def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> ContactPoints:
@@ -83,6 +82,9 @@ def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> Conta
             np.zeros(0), np.zeros(0), integer, np.zeros((0, dim - 1)), np.zeros((0, dim)),
             np.zeros((0, dim), dtype=bool), np.zeros(0), np.zeros(0, dtype=bool),
         )  # fmt: skip
+
+    if len(parts) == 1:
+        return parts[0]
 
     def strung(name: str) -> np.ndarray:
         return np.concatenate([getattr(part, name) for part in parts])

@@ -11,6 +11,7 @@ from scipy import sparse
 
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.linalg import scaled_rows
 from fenics_contact.pairing.mortar.candidates import candidate_pairs
 from fenics_contact.pairing.mortar.cells import cells_of, overlaps_of
 from fenics_contact.pairing.mortar.dual_basis import dual_integrals
@@ -109,7 +110,7 @@ def _coupling(
     node = np.flatnonzero(area > LEAST_SHARE * slave.areas)
     chosen = integrals[node]
     # The row sums are the areas, and dividing by them cancels their rounding errors.
-    weight = (sparse.diags(1 / np.asarray(chosen.sum(axis=1)).ravel()) @ chosen).tocsr()
+    weight = scaled_rows(chosen, 1 / np.asarray(chosen.sum(axis=1)).ravel())
     weight.sort_indices()
     normal = -slave.normals[node]
     raised = relief[node] / area[node, None]

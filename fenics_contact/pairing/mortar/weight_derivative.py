@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import scipy.sparse as sp
 
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import together
+from fenics_contact.linalg import scaled_rows
 from fenics_contact.pairing.mortar.candidates import candidate_pairs
 from fenics_contact.pairing.mortar.cells import Overlaps, cells_of, cells_pulled_back, overlaps_of
 from fenics_contact.pairing.mortar.coupling import MortarCoupling, chunks
@@ -65,7 +67,7 @@ def weight_derivatives(
     with together(comm):
         part = _integrals(slave, moved_aside(master), mine)
     parts = [each for each in comm.allgather(part) if each is not None]
-    key, integral, rows = _summed(*(list(column) for column in zip(*parts, strict=True)))
+    key, integral, rows = _joined(parts)
     node, opposite = np.divmod(key, len(master.nodes))
     kept = np.flatnonzero(marked[node])
     point, opposite = np.searchsorted(coupling.node, node[kept]), opposite[kept]
@@ -79,8 +81,15 @@ def _normalised(point: np.ndarray, integral: np.ndarray, rows: sp.csr_matrix, co
     entries = np.ones(len(point)), (point, np.arange(len(point)))
     over = sp.csr_matrix(entries, shape=(count, len(point)))
     area = (over @ integral)[point]
-    share = sp.diags(integral / area) @ over.T @ (over @ rows)
-    return (sp.diags(1.0 / area) @ (rows - share)).tocsr()
+    share = scaled_rows((over @ rows)[point], integral / area)
+    return scaled_rows((rows - share).tocsr(), 1.0 / area)
+
+
+def _joined(
+    parts: Sequence[tuple[np.ndarray, np.ndarray, sp.csr_matrix]],
+) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
+    """Return parts of which each has every number once as one."""
+    return parts[0] if len(parts) == 1 else _summed(*(list(column) for column in zip(*parts, strict=True)))
 
 
 def _summed(
@@ -98,8 +107,7 @@ def _integrals(
 ) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
     """Return numbers (slave node · n_master + master node), integrals M and their derivatives, of facets."""
     width = slave.dim * (len(slave.nodes) + len(master.nodes))
-    keys, integrals = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
-    rows = [sp.csr_matrix((0, width))]
+    parts = []
     if len(chosen) and len(master.facets):
         planes = planes_of(slave, chosen)
         pairs = candidate_pairs(planes, planes_of(master, np.arange(len(master.facets))))
@@ -107,11 +115,10 @@ def _integrals(
             overlaps = overlaps_of(planes, pair_slave, pair_master, master)
             if len(overlaps.pair) == 0:
                 continue
-            key, integral, part = _of_facets(overlaps, planes, slave, chosen, master)
-            keys.append(key)
-            integrals.append(integral)
-            rows.append(part)
-    return _summed(keys, integrals, rows)
+            parts.append(_of_facets(overlaps, planes, slave, chosen, master))
+    if not parts:
+        return np.zeros(0, dtype=np.int64), np.zeros(0), sp.csr_matrix((0, width))
+    return _joined(parts)
 
 
 def _of_facets(

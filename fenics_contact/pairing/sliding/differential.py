@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact.linalg import scaled_rows
 from fenics_contact.pairing.contact_points import ContactPoints
 
 
@@ -43,6 +44,8 @@ def without_patches(curvature: np.ndarray, n_nodes: int) -> Differential:
 
 def join_differentials(parts: Sequence[Differential], dim: int, n_nodes: int) -> Differential:
     """Concatenate those of several pairs; empty if there are none."""
+    if len(parts) == 1:
+        return parts[0]
     every = [without_patches(np.zeros((0, dim, dim)), n_nodes), *parts]
     return Differential(
         np.concatenate([part.tangents for part in every]),
@@ -107,7 +110,7 @@ def point_motion(points: ContactPoints, differential: Differential) -> PointMoti
     inverse, solved = inverse_metrics(points, differential)
     p = [spread(differential.tangents[:, a], jump) for a in range(width)]
     q = [spread(normal, differential.slopes[a]) for a in range(width)]
-    right = [p[a] + sp.diags(points.distance) @ q[a] for a in range(width)]
+    right = [p[a] + scaled_rows(q[a], points.distance) for a in range(width)]
     local = [_combined(solved[:, a], right) for a in range(width)]
     turn = [q[a] + _combined(differential.bend[:, a], local) for a in range(width)]
     directions = -np.einsum("nab,nbd->nad", inverse, differential.tangents)
@@ -120,7 +123,7 @@ def point_motion(points: ContactPoints, differential: Differential) -> PointMoti
 
 def _combined(factors: np.ndarray, rows: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
     """Return Σ_b factors[:, b] · rows[b]."""
-    return sum(sp.diags(factors[:, b]) @ rows[b] for b in range(len(rows))).tocsr()
+    return sum(scaled_rows(rows[b], factors[:, b]) for b in range(len(rows))).tocsr()
 
 
 def frame_changes(normal: np.ndarray, axes: np.ndarray, change: np.ndarray) -> np.ndarray:

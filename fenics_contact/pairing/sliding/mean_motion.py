@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact.linalg import scaled_rows
 from fenics_contact.pairing.contact_points import ContactPoints
 from fenics_contact.pairing.sliding.differential import frame_changes, spread
 from fenics_contact.pairing.sliding.stiffness import LowRank
@@ -49,7 +50,7 @@ class MeanMotion:
         """
         jump = points.jump @ coordinates
         turned = sum(
-            sp.diags(np.einsum("nd,nd->n", points.tangents[:, a], jump)) @ turn
+            scaled_rows(turn, np.einsum("nd,nd->n", points.tangents[:, a], jump))
             for a, turn in enumerate(self.turn)
         )
         return (turned - self.feet(points, coordinates, points.normal)).tocsr()
@@ -70,7 +71,7 @@ class MeanMotion:
         change = np.einsum("ncad,nd->nca", turned, way)
         rows = []
         for c in range(turned.shape[1]):
-            frames = sum(sp.diags(change[:, c, a]) @ turn for a, turn in enumerate(self.turn))
+            frames = sum(scaled_rows(turn, change[:, c, a]) for a, turn in enumerate(self.turn))
             rows.append((self.feet(points, coordinates, points.tangents[:, c]) + frames).tocsr())
         return rows
 
@@ -92,12 +93,14 @@ class MeanMotion:
         right = [turn[acting] for turn in self.turn]
         force = np.einsum("nc,ncd->nd", friction, points.tangents) - normal[:, None] * points.normal
         node, first, place = np.unique(self.node, return_index=True, return_inverse=True)
-        dim, every = force.shape[1], np.arange(len(self.node))
-        for component in range(dim):
-            entries = force[self.point, component], (place.ravel(), every)
-            right.append(sp.csr_matrix(entries, shape=(len(node), len(every))) @ self.weights)
-            each = -np.ones(len(node)), (np.arange(len(node)), dim * node + component)
-            left.append(sp.csr_matrix(each, shape=(len(node), self.weights.shape[1])))
+        # One row for each component of each node, component by component.
+        dim, every, component = force.shape[1], np.arange(len(self.node)), np.arange(force.shape[1])[:, None]
+        entry = (len(node) * component + place.ravel()).ravel(), np.tile(every, dim)
+        acted = sp.csr_matrix((force[self.point].T.ravel(), entry), shape=(dim * len(node), len(every)))
+        right.append(acted @ self.weights)
+        column, row = (dim * node + component).ravel(), np.arange(dim * len(node) + 1)
+        shape = dim * len(node), self.weights.shape[1]
+        left.append(sp.csr_matrix((-np.ones(len(column)), column, row), shape=shape))
         point = [np.tile(acting, change.shape[1]), np.tile(self.point[first], dim)]
         return LowRank(
             sp.vstack(left).T.tocsr(), sp.vstack(right).T.tocsr(), np.concatenate(point).astype(np.int64)
@@ -158,5 +161,7 @@ def placed(chosen: np.ndarray, count: int) -> sp.csr_matrix:
 def interleaved(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
     """Return the first row of each part, the second one of each, and so on."""
     width, count = len(parts), parts[0].shape[0]
+    if width == 1:
+        return parts[0]
     order = np.arange(width * count).reshape(width, count).T.ravel()
     return sp.vstack(parts, format="csr")[order]

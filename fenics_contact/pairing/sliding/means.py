@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._libraries import MPI
+from fenics_contact.linalg import scaled_rows
 from fenics_contact.mesh import coordinate_rounding
 from fenics_contact.pairing.contact_points import ContactPoints
 from fenics_contact.pairing.mortar import MortarCoupling, mortar_coupling, weight_derivatives
@@ -62,9 +63,9 @@ class MovingMeans:
 
     def weights(self, n_nodes: int) -> sp.csr_matrix:
         """Return the weights of the nodes of all bodies, shape (n, n_nodes)."""
-        count = len(self.master_nodes)
-        entries = np.ones(count), (np.arange(count), self.master_nodes)
-        return (self.coupling.weight @ sp.csr_matrix(entries, shape=(count, n_nodes))).tocsr()
+        weight = self.coupling.weight
+        entries = weight.data, self.master_nodes[weight.indices], weight.indptr
+        return sp.csr_matrix(entries, shape=(weight.shape[0], n_nodes))
 
     def symmetric(self) -> np.ndarray:
         """Return the components normal to planes of symmetry that cut both surfaces, shape (n, dim)."""
@@ -96,7 +97,7 @@ class MovingMeans:
         motion = self.motion(points, rubbed | (normal != 0.0))
         standing = (points.master - before - points.jump).tocsr()
         slip = [
-            sp.diags(rubbed.astype(float)) @ (spread(points.tangents[:, c], standing) + rows)
+            scaled_rows((spread(points.tangents[:, c], standing) + rows).tocsr(), rubbed.astype(float))
             for c, rows in enumerate(motion.slip_rows(points, coordinates, way))
         ]
         gap = motion.gap_rows(points, coordinates)
@@ -111,15 +112,20 @@ class MovingMeans:
         """
         nodes, dim = np.concatenate([self.slave_nodes, self.master_nodes]), self.slave.dim
         dof = (dim * nodes[:, None] + np.arange(dim)).ravel()
-        entries = np.ones(len(dof)), (np.arange(len(dof)), dof)
-        to_all = sp.csr_matrix(entries, shape=(len(dof), dim * points.master.shape[1]))
+        size = dim * points.master.shape[1]
+
+        def among_all(rows: sp.csr_matrix) -> sp.csr_matrix:
+            """Return rows by the dofs of both surfaces, or of the slave, as rows by those of all bodies."""
+            whole = sp.csr_matrix((rows.data, dof[rows.indices], rows.indptr), shape=(rows.shape[0], size))
+            whole.sum_duplicates()  # of nodes on both surfaces, and sorted
+            return whole
+
         found = weight_derivatives(self.slave, self.master, self.coupling, wanted, self.comm)
-        own = to_all[: dim * len(self.slave_nodes)]
         turn = tuple(
-            (sp.diags(wanted.astype(float)) @ self._turned(points.tangents[:, a]) @ own).tocsr()
+            among_all(scaled_rows(self._turned(points.tangents[:, a]), wanted.astype(float)))
             for a in range(dim - 1)
         )
-        return MeanMotion(turn, found.point, self.master_nodes[found.node], (found.rows @ to_all).tocsr())
+        return MeanMotion(turn, found.point, self.master_nodes[found.node], among_all(found.rows))
 
     def _turned(self, along: np.ndarray) -> sp.csr_matrix:
         """Return v·δn of the points by the slave's nodes for vectors v across the normals, (n, n_dofs)."""

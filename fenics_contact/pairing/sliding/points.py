@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact.linalg import scaled_rows
 from fenics_contact.pairing.contact_points import ContactPoints
 from fenics_contact.pairing.sliding.differential import Differential, frame_changes, point_motion, spread
 from fenics_contact.pairing.sliding.mean_motion import MeanTangents, interleaved, placed
@@ -121,7 +122,7 @@ class SlidingPoints:
             found = means.tangents(
                 self.points.part(mine), self.coordinates, forces, (way[mine], weights[mine])
             )
-            total = total.with_points(mine, found)
+            total = found if len(mine) == count else total.with_points(mine, found)
         # In the plane a slipping force does not turn with the slip, of which nothing is needed then.
         if friction.shape[1] == 2 and friction.any():
             total = replace(total, slip=total.slip + self._slip_beyond_rows(start, np.any(friction, axis=1)))
@@ -134,7 +135,7 @@ class SlidingPoints:
             chosen[mine] = False
         points, width = self.points, self.points.normal.shape[1] - 1
         rows = interleaved([spread(points.tangents[:, c], points.jump) for c in range(width)])
-        return (sp.diags(np.repeat(chosen, width).astype(float)) @ (self.slip_rows(start) - rows)).tocsr()
+        return scaled_rows((self.slip_rows(start) - rows).tocsr(), np.repeat(chosen, width).astype(float))
 
     def slip(self, start: MaterialPoints) -> np.ndarray:
         """Return t_a·(x_s − x_m), x_m where the node stood at the start, carried along by the master.
@@ -170,7 +171,7 @@ class SlidingPoints:
         for c in range(width):
             rows = spread(points.tangents[:, c], jump)
             for a in range(width):
-                rows = rows + sp.diags(np.einsum("nd,nd->n", turned[:, c, a], way)) @ motion.turn[a]
+                rows = rows + scaled_rows(motion.turn[a], np.einsum("nd,nd->n", turned[:, c, a], way))
             parts.append(rows)
         for mine, means in self._by_means:
             some = points.part(mine)
@@ -196,7 +197,8 @@ class SlidingPoints:
 
     def _way(self, start: MaterialPoints) -> tuple[np.ndarray, sp.csr_matrix]:
         """Return x_s − x_m, shape (n, dim), and the weights of nodes in x_m, shape (n, n_nodes)."""
-        start = start.extended(self.material_points())
+        if not np.isin(self.key, start.key).all():
+            start = start.extended(self.material_points())
         start = start.part(np.searchsorted(start.key, self.key))
         place = start.place.copy()
         for index, placement in enumerate(self.placements):
@@ -215,7 +217,7 @@ class SlidingPoints:
             at_node[mine] = 0.0
         place = np.arange(self.points.count), self.points.slave
         own = sp.csr_matrix((at_node, place), shape=self.points.master.shape)
-        return (own + sp.diags(1.0 - at_node) @ self.points.master).tocsr()
+        return (own + scaled_rows(self.points.master, 1.0 - at_node)).tocsr()
 
     @property
     def _by_means(self) -> list[tuple[np.ndarray, MovingMeans]]:

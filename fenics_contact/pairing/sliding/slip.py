@@ -59,6 +59,8 @@ class MaterialPoints:
         Nodes that had no point at the start of a step begin to slip where they are first found within it.
         """
         new = ~np.isin(other.key, self.key)
+        if not new.any():
+            return self
         order = np.argsort(np.concatenate([self.key, other.key[new]]))
         joined = {
             name: np.concatenate([getattr(self, name), getattr(other, name)[new]])[order]

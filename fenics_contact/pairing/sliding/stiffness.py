@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact.linalg import scaled_rows
 from fenics_contact.pairing.contact_points import ContactPoints
 from fenics_contact.pairing.sliding.differential import (
     Differential,
@@ -62,6 +63,12 @@ def geometric_stiffness(
         P. Wriggers, Computational Contact Mechanics, 2nd ed., Springer 2006, chapters 4 and 6.
     """
     pressed = np.flatnonzero((multiplier > 0.0) & (points.facet >= 0))
+    bent = differential.curvature.any(axis=(1, 2))
+    pushed = np.flatnonzero((multiplier > 0.0) & bent)
+    blocks = -multiplier[pushed, None, None] * differential.curvature[pushed]
+    if len(pressed) == 0:
+        nothing = sp.csr_matrix((points.normal.shape[1] * points.jump.shape[1], 0))
+        return GeometricStiffness(nothing, np.zeros(0), pressed, blocks, points.slave[pushed])
     core, gram = _core(points, differential, multiplier, pressed)
     lower = np.linalg.cholesky(gram)
     values, vectors = np.linalg.eigh(np.swapaxes(lower, 1, 2) @ core @ lower)
@@ -72,10 +79,7 @@ def geometric_stiffness(
     kept = np.abs(values) > rounding * np.abs(values).max(initial=0.0)
     place, column = np.nonzero(kept)
     chosen = mixed[place, :, column]
-    total = sum(sp.diags(chosen[:, r]) @ rows[r][place] for r in range(2 * width))
-    bent = differential.curvature.any(axis=(1, 2))
-    pushed = np.flatnonzero((multiplier > 0.0) & bent)
-    blocks = -multiplier[pushed, None, None] * differential.curvature[pushed]
+    total = sum(scaled_rows(rows[r][place], chosen[:, r]) for r in range(2 * width))
     return GeometricStiffness(
         total.T.tocsr(), values[place, column], pressed[place], blocks, points.slave[pushed]
     )

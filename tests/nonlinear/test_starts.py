@@ -1,0 +1,65 @@
+"""Where Newton's method starts in a load step of bodies that touch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import ContactProblem, State, solve_steps
+from fenics_contact.gallery import rectangle
+from fenics_contact.nonlinear.rigid_start import RigidStart
+from fenics_contact.scene import Body, ContactPair, LoadStep, NeoHooke, Scene, Support, Surface
+from tests.nonlinear.ironing import die
+
+#: Of the die: down, then along.
+WAY = [(0.0, -0.8), (0.25, -0.8), (0.5, -0.8), (0.75, -0.8)]
+
+
+def drawn(columns: int, cells: int, count: int) -> list[State]:
+    """A die that is pressed into a block and drawn along it, without friction."""
+    bodies = {
+        "block": Body(rectangle((0.0, 0.0), (6.0, 4.0), (columns, columns // 2)), NeoHooke(1.0, 0.32)),
+        "die": Body(die(cells), NeoHooke(10.0, 0.32)),
+    }
+    held = [[Support("block", "y0"), Support("die", "y1", at)] for at in WAY]
+    pair = ContactPair(Surface("die", "y0"), Surface("block", "y1"), discretisation="mortar")
+    steps = [LoadStep(f"{at}", supports=supports) for at, supports in zip(WAY, held, strict=True)]
+    scene = Scene(bodies, held[0], contacts=[pair])
+    return list(solve_steps(ContactProblem(scene, MPI.COMM_SELF), steps[:count]))
+
+
+def without_moving_first(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(RigidStart, "moved", lambda *given: None)
+
+
+def begun_again(states: list[State]) -> list[bool]:
+    return ["begun again" in state.solution.history[0].note for state in states]
+
+
+def require_the_same(found: list[State], other: list[State]) -> None:
+    for one, two in zip(found, other, strict=True):
+        force = two.contact.force
+        assert np.abs(force).max() > 0.0
+        np.testing.assert_allclose(one.contact.force, force, atol=1e-6 * np.abs(force).max())
+
+
+def test_a_die_that_slides_starts_where_its_support_takes_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = drawn(16, 6, 4)
+    without_moving_first(monkeypatch)
+    other = drawn(16, 6, 4)
+    require_the_same(found, other)
+    assert not any(begun_again(found))
+    taken, usual = (sum(len(state.solution.history) for state in states) for states in (found, other))
+    assert taken <= 0.8 * usual, f"{taken} Newton steps where {usual} are usual"
+
+
+def test_a_start_whose_first_step_fails_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = drawn(12, 5, 2)
+    without_moving_first(monkeypatch)
+    other = drawn(12, 5, 2)
+    require_the_same(found, other)
+    assert begun_again(found) == [False, True]
+    assert not any(begun_again(other))
+    taken, usual = (len(states[-1].solution.history) for states in (found, other))
+    assert taken == usual + 1, "the step that failed, and no other"
