@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import comb
 from typing import ClassVar
 
 import numpy as np
@@ -299,8 +300,14 @@ def _with_mirror_images(
 def _coefficients(
     place: np.ndarray, height: np.ndarray, centre: np.ndarray, count: int, powers: list[tuple[int, ...]]
 ) -> np.ndarray:
-    """Fit polynomials by weighted least squares, shape (count, number of powers)."""
-    terms = np.column_stack([np.prod(place**power, axis=1) for power in powers])
+    """Fit polynomials by weighted least squares, shape (count, number of powers).
+
+    Where the nodes do not determine a polynomial, as on a surface one layer of facets wide, it is the one of
+    the smallest norm. That of Bombieri, in which the powers of a degree count by one over their binomial
+    coefficient, is the same in all axes; in the plain one, normals would depend on a turn of the axes.
+    """
+    scale = np.sqrt([comb(sum(power), power[-1]) for power in powers])
+    terms = scale * np.column_stack([np.prod(place**power, axis=1) for power in powers])
     weight = 1.0 / np.maximum((place**2).sum(axis=1), 1e-12)
     size = len(powers)
     columns = np.concatenate([terms, height[:, None]], axis=1)
@@ -311,4 +318,4 @@ def _coefficients(
     values, vectors = np.linalg.eigh(matrix)
     known = values > UNKNOWN * values[:, -1:]
     inverse = np.where(known, 1.0 / np.where(known, values, 1.0), 0.0)
-    return np.asarray(np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, right))
+    return scale * np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, right)

@@ -12,6 +12,7 @@ ONE_STEP = (
     "tests/nonlinear/test_parts.py::"
     "test_friction_and_plastic_flow_do_not_depend_on_how_a_load_step_is_cut"
 )
+NARROW = "tests/surfaces/test_narrow_surfaces.py"
 RIGID = "tests/contact/test_rigid_surfaces.py"
 MERIT, NONLINEAR = "tests/optimize/test_merit.py", "tests/optimize/test_nonlinear.py"
 
@@ -432,5 +433,19 @@ MUTATIONS = (
         "return (self.steps or AutomaticSteps()).newton.tolerance",
         "return 1e-6",
         ("tests/shape/test_design_states.py::test_states_of_rubber_are_solved_to_newtons_tolerance",),
+    ),
+    Mutation(
+        "arcs are twice as high over their cubics",
+        "surfaces/reconstruction.py",
+        "(128.0 *",
+        "(64.0 *",
+        (f"{NARROW}::test_the_next_order_adds_what_an_arc_is_higher_than_its_cubic",),
+    ),
+    Mutation(
+        "normals of narrow surfaces depend on the axes",
+        "surfaces/reconstruction.py",
+        "np.sqrt([comb(sum(power), power[-1]) for power in powers])",
+        "np.ones(len(powers))",
+        (f"{NARROW}::test_a_narrow_strip_has_radial_normals_in_every_orientation",),
     ),
 )
