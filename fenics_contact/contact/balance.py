@@ -22,7 +22,8 @@ from fenics_contact.scene import RigidSurface, Surface
 class Balance:
     """Forces and moments on all bodies together, about one point, and what is missing to equilibrium.
 
-    Moments are those of the undeformed geometry, as in the linear theory of the state. The imbalance is
+    Moments on bodies of small strain are those of the undeformed geometry, as in their linear theory, on
+    bodies that deform much those of the deformed one. The imbalance is
     governed by the equilibrium of the multipliers with the load (``State.solution.coarse_residual``), which
     every step of a solver keeps to rounding; for one body without multipliers by the rounding of its
     factorisation, which is larger in slender bodies. It says that no force was forgotten, not how accurate
@@ -33,7 +34,8 @@ class Balance:
         reactions: Of all supports.
         obstacles: Of rigid obstacles.
         gaps: Of contacts and ties between bodies: both sides together have no force, but a moment where
-            friction, a tie or a mean over facets transmits forces across a gap between the meshes.
+            friction, a tie or a mean over facets transmits forces across a gap between the meshes, or where
+            one body has moments about undeformed places and the other about deformed ones.
         beds: Of materials that resist rigid motions, such as elastic beds; zero otherwise.
         force_scale: Largest sum of the sizes of the nodal forces of one of these, [force]; where nothing acts
             a force below which bodies count as free of forces.

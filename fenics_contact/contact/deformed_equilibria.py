@@ -281,7 +281,7 @@ def _with_slip(
     assert points is not None
     before = np.zeros_like(slip)
     if isinstance(origin, DeformedState) and (stood := origin.equilibrium.evaluation.meeting.points):
-        before = points.carry_tangential(origin.contact.slip + origin.contact.slip_before, stood)
+        before = points.carry_slip(origin.contact.total_slip, stood)
     return replace(contact, slip=slip, slip_before=before)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -30,8 +30,9 @@ if TYPE_CHECKING:
 class DeformedState(State):
     """An equilibrium of large deformations or nonlinear materials.
 
-    Forces, gaps, balance and stresses (Cauchy's) are those of the deformed bodies, where no material is made
-    for that those of the undeformed ones, as in linear elasticity. `energies` has the stored energy, NaN
+    Forces, gaps and stresses (Cauchy's) are those of the deformed bodies, where no material is made for that
+    those of the undeformed ones, as in linear elasticity. Moments are those of the deformed places of bodies
+    that deform much, and of the undeformed places of all others. `energies` has the stored energy, NaN
     where materials dissipate, and no dual value.
 
     Attributes:
@@ -125,18 +126,21 @@ class DeformedState(State):
         forces = nodal_forces(
             self.system, self.solution.multiplier, self.torn_displacement, self.contact.force
         )
-        places = forces.places
-        if any(body.deforms_much for body in self.scene.bodies.values()):
-            places = self.scene.points + self._displacement_everywhere
-        return NodalForces(
-            places, forces.load, forces.reaction, forces.contact, forces.tie, np.zeros_like(forces.bed)
-        )
+        return replace(forces, places=self._moment_arms, bed=np.zeros_like(forces.bed))
 
     @cached_property
     def _least_force(self) -> float:
         return self.dual_solution.residuals.force_scale
 
     @cached_property
-    def _displacement_everywhere(self) -> np.ndarray:
-        """Displacement of the nodes of all bodies on every rank, shape (n_nodes, dim), [length]."""
-        return np.concatenate([self.gather_displacement(name) for name in self.scene.bodies])
+    def _moment_arms(self) -> np.ndarray:
+        """Where forces act on the nodes of all bodies, on every rank, shape (n_nodes, dim), [length].
+
+        Stress keeps a body of small strain in balance about its undeformed places, whatever lies beside it.
+        """
+        return np.concatenate(
+            [
+                body.mesh.points + (self.gather_displacement(name) if body.deforms_much else 0.0)
+                for name, body in self.scene.bodies.items()
+            ]
+        )

@@ -19,7 +19,8 @@ class NodalForces:
     rows of B leave prescribed components out).
 
     Attributes:
-        places: Undeformed positions of the nodes of all bodies, shape (n_nodes, dim), [length].
+        places: Where the nodes of all bodies are for moments: undeformed, on bodies that deform much
+            deformed, shape (n_nodes, dim), [length].
         load: f, shape (n_nodes, dim); thermal strain included, which has no resultant.
         reaction: Of supports, zero on free components, shape (n_nodes, dim).
         contact: On the slave at each contact point, shape (n_contact, dim).

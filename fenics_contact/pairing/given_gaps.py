@@ -45,7 +45,7 @@ def with_given_gaps(
                 "of the surfaces less, or leave the gap of the pair to measurement"
             )
         measured, place = first.distance[then], place[then]
-        near = _near(pair, measured, place)
+        near = in_reach(pair, measured, place)
         if comm.rank == 0 and pair.adjust is not None:
             _tell_of_adjusted(pair, near, measured)
         wanted = pair.gap_at(place)
@@ -59,8 +59,14 @@ def with_given_gaps(
     return replace(points, gap=gap, given=given)
 
 
-def _near(pair: ContactPair, measured: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Return whose gap is replaced, shape (n,)."""
+def in_reach(pair: ContactPair, measured: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Return at which points a pair replaces the gap, shape (n,).
+
+    Args:
+        pair: The pair.
+        measured: Distances of its slave nodes from the master, shape (n,), [length].
+        place: Their coordinates, shape (n, dim), [length].
+    """
     if pair.adjust is None:
         return np.full(len(measured), pair.gives_all_gaps)
     return np.abs(measured) <= pair.adjust + computed_rounding(place)

@@ -448,4 +448,38 @@ MUTATIONS = (
         "np.ones(len(powers))",
         (f"{NARROW}::test_a_narrow_strip_has_radial_normals_in_every_orientation",),
     ),
+    Mutation(
+        "moments are about undeformed places",
+        "contact/deformed_state.py",
+        "self.gather_displacement(name) if body.deforms_much else 0.0",
+        "0.0",
+        (
+            "tests/nonlinear/test_reported_values.py::"
+            "test_forces_and_moments_balance_beside_bodies_of_small_strain",
+        ),
+    ),
+    Mutation(
+        "closable gaps take lost counterparts for zero",
+        "pairing/closable_gaps.py",
+        "np.where(lost, own, weight @ opposite)",
+        "weight @ opposite",
+        ("tests/shape/test_mortar_derivative.py::test_gaps_are_closable_from_both_sides_and_at_the_rim_means",),
+    ),
+    Mutation(
+        "slip of earlier steps does not turn with the master",
+        "contact/deformed_equilibria.py",
+        "points.carry_slip(origin.contact.total_slip, stood)",
+        "points.carry_tangential(origin.contact.total_slip, stood)",
+        ("tests/nonlinear/test_reported_values.py::test_slip_of_earlier_steps_turns_about_the_normal",),
+    ),
+    Mutation(
+        "nodes that meet their master later have no given gap",
+        "pairing/sliding/given_offsets.py",
+        "near[:] = True",
+        "pass",
+        (
+            "tests/pairing/test_sliding_given_gaps.py::"
+            "test_nodes_that_meet_their_master_later_have_the_gap_of_those_beside_them",
+        ),
+    ),
 )

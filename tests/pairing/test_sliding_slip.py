@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -142,3 +144,34 @@ def test_planes_that_stand_still_carry_nothing_along() -> None:
     way = np.array([0.3, -0.2, 0.1])
     now = contact.at(scene.points + way)
     assert in_space(now, now.slip(start)) == pytest.approx(np.tile(way * [1, 1, 0], (now.points.count, 1)))
+
+
+@pytest.mark.parametrize("discretisation", ["node", "mortar"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_slip_of_earlier_steps_turns_with_bodies_that_turn_together(kind: str, discretisation: str) -> None:
+    """About normals, too, and by more than a right angle."""
+    scene = on_arch(kind)
+    scene = replace(scene, contacts=[replace(scene.contacts[0], discretisation=discretisation)])
+    contact, x = sliding(scene), shaken(scene)
+    then = contact.at(x)
+    slip = np.random.default_rng(5).standard_normal((then.points.count, scene.dim - 1))
+    for axis in range(3 if scene.dim == 3 else 1):
+        turn = rotation(scene.dim, 2.1, axis)
+        now = contact.at(x @ turn.T + 0.4)
+        wanted = in_space(then, slip) @ turn.T
+        assert in_space(now, now.carry_slip(slip, then)) == pytest.approx(wanted, abs=1e-9)
+
+
+def test_slip_of_earlier_steps_turns_with_an_obstacle_and_not_with_the_slave() -> None:
+    plane, at_rest = RigidPlane((0, 0, 0), (0, 0, 1)), np.zeros(3)
+    wheel = MovingObstacle(plane, lambda time: (rotation(3, 2.0 * time, 2), at_rest))
+    body = on_arch("hexahedron").bodies["high"]
+    for obstacle, angle in ((wheel, 2.0), (plane, 0.0)):
+        pair = ContactPair(Surface("high", "z0"), obstacle)
+        scene = Scene({"high": Body(body.mesh, body.material)}, contacts=[pair])
+        contact = sliding(scene)
+        then = contact.at(scene.points)
+        now = contact.at(scene.points @ rotation(3, 0.7, 2).T, time=1.0)
+        slip = np.tile([0.3, -0.1], (then.points.count, 1))
+        wanted = in_space(then, slip) @ rotation(3, angle, 2).T
+        assert in_space(now, now.carry_slip(slip, then)) == pytest.approx(wanted, abs=1e-12)

@@ -78,6 +78,10 @@ def test_gaps_are_closable_from_both_sides_and_at_the_rim_means(kinds: tuple[str
     assert gaps is not None
     assert gaps.kept.any()
     assert {0.0, SHARE} == set(gaps.share)
+    alone = (gaps.share == 0.0) & ~gaps.kept
+    assert alone.any(), "what faces them has nodes that face nothing"
+    own = dict(zip(gaps.here.point, gaps.here.gap, strict=True))
+    assert gaps.value[alone] == pytest.approx([own[node] for node in np.flatnonzero(alone)], abs=1e-15)
     assert here.slave.mirrored.any()
     assert here.master.mirrored.any()
 

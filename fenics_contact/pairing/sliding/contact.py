@@ -21,6 +21,7 @@ from fenics_contact.pairing.contact_points import (
 )
 from fenics_contact.pairing.sliding.closest import patch_points
 from fenics_contact.pairing.sliding.differential import Differential, join_differentials, without_patches
+from fenics_contact.pairing.sliding.given_offsets import with_given_offsets
 from fenics_contact.pairing.sliding.means import MovingMeans
 from fenics_contact.pairing.sliding.meeting import Meeting, meetings_of
 from fenics_contact.pairing.sliding.points import SlidingPoints
@@ -90,7 +91,13 @@ class SlidingContact:
             reach: Distance beyond which nodes need no point, [length].
         """
         comm = comm or MPI.COMM_SELF
-        return cls(scene, fixed, comm, reach, meetings_of(scene, fixed, comm))
+        meetings = meetings_of(scene, fixed, comm)
+        if any(pair.given_gap for pair in scene.contacts):
+            origin = scene.origin
+            first = meetings if origin is scene else meetings_of(origin, fixed, comm)
+            stood = cls(origin, fixed, comm, np.inf, first).at(origin.points)
+            meetings = with_given_offsets(meetings, origin, stood.points, fixed, comm)
+        return cls(scene, fixed, comm, reach, meetings)
 
     def at(
         self,

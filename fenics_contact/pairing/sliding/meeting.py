@@ -10,7 +10,6 @@ from scipy.spatial import cKDTree
 
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import together
-from fenics_contact.pairing.contact_search import find_contact_points
 from fenics_contact.pairing.node_numbers import NodeNumbers
 from fenics_contact.pairing.sliding.closest import ClosestPoints
 from fenics_contact.pairing.sliding.moved_surface import moved_surface
@@ -106,17 +105,8 @@ def meetings_of(scene: Scene, fixed: np.ndarray, comm: MPI.Comm) -> tuple[Meetin
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         comm: Communicator of the ranks.
     """
-    first = find_contact_points(scene, fixed, comm) if any(p.given_gap for p in scene.contacts) else None
     with together(comm):
-        meetings = [_meeting(scene, pair, fixed) for pair in scene.contacts]
-    for index, pair in enumerate(scene.contacts):
-        if first is not None and pair.given_gap:
-            mine = first.pair == index
-            place = np.searchsorted(meetings[index].nodes, first.slave[mine])
-            offset, given = meetings[index].offset.copy(), meetings[index].given.copy()
-            offset[place], given[place] = (first.gap - first.distance)[mine], first.given[mine]
-            meetings[index] = replace(meetings[index], offset=offset, given=given)
-    return tuple(meetings)
+        return tuple(_meeting(scene, pair, fixed) for pair in scene.contacts)
 
 
 def _meeting(scene: Scene, pair: ContactPair, fixed: np.ndarray) -> Meeting:

@@ -71,12 +71,58 @@ class SlidingPoints:
             other: The other points.
         """
         vectors = np.einsum("na,nad->nd", friction, other.points.tangents)
-        vectors, before = self.carry(vectors, other), self.carry(other.points.normal, other)
+        return self._in_frames(self.carry(vectors, other), self.carry(other.points.normal, other))
+
+    def carry_slip(self, slip: np.ndarray, other: SlidingPoints) -> np.ndarray:
+        """Return the slip at another set of points in these points' frames, shape (n, dim − 1).
+
+        It turns with the master where the nodes stand now, from there by the smallest rotation of normals:
+        what bodies that turn together have slipped before stays what it is beside them.
+
+        Args:
+            slip: Slip in the other points' tangents, shape (n_other, dim − 1), [length].
+            other: The other points.
+        """
+        turn = self._turned_masters(other)
+        vectors = self.carry(np.einsum("na,nad->nd", slip, other.points.tangents), other)
+        normals = self.carry(other.points.normal, other)
+        return self._in_frames(*(np.einsum("nde,ne->nd", turn, each) for each in (vectors, normals)))
+
+    def _in_frames(self, vectors: np.ndarray, before: np.ndarray) -> np.ndarray:
+        """Return vectors across earlier normals, both (n, dim), in the present frames, (n, dim − 1)."""
         normal = self.points.normal
         cosine = np.einsum("nd,nd->n", before, normal)
         along = np.einsum("nd,nd->n", vectors, normal) / np.maximum(1.0 + cosine, 1e-12)
         turned = vectors - along[:, None] * (before + normal)
         return np.asarray(np.einsum("nd,nad->na", turned, self.points.tangents))
+
+    def _turned_masters(self, other: SlidingPoints, least: float = 1e-6) -> np.ndarray:
+        """Return the rotations of the masters since another set of points, shape (n, dim, dim).
+
+        On a body it is the one that turns the nodes which a point meets now from their places then, about
+        their mean. Where these lie on a line, normals decide, with the weight ``least``.
+        """
+        met = abs(self.points.master).tocsr()
+        count, dim = self.points.normal.shape
+        row = np.repeat(np.arange(count), np.diff(met.indptr))
+        size = np.maximum(np.asarray(met.sum(axis=1)), np.finfo(float).tiny)
+        now, then = (
+            places[met.indices] - (met @ places / size)[row]
+            for places in (self.coordinates, other.coordinates)
+        )
+        of_rows = sp.csr_matrix((met.data, np.arange(len(row)), met.indptr), shape=(count, len(row)))
+        products = (now[:, :, None] * then[:, None, :]).reshape(len(row), dim * dim)
+        moment = np.asarray(of_rows @ products).reshape(count, dim, dim)
+        normals = self.points.normal[:, :, None] * self.carry(other.points.normal, other)[:, None]
+        scale = least * np.abs(moment).sum(axis=(1, 2))[:, None, None]
+        left, _, right = np.linalg.svd(moment + scale * normals)
+        left[:, :, -1] *= np.linalg.det(left @ right)[:, None]
+        rotation = np.asarray(left @ right)
+        rotation[np.diff(met.indptr) == 0] = np.eye(dim)
+        for index, (new, old) in enumerate(zip(self.placements, other.placements, strict=True)):
+            if new is not None and old is not None:
+                rotation[self.points.pair == index] = new[0] @ old[0].T
+        return rotation
 
     def stiffness(self, multiplier: np.ndarray) -> GeometricStiffness:
         """Return the derivative of the normal forces by the coordinates, see `geometric_stiffness`."""
