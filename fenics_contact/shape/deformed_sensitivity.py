@@ -113,6 +113,7 @@ def deformed_contact_by_shape(
     w = _on_surfaces(torn, points, adjoint.displacement)
     turning, rubbing = points.stiffness(np.maximum(normal, 0.0)), points.friction_stiffness(friction)
     by_nodes = -turning.assembled() @ w - rubbing.right @ (rubbing.left.T @ w) + points.gap_rows.T @ by_gap
+    by_nodes += points.means_pulled_back(np.maximum(normal, 0.0), friction, by_gap, w)
     if by_slip.any() and state.begun is not None and (start := state.begun.points) is not None:
         rows = points.slip_rows(start.material_points()) + points.slip_by_start(start)
         by_nodes -= rows.T @ by_slip.ravel()
@@ -129,8 +130,7 @@ def deformed_contact_by_shape(
 
 def _on_surfaces(torn: TornSystem, points: SlidingPoints, field: np.ndarray) -> np.ndarray:
     """Return a torn field at the nodes of contact surfaces, zero at others, by dof. Collective."""
-    reached = [points.points.jump.indices, *(slopes.indices for slopes in points.differential.slopes)]
-    nodes = np.unique(np.concatenate(reached))
+    nodes = points.moving_nodes
     values = np.zeros((torn.decomposition.tearing.n_nodes, torn.dim))
     values[nodes] = nodal_mean_at(torn.decomposition, field, nodes)
     return values.ravel()

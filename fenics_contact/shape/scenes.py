@@ -62,7 +62,6 @@ def _check_differentiable(scene: Scene) -> None:
         "materials without mean_dilatation": any(
             has_mean_dilatation(each) for body in scene.bodies.values() for each in body.materials
         ),
-        "contact by nodes": any(pair.discretisation == "mortar" for pair in scene.contacts),
         "pressures that do not follow their surfaces": bool(scene.following_pressures),
     }
     for needed, missing in reasons.items():

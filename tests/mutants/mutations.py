@@ -482,4 +482,18 @@ MUTATIONS = (
             "test_nodes_that_meet_their_master_later_have_the_gap_of_those_beside_them",
         ),
     ),
+    Mutation(
+        "gradients of rubber hold weighted means where they are",
+        "pairing/sliding/points.py",
+        "total += motion.gap_rows(some, self.coordinates).T @ by",
+        "total += 0.0",
+        ("tests/shape/test_deformed_sensitivity.py::test_plane_blocks_that_meet_by_mortar",),
+    ),
+    Mutation(
+        "slip of weighted means begins where no design moves it",
+        "pairing/sliding/slip_origin.py",
+        "result = result - _of_nodes(width * now[met] + a, width * count).T @ rows",
+        "result = result - 0.0 * _of_nodes(width * now[met] + a, width * count).T @ rows",
+        ("tests/shape/test_deformed_sensitivity.py::test_plane_blocks_that_meet_by_mortar",),
+    ),
 )

@@ -52,7 +52,7 @@ def pressed(master: str, friction: float, pushed: float, dim: int = 2) -> Scene:
             else block((-0.5, -0.4, -1), (2.6, 2.5, 0), wide)
         )
         bodies["lower"] = Body(lower, HARDER)
-        pair = ContactPair(Surface("block", low), Surface("lower", high), law)
+        pair = ContactPair(Surface("block", low), Surface("lower", high), law, "node")
         supports.append(Support("lower", low))
     else:
         up = (*flat, 1.0)
@@ -71,9 +71,10 @@ def design_problem(
     tolerance: float | None = None,
     comm: MPI.Comm = MPI.COMM_SELF,
     steps: AutomaticSteps | None = None,
+    designs: tuple[SurfaceDesign, ...] = (),
 ) -> Remembering:
-    """The design of the block's lower side, with the block cut in pieces."""
+    """The design of the block's lower side, or others, with the block cut in pieces."""
     low, net = ("y0", (4,)) if scene.dim == 2 else ("z0", (3, 3))
     pieces = {name: box_partition(body.mesh, (2,) * scene.dim) for name, body in scene.bodies.items()}
     contact = ContactProblem(scene, comm, partitions=pieces, tolerance=tolerance, steps=steps)
-    return Remembering(contact, SurfaceDesign("block", low, net=net), objective)
+    return Remembering(contact, designs or SurfaceDesign("block", low, net=net), objective)

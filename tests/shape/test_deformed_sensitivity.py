@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from fenics_contact.contact import DeformedState, Status
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.nonlinear import AutomaticSteps
 from fenics_contact.pairing.sliding import points as sliding_points
-from fenics_contact.scene import LoadStep, MovingObstacle
+from fenics_contact.scene import LoadStep, MovingObstacle, Scene
 from fenics_contact.shape import (
     LargestPressure,
     LoadPath,
@@ -21,10 +22,12 @@ from fenics_contact.shape import (
     PressureNorm,
     ShapeProblem,
     StrainEnergy,
+    SurfaceDesign,
 )
 from tests.shape.deformed_blocks import design_problem, pressed
 
 Patch = pytest.MonkeyPatch
+slowly = partial(pytest.param, marks=[pytest.mark.slow, pytest.mark.claim])
 STEP = 3e-5
 
 
@@ -82,6 +85,41 @@ def test_blocks_in_space(master: str, friction: float, pushed: float) -> None:
     assert miss(problem, design_problem(scene, objective, tolerance=1e-12)) < 1e-5
 
 
+def by_mortar(friction: float, pushed: float, dim: int = 2, **more: object) -> Scene:
+    """A block on another one, which meets it in weighted means."""
+    scene = pressed("block", friction, pushed, dim)
+    pair = replace(scene.contacts[0], discretisation="mortar", **more)  # type: ignore[arg-type]
+    return replace(scene, contacts=[pair])
+
+
+@pytest.mark.parametrize(
+    ("friction", "pushed", "given", "statuses"),
+    [
+        (0.3, 0.1, {"gap": 0.01}, {Status.STICK, Status.SLIP}),
+        slowly(0.0, 0.1, {}, {Status.SLIP}),
+        slowly(0.9, 0.02, {}, {Status.STICK}),
+        slowly(0.15, 0.1, {}, {Status.STICK, Status.SLIP}),
+    ],
+)
+def test_plane_blocks_that_meet_by_mortar(
+    friction: float, pushed: float, given: dict[str, object], statuses: set[Status]
+) -> None:
+    scene, objective = by_mortar(friction, pushed, **given), PressureNorm()
+    both = SurfaceDesign("block", "y0", net=3), SurfaceDesign("lower", "y1", net=3)
+    problem = design_problem(scene, objective, designs=both)
+    assert miss(problem, design_problem(scene, objective, tolerance=1e-12, designs=both)) < 1e-5
+    assert {Status(each) for each in problem.last.state.contact.status} == statuses  # type: ignore[union-attr]
+
+
+@pytest.mark.slow
+@pytest.mark.claim
+@pytest.mark.parametrize(("friction", "pushed"), [(0.0, 0.1), (0.3, 0.1)])
+def test_blocks_in_space_that_meet_by_mortar(friction: float, pushed: float) -> None:
+    scene, objective = by_mortar(friction, pushed, dim=3), Movement("block", "x1", (1.0, 0.3, 0.3))
+    problem = design_problem(scene, objective)
+    assert miss(problem, design_problem(scene, objective, tolerance=1e-12)) < 1e-5
+
+
 def test_an_obstacle_that_turns() -> None:
     """A rolling disc: slip counts from where nodes stood on it before it turned."""
     still = pressed("disc", 0.4, 0.0)
@@ -127,6 +165,25 @@ def without_turning_friction(patch: Patch) -> None:
         return type(found)(0.0 * found.left, found.right, found.point)
 
     patch.setattr(sliding_points, "friction_stiffness", none)
+
+
+def without_the_start_of_means(patch: Patch) -> None:
+    whole = sliding_points.slip_by_start_of_means  # type: ignore[attr-defined]
+    patch.setattr(sliding_points, "slip_by_start_of_means", lambda *given: 0.0 * whole(*given))
+
+
+def without_moving_means(patch: Patch) -> None:
+    patch.setattr(sliding_points.SlidingPoints, "means_pulled_back", lambda *_: 0.0)
+
+
+@pytest.mark.parametrize("leave_out", [without_the_start_of_means, without_moving_means])
+def test_a_term_of_mortar_left_out_is_missed(leave_out: object, monkeypatch: Patch) -> None:
+    scene = by_mortar(0.3, 0.1)
+    exact = design_problem(scene, PressureNorm(), tolerance=1e-12)
+    problem = design_problem(scene, PressureNorm())
+    problem.state_of(line(problem)[0])
+    leave_out(monkeypatch)  # type: ignore[operator]
+    assert miss(problem, exact) > 1e-4
 
 
 @pytest.mark.parametrize("leave_out", [without_the_start_of_slip, without_turning_friction])

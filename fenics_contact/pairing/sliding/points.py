@@ -14,7 +14,7 @@ from fenics_contact.pairing.sliding.differential import Differential, frame_chan
 from fenics_contact.pairing.sliding.mean_motion import MeanTangents, interleaved, placed
 from fenics_contact.pairing.sliding.means import MovingMeans
 from fenics_contact.pairing.sliding.slip import LAST, MaterialPoints
-from fenics_contact.pairing.sliding.slip_origin import slip_by_start
+from fenics_contact.pairing.sliding.slip_origin import slip_by_start, slip_by_start_of_means
 from fenics_contact.pairing.sliding.stiffness import (
     GeometricStiffness,
     LowRank,
@@ -183,6 +183,37 @@ class SlidingPoints:
         rows = interleaved([spread(points.tangents[:, c], points.jump) for c in range(width)])
         return scaled_rows((self.slip_rows(start) - rows).tocsr(), np.repeat(chosen, width).astype(float))
 
+    def means_pulled_back(
+        self, normal: np.ndarray, friction: np.ndarray, by_gap: np.ndarray, field: np.ndarray
+    ) -> np.ndarray:
+        """Return the derivative of −fᵀ field + by_gapᵀ g by the coordinates, of means alone. Collective.
+
+        That is, of the contact forces f of mortar contact at fixed multipliers, and of its gaps g beside
+        `gap_rows`.
+
+        Args:
+            normal: λ_N, shape (n,), [force].
+            friction: τ in the points' tangents, shape (n, dim − 1), [force].
+            by_gap: Shape (n,).
+            field: By dof of all nodes, shape (n_dofs,).
+        """
+        total = np.zeros(self.coordinates.size)
+        for mine, means in self._by_means:
+            some, by, forces = self.points.part(mine), by_gap[mine], (normal[mine], friction[mine])
+            motion = means.motion(some, (by != 0.0) | (forces[0] != 0.0) | forces[1].any(axis=1))
+            stiffness = motion.stiffness(some, *forces)
+            total += motion.gap_rows(some, self.coordinates).T @ by
+            total -= stiffness.right @ (stiffness.left.T @ field)
+        return total
+
+    @property
+    def moving_nodes(self) -> np.ndarray:
+        """Nodes on whose coordinates points depend, among those of all bodies, ascending."""
+        reached = [self.points.jump.indices, *(slopes.indices for slopes in self.differential.slopes)]
+        for _, means in self._by_means:
+            reached += [means.slave_nodes, means.master_nodes]
+        return np.unique(np.concatenate(reached))
+
     def slip(self, start: MaterialPoints) -> np.ndarray:
         """Return t_a·(x_s − x_m), x_m where the node stood at the start, carried along by the master.
 
@@ -233,13 +264,20 @@ class SlidingPoints:
             start: The points there.
         """
         _, here, there = np.intersect1d(self.key, start.key, assume_unique=True, return_indices=True)
-        turned = [
+        plain: list[np.ndarray | None] = [
             np.eye(self.coordinates.shape[1]) if now is None or then is None else now[0] @ then[0].T
             for now, then in zip(self.placements, start.placements, strict=True)
         ]
-        return slip_by_start(
+        turned = [None if means else each for each, means in zip(plain, start.means, strict=True)]
+        result = slip_by_start(
             self.points, self.coordinates, start.points, start.differential, (here, there), turned
         )
+        for mine, means in start._by_means:
+            moved = slip_by_start_of_means(
+                self.points, self.coordinates, (start.points, mine), means, (here, there)
+            )
+            result = result + moved
+        return result.tocsr()
 
     def _way(self, start: MaterialPoints) -> tuple[np.ndarray, sp.csr_matrix]:
         """Return x_s − x_m, shape (n, dim), and the weights of nodes in x_m, shape (n, n_nodes)."""

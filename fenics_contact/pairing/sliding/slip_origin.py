@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.pairing.contact_points import ContactPoints
 from fenics_contact.pairing.sliding.differential import Differential, point_motion, spread
+
+if TYPE_CHECKING:
+    from fenics_contact.pairing.sliding.means import MovingMeans
 
 
 def slip_by_start(
@@ -17,7 +21,7 @@ def slip_by_start(
     start: ContactPoints,
     differential: Differential,
     alike: tuple[np.ndarray, np.ndarray],
-    turned: Sequence[np.ndarray],
+    turned: Sequence[np.ndarray | None],
 ) -> sp.csr_matrix:
     """Return the derivative of `SlidingPoints.slip` by the coordinates at its start.
 
@@ -30,7 +34,7 @@ def slip_by_start(
         start: The points at the start.
         differential: Theirs.
         alike: Numbers of points now and of the same points at the start; others have no derivative.
-        turned: Q of each pair, shape (dim, dim).
+        turned: Q of each pair, shape (dim, dim); None for pairs of mortar contact, which are left out.
 
     Returns:
         Shape (n · (dim − 1), n_dofs), dof dim · node + component, rows as those of `SlidingPoints.slip_rows`.
@@ -40,6 +44,8 @@ def slip_by_start(
     local, slaves = point_motion(start, differential).local, _of_nodes(start.slave, nodes)
     result = sp.csr_matrix((width * count, dim * nodes))
     for index, rotation in enumerate(turned):
+        if rotation is None:
+            continue
         now, then = (each[points.pair[alike[0]] == index] for each in alike)
         rigid = bool(np.any(start.facet[then] < 0))
         for a in range(width):
@@ -53,6 +59,42 @@ def slip_by_start(
                     rate = np.einsum("nd,nd->n", tangent, differential.slopes[b][then] @ coordinates)
                     rows = rows - sp.diags(rate) @ local[b][then]
             result = result + _of_nodes(width * now + a, width * count).T @ rows
+    return result.tocsr()
+
+
+def slip_by_start_of_means(
+    points: ContactPoints,
+    coordinates: np.ndarray,
+    start: tuple[ContactPoints, np.ndarray],
+    means: MovingMeans,
+    alike: tuple[np.ndarray, np.ndarray],
+) -> sp.csr_matrix:
+    """Return the same of a pair of mortar contact. Collective.
+
+    Of t_a·Σ (W_j − W_j,start) x_j it is −t_a·Σ δW_j,start x_j, with the master where it lies now.
+
+    Args:
+        points: The points now.
+        coordinates: Coordinates of all nodes now, shape (n_nodes, dim), [length].
+        start: All points at the start, and which of them are those of the pair.
+        means: The coupling of the pair at the start.
+        alike: As for `slip_by_start`.
+
+    Returns:
+        As `slip_by_start`.
+    """
+    every, mine = start
+    count, (width, dim) = points.count, points.tangents.shape[1:]
+    now = np.full(every.count, -1)
+    now[alike[1]] = alike[0]
+    now, some = now[mine], every.part(mine)
+    motion, met = means.motion(some, now >= 0), np.flatnonzero(now >= 0)
+    result = sp.csr_matrix((width * count, dim * len(coordinates)))
+    for a in range(width):
+        along = np.zeros((len(mine), dim))
+        along[met] = points.tangents[now[met], a]
+        rows = motion.feet(some, coordinates, along)[met]
+        result = result - _of_nodes(width * now[met] + a, width * count).T @ rows
     return result.tocsr()
 
 
