@@ -130,7 +130,7 @@ def _plotter(path: Path, look: tuple[str, float], *, off_screen: bool) -> Any:
     return plotter
 
 
-_WORDS = {"von_mises": "von Mises stress", "nodal_von_mises": "von Mises stress"}
+_WORDS = {"von_mises": "von Mises stress of cells", "nodal_von_mises": "von Mises stress at nodes"}
 #: The colours end at this quantile, and with negative numbers at its counterpart.
 QUANTILE = 0.995
 #: Colour bar on the right, clear of the bodies.

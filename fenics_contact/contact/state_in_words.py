@@ -47,7 +47,7 @@ def first_pairs(scene: Scene, contact: ContactResult, most: int = 8) -> dict[str
 
 
 def pairs_in_words(scene: Scene, contact: ContactResult, force: str = "", stress: str = "") -> list[str]:
-    """Return a summary of each contact pair.
+    """Return a summary of each contact pair: points by status, resultants, largest pressure.
 
     Args:
         scene: The scene.
@@ -58,13 +58,21 @@ def pairs_in_words(scene: Scene, contact: ContactResult, force: str = "", stress
     rows = []
     for number, pair in enumerate(scene.contacts):
         mine = contact.on_pair(number)
-        resultant = f"{np.linalg.norm(contact.force[mine].sum(axis=0)):.6g} {force}".rstrip()
+        pressing = contact.normal_force[mine, None] * contact.points.normal[mine]
+        resultant = f"normal force {_size(pressing, force)}"
+        if pair.has_friction:
+            resultant += f", friction {_size(contact.force[mine] - pressing, force)}"
         pressure = f"{contact.pressure[mine].max(initial=0.0):.5g} {stress}".rstrip()
         rows.append(
             f"{pair.place}: {len(mine)} points, {_kinds(pair, contact.status[mine])}; "
-            f"force {resultant}, pressure up to {pressure}"
+            f"{resultant}, pressure up to {pressure}"
         )
     return rows
+
+
+def _size(forces: np.ndarray, unit: str) -> str:
+    """Return the magnitude of the sum of forces, shape (n, dim), with its unit."""
+    return f"{np.linalg.norm(forces.sum(axis=0)):.6g} {unit}".rstrip()
 
 
 def _kinds(pair: ContactPair, status: np.ndarray) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from fenics_contact.gallery.hemisphere import half_cylinder
 from fenics_contact.mesh import BodyMesh, boundary_faces
-from fenics_contact.surface_shapes import Sphere
+from fenics_contact.surface_shapes import Circle
 
 
 def half_disc(radius: float, n: int, *, symmetry: str = "x", grading: float = 3.0) -> BodyMesh:
@@ -37,6 +37,6 @@ def half_disc(radius: float, n: int, *, symmetry: str = "x", grading: float = 3.
         if name in solid.surfaces:
             inside = np.isin(nodes, solid.surfaces[name])
             surfaces[name] = edges[inside[edges].all(axis=1)]
-    disc = Sphere((0.0, radius), radius)
+    disc = Circle((0.0, radius), radius)
     shapes = {name: disc for name in ("contact", "side")}
     return BodyMesh(solid.points[nodes][:, [0, 2]], cells, surfaces, shapes=shapes)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.faces import corners_of
-from fenics_contact.surface_shapes import SurfaceShape, asked
+from fenics_contact.surface_shapes import Joined, Plane, SurfaceShape, asked
 
 #: Largest distance of nodes from their shape, relative to the shortest edge of a facet around them.
 FARTHEST = 0.1
+#: Cosine of the angle between a facet's normal and the inward normal of a shape above which it faces inwards.
+INWARD = 0.5
 
 
 def distance_in_edges(points: np.ndarray, facets: np.ndarray, shape: SurfaceShape) -> np.ndarray:
@@ -50,7 +52,7 @@ def check_shapes(
 
     Raises:
         InvalidInputError: If there is no such surface, the shape is of another dimension, or nodes lie off it
-            by more than a tenth of an edge.
+            by more than a tenth of an edge, or the shape faces into the body.
     """
     distances = {}
     for name, shape in shapes.items():
@@ -62,8 +64,7 @@ def check_shapes(
         if dim != points.shape[1]:
             raise InvalidInputError(
                 f"the shape of surface {name!r} must be of the mesh's dimension {points.shape[1]}, "
-                f"{type(shape).__name__} is for {dim}: in the plane give curves, such as a Sphere of two "
-                "coordinates"
+                f"{type(shape).__name__} is for {dim}: in the plane give curves, such as a Circle"
             )
         away = distance_in_edges(points, surfaces[name], shape)
         off = away > FARTHEST
@@ -73,5 +74,42 @@ def check_shapes(
                 f"lie off {type(shape).__name__} by more than a tenth of an edge, up to {away.max():.3g} "
                 "edges: check its place and size and the unit of length, or give the shape of another surface"
             )
+        _check_side(name, points, surfaces[name], shape)
         distances[name] = away
     return distances
+
+
+def _check_side(name: str, points: np.ndarray, facets: np.ndarray, shape: SurfaceShape) -> None:
+    """Reject a shape, or a part of a joined one, whose normals point into the body."""
+    corners = points[corners_of(facets, points.shape[1])]
+    if points.shape[1] == 2:
+        along = corners[:, 1] - corners[:, 0]
+        outward = np.column_stack([along[:, 1], -along[:, 0]])
+    else:
+        outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0])
+    middles = corners.mean(axis=1)
+    area = np.linalg.norm(outward, axis=1)
+    along = np.einsum("nd,nd->n", outward, asked(shape, "normals", middles))
+    parts: Sequence[SurfaceShape] = [shape]
+    part = np.zeros(len(middles), dtype=np.int64)
+    if isinstance(shape, Joined):
+        parts, part = shape.shapes, shape.nearest(middles)
+    inward = np.bincount(part, np.where(along < -INWARD * area, area, 0.0), len(parts))
+    # By area, as normals of a coarse facet beside a sharp edge may be those of the next part.
+    wrong = np.flatnonzero(inward > 0.5 * np.bincount(part, area, len(parts)))
+    if len(wrong):
+        turned = parts[wrong[0]]
+        raise InvalidInputError(
+            f"the shape of surface {name!r} must have its normals out of the body, those of "
+            f"{type(turned).__name__} point into it: {_turning(turned)}"
+        )
+
+
+def _turning(shape: SurfaceShape) -> str:
+    """Return how to let a shape face the other way."""
+    for switch in ("hollow", "flipped"):
+        if hasattr(shape, switch):
+            return f"give it {switch}={not getattr(shape, switch)}"
+    if isinstance(shape, Plane):
+        return f"give it the normal {tuple(-x for x in shape.normal)}"
+    return "turn it round, its distance is negative inside the body"

@@ -9,13 +9,14 @@ import numpy as np
 
 from fenics_contact.display import displayed
 from fenics_contact.mesh_io.gmsh_geometry import shape_seen
-from fenics_contact.surface_shapes import Cylinder, Plane, Sphere, SurfaceShape, Torus
+from fenics_contact.surface_shapes import Circle, Cylinder, Plane, Sphere, SurfaceShape, Torus
 
 #: Names of kinds of faces (dimension 2) and of curves (1).
 _KINDS: dict[type, dict[int, str]] = {
     Plane: {2: "plane", 1: "line"},
     Cylinder: {2: "cylinder"},
-    Sphere: {2: "sphere", 1: "circle"},
+    Sphere: {2: "sphere"},
+    Circle: {1: "circle"},
     Torus: {2: "torus"},
 }
 

@@ -19,7 +19,7 @@ _AXES = ("x", "y", "z")
 _PRINCIPAL = ("first (largest)", "second", "third (smallest)")
 #: Fields of the library: part of the menu, words, and the unit's name in `Units`. In the order of the menu.
 _KNOWN = {
-    "nodal_von_mises": ("at nodes", "von Mises stress", "stress"),
+    "nodal_von_mises": ("at nodes", "von Mises stress at nodes", "stress"),
     "displacement": ("at nodes", "displacement", "length"),
     "nodal_stress": ("at nodes", "stress", "stress"),
     "nodal_principal_stress": ("at nodes", "principal stress", "stress"),

@@ -12,13 +12,14 @@ from fenics_contact.surface_shapes.profile import Profile
 from fenics_contact.surface_shapes.protocol import SurfaceShape, asked
 from fenics_contact.surface_shapes.recognised import recognised
 from fenics_contact.surface_shapes.revolved import Revolved
-from fenics_contact.surface_shapes.round import Cylinder, Sphere
+from fenics_contact.surface_shapes.round import Circle, Cylinder, Sphere
 from fenics_contact.surface_shapes.signed_distance import SignedDistance
 from fenics_contact.surface_shapes.spline_patch import SplinePatch
 from fenics_contact.surface_shapes.tensor_grid import tensor_grid
 from fenics_contact.surface_shapes.torus import Torus
 
 __all__ = [
+    "Circle",
     "Cylinder",
     "Extruded",
     "Joined",

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.checks import GivenVector, checked, floats, unit_vector
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.surface_shapes.places import require_place, require_plane
 from fenics_contact.surface_shapes.protocol import SurfaceShape
 
 
+@displayed
 @dataclass(frozen=True)
 @checked()
 class Extruded:

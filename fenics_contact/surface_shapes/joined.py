@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact.checks import checked
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.surface_shapes.protocol import Quantity, SurfaceShape
 
@@ -20,6 +22,7 @@ SAMPLES = 4
 BEYOND = 2.0
 
 
+@displayed
 @dataclass(frozen=True)
 @checked("facets")
 class Joined:
@@ -40,6 +43,13 @@ class Joined:
                 f"Joined.facets must hold facets for each of the {len(self.shapes)} shapes, got "
                 f"{[len(each) for each in self.facets]}: give the parts of the surface that have the shapes"
             )
+
+    def _facts(self) -> dict[str, str]:
+        kinds = Counter(type(shape).__name__ for shape in self.shapes)
+        return {
+            "shapes": ", ".join(f"{count} × {kind}" for kind, count in kinds.items()),
+            "facets": str(sum(map(len, self.facets))),
+        }
 
     @property
     def dim(self) -> int:

@@ -8,17 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.checks import GivenVector, checked, floats
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.surface_shapes.joined import Joined
 from fenics_contact.surface_shapes.places import require_place
 from fenics_contact.surface_shapes.plane import Plane
 from fenics_contact.surface_shapes.protocol import SurfaceShape
-from fenics_contact.surface_shapes.round import Cylinder, Sphere
+from fenics_contact.surface_shapes.round import Circle, Cylinder, Sphere
 
 #: Tolerance of the orthonormality of a rotation's columns.
 ORTHOGONAL = 1e-9
 
 
+@displayed
 @dataclass(frozen=True)
 @checked()
 class Placed:
@@ -121,7 +123,8 @@ def simplified(shape: SurfaceShape) -> SurfaceShape:
         case Plane(point, normal):
             return Plane(floats(scale * turn @ point + shift), floats(turn @ normal))
         case Sphere(centre, radius, hollow):
-            return Sphere(floats(scale * turn @ centre + shift), scale * radius, hollow)
+            kind = Circle if isinstance(shape, Circle) else Sphere
+            return kind(floats(scale * turn @ centre + shift), scale * radius, hollow)
         case Cylinder(point, axis, radius, hollow):
             return Cylinder(floats(scale * turn @ point + shift), floats(turn @ axis), scale * radius, hollow)
     return shape

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from fenics_contact.checks import GivenVector, checked
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.surface_shapes.patch import Patch
 
@@ -17,6 +18,7 @@ from fenics_contact.surface_shapes.patch import Patch
 SAMPLES = 8
 
 
+@displayed
 @dataclass(frozen=True)
 @checked()
 class Profile(Patch):

@@ -9,7 +9,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.surface_shapes.plane import Plane
 from fenics_contact.surface_shapes.protocol import SurfaceShape
 from fenics_contact.surface_shapes.revolved import Revolved
-from fenics_contact.surface_shapes.round import Cylinder, Sphere
+from fenics_contact.surface_shapes.round import Circle, Cylinder, Sphere
 from fenics_contact.surface_shapes.torus import Torus
 
 #: Largest distance of points from their shape, relative to their extent.
@@ -51,7 +51,8 @@ def _sphere(points: np.ndarray, normals: np.ndarray) -> SurfaceShape:
     centre, rest = np.split(np.linalg.lstsq(linear, np.einsum("nd,nd->n", off, off), rcond=None)[0], [-1])
     radius = float(np.sqrt(max(rest[0] + centre @ centre, 0.0)))
     hollow = bool(np.einsum("nd,nd->n", off - centre, normals).sum() < 0)
-    return Sphere(floats(middle + centre), radius, hollow)
+    kind = Circle if len(centre) == 2 else Sphere
+    return kind(floats(middle + centre), radius, hollow)
 
 
 def _about_an_axis(points: np.ndarray, normals: np.ndarray) -> SurfaceShape | None:

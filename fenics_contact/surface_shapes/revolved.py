@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.checks import GivenVector, checked, unit_vector
+from fenics_contact.display import displayed
 from fenics_contact.surface_shapes.places import outer, require_place, require_plane
 from fenics_contact.surface_shapes.protocol import SurfaceShape
 
@@ -15,6 +16,7 @@ from fenics_contact.surface_shapes.protocol import SurfaceShape
 SMOOTH = 1e-10
 
 
+@displayed
 @dataclass(frozen=True)
 @checked()
 class Revolved:

@@ -85,6 +85,15 @@ class Sphere(_Round):
         return np.asarray(points - np.asarray(self.centre))
 
 
+class Circle(Sphere):
+    """A disc in the plane, or everything outside it; arguments as for `Sphere`."""
+
+    def __post_init__(self) -> None:
+        """Reject a centre that is not in the plane."""
+        require_place(self, self.centre, (2,))
+        super().__post_init__()
+
+
 @dataclass(frozen=True)
 @checked()
 class Cylinder(_Round):

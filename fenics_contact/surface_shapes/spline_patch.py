@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import BSpline, RectBivariateSpline, make_interp_spline
 
+from fenics_contact.display import displayed
 from fenics_contact.surface_shapes.patch import Patch
 from fenics_contact.surface_shapes.tensor_grid import tensor_grid
 
@@ -17,6 +18,7 @@ DEGREE = 5
 OFF_POLES = 1e-4
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class SplinePatch(Patch):
     """A smooth surface through a grid of points, in the plane a curve through a row.

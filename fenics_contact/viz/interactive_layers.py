@@ -66,7 +66,7 @@ def stress_content(subject: Subject) -> Content:
     unit, clim = subject.units.stress, subject.clim or stress_range(subject.bodies)
     values = {name: nodal(body, "von_mises") for name, body in subject.bodies.items()}
     layers = _coloured(subject, values, {"cmap": STRESS_MAP, "clim": clim}, f"von Mises stress ({unit})")
-    return Content(layers, f"von Mises stress, largest {written(peak)} {unit}")
+    return Content(layers, f"von Mises stress, largest mean over a cell {written(peak)} {unit}")
 
 
 def displacement_content(subject: Subject) -> Content:

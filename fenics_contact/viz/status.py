@@ -85,7 +85,7 @@ def _draw(patches: Mapping[str, ContactPatch], paper: BinaryIO, title: str, unit
         panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
         for axes, (name, patch) in zip(panels, patches.items(), strict=False):
             draw_status(axes, patch, counted=False)
-            axes.set_title(f"{name}\n{_words(patch, units)}")
+            axes.set_title(_words(patch, units) if name == title else f"{name}\n{_words(patch, units)}")
             label_patch(axes, patch, units, mirror=True)
         for axes in panels[len(patches) :]:
             axes.set_axis_off()

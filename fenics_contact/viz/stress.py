@@ -83,7 +83,8 @@ def plot_stress(
     factor = chosen if scale is None else float(scale)
     shown, named = given or stress_range(bodies), units or Units()
     peak = max(float(body["von_mises"].max()) for body in bodies.values())
-    facts = f"von Mises stress, largest {written(peak)} {named.stress}; displacement × {factor:g}"
+    largest = f"largest mean over a cell {written(peak)} {named.stress}"
+    facts = f"von Mises stress, {largest}; displacement × {factor:g}"
     values = {
         name: nodal(body, "von_mises") if smooth else body["von_mises"] for name, body in bodies.items()
     }

@@ -11,8 +11,8 @@ from fenics_contact.contact import pairs_in_words, solve_scene
 from fenics_contact.scene import Coulomb, Scene
 from tests.contact.gallery import partitions, pressed_block, two_blocks
 
-RUBBING = r"\w+ \w+ on \w+ \w+: \d+ points, \d+ open, \d+ stick, \d+ slip; force [1-9.]"
-SMOOTH = r"\w+ \w+ on rigid plane: \d+ points, \d+ open, [1-9]\d* closed; force [1-9.]"
+RUBBING = r"\w+ \w+ on \w+ \w+: \d+ points, \d+ open, \d+ stick, \d+ slip; normal force \S+ N, friction \d"
+SMOOTH = r"\w+ \w+ on rigid plane: \d+ points, \d+ open, [1-9]\d* closed; normal force [1-9.]"
 
 
 @pytest.mark.parametrize(
@@ -24,4 +24,8 @@ def test_a_pair_is_told_by_its_surfaces_and_its_points_by_what_they_can_do(scene
     state = solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene))
     (words,) = pairs_in_words(scene, state.contact, "N", "MPa")
     assert re.match(told, words), words
-    assert re.search(r"force \S+ N, pressure up to \S+ MPa$", words), words
+    assert re.search(r" \S+ N, pressure up to \S+ MPa$", words), words
+    # These surfaces are flat.
+    pressing = re.search(r"normal force (\S+) N", words)
+    assert pressing is not None
+    assert float(pressing[1]) == pytest.approx(state.contact.normal_force.sum(), rel=1e-5)

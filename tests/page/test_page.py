@@ -94,7 +94,7 @@ def test_fields_have_words_units_and_ranges() -> None:
     state = touching_blocks()
     data, _ = content(result_page(state, units=Units("m", "kN", "kPa")).html)
     labels = [entry["label"] for entry in data["fields"]]
-    assert labels[:3] == ["von Mises stress", "displacement, magnitude", "displacement, x"]
+    assert labels[:3] == ["von Mises stress at nodes", "displacement, magnitude", "displacement, x"]
     assert {"contact pressure", "contact status", "stress, xy", "principal stress, first (largest)"} < set(
         labels
     )
@@ -110,7 +110,8 @@ def test_fields_have_words_units_and_ranges() -> None:
     assert pressure["contact"]
     assert pressure["extremes"][0][1] == pytest.approx(state.contact.pressure.max())
     assert field(data, "displacement, x")["unit"] == "m"
-    parts = [field(data, label)["part"] for label in ("von Mises stress", "stress of cells, xy", "subdomain")]
+    three = ("von Mises stress at nodes", "stress of cells, xy", "subdomain")
+    parts = [field(data, label)["part"] for label in three]
     assert parts == ["at nodes", "means over cells", "more"]
 
 
@@ -155,7 +156,7 @@ def test_a_series_becomes_load_steps(tmp_path: Path) -> None:
     assert [step["label"] for step in data["steps"]] == ["stuck", "0.5"]
     first, second = (arrays[step["bodies"][0]["nodes"]["displacement"]] for step in data["steps"])
     assert np.abs(first - second).max() > 1e-4
-    assert len(field(data, "von Mises stress")["extremes"]) == 2
+    assert len(field(data, "von Mises stress at nodes")["extremes"]) == 2
 
 
 def test_tables_tell_the_numbers_of_the_result() -> None:
