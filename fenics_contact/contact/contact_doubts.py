@@ -12,6 +12,7 @@ from fenics_contact.feti import TornSystem
 from fenics_contact.mesh import computed_rounding
 from fenics_contact.pairing import ContactPoints
 from fenics_contact.scene import ContactPair, Scene, Surface, surface_of
+from fenics_contact.surfaces import share_areas
 
 #: Errors up to this share of what moves are small.
 SHARE = 0.1
@@ -49,6 +50,12 @@ class ContactDoubts:
             if not (overlap and kind == "overlap"):
                 self._tell(state.torn, pair, kind, words)
 
+    def warn_of_sliding(self, state: State) -> None:
+        """Warn of pairs that slide far alone, as where materials are nonlinear. Collective."""
+        for number in range(len(state.scene.contacts)):
+            for doubt in _slid_far(state, number):
+                self._tell(state.torn, *doubt)
+
     def overlaps(self, state: State) -> tuple[str, ...]:
         """Return words about the pairs whose surfaces overlap before they are loaded. Collective."""
         return tuple(words for _, kind, words in self._doubts(state) if kind == "overlap")
@@ -63,9 +70,7 @@ class ContactDoubts:
         change, pressed_in = self._finer - contact.points.gap, _indentation(state)
         for number, pair in enumerate(torn.scene.contacts):
             mine = contact.on_pair(number)
-            slid, reach = _sliding(torn.scene, pair, contact.total_slip[mine])
-            if slid > reach:
-                found.append((number, "sliding", _words_of_sliding(pair, slid, reach)))
+            found += _slid_far(state, number)
             mine = mine[~contact.points.given[mine]]
             before, after = contact.points.gap[mine], contact.gap[mine]
             touching = contact.normal_force[mine] > 0.0
@@ -87,14 +92,34 @@ class ContactDoubts:
         self._told.add((pair, kind))
 
 
-def _sliding(scene: Scene, pair: ContactPair, slip: np.ndarray) -> tuple[float, float]:
-    """Return how far points slide, and how far they may: across the slave's surface, [length]."""
+def _slid_far(state: State, number: int) -> list[tuple[int, str, str]]:
+    """Return the doubt about a pair whose points slide farther than they may, where there is one.
+
+    Points that press may slide by a facet of the master, all of them across the slave's surface.
+    """
+    contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
+    mine = contact.on_pair(number)
     if not isinstance(pair.master, Surface):
-        return 0.0, np.inf
+        return []
+    slid = np.linalg.norm(contact.total_slip[mine], axis=1)
     mesh = scene.bodies[pair.slave.body].mesh
     places = mesh.points[np.unique(mesh.surfaces[pair.slave.name])]
-    slid = np.linalg.norm(slip, axis=1).max(initial=0.0)
-    return float(slid), float(np.linalg.norm(np.ptp(places, axis=0)))
+    farthest, reach = float(slid.max(initial=0.0)), float(np.linalg.norm(np.ptp(places, axis=0)))
+    if farthest > reach:
+        return [(number, "sliding", _words_of_sliding(pair, farthest, reach))]
+    master = scene.bodies[pair.master.body].mesh
+    area = float(share_areas(master, pair.master.name).sum()) / len(master.surfaces[pair.master.name])
+    pressed, facet = slid[contact.normal_force[mine] > 0.0].max(initial=0.0), area ** (1.0 / (scene.dim - 1))
+    return [(number, "facets slid", _words_of_facets_slid(pair, pressed, facet))] if pressed > facet else []
+
+
+def _words_of_facets_slid(pair: ContactPair, slid: float, facet: float) -> str:
+    return (
+        f"surfaces of {pair.place} that press slide by up to {slid:.3g} along each other, {slid / facet:.2g} "
+        "facets of the master, but with small strains contact points keep the place that they meet at the "
+        "start, also beyond the master's edge: move the body in the mesh, or give one of both a material for "
+        "large deformations, such as StVenantKirchhoff, whose contact follows"
+    )
 
 
 def _words_of_sliding(pair: ContactPair, slid: float, reach: float) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from fenics_contact._libraries import MPI
 from fenics_contact.contact.advice import advice
+from fenics_contact.contact.contact_doubts import ContactDoubts
 from fenics_contact.contact.deformed_state import DeformedState
 from fenics_contact.contact.dual_solve import contact_result
 from fenics_contact.contact.energies import Energies
@@ -19,7 +20,7 @@ from fenics_contact.contact.static_admissibility import check_held
 from fenics_contact.contact.stored_deformed import stored_configuration
 from fenics_contact.contact.stored_rows import Stored
 from fenics_contact.contact.tolerance import Tolerance
-from fenics_contact.contact.turned_bodies import tell_of_turned_bodies
+from fenics_contact.contact.turned_bodies import TurnedBodies
 from fenics_contact.contact.unheld import UnheldMotion
 from fenics_contact.contact.unresisted import require_resisted, unresisted_in_words, unresisted_motions
 from fenics_contact.errors import InfeasibleError, InvalidInputError, LoadStepError, together
@@ -77,6 +78,7 @@ class DeformedEquilibria:
         self._assembled: TornSystem | None = None
         self._unresisted: tuple[UnheldMotion, ...] | None = None
         moves = any(body.deforms_much for body in scene.bodies.values())
+        self._turned, self._doubts = TurnedBodies(), ContactDoubts()
         self._contact: Contact = StillContact()
         if scene.contacts and moves:
             self._contact = MovingContact(scene, decomposition)
@@ -144,7 +146,9 @@ class DeformedEquilibria:
             words = f"{where}{failure}{advice(scene, moves=isinstance(self._contact, MovingContact))}"
             raise LoadStepError(words, failure.history, last) from failure
         state = _state_after(path, origin, timer)
-        tell_of_turned_bodies(state)
+        self._turned.tell(state)
+        if isinstance(self._contact, StillContact):
+            self._doubts.warn_of_sliding(state)
         return state
 
     def restored(self, stored: Stored, scene: Scene) -> DeformedState:

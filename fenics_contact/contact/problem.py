@@ -21,6 +21,7 @@ from fenics_contact.contact.static_admissibility import check_held
 from fenics_contact.contact.stored import restored_solution
 from fenics_contact.contact.stored_rows import Stored, with_stored_slip
 from fenics_contact.contact.tolerance import Tolerance, checked_tolerance
+from fenics_contact.contact.turned_bodies import TurnedBodies
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti import (
@@ -87,7 +88,7 @@ class ContactProblem:
         self.timer = PhaseTimer()
         self.state = None
         self._partitions, self._decomposition = partitions, None
-        self._contact_doubts = ContactDoubts()
+        self._contact_doubts, self._turned = ContactDoubts(), TurnedBodies()
 
     state: State | None
     _decomposition: Decomposition | None
@@ -147,7 +148,7 @@ class ContactProblem:
             scene, self.comm,
             partitions=partitions, solver=self.solver, tolerance=self.tolerance, steps=self.steps,
         )  # fmt: skip
-        other._contact_doubts = self._contact_doubts
+        other._contact_doubts, other._turned = self._contact_doubts, self._turned
         return other
 
     def number(self, scene: Scene | None = None) -> float:
@@ -256,6 +257,7 @@ class ContactProblem:
                 check_held(torn)
         if self.solver is None and kind is SolverKind.DIRECT:
             self.state = direct_state(torn, known, self.timer)
+            self._turned.tell(self.state)
             return self.state
         solver = self.solver or default_solver(kind)
         # Derivatives need the status of every contact point, which a balanced state leaves uncertain.
@@ -265,6 +267,7 @@ class ContactProblem:
         if not (overlap and self._contact_doubts.asked):  # designs differ little from the first one
             with self.timer.phase("state"):
                 self._contact_doubts.warn(self.state, overlap=overlap)
+                self._turned.tell(self.state)
         return self.state
 
     def _equilibria(self, scene: Scene) -> DeformedEquilibria:

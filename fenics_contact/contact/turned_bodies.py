@@ -3,43 +3,97 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fenics_contact._libraries import MPI
 from fenics_contact.errors import tell
-from fenics_contact.scene import rigid_body_modes
+from fenics_contact.mesh import BodyMesh
 
 if TYPE_CHECKING:
-    from fenics_contact.contact.deformed_state import DeformedState
+    from fenics_contact.contact.state import State
 
 _LOG = logging.getLogger(__name__)
-#: Mean rotation, in radians, beyond which it is told: its square is twice the strain that it makes.
+#: Rotation in radians, as the root mean square of all cells, beyond which it is told: half of its square is
+#: the strain that it makes.
 FAR = 0.05
 
 
-def tell_of_turned_bodies(state: DeformedState) -> None:
-    """Log a warning for each body of small strain, beside others, that has turned far. Collective."""
-    for name, body in state.scene.bodies.items():
-        if body.deforms_much:
-            continue
-        angle = mean_rotation(body.mesh.points, state.gather_displacement(name))
-        if angle > FAR and state.dual.problem.comm.rank == 0:
-            words = (
-                "body %r has turned by %.2g rad; its material is for small rotations, %.1g of strain is due "
-                "to this alone: give it a material for large deformations, such as StVenantKirchhoff"
-            )
-            tell(_LOG.warning, words, name, angle, angle**2 / 2)
+class TurnedBodies:
+    """Bodies of small strain that have turned far; each is told of once."""
+
+    def __init__(self) -> None:
+        """Start without any."""
+        self._told: set[str] = set()
+
+    def tell(self, state: State) -> None:
+        """Log a warning for each body of small strain that has turned far. Collective."""
+        comm = state.torn.decomposition.comm
+        steps = state.torn_displacement.reshape(-1, state.torn.dim)
+        longest = float(comm.allreduce(np.linalg.norm(steps, axis=1).max(initial=0.0), op=MPI.MAX))
+        for name, body in state.scene.bodies.items():
+            if body.deforms_much or name in self._told or longest == 0.0:
+                continue
+            cells = _Arms.of(body.mesh)
+            if longest * cells.largest <= FAR:
+                continue
+            angle = cells.rotation(state.gather_displacement(name))
+            if angle <= FAR:
+                continue
+            self._told.add(name)
+            if comm.rank == 0:
+                words = (
+                    "body %r has turned by %.2g rad; its material is for small rotations, %.1g of strain is "
+                    "due to this alone: give it a material for large deformations, such as StVenantKirchhoff"
+                )
+                tell(_LOG.warning, words, name, angle, angle**2 / 2)
 
 
-def mean_rotation(points: np.ndarray, displacement: np.ndarray) -> float:
-    """Return the angle of the rigid motion nearest to a displacement, in radians.
+@dataclass(frozen=True)
+class _Arms:
+    """How gradients of cells follow from the displacements of their corners, by least squares.
+
+    Attributes:
+        corners: Corners of the cells, shape (n, k).
+        inverse: Gradient by the displacement of each corner, shape (n, k, dim), [1 / length].
+        size: Volumes up to a factor, shape (n,).
+    """
+
+    corners: np.ndarray
+    inverse: np.ndarray
+    size: np.ndarray
+
+    @classmethod
+    def of(cls, mesh: BodyMesh) -> _Arms:
+        corners = mesh.linear.cells
+        arms = mesh.points[corners]
+        arms = arms - arms.mean(axis=1, keepdims=True)
+        metric = np.einsum("nkd,nke->nde", arms, arms)
+        return cls(corners, arms @ np.linalg.inv(metric), np.sqrt(np.linalg.det(metric)))
+
+    @property
+    def largest(self) -> float:
+        """A bound on the rotation of any cell by displacements of length one, [1 / length]."""
+        return float(np.linalg.norm(self.inverse, axis=2).sum(axis=1).max())
+
+    def rotation(self, displacement: np.ndarray) -> float:
+        """Return the root mean square of the rotations of cells, in radians.
+
+        Args:
+            displacement: Of the nodes, shape (n_nodes, dim), [length].
+        """
+        gradient = np.einsum("nkd,nke->nde", self.inverse, displacement[self.corners])
+        square = ((gradient - gradient.transpose(0, 2, 1)) ** 2).sum(axis=(1, 2)) / 8.0
+        return float(np.sqrt(np.average(square, weights=self.size)))
+
+
+def rotation_of(mesh: BodyMesh, displacement: np.ndarray) -> float:
+    """Return by how much the cells of a body turn, as a root mean square, in radians.
 
     Args:
-        points: Shape (n, dim), [length].
-        displacement: Shape (n, dim), [length].
+        mesh: Its mesh.
+        displacement: Of the nodes, shape (n_nodes, dim), [length].
     """
-    dim, size = points.shape[1], np.abs(points - points.mean(axis=0)).max()
-    modes = rigid_body_modes(points / size).reshape(displacement.size, -1)
-    motion = np.linalg.lstsq(modes, (displacement / size).ravel(), rcond=None)[0]
-    return float(np.linalg.norm(motion[dim:]))
+    return _Arms.of(mesh).rotation(displacement)

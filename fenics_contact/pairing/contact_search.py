@@ -25,6 +25,7 @@ from fenics_contact.pairing.mortar_points import MortarPoints
 from fenics_contact.pairing.node_numbers import NodeNumbers
 from fenics_contact.pairing.shared_projection import shared_projection
 from fenics_contact.pairing.surface_doubts import warn_of_surface
+from fenics_contact.pairing.tied_edges import warn_of_edge
 from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie, master_share, surface_of
 from fenics_contact.surface_shapes import asked
 from fenics_contact.surfaces import (
@@ -153,6 +154,9 @@ def _measured(
             points = _by_mortar(slave, bearing, master, comm, master_share(scene, pair))
         else:
             points = _by_projection(slave, bearing, master, comm)
+            if isinstance(pair, Tie):
+                held = ~movable | np.isin(slave.nodes, points.slave)
+                warn_of_edge(pair, slave.surface, held, master.surface, comm)
         points = replace(points, symmetric=_symmetric(points, slave, master))
     if comm.rank == 0 and not movable.all():
         tell(

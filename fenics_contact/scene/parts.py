@@ -60,6 +60,8 @@ class SceneParts:
                 self._require_linear(pair.slave, pair.master, pair.discretisation, kind)
             else:
                 self._require_dimension(pair.master)
+        _require_different(self.contacts)
+        _require_different(self.ties)
 
     @property
     def following_pressures(self) -> tuple[Pressure, ...]:
@@ -238,3 +240,16 @@ class SceneParts:
     def _with_meshes(self, meshes: Mapping[str, BodyMesh]) -> Self:
         changed = {name: replace(self.bodies[name], mesh=mesh) for name, mesh in meshes.items()}
         return replace(self, bodies={**self.bodies, **changed})
+
+
+def _require_different(pairs: Sequence[ContactPair | Tie]) -> None:
+    """Reject two pairs of the same slave and master: how they share the force is not determined."""
+    for number, pair in enumerate(pairs):
+        for earlier in range(number):
+            other = pairs[earlier]
+            if pair.slave == other.slave and pair.master == other.master:
+                kind = type(pair).__name__
+                raise InvalidInputError(
+                    f"the surfaces of {kind} {number}, {pair.place}, are those of {kind} {earlier}: how both "
+                    "share the force is not determined; keep one of them, or give them different parts"
+                )

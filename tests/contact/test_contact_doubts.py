@@ -15,6 +15,7 @@ from fenics_contact.gallery import half_disc, rectangle
 from fenics_contact.scene import (
     Body,
     ContactPair,
+    J2Plasticity,
     PlaneStrain,
     Pressure,
     Scene,
@@ -125,8 +126,27 @@ def test_a_shaft_that_turns_away_is_told(caplog: pytest.LogCaptureFixture) -> No
     free = replace(scene, bodies={**scene.bodies, "hub": turned})
     # Weighted means over facets that are turned against each other do not face their nodes exactly, and
     # nothing else keeps the shaft from turning.
-    (words,) = told(caplog, free)
+    words, further = told(caplog, free)
+    assert further.startswith("body 'shaft' has turned by ")
     assert words.startswith("surfaces of hub inner on shaft outer slide by up to ")
     assert words.endswith("what only the facets keep from turning or shifting, or move it in the mesh")
     (pair,) = free.contacts
     assert told(caplog, replace(free, contacts=[replace(pair, discretisation="node")])) == []
+
+
+def test_surfaces_that_press_and_slide_by_a_facet_of_the_master_are_told(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """Where contact points do not follow: with small strains, also of metal."""
+    low, high = rectangle((0, 0), (8, 1), (8, 2)), rectangle((1, 1), (3, 2), (3, 1))
+    pair = ContactPair(Surface("high", "y0"), Surface("low", "y1"), discretisation="node")
+    for material in (PlaneStrain(1e3, 0.3), J2Plasticity(1e3, 0.3, 1e3)):
+        for way, facets in ((0.9, 0), (1.5, 1)):
+            bodies = {"low": Body(low, material), "high": Body(high, material)}
+            supports = [Support("low", "y0"), Support("high", "y1", (way, -1e-3))]
+            words = told(caplog, Scene(bodies, supports, contacts=[pair]))
+            assert len(words) == facets
+            if facets:
+                slid = "that press slide by up to 1.5 along each other, 1.5 facets of the master"
+                assert words[0].startswith(f"surfaces of high y0 on low y1 {slid}")
+                assert "a material for large deformations, such as StVenantKirchhoff" in words[0]

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from fenics_contact.contact import solve_scene
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block
+from fenics_contact.pairing import find_tied_points
 from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
@@ -144,3 +145,28 @@ def test_tied_surfaces_that_do_not_meet_are_refused() -> None:
     )
     with pytest.raises(InvalidInputError, match=message):
         solve_scene(replace(away, ties=[Tie(*FACES)]), MPI.COMM_SELF, partitions=cuts(away), tolerance=1e-10)
+
+
+@pytest.mark.parametrize("edge", [1.5, 1.1])
+def test_ties_by_nodes_beyond_the_masters_edge_are_told(
+    edge: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The last facet of the slave hangs over the edge: what the master transmits there is lost."""
+    wide, narrow = block((0, 0, 1), (3, 1, 2), (6, 1, 1)), block((0, 0, 0), (edge, 1, 1), (4, 1, 2))
+    bodies = {"wide": Body(wide, STEEL), "narrow": Body(narrow, STEEL)}
+    over, under = Surface("wide", "z0"), Surface("narrow", "z1")
+
+    def told(tie: Tie) -> list[str]:
+        caplog.clear()
+        find_tied_points(Scene(bodies, ties=[tie]), np.zeros((wide.n_nodes + narrow.n_nodes, 3), dtype=bool))
+        return [record.getMessage() for record in caplog.records]
+
+    words = told(Tie(over, under, discretisation="node"))
+    if edge == 1.5:  # edges of facets lie upon each other
+        assert words == []
+    else:
+        (warning,) = words
+        assert warning.startswith("the tie of wide z0 on narrow z1 is by nodes, and the master ends within")
+        assert "only some of their nodes are tied, 12 % of the master's surface lies under them" in warning
+    assert told(Tie(under, over, discretisation="node")) == []
+    assert told(Tie(over, under)) == []

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.contact.turned_bodies import mean_rotation
-from fenics_contact.gallery import block
+from fenics_contact.contact import ContactProblem, solve_scene
+from fenics_contact.contact.turned_bodies import rotation_of
+from fenics_contact.gallery import block, rectangle
 from fenics_contact.scene import Body, IsotropicElasticity, NeoHooke, RigidSurface, Scene, Support
 
 
@@ -34,11 +34,30 @@ def test_a_linear_body_that_turns_far_is_told_of(
     assert "soft" not in caplog.text
 
 
+def test_a_linear_body_alone_is_told_of_once(caplog: pytest.LogCaptureFixture) -> None:
+    """In a scene without any large deformations, in one piece and cut."""
+    beam = block((0, 0, 0), (6, 1, 1), (6, 1, 1))
+
+    def scene(angle: float) -> Scene:
+        turn = RigidSurface("beam", "x1", (6.0, 0.5, 0.5), (0, 0, 0), (0.0, 0.0, angle))
+        return Scene({"beam": Body(beam, IsotropicElasticity(100.0, 0.3))}, [Support("beam", "x0"), turn])
+
+    for partition in ({"beam": np.zeros(6, dtype=int)}, {"beam": np.arange(6) // 3}):
+        caplog.clear()
+        problem = ContactProblem(scene(0.7), MPI.COMM_SELF, partitions=partition)
+        with caplog.at_level(logging.WARNING, logger="fenics_contact"):
+            for angle in (0.01, 0.7, 0.8):
+                problem.solve(scene(angle))
+        (words,) = [record.getMessage() for record in caplog.records]
+        assert words.startswith("body 'beam' has turned by ")
+        assert words.endswith("give it a material for large deformations, such as StVenantKirchhoff")
+
+
 @pytest.mark.parametrize("dim", [2, 3])
-def test_the_mean_rotation_is_that_of_a_rigid_motion(dim: int) -> None:
-    points = np.random.default_rng(3).standard_normal((20, dim)) * np.arange(1, dim + 1) + 100.0
+def test_the_rotation_of_a_body_is_that_of_its_rigid_motion(dim: int) -> None:
+    mesh = rectangle((100, 0), (101, 2), (3, 2)) if dim == 2 else block((100, 0, 0), (101, 2, 3), (2, 2, 1))
     spin = np.zeros((3, 3))
     spin[0, 1], spin[2, 0], spin[1, 2] = (0.03, 0.0, 0.0) if dim == 2 else (0.03, 0.1, -0.2)
-    moved = points @ (spin - spin.T)[:dim, :dim] + 5.0
-    assert mean_rotation(points, moved) == pytest.approx(np.linalg.norm(spin), rel=1e-10)
-    assert mean_rotation(points, 0.1 * points) == pytest.approx(0.0, abs=1e-12)
+    moved = mesh.points @ (spin - spin.T)[:dim, :dim] + 5.0
+    assert rotation_of(mesh, moved) == pytest.approx(np.linalg.norm(spin), rel=1e-10)
+    assert rotation_of(mesh, 0.1 * mesh.points) == pytest.approx(0.0, abs=1e-12)

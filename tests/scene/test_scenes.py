@@ -21,6 +21,7 @@ from fenics_contact.scene import (
     Scene,
     Support,
     Surface,
+    Tie,
     TotalForce,
     Traction,
     Tresca,
@@ -139,3 +140,13 @@ def test_friction_that_can_carry_nothing_is_not_an_effect(friction: Coulomb | Tr
 
 def test_a_scene_without_contact_calls_for_none() -> None:
     assert [effect.name for effect in stack().effects()] == ["elasticity"]
+
+
+@pytest.mark.parametrize("kind", [ContactPair, Tie])
+def test_the_same_surfaces_twice_are_refused(kind: type[ContactPair] | type[Tie]) -> None:
+    pairs = [kind(BASE, TOP), kind(TOP, BASE)]
+    name = "contacts" if kind is ContactPair else "ties"
+    assert len(getattr(stack(**{name: pairs}), name)) == 2
+    words = f"the surfaces of {kind.__name__} 2, upper z0 on lower z1, are those of {kind.__name__} 0: how"
+    with pytest.raises(InvalidInputError, match=words):
+        stack(**{name: [*pairs, pairs[0]]})
