@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import wraps
+from inspect import Signature, signature
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from fenics_contact.errors import meeting
@@ -147,20 +148,55 @@ def collectively(
         where: Its name, for messages.
         comm_of: Takes its arguments, returns the communicator.
 
+    Raises:
+        InvalidInputError: When it is called with arguments that have no communicator.
+
     Example:
         >>> @collectively("Model.solve", lambda self: self.comm)
         ... def solve(self): ...
     """
 
     def guarded(function: Callable[Given, Found]) -> Callable[Given, Found]:
+        wanted = signature(function)
+
         @wraps(function)
         def called(*arguments: Given.args, **named: Given.kwargs) -> Found:
-            with collective(comm_of(*arguments, **named), where):
+            comm = _communicator(wanted, where, comm_of, arguments, named)
+            with collective(comm, where):
                 return function(*arguments, **named)
 
         return called
 
     return guarded
+
+
+def _communicator(
+    wanted: Signature,
+    where: str,
+    comm_of: Callable[..., MPI.Comm],
+    arguments: tuple[Any, ...],
+    named: dict[str, Any],
+) -> MPI.Comm:
+    """Return the communicator in the arguments of a call.
+
+    Raises:
+        InvalidInputError: If arguments are missing or in another order, so that there is none.
+    """
+    cause: Exception | None = None
+    try:
+        wanted.bind(*arguments, **named)
+        comm = comm_of(*arguments, **named)
+        if hasattr(comm, "allreduce"):
+            return comm
+    except (TypeError, AttributeError) as error:
+        cause = error
+    names = [name for name in wanted.parameters if name != "self"]
+    given = [type(each).__name__ for each in arguments[len(arguments) and "self" in wanted.parameters :]]
+    given += [f"{name}={type(value).__name__}" for name, value in named.items()]
+    raise InvalidInputError(
+        f"{where} takes ({', '.join(names)}), got ({', '.join(given)}): give what is needed in this order, "
+        "as communicator one of mpi4py: MPI.COMM_WORLD for all ranks"
+    ) from cause
 
 
 Report = tuple[type[BaseException], str, Any]

@@ -41,6 +41,7 @@ _WAITING = (
     "rank %d waits since %.0f s for the others in %s, which is collective: if they are not just slower, call "
     "it on every rank, outside of blocks like `if comm.rank == 0`"
 )
+_FIRST = "the first call of this package with this communicator (or did one of them end with an error?)"
 _ENDING = (
     "rank %d failed in %s, and the other ranks wait for it where they cannot be told: the program is ended "
     "on all ranks"
@@ -56,7 +57,7 @@ def own_of(comm: MPI.Comm) -> MPI.Comm:
     key = _key(kind)
     own: Any = comm.Get_attr(key)
     if own is None:
-        own = comm.Dup()
+        own = _duplicated(comm)
         comm.Set_attr(key, own)
         _open[id(own)] = own
     # Handlers run in reverse order: this one before the end of PETSc, which waits for ranks and may be
@@ -64,6 +65,22 @@ def own_of(comm: MPI.Comm) -> MPI.Comm:
     atexit.unregister(_answer_until_all_have_ended)
     atexit.register(_answer_until_all_have_ended, os.getpid())
     return cast("MPI.Comm", own)
+
+
+def _duplicated(comm: MPI.Comm) -> MPI.Comm:
+    """Return a duplicate of a communicator, with a word where the others do not come. Collective.
+
+    A rank that has failed before it ever met the others, as in the description of a scene, cannot be heard.
+    """
+    own, request = comm.Idup()
+    begun, warned = time.monotonic(), False
+    while not request.Test():
+        waited = time.monotonic() - begun
+        if waited > PATIENCE and not warned:
+            warned = True
+            tell(_LOG.warning, _WAITING, comm.rank, waited, _FIRST)
+        time.sleep(min(PAUSE * waited, LONGEST_PAUSE))
+    return own
 
 
 @cache

@@ -348,7 +348,7 @@ def _with_rows(
 ) -> TornSystem:
     """Build B for contact points and tied ones; the right side is left empty. Collective."""
     points, ties = met
-    has_friction, coefficient, tresca = friction_data(scene, points)
+    has_friction, coefficient, tresca = friction_data(scene, points, decomposition.comm)
     frictional = np.flatnonzero(has_friction)
     gluing, tearing, fixed = decomposition.gluing.rows, decomposition.tearing, decomposition.fixed
     tied = tied_relations(ties, scene.ties, fixed)

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.display import displayed
+from fenics_contact.errors import together
 from fenics_contact.feti import Decomposition, TornSystem, meeting_at, nodal_mean_at, on_copies
 from fenics_contact.linalg import scaled_rows
 from fenics_contact.nonlinear.loading import Loading
@@ -181,7 +182,10 @@ class Contact(Protocol):
     """How bodies meet."""
 
     def longest_part(self, first: Loading, last: Loading) -> float:
-        """Return the part of the way between two loads that one step may take: what moves must be found."""
+        """Return the part of the way between two loads that one step may take. Collective.
+
+        What moves must be found again.
+        """
 
     def at(
         self, load: Loading, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
@@ -229,17 +233,17 @@ class MovingContact:
         self._facet = min((_facet_size(scene, side) for side in sides), default=np.inf)
 
     def longest_part(self, first: Loading, last: Loading) -> float:
-        """Return the part in which supports and obstacles that nodes may pass move by a few facets."""
+        """Return the part in which what nodes may pass moves by a few facets. Collective."""
         if np.isinf(self._facet):
             return 1.0
         way = np.nan_to_num(last.prescribed - first.prescribed)
         moved = float(np.linalg.norm(way, axis=1).max(initial=0.0))
         corners = np.array([self._places[self._nodes].min(axis=0), self._places[self._nodes].max(axis=0)])
-        for obstacle in self._obstacles:
-            before, after = (
-                corners @ rotation.T + translation
-                for rotation, translation in (obstacle.frame(load.time) for load in (first, last))
-            )
+        with together(last.torn.numbering.comm):
+            times = first.time, last.time
+            paths = [[obstacle.frame(time) for time in times] for obstacle in self._obstacles]
+        for path in paths:
+            before, after = (corners @ rotation.T + translation for rotation, translation in path)
             moved = max(moved, float(np.linalg.norm(after - before, axis=1).max()))
         return min(1.0, FACETS * self._facet / moved) if moved > 0.0 else 1.0
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fenics_contact.checks import brief, checked
 from fenics_contact.display import displayed
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, calling
 from fenics_contact.mesh import CELL_TYPES, BodyMesh
 from fenics_contact.scene.materials import HistoryMaterial, Material, has_mean_dilatation, is_finite_strain
 
@@ -78,11 +78,9 @@ def _check_regions(mesh: BodyMesh, materials: Mapping[str, Material]) -> None:
 
 def _check_material(material: Material, dim: int) -> None:
     name = type(material).__name__
-    missing = [
-        part
-        for part in ("dims", "parameters", "stress", "stiffness", "kernel")
-        if not hasattr(material, part)
-    ]
+    needed = ("dims", "parameters", "stress", "stiffness", "kernel")
+    with calling(f"reading {', '.join(needed)} of material {name}"):
+        missing = [part for part in needed if not hasattr(material, part)]
     if missing:
         raise InvalidInputError(
             f"a material must have dims, parameters, stress, stiffness and kernel, {name} lacks {missing}: "

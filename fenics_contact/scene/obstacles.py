@@ -86,8 +86,9 @@ class MovingObstacle:
 
     @property
     def dim(self) -> int:
-        """Dimension of the space in which it moves."""
-        return len(self.frame(0.0)[1])
+        """Dimension of the space in which it moves: that of the obstacle, else of its path."""
+        known = getattr(self.obstacle, "dim", None)
+        return len(self.frame(0.0)[1]) if known is None else int(known)
 
     def frame(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Return rotation, shape (dim, dim), and translation, shape (dim,), at a time.
@@ -100,13 +101,14 @@ class MovingObstacle:
             rotation, translation = self.path(time)
             shift = np.asarray(translation, dtype=np.float64)
             turn = np.eye(shift.size) if rotation is None else np.asarray(rotation, dtype=np.float64)
-        dim = shift.size
-        rigid = shift.ndim == 1 and dim in (2, 3) and turn.shape == (dim, dim) and np.isfinite(shift).all()
-        if not rigid or not np.abs(turn @ turn.T - np.eye(dim)).max() <= 1e-9 or np.linalg.det(turn) < 0:
+        dim = getattr(self.obstacle, "dim", shift.size)
+        fits = shift.shape == (dim,) and dim in (2, 3) and turn.shape == (dim, dim)
+        fits = fits and bool(np.isfinite(shift).all())
+        if not fits or not np.abs(turn @ turn.T - np.eye(dim)).max() <= 1e-9 or np.linalg.det(turn) < 0:
             raise InvalidInputError(
-                "the path of MovingObstacle must return a rotation matrix of shape (dim, dim), or None, and "
-                f"a translation of dim finite numbers, got {rotation!r}, {translation!r} at time {time:g}: "
-                "give an orthogonal matrix of determinant one"
+                f"the path of MovingObstacle must return a rotation matrix of shape ({dim}, {dim}), or None, "
+                f"and a translation of {dim} finite numbers, got {rotation!r}, {translation!r} at time "
+                f"{time:g}: give an orthogonal matrix of determinant one"
             )
         return turn, shift
 

@@ -38,6 +38,7 @@ class SceneParts:
             raise InvalidInputError(
                 "a scene needs at least one body, got none: pass bodies={'name': Body(...)}"
             )
+        self._require_one_dimension()
         for part in (*self.supports, *self.loads):
             surface = part.surface if isinstance(part, SurfaceLoad | AnySupport) else None
             self._require(part.body, surface, type(part).__name__)
@@ -71,6 +72,17 @@ class SceneParts:
             for load in self.loads
             if isinstance(load, Pressure) and not load.dead and self.bodies[load.body].deforms_much
         )
+
+    def _require_one_dimension(self) -> None:
+        """Reject plane bodies beside solid ones."""
+        plane = [name for name, body in self.bodies.items() if body.mesh.dim == 2]
+        solid = [name for name in self.bodies if name not in plane]
+        if plane and solid:
+            raise InvalidInputError(
+                f"the bodies of a scene must all be plane or all be solid, got plane {plane} and solid "
+                f"{solid}: give the plane ones a thickness, as block(...) or an extruded mesh, or describe "
+                "two scenes"
+            )
 
     def _require(self, body: str, surface: str | None, user: str) -> None:
         if body not in self.bodies:

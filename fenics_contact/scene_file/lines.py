@@ -17,6 +17,10 @@ _KEY = re.compile(rf"{_PART}(?:[ \t]*\.[ \t]*{_PART})*")
 _BARE_KEY = re.compile(rf"{_BARE}(?:\.{_BARE})*")
 #: Multi-line strings come first: they begin like the others.
 _STRING = re.compile(rf"\"{{3}}(?:[^\\]|\\.)*?\"{{3,5}}|'{{3}}.*?'{{3,5}}|{_BASIC}|{_LITERAL}", re.DOTALL)
+_STRING_OR_COMMENT = re.compile(rf"{_STRING.pattern}|#[^\n]*", re.DOTALL)
+#: Most names of a dotted key.
+DEEPEST = 32
+_PARTS, _DEEP = re.compile(r"[A-Za-z0-9_ \t-]+"), re.compile(rf"\.{{{DEEPEST},}}")
 _NUMBER_OR_DATE = re.compile(r"[^,\]}#\n]*")
 _OPEN_HEAD, _CLOSED_HEAD = re.compile(r"\[+[ \t]*"), re.compile(r"[ \t]*\]+")
 _EQUALS = re.compile(r"[ \t]*=[ \t]*")
@@ -31,6 +35,16 @@ def lines_of(text: str) -> dict[Path, int]:
         text: A valid TOML text; for any other the result is meaningless.
     """
     return _Scanner(text).lines
+
+
+def too_deep(text: str) -> int | None:
+    """Return the line of the first key with more than `DEEPEST` names, None without any.
+
+    Parsers take a time that grows with the square of their number.
+    """
+    bare = _STRING_OR_COMMENT.sub(lambda match: "\n" * match.group().count("\n"), text)
+    run = _DEEP.search(_PARTS.sub("", bare))  # what is left of a key are its dots
+    return None if run is None else run.string.count("\n", 0, run.start()) + 1
 
 
 def nearest(lines: Mapping[Path, int], path: Path) -> int:

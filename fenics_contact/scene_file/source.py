@@ -15,7 +15,7 @@ import tomlkit
 import tomlkit.exceptions
 
 from fenics_contact.progress import visible
-from fenics_contact.scene_file.lines import key_parts, lines_of, nearest
+from fenics_contact.scene_file.lines import DEEPEST, key_parts, lines_of, nearest, too_deep
 from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
 from fenics_contact.scene_file.places import Path, replaced, shortened, value_at
 
@@ -98,6 +98,12 @@ def parse(text: str, name: str, folder: FilePath) -> Source:
             "the editor save the file as UTF-8 without BOM"
         )
         raise SceneFileError(name, [Mistake((), 1, "line 1", words)])
+    if (line := too_deep(text)) is not None:
+        words = (
+            f"must have keys of at most {DEEPEST} names between dots, got "
+            f"{shortened(text.splitlines()[line - 1].strip())!r}: no key of a scene file is as deep"
+        )
+        raise SceneFileError(name, [Mistake((), line, f"line {line}", words)])
     try:
         return Source(name, folder, tomllib.loads(text), text)
     except (ValueError, RecursionError) as error:

@@ -23,7 +23,7 @@ KINDS = ("start", "serious", "null", "rejected", "refined")
 
 def plot_convergence(
     values: Sequence[float] | np.ndarray,
-    kinds: Sequence[str],
+    kinds: Sequence[str] | None = None,
     path: str | Path | None = None,
     *,
     label: str = "objective",
@@ -36,7 +36,7 @@ def plot_convergence(
 
     Args:
         values: Objective of each trial point in the order of evaluation, (n,); NaN where it was rejected.
-        kinds: Outcome of each: "start", "serious", "null", "rejected" or "refined".
+        kinds: Outcome of each: "start", "serious", "null", "rejected" or "refined"; needed.
         path: PNG file to write, None to write none.
         label: Name of the objective, with its unit.
         title: Text before the facts in the title.
@@ -66,8 +66,19 @@ def plot_convergence(
     )
 
 
-def _checked(values: Sequence[float] | np.ndarray, kinds: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
-    objective, kind = np.asarray(values, dtype=float), np.asarray(kinds, dtype=str)
+def _checked(
+    values: Sequence[float] | np.ndarray, kinds: Sequence[str] | None
+) -> tuple[np.ndarray, np.ndarray]:
+    try:
+        if kinds is None:
+            raise TypeError("no kinds")
+        objective, kind = np.asarray(values, dtype=float), np.asarray(kinds, dtype=str)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(
+            "values must be numbers and kinds words, one for each evaluation, got "
+            f"{type(values).__name__} and {type(kinds).__name__}: of the result of an "
+            "optimisation give [each.value for each in result.history] and the same of each.kind"
+        ) from error
     if objective.ndim != 1 or objective.shape != kind.shape:
         raise InvalidInputError(
             f"values and kinds must have one entry for each evaluation, got {objective.shape} and "

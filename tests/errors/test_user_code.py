@@ -7,7 +7,16 @@ import logging
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.errors import InvalidDesignError, UserCodeError, calling, collective, tell, together
+from fenics_contact.errors import (
+    InvalidDesignError,
+    InvalidInputError,
+    UserCodeError,
+    calling,
+    collective,
+    collectively,
+    tell,
+    together,
+)
 
 
 def failing(error: BaseException) -> None:
@@ -77,3 +86,22 @@ def test_a_report_names_its_own_place() -> None:
         "test_user_code.py",
         1,
     )
+
+
+def test_calls_without_a_communicator_or_in_another_order_say_what_they_take() -> None:
+    @collectively("solve", lambda scene, comm, **_: comm)
+    def solve(scene: object, comm: MPI.Comm, *, tolerance: float = 1.0) -> str:
+        return "solved"
+
+    @collectively("write", lambda result, problem: problem.comm)
+    def write(result: object, problem: object) -> None: ...
+
+    assert solve("scene", MPI.COMM_SELF, tolerance=0.1) == "solved"
+    with pytest.raises(InvalidInputError, match=r"solve takes \(scene, comm, tolerance\), got \(str\): "):
+        solve("scene")  # type: ignore[call-arg]
+    with pytest.raises(InvalidInputError, match=r"got \(str, NoneType, tolerance=float\): give"):
+        solve("scene", None, tolerance=0.1)  # type: ignore[arg-type]
+    words = r"write takes \(result, problem\), got \(int, str\)"
+    with pytest.raises(InvalidInputError, match=words) as caught:
+        write(1, "result")
+    assert isinstance(caught.value.__cause__, AttributeError)

@@ -15,7 +15,7 @@ from fenics_contact.accuracy import discretisation_error
 from fenics_contact.contact import State, Status
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.io import write_vtu, write_xdmf
-from fenics_contact.io.names import file_of_each
+from fenics_contact.io.names import checked_name, file_of_each
 from tests.contact.gallery import partitions
 from tests.contact.stress_cases import composite, solved
 from tests.io.states import touching_blocks
@@ -276,3 +276,16 @@ def test_two_ranks_write_the_same_files_and_share_their_errors(
     ]
     assert (tmp_path / "ranks.json").read_text().split() == ["{", '"ranks":', "2", "}"]
     assert not (tmp_path / "nan.json").exists()
+
+
+def test_names_of_bodies_that_are_too_long_for_a_disk_become_different_short_ones(tmp_path: Path) -> None:
+    long = "b" * 300
+    files = file_of_each([long, f"{long}c"], tmp_path, "state_0001", ".vtu")
+    assert len(set(files.values())) == 2
+    for path in files.values():
+        assert path.name.startswith("state_0001_bbb")
+        path.touch()
+    assert files == file_of_each([long, f"{long}c"], tmp_path, "state_0001", ".vtu")
+    assert files[long] not in file_of_each([long], tmp_path, "state_0002", ".vtu").values()
+    with pytest.raises(InvalidInputError, match=r"name must have at most 200 bytes, .* got 300: give"):
+        checked_name(tmp_path, long, ".vtu")

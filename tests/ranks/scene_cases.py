@@ -9,12 +9,18 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from fenics_contact.contact import ContactProblem, solve_steps
 from fenics_contact.progress import LOGGER_NAME
 from fenics_contact.scene import (
     BodyForce,
     ContactPair,
+    Coulomb,
     DistanceObstacle,
+    LoadStep,
+    MovingObstacle,
+    NeoHooke,
     Pressure,
+    RigidSphere,
     Support,
     Surface,
     ThermalStrain,
@@ -22,6 +28,7 @@ from fenics_contact.scene import (
     Ufl,
 )
 from tests.ranks.given import (
+    FLOOR,
     STEEL,
     Function,
     case,
@@ -114,6 +121,46 @@ def ufl_exits(comm: MPI.Comm) -> None:
 def ufl_differs(comm: MPI.Comm) -> None:
     value = differs_on_last(comm, lambda x: 1.0 + x[0], lambda x: 1.0 + x[1] ** 2)
     solve(comm, scene(loads=[Pressure("block", "z1", Ufl(value))]))
+
+
+def rubbed(comm: MPI.Comm, friction: Function) -> None:
+    solve(comm, scene(contacts=[ContactPair(Surface("block", "z0"), FLOOR, Coulomb(friction))]))
+
+
+def rough(x: np.ndarray) -> np.ndarray:
+    return np.full(len(x), 0.3)
+
+
+@case
+def friction_raises(comm: MPI.Comm) -> None:
+    rubbed(comm, fails_on_last(comm, rough))
+
+
+@case
+def friction_differs_as_a_function(comm: MPI.Comm) -> None:
+    rubbed(comm, differs_on_last(comm, rough, lambda x: 0.1 + rough(x)))
+
+
+def still(time: float) -> tuple[None, tuple[float, ...]]:
+    return None, (0.0, 0.0, 0.0)
+
+
+@case
+def path_raises(comm: MPI.Comm) -> None:
+    on_obstacle(comm, MovingObstacle(FLOOR, fails_on_last(comm, still)))
+
+
+@case
+def path_raises_where_a_step_is_cut(comm: MPI.Comm) -> None:
+    path = fails_on_last(comm, still)
+    ball = RigidSphere((0.6, 0.5, -5.0), 5.0)
+    moving = MovingObstacle(ball, lambda time: path(time) if time else still(time))
+    top = Support("block", "z1", (0.0, 0.0, -1e-3))
+    pressed = scene(
+        material=NeoHooke(1.0, 0.3), supports=[top], contacts=[ContactPair(Surface("block", "z0"), moving)]
+    )
+    steps = [LoadStep("first", time=0.0), LoadStep("then", time=1.0)]
+    solve_steps(ContactProblem(pressed, comm), steps)
 
 
 def on_obstacle(comm: MPI.Comm, obstacle: Any) -> None:

@@ -30,6 +30,16 @@ EXPECTED = {
     "ufl_raises": ("UserCodeError", f"the function given as Ufl of Pressure on body 'block' {BUG}"),
     "ufl_exits": ("UserCodeError", f"the function given as Ufl of Pressure on body 'block' {EXIT}"),
     "ufl_differs": ("InvalidInputError", f"{SAME}the form of pressure, UFL, hexahedron ("),
+    "friction_raises": (
+        "UserCodeError",
+        f"the function given as friction of block z0 on rigid plane {BUG}",
+    ),
+    "friction_differs_as_a_function": (
+        "InvalidInputError",
+        f"{SAME}friction given as functions of position (float64 array",
+    ),
+    "path_raises": ("UserCodeError", f"the path of MovingObstacle {BUG}"),
+    "path_raises_where_a_step_is_cut": ("UserCodeError", f"the path of MovingObstacle {BUG}"),
     "distance_raises": ("UserCodeError", f"the normals of DistanceObstacle {BUG}"),
     "distance_is_nan": (
         "InvalidInputError",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 
 from tests.conftest import launch
@@ -68,6 +69,24 @@ solve(world, scene())
     )
     assert end.returncode != 0
     assert "rank 0 calls solve_scene and rank 1 nothing any more, for its program has ended" in end.stderr
+
+
+def test_a_rank_that_fails_before_all_have_met_is_waited_for_with_a_word() -> None:
+    end = launch(
+        2,
+        "-c",
+        SOLVED
+        + """
+meeting.PATIENCE = 0.5
+if world.rank == 1:
+    import time
+    time.sleep(2.0)
+solve(world, scene())
+""",
+        timeout=60.0,
+    )
+    assert end.returncode == 0, end.stderr
+    assert re.search(r"rank 0 waits since \d s for the others in the first call of this package", end.stderr)
 
 
 def test_where_the_others_cannot_be_told_the_program_ends_and_says_why() -> None:

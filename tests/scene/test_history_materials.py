@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import HistoryMaterial, J2Plasticity, MaterialResponse
+from fenics_contact.errors import InvalidInputError, UserCodeError
+from fenics_contact.gallery import block
+from fenics_contact.scene import Body, HistoryMaterial, IsotropicElasticity, J2Plasticity, MaterialResponse
 from tests.scene.material_points import at_rest
 
 SYMMETRIC = 0.5 * (
@@ -94,3 +95,22 @@ def test_the_linear_part_is_elastic() -> None:
     np.testing.assert_allclose(steel.moduli, expected, rtol=1e-12)
     assert len(steel.parameters) == 21
     assert hash(steel) == hash(J2Plasticity(2e5, 0.3, 200.0, 1e3))
+
+
+def test_a_model_that_replaces_the_checks_of_its_answer_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match="must define respond, Hasty defines answer, which checks"):
+
+        class Hasty(J2Plasticity):
+            def answer(self, *given: Any) -> Any:
+                return super().answer(*given)
+
+
+def test_parameters_that_raise_are_told_with_their_material() -> None:
+    @dataclass(frozen=True)
+    class Unknown(IsotropicElasticity):
+        @property
+        def parameters(self) -> tuple[float, ...]:
+            raise OSError("no table")
+
+    with pytest.raises(UserCodeError, match=r"reading .* of material Unknown failed with OSError: no"):
+        Body(block((0, 0, 0), (1, 1, 1), (1, 1, 1)), Unknown(1.0, 0.3))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block
+from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import (
     Body,
@@ -17,6 +17,7 @@ from fenics_contact.scene import (
     ContactPair,
     Coulomb,
     IsotropicElasticity,
+    PlaneStrain,
     RigidPlane,
     Scene,
     Support,
@@ -150,3 +151,9 @@ def test_the_same_surfaces_twice_are_refused(kind: type[ContactPair] | type[Tie]
     words = f"the surfaces of {kind.__name__} 2, upper z0 on lower z1, are those of {kind.__name__} 0: how"
     with pytest.raises(InvalidInputError, match=words):
         stack(**{name: [*pairs, pairs[0]]})
+
+
+def test_plane_and_solid_bodies_in_one_scene_are_refused() -> None:
+    solid, plane = stack().bodies["lower"], Body(rectangle((0, 0), (1, 1), (1, 1)), PlaneStrain(1.0, 0.3))
+    with pytest.raises(InvalidInputError, match=r"be solid, got plane \['b'\] and solid \['a'\]: give"):
+        Scene({"a": solid, "b": plane})

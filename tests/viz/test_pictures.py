@@ -192,3 +192,10 @@ def test_convergence_refuses_a_history_that_is_none(
     with pytest.raises(InvalidInputError, match=message):
         plot_convergence(values, kinds, tmp_path / "history.png")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_diagram_of_convergence_of_a_whole_result_is_refused_with_what_to_give() -> None:
+    with pytest.raises(InvalidInputError, match=r"got object and list: .* give \[each.value for each"):
+        plot_convergence(object(), [])  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match=r"got object and NoneType"):
+        plot_convergence(object())  # type: ignore[arg-type]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import ufl
@@ -79,6 +79,19 @@ class HistoryMaterial(Elasticity):
     nonlinear: ClassVar[bool] = True
     finite: ClassVar[bool] = False
     mean_dilatation: bool = False
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        """Reject a model that replaces the checks of what it returns.
+
+        Raises:
+            InvalidInputError: If it has an `answer` of its own.
+        """
+        super().__init_subclass__(**given)
+        if "answer" in vars(cls):
+            raise InvalidInputError(
+                f"a material with a history must define respond, {cls.__name__} defines answer, which checks "
+                "what respond returns: rename it, and call super().respond there"
+            )
 
     @property
     @abstractmethod
