@@ -123,9 +123,7 @@ class DeformedState(State):
 
     @cached_property
     def _nodal_forces(self) -> NodalForces:
-        forces = nodal_forces(
-            self.system, self.solution.multiplier, self.torn_displacement, self.contact.force
-        )
+        forces = nodal_forces(self.system, self.solution.multiplier, self.torn_displacement)
         return replace(forces, places=self._moment_arms, bed=np.zeros_like(forces.bed))
 
     @cached_property

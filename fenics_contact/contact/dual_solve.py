@@ -52,7 +52,7 @@ def contact_result(system: DualSystem, solution: DualSolution, displacement: np.
     origin = torn.numbering.gather(torn.right + torn.supported, torn.tangential_rows.ravel())
     return ContactResult(
         torn.points,
-        normal,
+        np.where(trial_normal > 0, np.maximum(normal, 0.0), 0.0),
         spread(tau),
         spread(bound),
         gap,

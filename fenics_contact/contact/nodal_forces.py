@@ -37,7 +37,7 @@ class NodalForces:
 
 
 def nodal_forces(
-    system: DualSystem | DirectSystem, multiplier: np.ndarray, displacement: np.ndarray, contact: np.ndarray
+    system: DualSystem | DirectSystem, multiplier: np.ndarray, displacement: np.ndarray
 ) -> NodalForces:
     """Return the forces on all nodes. Collective.
 
@@ -45,10 +45,9 @@ def nodal_forces(
         system: The solved system.
         multiplier: λ, owned, [force].
         displacement: Torn displacement of this rank as the solver returned it, shape (torn_size,), [length].
-        contact: Force on the slave at each contact point, shape (n_contact, dim), [force].
     """
     torn, decomposition = system.torn, system.torn.decomposition
-    tie = _tie_forces(torn, multiplier)
+    contact, tie = _contact_forces(torn, multiplier), _tie_forces(torn, multiplier)
     joined = torn.points.jump.T @ contact + torn.ties.jump.T @ tie
     connecting = -nodal_sum(decomposition, system.force(multiplier))
     return NodalForces(
@@ -59,6 +58,20 @@ def nodal_forces(
         tie,
         nodal_sum(decomposition, -_resisted(torn, displacement)),
     )
+
+
+def _contact_forces(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:
+    """Return the forces on the slave nodes of contacts, shape (n_contact, dim), [force]. Collective.
+
+    They balance the others, also where a solver that ends at its tolerance leaves a pull.
+    """
+    points, frictional = torn.points, torn.frictional
+    rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])
+    normal, friction = np.split(torn.numbering.gather(multiplier, rows), [points.count])
+    force = normal[:, None] * points.normal
+    tangential = friction.reshape(-1, torn.dim - 1)
+    force[frictional] -= np.einsum("na,nad->nd", tangential, points.tangents[frictional])
+    return force
 
 
 def _tie_forces(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:

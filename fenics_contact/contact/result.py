@@ -30,7 +30,8 @@ class ContactResult:
 
     Attributes:
         points: Positions and frames of the contact points.
-        normal_force: λ_N ≥ 0, shape (n,), [force].
+        normal_force: λ_N ≥ 0, zero at open points, shape (n,), [force]. What a solver that ends at its
+            tolerance leaves beside that is in balance, reactions and resultants alone.
         friction_force: τ in the points' tangents, zero without friction, shape (n, dim - 1), [force]. It
             acts on the master; the slave feels the opposite.
         slip_bound: Largest friction force, shape (n,), [force].

@@ -353,8 +353,7 @@ class State:
 
     @cached_property
     def _nodal_forces(self) -> NodalForces:
-        multiplier, contact = self.solution.multiplier, self.contact.force
-        return nodal_forces(self.system, multiplier, self.torn_displacement, contact)
+        return nodal_forces(self.system, self.solution.multiplier, self.torn_displacement)
 
     @collectively("State.to_pyvista", _comm)
     def to_pyvista(self, deformed: float = 0.0, *, linear: bool = False) -> pyvista.MultiBlock:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import State, Status, solve_scene
+from fenics_contact.contact.dual_solve import contact_result
+from fenics_contact.contact.nodal_forces import nodal_forces
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Coulomb, Tresca
 from tests.contact.checks import assert_solved
@@ -105,3 +109,19 @@ def test_places_of_contact_points_are_those_of_their_slave_nodes() -> None:
     assert places.shape == (state.contact.points.count, 3)
     assert len(wanted) == len(places) > 10
     np.testing.assert_array_equal(np.unique(places, axis=0), np.unique(wanted, axis=0))
+
+
+def test_forces_are_never_below_zero_whatever_the_tolerance_leaves_and_still_balance() -> None:
+    state = solved(block_on_plane(Coulomb(0.6)))
+    torn, multiplier = state.torn, state.solution.multiplier.copy()
+    ways = np.where(state.contact.status == Status.OPEN, state.contact.gap, np.inf)
+    opened = np.sort(np.argsort(-np.where(np.isfinite(ways), ways, -1.0))[:2])
+    rows = np.searchsorted(torn.numbering.owned, torn.normal_rows[opened])
+    multiplier[rows] = [-7e-4, 1e-6]
+    unclean = replace(state.dual_solution, multiplier=multiplier)
+    contact = contact_result(state.dual, unclean, state.torn_displacement)
+    assert contact.normal_force.min() == 0.0
+    assert np.array_equal(contact.normal_force > 0.0, contact.status != Status.OPEN)
+    acting = nodal_forces(state.system, multiplier, state.torn_displacement).contact
+    left = np.einsum("nd,nd->n", (acting - contact.force)[opened], contact.points.normal[opened])
+    assert left == pytest.approx([-7e-4, 1e-6], rel=1e-9)
