@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,8 +11,12 @@ import scipy.sparse as sp
 from fenics_contact.pairing.sliding.patches import SmoothPatches
 from fenics_contact.surfaces import Projection
 
-#: What decides where ways between places that meet do not: square to no side that meshes usually have.
+#: What decides where ways between places that meet do not, along the axes of the surface: square to no side
+#: that meshes usually have.
 LEANING = np.array([0.4796, 0.7311, 0.4853])
+#: Lengths that differ by less than this part count as the same: which node is first among them may not depend
+#: on rounding, nor on how the body lies in space.
+ALIKE = 1e-6
 #: Its weight beside one way, of length one.
 LIGHT = 0.1
 
@@ -52,11 +57,26 @@ class Roles:
         weights = self.patches.weights(found.facet, self.patches.functions(found.local).value)
         way = weights @ self.places - self.places[self.candidates[found.point]]
         way /= np.maximum(np.linalg.norm(way, axis=1), np.finfo(float).tiny)[:, None]
-        leaning = LIGHT * LEANING[: way.shape[1]]
+        leaning = LIGHT * self._leaning
         _, axes = np.linalg.eigh(way.T @ way / max(len(way), 1) + np.outer(leaning, leaning))
         along = way @ axes[:, ::-1] * np.sign((way[known].sum(axis=0) + leaning) @ axes[:, ::-1])
         chosen = np.argmax(np.abs(along) >= 0.5, axis=1)  # in space one of three is, in the plane one of two
         return np.asarray(along[np.arange(len(way)), chosen] > 0.0)
+
+    @cached_property
+    def _leaning(self) -> np.ndarray:
+        """Return a direction that turns with the body, shape (dim,): nodes decide, by their numbers."""
+        arms = self.places - self.places.mean(axis=0)
+        direction = np.zeros(arms.shape[1])
+        for share in LEANING[: arms.shape[1]]:
+            lengths = np.linalg.norm(arms, axis=1)
+            if lengths.max() == 0.0:
+                break
+            first = int(np.argmax(lengths >= (1.0 - ALIKE) * lengths.max()))
+            axis = arms[first] / lengths[first]
+            direction += share * axis
+            arms = arms - np.outer(arms @ axis, axis)
+        return direction
 
     def _are_masters(self, found: Projection, last: np.ndarray) -> np.ndarray:
         """Return which candidates move the patches of slaves that move their own, shape (n,)."""
