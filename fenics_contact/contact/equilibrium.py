@@ -9,6 +9,7 @@ import numpy as np
 
 from fenics_contact.contact.dual_solve import contact_result, solve_dual
 from fenics_contact.contact.energies import compute_energies
+from fenics_contact.contact.followed_loads import FollowedLoads
 from fenics_contact.contact.result import no_contact
 from fenics_contact.contact.state import State
 from fenics_contact.contact.warm_start import carried_over
@@ -23,6 +24,7 @@ from fenics_contact.timing import PhaseTimer
 
 if TYPE_CHECKING:
     from fenics_contact.accuracy import Balanced
+    from fenics_contact.contact.balancing import Solve
 
 #: Largest relative residual of a scene without contact; its solution then equals that of a direct solver.
 LINEAR_TOLERANCE = 1e-10
@@ -47,9 +49,11 @@ def dual_state(
         timer: Collects the wall time.
     """
     system, start = _dual_system(torn, previous, known, timer)
+    before = known_system(known)
+    solve = solve_dual if before is None else FollowedLoads(before, timer).solve
     if isinstance(tolerance, float):
-        return _to_tolerance(system, solver.with_tolerance(tolerance), start, timer)
-    return _balanced(system, solver, tolerance, start, timer)
+        return _to_tolerance(system, solve, solver.with_tolerance(tolerance), start, timer)
+    return _balanced(system, solve, solver, tolerance, start, timer)
 
 
 def _dual_system(
@@ -68,11 +72,11 @@ def known_system(state: State | None) -> DualSystem | None:
 
 
 def _to_tolerance(
-    system: DualSystem, solver: DualSolver, start: np.ndarray | None, timer: PhaseTimer
+    system: DualSystem, solve: Solve, solver: DualSolver, start: np.ndarray | None, timer: PhaseTimer
 ) -> State:
     """Compute the state to the tolerance of a solver. Collective."""
     with timer.phase("solve"):
-        solution = solve_dual(system, solver, start)
+        solution = solve(system, solver, start)
     with timer.phase("state"):
         displacement = system.displacement(solution.multiplier, solution.alpha)
     return replace(state_of(system, solution, displacement, timer), tolerance=solver.tolerance)
@@ -80,6 +84,7 @@ def _to_tolerance(
 
 def _balanced(
     system: DualSystem,
+    solve: Solve,
     solver: DualSolver,
     balanced: Balanced | None,
     start: np.ndarray | None,
@@ -91,7 +96,7 @@ def _balanced(
     from fenics_contact.contact.balancing import solve_balanced
 
     wanted = balanced or Balanced()
-    rounds = solve_balanced(system, solve_dual, solver, wanted, start, timer)
+    rounds = solve_balanced(system, solve, solver, wanted, start, timer)
     state = state_of(system, rounds.solution, rounds.displacement, timer)
     return replace(state, known_errors=rounds.state_errors(state.energies.norm), tolerance=wanted)
 

@@ -37,6 +37,21 @@ class FacePreconditioner(Protocol):
         """Return the preconditioner of the face with basis Z, shape (n_owned, n_face). Collective."""
 
 
+@dataclass(frozen=True)
+class LeastSizes:
+    """Sizes that residuals are relative to where those of the answer may vanish.
+
+    Attributes:
+        force: Of contact forces, [force].
+        gluing: Of the jumps of gluing rows that cancel, [length].
+        everything: Of all multipliers, [force].
+    """
+
+    force: float = 0.0
+    gluing: float = 0.0
+    everything: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class DualProblem:
     """The data of a dual solver: an operator, a coarse space and the layout of vectors.
@@ -58,6 +73,7 @@ class DualProblem:
         supported: Marks of contact rows that supports alone determine, owned, shape (size,): no multiplier
             moves them, and their diagonal is not a flexibility. None where there are no such rows.
         friction: The law of the slip bounds; None where no disc carries a force.
+        least: Sizes below which those of forces and jumps do not fall in residuals; None: no such sizes.
     """
 
     comm: MPI.Comm
@@ -71,6 +87,7 @@ class DualProblem:
     reach: Callable[[Vector, Vector], Vector] | None = None
     supported: Marks | None = None
     friction: SlipLaw | None = None
+    least: LeastSizes | None = None
 
     @cached_property
     def between_supports(self) -> Marks:

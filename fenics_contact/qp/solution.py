@@ -9,7 +9,7 @@ import numpy as np
 from fenics_contact.display import displayed
 from fenics_contact.linalg import LAST_PLACES
 from fenics_contact.qp.layout import ContactLayout
-from fenics_contact.qp.problem import DualProblem
+from fenics_contact.qp.problem import DualProblem, LeastSizes
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
 FORCE_FLOOR = 1e-10
@@ -123,11 +123,14 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
     jump, cancelled, load, everything, rhs, pressed = np.sqrt(sums[4:10])
     distance, distance_held, closing, closing_held = np.sqrt(sums[10:14])
     unbalanced = problem.coarse.norm(sums[14:] - problem.coarse.load)
+    loads = problem.coarse.norm(problem.coarse.load)
     force_scale = max(normal, normal_mapped)
     if force_scale <= FORCE_FLOOR * max(force, force_mapped):
         force_scale = max(force, force_mapped)
     force_scale = max(force_scale, FORCE_FLOOR * max(everything, closing))
-    gluing_scale = max(cancelled, load) or rhs
+    least = problem.least or LeastSizes()
+    force_scale = max(force_scale, least.force)
+    gluing_scale = max(cancelled, load, least.gluing) or rhs
     # Errors below the last places of all forces, and jumps of what the loads alone would open, or of what
     # contact forces displace, are none: an interference alone may displace nothing at supports.
     rounding = LAST_PLACES * max(everything, closing)
@@ -139,7 +142,7 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
     return Residuals(
         natural=_ratio(distance, force_scale),
         gluing=_ratio(jump if jump > LAST_PLACES * max(load, pressed) else 0.0, gluing_scale),
-        coarse=_ratio(unbalanced, max(everything, problem.coarse.norm(problem.coarse.load))),
+        coarse=_ratio(unbalanced, max(everything, loads, least.everything)),
         violation=_ratio(violation if violation > rounding else 0.0, force_scale),
         force_scale=force_scale,
         gluing_scale=gluing_scale,

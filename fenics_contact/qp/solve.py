@@ -19,13 +19,16 @@ from fenics_contact.qp.iterate import (
     iterate_at,
     iterate_fitted,
 )
-from fenics_contact.qp.problem import CountedOperator, DualProblem
+from fenics_contact.qp.problem import CountedOperator, DualProblem, LeastSizes
 from fenics_contact.qp.reductions import Vector
 from fenics_contact.qp.slip_law import CoulombLaw, SlipLaw, TrescaLaw
 from fenics_contact.qp.solution import DualSolution, SolverStep
 
 #: Largest number of times that a solution in scaled multipliers is refined.
 SCALED_ATTEMPTS = 4
+#: Forces of bodies that no load acts on, relative to those of the last load, that are none if zero is one of
+#: the answers.
+SMALL = 1e-3
 
 
 class DualSolver(Protocol):
@@ -97,7 +100,7 @@ def _solve_as_given(
         answer = _as_it_is(problem, begin, solver.tolerance)
         if answer is not None:
             return answer
-        solution = solver.run(problem, begin)
+        solution = _run(problem, solver, begin)
     if not solution.residuals.within(solver.tolerance):
         raise ConvergenceError(
             f"a solution needs residuals below {solver.tolerance:.1e}, got {solution.residuals}: "
@@ -105,6 +108,32 @@ def _solve_as_given(
             solution.history,
         )
     return solution
+
+
+def _run(problem: DualProblem, solver: DualSolver, begin: Start) -> DualSolution:
+    """Solve from a start; where nothing is loaded and friction lets go, forces are exactly zero. Collective.
+
+    Residuals are relative to the forces at the start first: those of bodies that are let go vanish.
+    """
+    released = None if begin.cold else _released(problem, begin, solver.tolerance)
+    if released is None:
+        return solver.run(problem, begin)
+    residuals, size = begin.iterate.residuals, problem.norm(begin.iterate.multiplier)
+    least = LeastSizes(residuals.force_scale, residuals.gluing_scale, size)
+    found = solver.run(replace(problem, least=least, reach=None), begin)
+    if problem.norm(found.multiplier) <= max(solver.tolerance, min(100.0 * solver.tolerance, SMALL)) * size:
+        return replace(released, products=found.products)
+    answer = certify(problem, found.multiplier, found.product, found.residual)
+    if answer.iterate.residuals.within(solver.tolerance):
+        return answer.solution(list(found.history), found.products, found.memory)
+    return solver.run(problem, replace(begin, iterate=answer.iterate))
+
+
+def _released(problem: DualProblem, begin: Start, tolerance: float) -> DualSolution | None:
+    """Return the solution without any force, None if there is none. Collective."""
+    if problem.norm(problem.coarse.particular()) > 0.0:
+        return None
+    return _as_it_is(problem, _at_rest(problem, begin), tolerance)
 
 
 def _solve_scaled(
@@ -192,14 +221,29 @@ def _begin(
         iterate = iterate_at(problem, multiplier, product, earlier.alpha)
     else:
         iterate = iterate_fitted(problem, multiplier, product)
-    memory = None if earlier is None else earlier.memory
-    if start is not None and problem.norm(coarse.particular()) == 0.0:
-        # No body is loaded: zero forces, free of cost, may be closer than those of another load.
-        nothing = np.zeros_like(multiplier)
-        rest = iterate_fitted(problem, nothing, nothing)
-        if rest.residuals.worst <= iterate.residuals.worst:
-            return Start(rest, operator, memory, cold=True)
-    return Start(iterate, operator, memory, cold=start is None)
+    begin = Start(iterate, operator, None if earlier is None else earlier.memory, cold=start is None)
+    if begin.cold or problem.norm(coarse.particular()) > 0.0 or _may_jam(problem, multiplier):
+        return begin
+    # No body is loaded: zero forces, free of cost, may be closer than those of another load.
+    rest = _at_rest(problem, begin)
+    return rest if rest.iterate.residuals.worst <= iterate.residuals.worst else begin
+
+
+def _at_rest(problem: DualProblem, begin: Start) -> Start:
+    """Return the start without any force. Collective."""
+    nothing = np.zeros_like(begin.iterate.multiplier)
+    return replace(begin, iterate=iterate_fitted(problem, nothing, nothing), cold=True)
+
+
+def _may_jam(problem: DualProblem, multiplier: Vector) -> bool:
+    """Return whether friction may hold bodies pressed together without a load. Collective.
+
+    Where it grows with the normal forces there are several equilibria without a load, and that of a load
+    step is the one near the last: a wedge that was driven in stays. Otherwise the answer is unique.
+    """
+    return problem.norm(problem.law.bound(multiplier) - problem.law.bound(np.zeros_like(multiplier))) > 0.0
+
+
 
 
 def _as_it_is(problem: DualProblem, start: Start, tolerance: float) -> DualSolution | None:
