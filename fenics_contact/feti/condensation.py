@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._libraries import PETSc
-from fenics_contact.feti.factor import symmetric_matrix
+from fenics_contact.feti.factor import require_factored, symmetric_matrix
 from fenics_contact.feti.petsc_calls import petsc_call
 from fenics_contact.linalg import dispose_with
 
@@ -54,6 +54,7 @@ class Condensation:
         self._matrix.setValuesCSR(*self._structure, stiffness.data / unit)
         self._matrix.assemble()
         self._pc.setUp()
+        require_factored(self._factor)
         return unit * self._schur_complement()
 
     def _schur_complement(self) -> np.ndarray:
