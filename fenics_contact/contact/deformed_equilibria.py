@@ -178,7 +178,8 @@ class DeformedEquilibria:
         rows = stored.get("snaps", ())
         snaps = tuple(Snap(fraction, way, work, int(stages)) for fraction, way, work, stages in rows)
         since = float(stored.get("since", 0.0))
-        path = Path(whole, end, None, None, fractions, since, snaps, (), 0, 1)
+        rubbed = float(stored.get("rubbed", 0.0))
+        path = Path(whole, end, None, None, fractions, since, snaps, rubbed, (), 0, 1)
         return _state_after(path, None, timer, stored.get("slip"))
 
     def _require_later(self, scene: Scene, before: float, time: float) -> None:
@@ -269,7 +270,7 @@ def _state_after(
             contact = _with_slip(contact, evaluation.meeting, path.start, origin)
         if known is not None:
             contact = replace(contact, slip=known[0], slip_before=known[1])
-        energies = _energies(evaluation, contact)
+        energies = _energies(evaluation, path.rubbed)
     return DeformedState(
         system, solution, at.displacement, contact, energies, dict(timer.seconds), equilibrium=end,
         load=path.load, begun=path.begun, fractions=path.fractions, since=path.since, snaps=path.snaps,
@@ -289,14 +290,17 @@ def _with_slip(
     return replace(contact, slip=slip, slip_before=before)
 
 
-def _energies(evaluation: Evaluation, contact: ContactResult) -> Energies:
-    """Return the stored energy, the work of dead loads and the friction of the last step. Collective.
+def _energies(evaluation: Evaluation, rubbed: float) -> Energies:
+    """Return the stored energy, the work of dead loads and of friction in the last load step. Collective.
 
     The work of pressures that follow their surfaces depends on the way: then it is not known.
+
+    Args:
+        evaluation: The equations at the end.
+        rubbed: Work of friction before the last step of histories, [force · length].
     """
     stored = [np.nan if response.energy is None else response.energy for response in evaluation.responses]
     strain = float(evaluation.torn.numbering.comm.allreduce(float(np.sum(stored))))
     dead = evaluation.softening is None
     work = evaluation.torn.load_work(evaluation.at.displacement) if dead else np.nan
-    friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))
-    return Energies(strain, work, friction, np.nan)
+    return Energies(strain, work, rubbed + evaluation.rubbing, np.nan)

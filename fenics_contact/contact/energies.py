@@ -16,7 +16,9 @@ class Energies:
     Attributes:
         strain: ½ uᵀK u.
         load: Work of the loads, fᵀu.
-        friction: Σ Ψ ‖slip‖, the dissipation by friction if the whole load acts at once.
+        friction: Σ Ψ ‖slip‖, the dissipation by friction if the whole load step acts at once: what slips to
+            and fro within it counts by where it ends, take more load steps and add up. Where parts of a step
+            have histories of their own (`AutomaticSteps.finer_history`), the sum over these.
         dual: Value of the dual functional, −½ (f − Bᵀλ)ᵀK⁺(f − Bᵀλ) − λᵀc.
     """
 

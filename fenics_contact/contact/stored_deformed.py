@@ -25,9 +25,9 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
     Returns:
         ``displacement`` of all copies of the nodes, shape (n_copies, dim), ``multiplier`` λ of all rows, the
         ``history`` of materials of each body, with the time and the largest displacement, before the step of
-        histories, and the ``parts`` and ``snaps``; of moved bodies the facets on which nodes
-        stand, where they stood, and the slip; else ``origin`` and ``slid``, from which slip is measured. All
-        replicated.
+        histories, the work of friction before it (``rubbed``), and the ``parts`` and ``snaps``; of moved
+        bodies the facets on which nodes stand, where they stood, and the slip; else ``origin`` and ``slid``,
+        from which slip is measured. All replicated.
     """
     decomposition, evaluation = state.torn.decomposition, state.equilibrium.evaluation
     comm, tearing, at = decomposition.comm, decomposition.tearing, evaluation.at
@@ -41,6 +41,7 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
         "times": np.array([at.time, state.equilibrium.time, at.largest]),
         "parts": np.array(state.fractions),
         "since": np.array(state.since),
+        "rubbed": np.array(state.energies.friction - evaluation.rubbing),
         "snaps": np.array([astuple(snap) for snap in state.snaps]),
     }
     pairs = zip(decomposition.meshes, at.history, strict=True)

@@ -96,6 +96,13 @@ class Evaluation:
     stiff: float
 
     @property
+    def rubbing(self) -> float:
+        """Work of friction Σ τ·slip since histories began their step, [force · length]. Collective."""
+        _, friction = self.meeting.at_points(self.at.multiplier)
+        _, against = self.meeting.at_points(self.lacking)
+        return -float(np.sum(friction * against))
+
+    @property
     def torn(self) -> TornSystem:
         """The system with load, supports and the rows of the contact points."""
         return self.meeting.torn

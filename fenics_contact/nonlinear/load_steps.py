@@ -48,6 +48,8 @@ class Path:
         since: The part from which slip and the histories of materials are one step up to the end: 0, unless
             parts are steps of their own or bodies snapped.
         snaps: Where bodies snapped.
+        rubbed: Work of friction before the last step of histories, zero where the whole load is one,
+            [force · length].
         history: One line for each Newton step of all parts, those of parts that were cut included.
         products: Applications of F.
         factorisations: Factored tangents, counting all subdomains as one.
@@ -60,6 +62,7 @@ class Path:
     fractions: tuple[float, ...]
     since: float
     snaps: tuple[Snap, ...]
+    rubbed: float
     history: tuple[SolverStep, ...]
     products: int
     factorisations: int
@@ -203,6 +206,8 @@ class _Walk:
         self._products = self._factorisations = 0
         # Where the step of histories begins, with the system of then.
         self._origin, self._since = (at, first.torn), 0.0
+        # Work of friction of those before it, and whether the last equilibrium ends one.
+        self._rubbed, self._ended = 0.0, False
         self.reached = 0.0
 
     def advance(self, fraction: float) -> int:
@@ -248,7 +253,13 @@ class _Walk:
         return replace(load, torn=load.torn.with_slip_from(*slipped))
 
     def _reach(self, fraction: float, found: NonlinearEquilibrium, anew: bool = False) -> int:
-        """Go on from an equilibrium, where histories begin anew or go on; return its Newton steps."""
+        """Go on from an equilibrium, where histories begin anew or go on; return its Newton steps.
+
+        Collective.
+        """
+        if self._end is not None and (self._ended or anew):
+            self._rubbed += self._end.evaluation.rubbing
+        self._ended = anew or self._finer
         if anew:
             self._since = fraction
         elif self._finer:
@@ -281,6 +292,7 @@ class _Walk:
             tuple(self._fractions),
             self._since,
             tuple(self._snaps),
+            self._rubbed,
             tuple(self._history),
             self._products,
             self._factorisations,

@@ -449,6 +449,16 @@ MUTATIONS = (
         (f"{NARROW}::test_a_narrow_strip_has_radial_normals_in_every_orientation",),
     ),
     Mutation(
+        "friction of parts with histories of their own is not added up",
+        "nonlinear/load_steps.py",
+        "self._rubbed += self._end.evaluation.rubbing",
+        "self._rubbed = 0.0",
+        (
+            "tests/nonlinear/test_reported_values.py::test_friction_to_and_fro_within_a_load_step_is_the_sum"
+            "_over_parts_with_histories_of_their_own",
+        ),
+    ),
+    Mutation(
         "moments are about undeformed places",
         "contact/deformed_state.py",
         "self.gather_displacement(name) if body.deforms_much else 0.0",

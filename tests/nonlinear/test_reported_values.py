@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, solve_scene, solve_steps
+from fenics_contact.contact import ContactProblem, DeformedState, solve_scene, solve_steps
 from fenics_contact.gallery import block, rectangle
+from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -67,3 +71,33 @@ def test_slip_of_earlier_steps_turns_about_the_normal() -> None:
     assert np.abs(turned.slip).max() < 1e-6
     assert np.linalg.norm(before, axis=1).min() > 0.1
     np.testing.assert_allclose(after, before @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T, atol=1e-6)
+
+
+def test_friction_to_and_fro_within_a_load_step_is_the_sum_over_parts_with_histories_of_their_own() -> None:
+    """As one step of the law it counts by where slip ends."""
+    bodies = {
+        "low": Body(rectangle((0.0, 0.0), (3.0, 1.0), (6, 2)), RUBBER),
+        "high": Body(rectangle((1.0, 1.0), (2.0, 1.6), (2, 1)), RUBBER),
+    }
+    pair = ContactPair(Surface("high", "y0"), Surface("low", "y1"), Coulomb(0.1), "node")
+
+    def supports(time: float) -> list[Support]:
+        down, along = min(4.0 * time, 1.0), max(4.0 * time - 1.0, 0.0) / 3.0
+        return [Support("low", "y0"), Support("high", "y1", (0.3 * along * (1.0 - along), -0.05 * down))]
+
+    def followed(times: Sequence[float], **how: Any) -> list[DeformedState]:
+        steps = AutomaticSteps(TangentNewton(tolerance=1e-10), **how)
+        problem = ContactProblem(Scene(bodies, supports(0.0), contacts=[pair]), MPI.COMM_SELF, steps=steps)
+        found = solve_steps(problem, [LoadStep(str(t), supports=supports, time=t) for t in times])
+        return [state for state in found if isinstance(state, DeformedState)]
+
+    (by_parts,) = followed([1.0], first=0.125, finer_history=True)
+    assert 4 <= len(by_parts.fractions) <= 8
+    singly = followed(by_parts.fractions)
+    dissipated = sum(state.energies.friction for state in singly)
+    assert dissipated > 1e-4
+    assert by_parts.energies.friction == pytest.approx(dissipated, rel=1e-6)
+    (at_once,) = followed([1.0], first=0.125)
+    assert at_once.energies.friction < 0.5 * dissipated
+    slip = np.linalg.norm(at_once.contact.slip, axis=1)
+    assert at_once.energies.friction == pytest.approx(at_once.contact.slip_bound @ slip, rel=1e-6)
