@@ -16,6 +16,7 @@ from mpi4py import MPI
 from fenics_contact.contact import ContactProblem, LoadSequence
 from fenics_contact.gallery import box_lattice, growing_ticks
 from fenics_contact.mesh import BodyMesh, boundary_faces
+from fenics_contact.nonlinear import AutomaticSteps
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -103,7 +104,8 @@ def held(depth: float, degrees: float) -> list[Support | RigidSurface]:
 def measured(comm: MPI.Comm, columns: int, last: int = ANGLES[-1]) -> dict[str, Any]:
     """Return forces and moments for one of `COLUMNS`, at the angles up to the last one."""
     scene = twisted(columns)
-    sequence = LoadSequence(ContactProblem(scene, comm))
+    # Parts of steps, which the finest mesh needs, are steps of friction, too.
+    sequence = LoadSequence(ContactProblem(scene, comm, steps=AutomaticSteps(finer_history=True)))
     pressing = [(DEPTH * part / PRESSING, 0) for part in range(1, PRESSING + 1)]
     began, found = perf_counter(), list[dict[str, float]]()
     for depth, angle in [*pressing, *((DEPTH, angle) for angle in ANGLES if angle <= last)]:

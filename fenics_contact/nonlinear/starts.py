@@ -14,6 +14,8 @@ from fenics_contact.qp import Vector, global_max, global_sum
 
 #: Friction short of its bound by less than this part of the largest one counts as slipping.
 SLIDING = 1e-2
+#: Relative residual where supports take bodies above which they are pressed rather than drawn.
+PRESSED = 0.5
 
 
 def starts(
@@ -39,7 +41,7 @@ def starts(
     except ConvergenceError:
         return evaluated(at), None
     if touching:
-        return there, at
+        return (there, at) if there.residuals.worst < PRESSED else (evaluated(at), None)
     if _acts(there.torn, there.law.feasible(there.at.multiplier).project(-there.lacking)):
         return evaluated(at), None
     return there, None
