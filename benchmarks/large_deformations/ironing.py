@@ -34,7 +34,6 @@ from fenics_contact.scene import (
     Surface,
 )
 
-
 #: Between two times the die moves by up to two facets in a part, each a step of friction of its own.
 PARTS = AutomaticSteps(finer_history=True)
 

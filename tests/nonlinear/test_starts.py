@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, State, solve_steps
+from benchmarks.large_deformations.ironing import ironing
+from fenics_contact.contact import ContactProblem, LoadSequence, State, solve_steps
 from fenics_contact.gallery import rectangle
 from fenics_contact.nonlinear.rigid_start import RigidStart
 from fenics_contact.scene import Body, ContactPair, LoadStep, NeoHooke, Scene, Support, Surface
@@ -63,3 +64,17 @@ def test_a_start_whose_first_step_fails_is_left(monkeypatch: pytest.MonkeyPatch)
     assert not any(begun_again(other))
     taken, usual = (len(states[-1].solution.history) for states in (found, other))
     assert taken == usual + 1, "the step that failed, and no other"
+
+
+@pytest.mark.slow
+@pytest.mark.claim
+def test_ironing_by_five_millimetres_takes_the_newton_steps_of_the_study() -> None:
+    sequence = LoadSequence(ContactProblem(ironing(48, "mortar"), MPI.COMM_SELF))
+    places = [(0.0, 0.25 * k) for k in range(1, 5)] + [(0.25 * k, 1.0) for k in range(1, 21)]
+    taken = []
+    for across, down in places:
+        supports = [Support("bed", "y0"), Support("die", "y1", (across, -down))]
+        state = sequence.advance(LoadStep(f"{across} {down}", supports=supports))
+        taken.append(len(state.solution.history))
+    assert sum(taken) == pytest.approx(130, abs=6)
+    assert max(taken[8:]) <= 6
