@@ -16,6 +16,7 @@ from fenics_contact.contact.equilibrium import (
     known_system,
     state_of,
 )
+from fenics_contact.contact.passing_bodies import PassingBodies
 from fenics_contact.contact.state import State
 from fenics_contact.contact.static_admissibility import check_held
 from fenics_contact.contact.stored import restored_solution
@@ -89,6 +90,7 @@ class ContactProblem:
         self.state = None
         self._partitions, self._decomposition = partitions, None
         self._contact_doubts, self._turned = ContactDoubts(), TurnedBodies()
+        self._passing_bodies = PassingBodies()
 
     state: State | None
     _decomposition: Decomposition | None
@@ -149,6 +151,7 @@ class ContactProblem:
             partitions=partitions, solver=self.solver, tolerance=self.tolerance, steps=self.steps,
         )  # fmt: skip
         other._contact_doubts, other._turned = self._contact_doubts, self._turned
+        other._passing_bodies = self._passing_bodies
         return other
 
     def number(self, scene: Scene | None = None) -> float:
@@ -240,6 +243,7 @@ class ContactProblem:
                     "give steps=AutomaticSteps(TangentNewton(...)) of fenics_contact.nonlinear instead"
                 )
             self.state = self._equilibria(scene).solve(scene, slip_from, wanted, time, step, overlap=overlap)
+            self._passing_bodies.warn(self.state)
             return self.state
         previous = self.state if start == "last" else start
         decomposition = self._decomposed(scene)
@@ -268,6 +272,7 @@ class ContactProblem:
             with self.timer.phase("state"):
                 self._contact_doubts.warn(self.state, overlap=overlap)
                 self._turned.tell(self.state)
+                self._passing_bodies.warn(self.state)
         return self.state
 
     def _equilibria(self, scene: Scene) -> DeformedEquilibria:
