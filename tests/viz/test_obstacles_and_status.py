@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import BinaryIO
 
 import numpy as np
 import pytest
@@ -12,10 +15,11 @@ from matplotlib.figure import Figure
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene import RigidCylinder, RigidPlane, RigidSphere
-from fenics_contact.viz import plot_contact_status, plot_stress
+from fenics_contact.viz import plot_contact_status, plot_stress, status
 from fenics_contact.viz.obstacles import obstacle_layers, obstacles_of, shade_obstacles
 from fenics_contact.viz.patch import contact_patches
 from fenics_contact.viz.section import strongest_contact
+from fenics_contact.viz.sheet import sheet
 from fenics_contact.viz.view import Frame, oblique_view
 from tests.viz.moving_states import block_among_movers, pressed_by_a_lid
 from tests.viz.plane_states import caged_block, plane_block
@@ -130,3 +134,21 @@ def test_status_maps_refuse_what_they_cannot_show(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match=r"got 'flat' with 1 pairs in 2 dimensions"):
         plot_contact_status({"flat": plane_block()}, tmp_path / "maps.png")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_map_of_one_state_says_its_title_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    texts: list[str] = []
+    state = touching_blocks()
+
+    @contextmanager
+    def kept(paper: BinaryIO, size: tuple[int, int], title: str) -> Iterator[Figure]:
+        with sheet(paper, size, title) as figure:
+            yield figure
+            texts.extend([title, *(axes.get_title() for axes in figure.axes)])
+
+    monkeypatch.setattr(status, "sheet", kept)
+    plot_contact_status({"Pressed": state}, title="Pressed")
+    assert sum(text.count("Pressed") for text in texts) == 1
+    texts.clear()
+    plot_contact_status({"first": state, "second": state}, title="Pressed")
+    assert [text.splitlines()[0] for text in texts] == ["Pressed", "first", "second"]
