@@ -27,6 +27,7 @@ class TurnedBodies:
     def __init__(self) -> None:
         """Start without any."""
         self._told: set[str] = set()
+        self._bounds = dict[str, tuple[BodyMesh, float]]()
 
     def tell(self, state: State) -> None:
         """Log a warning for each body of small strain that has turned far. Collective."""
@@ -36,10 +37,9 @@ class TurnedBodies:
         for name, body in state.scene.bodies.items():
             if body.deforms_much or name in self._told or longest == 0.0:
                 continue
-            cells = _Arms.of(body.mesh)
-            if longest * cells.largest <= FAR:
+            if longest * self._bound(name, body.mesh) <= FAR:
                 continue
-            angle = cells.rotation(state.gather_displacement(name))
+            angle = rotation_of(body.mesh, state.gather_displacement(name))
             if angle <= FAR:
                 continue
             self._told.add(name)
@@ -49,6 +49,12 @@ class TurnedBodies:
                     "due to this alone: give it a material for large deformations, such as StVenantKirchhoff"
                 )
                 tell(_LOG.warning, words, name, angle, angle**2 / 2)
+
+    def _bound(self, name: str, mesh: BodyMesh) -> float:
+        """Return `_Arms.largest` of a body, computed once for a mesh."""
+        if name not in self._bounds or self._bounds[name][0] is not mesh:
+            self._bounds[name] = mesh, _Arms.of(mesh).largest
+        return self._bounds[name][1]
 
 
 @dataclass(frozen=True)
