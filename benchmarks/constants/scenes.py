@@ -104,7 +104,9 @@ def _two_blocks(friction: Friction, cell: str, pair: dict[str, Any]) -> Scene:
         {"lower": Body(lower, STIFF), "upper": Body(upper, SOFT)},
         [Support("lower", "z0")],
         [Traction("upper", "z1", (0.6, 0.12, -2.0))],
-        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), friction, **pair)],
+        [ContactPair(
+            Surface("upper", "z0"), Surface("lower", "z1"), friction, **{"discretisation": "node", **pair}
+        )],
     )
 
 
@@ -145,7 +147,7 @@ def pressed_ball() -> Figures:
         {name: Body(mesh, SOFT) for name, mesh in meshes.items()},
         [Support("block", "z0"), *(Support(name, *side) for name in meshes for side in symmetric.items())],
         [TotalForce("ball", "top", (0.0, 0.0, -0.1))],
-        [ContactPair(Surface("block", "z1"), Surface("ball", "contact"), geometry="reconstructed")],
+        [ContactPair(Surface("block", "z1"), Surface("ball", "contact"), None, "node", "reconstructed")],
     )
     state = solve_scene(scene, COMM, tolerance=Balanced(share=1e-5))
     found = _balanced_figures(state)

@@ -62,7 +62,7 @@ def disc_on_block(facets: int, fineness: int = 1) -> Model:
         {"disc": Body(stamp(2, facets), PlaneStrain(CONTRAST, POISSON)), "block": block},
         [Support("block", "y0", (0.0, 0.0)), *_symmetric("block", 2), *_symmetric("disc", 2)],
         [TotalForce("disc", "top", (0.0, -force / 2))],
-        [ContactPair(Surface("block", "y1"), Surface("disc", "contact"))],
+        [ContactPair(Surface("block", "y1"), Surface("disc", "contact"), discretisation="node")],
     )
     return Model(scene, exact.peak_pressure, exact.half_width)
 
@@ -75,7 +75,7 @@ def ball_on_block(facets: int, fineness: int = 1) -> Model:
         _stiff_and_soft("ball", stamp(3, facets), "block", pad(3, 1.5, 22 * fineness, 3.2)),
         [Support("block", "z0"), *_symmetric("block", 3), *_symmetric("ball", 3)],
         [TotalForce("ball", "top", (0.0, 0.0, -force / 4))],
-        [ContactPair(Surface("block", "z1"), Surface("ball", "contact"))],
+        [ContactPair(Surface("block", "z1"), Surface("ball", "contact"), discretisation="node")],
     )
     return Model(scene, exact.peak_pressure, exact.area / 4)
 
@@ -90,7 +90,7 @@ def crossed_cylinders(facets: int, fineness: int = 1) -> Model:
         _stiff_and_soft("lower", lower, "upper", bar(14 * fineness, 4.0)),
         [Support("lower", "top"), *turned, *_symmetric("upper", 3)],
         [TotalForce("upper", "top", (0.0, 0.0, -force / 4))],
-        [ContactPair(Surface("upper", "contact"), Surface("lower", "contact"))],
+        [ContactPair(Surface("upper", "contact"), Surface("lower", "contact"), discretisation="node")],
     )
     return Model(scene, exact.peak_pressure, exact.area / 4)
 
@@ -102,7 +102,7 @@ def ball_in_seat(facets: int, fineness: int = 1) -> Model:
         _stiff_and_soft("ball", stamp(3, facets), "seat", socket),
         [Support("seat", "base"), *_symmetric("seat", 3), *_symmetric("ball", 3)],
         [TotalForce("ball", "top", (0.0, 0.0, -5e-4))],
-        [ContactPair(Surface("seat", "contact"), Surface("ball", "contact"))],
+        [ContactPair(Surface("seat", "contact"), Surface("ball", "contact"), discretisation="node")],
     )
     return Model(scene)
 
@@ -126,7 +126,7 @@ def shaft_in_bush(facets: int, fineness: int = 1) -> Model:
         },
         [Support("bush", "outer", (0.0, 0.0)), *_symmetric("bush", 2), *_symmetric("shaft", 2)],
         [TotalForce("shaft", "inner", (0.0, -force / 2))],
-        [ContactPair(Surface("shaft", "outer"), Surface("bush", "inner"))],
+        [ContactPair(Surface("shaft", "outer"), Surface("bush", "inner"), discretisation="node")],
     )
     return Model(scene, exact.peak_pressure, exact.half_angle)
 

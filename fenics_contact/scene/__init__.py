@@ -4,6 +4,7 @@ from fenics_contact.scene.approach import master_share
 from fenics_contact.scene.automatic import Automatic
 from fenics_contact.scene.bodies import bodies_from
 from fenics_contact.scene.body import Body
+from fenics_contact.scene.chosen_discretisation import keeping_discretisation
 from fenics_contact.scene.effects import Effect, EffectName
 from fenics_contact.scene.field_files import read_field
 from fenics_contact.scene.held import RANK_TOLERANCE, held_components, point_loads, resisted_motions
@@ -145,6 +146,7 @@ __all__ = [
     "held_components",
     "is_finite_strain",
     "is_nonlinear",
+    "keeping_discretisation",
     "master_share",
     "material_axes",
     "mirrored",

@@ -16,7 +16,7 @@ from fenics_contact.errors import InvalidInputError, tell
 from fenics_contact.mesh import BodyMesh, boundary_faces, corners_of, near_surfaces
 from fenics_contact.scene.approach import master_share
 from fenics_contact.scene.body import Body
-from fenics_contact.scene.pairs import ContactPair, Discretisation, Friction, Surface
+from fenics_contact.scene.pairs import AnyDiscretisation, ContactPair, Friction, Surface
 from fenics_contact.surfaces import Geometry
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Automatic(Sequence[ContactPair]):
 
     friction: Friction = None
     distance: float | None = None
-    discretisation: Discretisation = "node"
+    discretisation: AnyDiscretisation = "node"
     geometry: Geometry = "best"
     self_contact: tuple[str, ...] = ()
 

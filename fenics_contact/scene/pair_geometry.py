@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from fenics_contact.display import displayed
 from fenics_contact.scene.approach import displacement_along, force_along, hertz_approach, modulus_of
+from fenics_contact.scene.chosen_discretisation import in_words
 from fenics_contact.scene.pairs import ContactPair, Surface
 from fenics_contact.scene.true_surfaces import surface_of
 from fenics_contact.surface_shapes import Joined, Placed, SurfaceShape, asked
@@ -38,6 +39,7 @@ class PairGeometry:
         approach: Estimate of how far the bodies come closer, [length]: by Hertz's theory under the largest
             resultant of the loads on one body, or by the largest displacement along the normal that a support
             prescribes, if that is larger. None if neither is known.
+        discretisation: Where contact is enforced, and why, see `ContactPair.reason`.
         given: What the pair gives in place of measured gaps, in words, see `ContactPair.given_gap`.
     """
 
@@ -45,6 +47,7 @@ class PairGeometry:
     master: str
     height: float
     approach: float | None
+    discretisation: str
     given: str = ""
 
     @property
@@ -54,7 +57,8 @@ class PairGeometry:
 
     def __str__(self) -> str:
         """Describe it in one line."""
-        words = f"{self.slave} on {self.master}; {self.given}; facets ".replace("; ;", ";")
+        parts = f"{self.slave} on {self.master}", self.discretisation, self.given, "facets "
+        words = "; ".join(filter(None, parts))
         if self.height == 0.0:
             return words + "miss nothing"
         share = self.share
@@ -88,7 +92,7 @@ def pair_geometry(scene: SceneParts, pair: ContactPair) -> PairGeometry:
     if not isinstance(pair.master, Surface):
         met = _meeting_obstacle(slave, pair.master)
         approach = _approach(scene, pair, slave, met)
-        return PairGeometry(name, _shape_name(pair.master), 0.0, approach, pair.given_gap)
+        return PairGeometry(name, _shape_name(pair.master), 0.0, approach, in_words(pair), pair.given_gap)
     master = surface_of(scene, pair.master, geometry)
     met = _meeting(slave, master)
     approach = _approach(scene, pair, slave, met)
@@ -99,7 +103,8 @@ def pair_geometry(scene: SceneParts, pair: ContactPair) -> PairGeometry:
         height = max(height, _largest_height(slave, touching))
     if pair.gives_all_gaps:
         height = 0.0
-    return PairGeometry(name, _name(scene, pair, pair.master, master), height, approach, pair.given_gap)
+    names = name, _name(scene, pair, pair.master, master)
+    return PairGeometry(*names, height, approach, in_words(pair), pair.given_gap)
 
 
 def _name(scene: SceneParts, pair: ContactPair, surface: Surface, faceted: FacetedSurface) -> str:

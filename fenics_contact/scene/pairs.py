@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -16,6 +16,8 @@ from fenics_contact.surfaces import Geometry
 
 #: Where contact is enforced: at the slave's nodes, or weighted by its shape functions (mortar).
 Discretisation: TypeAlias = Literal["node", "mortar"]
+#: What a pair may be given: one of them, or the better one of its scene, see `chosen_discretisation`.
+AnyDiscretisation: TypeAlias = Literal["best"] | Discretisation
 
 
 @dataclass(frozen=True)
@@ -96,8 +98,9 @@ class ContactPair:
         friction: Law of friction; without one (None) contact is frictionless.
         discretisation: ``"node"`` keeps the gap of every slave node non-negative; ``"mortar"`` does so for
             weighted means of the gap. The former is simple. The latter (dual basis, integration over the
-            common segments of both meshes) passes the contact patch test on non-matching meshes. Contact with
-            a rigid obstacle is always nodal.
+            common segments of both meshes) passes the contact patch test on non-matching meshes. ``"best"``:
+            the scene takes mortar between bodies of linear cells whose meshes do not match, and nodes
+            elsewhere. Contact with a rigid obstacle is always nodal.
         geometry: What gaps and normals are measured between: ``"best"``, true shapes that the meshes know,
             else smooth surfaces through the nodes; ``"reconstructed"``, always the latter; ``"faceted"``, the
             flat facets, for comparison. Between round bodies the error of facets is often larger than the
@@ -109,6 +112,7 @@ class ContactPair:
         adjust: Slave points whose measured clearance or overlap is at most this, [length], are put in touch
             without strain, or get ``gap`` or ``interference`` if these are given; all others keep the
             measured gap. None: no point is put in touch, and ``gap`` and ``interference`` hold at all points.
+        reason: Why the scene chose the discretisation that it has, in words; empty where it was given.
 
     Raises:
         InvalidInputError: If the discretisation or geometry is unknown, or both gap and interference, or
@@ -123,11 +127,12 @@ class ContactPair:
     slave: Surface
     master: Surface | RigidObstacle
     friction: Friction = None
-    discretisation: Discretisation = "node"
+    discretisation: AnyDiscretisation = "node"
     geometry: Geometry = "best"
     gap: float | OfPosition | None = None
     interference: float | OfPosition | Literal["measured"] | None = None
     adjust: float | None = None
+    reason: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
         """Reject gaps that contradict each other or are no lengths."""
@@ -139,6 +144,7 @@ class ContactPair:
             )
         for name in ("gap", "interference", "adjust"):
             _check_length(f"ContactPair.{name}", getattr(self, name))
+        _forget_other_reason(self)
 
     @property
     def within_body(self) -> bool:
@@ -220,13 +226,15 @@ class Tie:
         master: Surface of another body.
         sliding: Whether the surfaces may slide along each other: contact known to be closed.
         discretisation: ``"node"`` ties every slave node to its master facet, ``"mortar"`` ties weighted
-            means. See `ContactPair`.
+            means, ``"best"`` leaves it to the scene. See `ContactPair`.
+        reason: As in `ContactPair`.
     """
 
     slave: Surface
     master: Surface
     sliding: bool = False
-    discretisation: Discretisation = "mortar"
+    discretisation: AnyDiscretisation = "mortar"
+    reason: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
         """Reject a body that is tied to itself."""
@@ -235,6 +243,7 @@ class Tie:
                 f"body {self.slave.body!r} cannot be tied to itself: a tie joins two bodies; mesh its parts "
                 "together, or as two bodies"
             )
+        _forget_other_reason(self)
 
     @property
     def geometry(self) -> Geometry:
@@ -245,6 +254,12 @@ class Tie:
     def place(self) -> str:
         """Its surfaces: "upper z0 on lower z1"."""
         return _place(self.slave, self.master)
+
+
+def _forget_other_reason(pair: ContactPair | Tie) -> None:
+    """Drop the reason for a choice in whose place another discretisation was given."""
+    if not pair.reason.startswith(f"{pair.discretisation}, "):
+        object.__setattr__(pair, "reason", "")
 
 
 def _check_length(name: str, value: float | OfPosition | str | None) -> None:

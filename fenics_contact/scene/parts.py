@@ -58,7 +58,7 @@ class SceneParts:
                 self._require_deforming(pair)
             if isinstance(pair.master, Surface):
                 self._require(pair.master.body, pair.master.name, f"{kind}.master")
-                self._require_linear(pair.slave, pair.master, pair.discretisation, kind)
+                self._require_linear(pair, pair.master)
             else:
                 self._require_dimension(pair.master)
         _require_different(self.contacts)
@@ -159,14 +159,14 @@ class SceneParts:
     def _materials(self, surface: Surface) -> tuple[Material, ...]:
         return self.bodies[surface.body].materials
 
-    def _require_linear(self, slave: Surface, master: Surface, discretisation: str, kind: str) -> None:
-        """Reject mortar coupling of quadratic facets."""
-        orders = {surface.name: self.bodies[surface.body].mesh.order for surface in (slave, master)}
-        if discretisation == "mortar" and max(orders.values()) > 1:
+    def _require_linear(self, pair: ContactPair | Tie, master: Surface) -> None:
+        """Reject mortar coupling of quadratic facets, unless a scene of other meshes chose it."""
+        orders = {side.name: self.bodies[side.body].mesh.order for side in (pair.slave, master)}
+        if pair.discretisation == "mortar" and not pair.reason and max(orders.values()) > 1:
             raise InvalidInputError(
-                f"{kind} with discretisation='mortar' needs linear cells on both sides, got cells of order "
-                f"{orders}: mean gaps of linear facets do not pass the patch test between quadratic cells; "
-                "use discretisation='node', or linear cells"
+                f"{type(pair).__name__} with discretisation='mortar' needs linear cells on both sides, got "
+                f"cells of order {orders}: mean gaps of linear facets do not pass the patch test between "
+                "quadratic cells; use discretisation='node', or linear cells"
             )
 
     def _require_expansion(self, load: ThermalStrain) -> None:

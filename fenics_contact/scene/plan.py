@@ -12,6 +12,7 @@ import numpy as np
 from fenics_contact.display import displayed
 from fenics_contact.linalg import expected_bytes
 from fenics_contact.mesh import BodyMesh
+from fenics_contact.scene.chosen_discretisation import in_words
 from fenics_contact.scene.effects import Effect, EffectName, effects_of
 from fenics_contact.scene.held import held_by_supports
 from fenics_contact.scene.pair_geometry import PairGeometry, pair_geometry
@@ -62,7 +63,8 @@ class Plan:
             coarse problem; 0 without one.
         adjoint: Whether sensitivities are requested, which need one adjoint solve per design.
         memory: Expected memory of all ranks together without their libraries, [bytes].
-        contacts: Between which surfaces the gaps of each contact pair are measured.
+        contacts: Between which surfaces the gaps of each contact pair are measured, and where it is enforced.
+        ties: Where each tie is enforced, and why.
     """
 
     effects: tuple[Effect, ...]
@@ -76,6 +78,7 @@ class Plan:
     adjoint: bool
     memory: float
     contacts: tuple[PairGeometry, ...]
+    ties: tuple[str, ...]
 
     def __str__(self) -> str:
         """Return one line for each decision."""
@@ -96,6 +99,7 @@ class Plan:
             "adjoint": "one solve per design" if self.adjoint else "none",
             "memory": f"{self.memory / 1e6:.0f} MB",
             **{f"pair {number}": str(pair) for number, pair in enumerate(self.contacts)},
+            **{f"tie {number}": tie for number, tie in enumerate(self.ties)},
         }
 
 
@@ -130,6 +134,7 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
         adjoint=sensitivity,
         memory=factors + BYTES_PER_UNKNOWN * unknowns + 8.0 * motions**2,
         contacts=tuple(pair_geometry(scene, pair) for pair in scene.contacts),
+        ties=tuple(f"{tie.place}; {in_words(tie)}" for tie in scene.ties),
     )
 
 

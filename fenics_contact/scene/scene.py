@@ -11,6 +11,7 @@ import numpy as np
 from fenics_contact.display import displayed
 from fenics_contact.partition import default_partition
 from fenics_contact.scene.automatic import Automatic
+from fenics_contact.scene.chosen_discretisation import with_discretisation
 from fenics_contact.scene.effects import Effect, effects_of
 from fenics_contact.scene.materials import is_nonlinear
 from fenics_contact.scene.parts import SceneParts
@@ -26,8 +27,9 @@ class Scene(SceneParts):
         bodies: Bodies by name.
         supports: Prescribed displacements.
         loads: Forces.
-        contacts: Pairs of surfaces that may touch; `Automatic` finds them, and names the surfaces.
-        ties: Pairs of surfaces that stay together.
+        contacts: Pairs of surfaces that may touch; `Automatic` finds them, and names the surfaces. Each has
+            the discretisation that it was given or that the scene chose for it, see `plan`.
+        ties: Pairs of surfaces that stay together, likewise.
 
     Raises:
         InvalidInputError: If a part names a body or a surface that is not there, does not suit the body's
@@ -56,6 +58,8 @@ class Scene(SceneParts):
             object.__setattr__(self, "bodies", bodies)
             object.__setattr__(self, "contacts", pairs)
             super().__post_init__()
+        object.__setattr__(self, "contacts", with_discretisation(self, self.contacts))
+        object.__setattr__(self, "ties", with_discretisation(self, self.ties))
 
     def partition(self, ranks: int = 1) -> dict[str, np.ndarray]:
         """Cut every body into subdomains of a suitable size.

@@ -105,7 +105,7 @@ Master: TypeAlias = Annotated[
 AnyFriction: TypeAlias = Annotated[Any, one_of("law", NoFriction, CoulombFriction, TrescaFriction)]
 
 
-@keys_of(ContactPair)
+@keys_of(ContactPair, without={"reason"})
 class ContactPart(Part):
     """Two surfaces that may touch, or a surface and a rigid obstacle."""
 
@@ -131,7 +131,7 @@ class AutomaticPart(Part):
     distance: PositiveFloat | None
 
 
-@keys_of(Tie)
+@keys_of(Tie, without={"reason"})
 class TiePart(Part):
     """Two surfaces that stay together."""
 

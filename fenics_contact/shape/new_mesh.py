@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError, calling, together
 from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import Scene, Surface
+from fenics_contact.scene import Scene, Surface, keeping_discretisation
 from fenics_contact.shape.design import SurfaceDesign
 from fenics_contact.surfaces import project, shape_functions, true_surface
 
@@ -48,7 +48,8 @@ def meshed(
     made = comm.bcast(made)
     bodies = {name: replace(scene.bodies[name], mesh=mesh) for name, mesh in made.items()}
     found = tuple(_found(design, scene.bodies[design.body].mesh, made[design.body]) for design in designs)
-    return replace(scene, bodies={**scene.bodies, **bodies}), found
+    kept = keeping_discretisation(scene)
+    return replace(kept, bodies={**scene.bodies, **bodies}), found
 
 
 def _with_given_gaps(scene: Scene) -> Mapping[str, set[str]]:

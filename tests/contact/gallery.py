@@ -57,7 +57,7 @@ def two_blocks(friction: Friction, cell: str = "hexahedron", *, push: float = 0.
         {"lower": Body(lower, STIFF), "upper": Body(upper, SOFT)},
         [Support("lower", "z0")],
         [Traction("upper", "z1", (push, 0.2 * push, -2.0)), BodyForce("upper", (0.0, 0.0, -0.1))],
-        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), friction)],
+        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), friction, discretisation="node")],
     )
 
 

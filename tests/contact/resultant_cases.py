@@ -74,7 +74,7 @@ def pinched() -> Scene:
         {"lower": lower, "upper": upper},
         [Support("lower", "y0", (0.0, 0.0)), Support("upper", "x0", (0.01, None))],
         [Pressure("upper", "y1", 2.0)],
-        [ContactPair(Surface("upper", "y0"), Surface("lower", "y1"), Coulomb(0.4))],
+        [ContactPair(Surface("upper", "y0"), Surface("lower", "y1"), Coulomb(0.4), discretisation="node")],
     )
 
 

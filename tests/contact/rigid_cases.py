@@ -75,7 +75,7 @@ def punched() -> Scene:
     pad = Body(block((0.0, 0.0, 0.0), (3.0, 2.0, 1.0), (6, 4, 2)), SOFT)
     punch = Body(block((0.9, 0.6, 1.0), (2.0, 1.5, 1.6), (4, 2, 2)), SOFT)
     face = RigidSurface("punch", "z0", (1.4, 1.0, 1.6), force=(1.0, 0.3, -20.0))
-    pair = ContactPair(Surface("pad", "z1"), Surface("punch", "z0"), Coulomb(0.3))
+    pair = ContactPair(Surface("pad", "z1"), Surface("punch", "z0"), Coulomb(0.3), discretisation="node")
     return Scene({"pad": pad, "punch": punch}, [Support("pad", "z0"), face], contacts=[pair])
 
 

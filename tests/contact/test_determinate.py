@@ -24,7 +24,7 @@ def beam_on_a_block(rows: int, tied: bool) -> Scene:
         {"block": Body(block, SOFT), "beam": Body(beam, SOFT)},
         [Support("block", "y0", (0.0, 0.0)), Support("beam", "x0", (0.0, None))],
         [Pressure("beam", "y1", 1e-3)],
-        [] if tied else [ContactPair(over, under)],
+        [] if tied else [ContactPair(over, under, discretisation="node")],
         [Tie(over, under, True, "node")] if tied else [],
     )
 

@@ -111,7 +111,7 @@ CASES = {
         LINEAR | {"search for ties", "projection on facets"}, {"surface load"},
     ),
     "contact": Case(
-        tower(held=True, loads=[DOWN], contacts=[ContactPair(*FACES)]),
+        tower(held=True, loads=[DOWN], contacts=[ContactPair(*FACES, discretisation="node")]),
         CONTACT | {"projection on facets"}, {"surface load"},
     ),
     "mortar contact": Case(
@@ -119,20 +119,20 @@ CASES = {
         CONTACT | {"mortar"}, {"surface load"},
     ),
     "friction of zero": Case(
-        tower(held=True, loads=[DOWN], contacts=[ContactPair(*FACES, Coulomb(0.0))]),
+        tower(held=True, loads=[DOWN], contacts=[ContactPair(*FACES, Coulomb(0.0), discretisation="node")]),
         CONTACT | {"projection on facets"}, {"surface load"},
     ),
     "Tresca": Case(
-        tower(held=True, loads=[DOWN], contacts=[ContactPair(*FACES, Tresca(0.1))]),
+        tower(held=True, loads=[DOWN], contacts=[ContactPair(*FACES, Tresca(0.1), discretisation="node")]),
         CONTACT | {"projection on facets"}, {"surface load"},
     ),
     "Coulomb": Case(
-        tower(held=True, loads=[DOWN], contacts=[ContactPair(*FACES, Coulomb(0.05))]),
+        tower(held=True, loads=[DOWN], contacts=[ContactPair(*FACES, Coulomb(0.05), discretisation="node")]),
         CONTACT | {"projection on facets", "slip bounds that follow", "friction that grows in a step"},
         {"surface load"},
     ),
     "a floating body": Case(
-        tower(held=False, loads=[DOWN], contacts=[ContactPair(*FACES, Tresca(10.0))]),
+        tower(held=False, loads=[DOWN], contacts=[ContactPair(*FACES, Tresca(10.0), discretisation="node")]),
         CONTACT | {"projection on facets", "balance of floating bodies"}, {"surface load"},
     ),
     "everything": Case(

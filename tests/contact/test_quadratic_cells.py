@@ -160,7 +160,8 @@ def test_mean_gaps_between_quadratic_facets_are_refused() -> None:
     low, high = rectangle((0, -1), (1, 0), (1, 1)), rectangle((0, 0), (1, 1), (2, 2))
     bodies = {"low": Body(quadratic(low), PlaneStrain(1.0, 0.3)), "high": Body(high, PlaneStrain(1.0, 0.3))}
     surfaces = Surface("high", "y0"), Surface("low", "y1")
-    for part in ({"contacts": [ContactPair(*surfaces, discretisation="mortar")]}, {"ties": [Tie(*surfaces)]}):
+    by_means = {"discretisation": "mortar"}
+    for part in ({"contacts": [ContactPair(*surfaces, **by_means)]}, {"ties": [Tie(*surfaces, **by_means)]}):
         with pytest.raises(InvalidInputError, match=r"discretisation='mortar' needs linear cells .* 'y1': 2"):
             Scene(bodies, [Support("low", "y0", (0.0, 0.0))], **part)
     load = [TotalForce("high", "y1", (0.0, -1.0))]

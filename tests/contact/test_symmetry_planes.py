@@ -198,7 +198,7 @@ def beside(share: float) -> Scene:
     return Scene(
         {"lower": Body(lower, STEEL), "upper": Body(upper, STEEL)},
         [Support("lower", "z0", (None, 0.0, 0.0)), *rollers, Support("upper", "z1", (None, 0.0, -0.05))],
-        contacts=[ContactPair(*FACES, Coulomb(0.2))],
+        contacts=[ContactPair(*FACES, Coulomb(0.2), discretisation="node")],
     )
 
 

@@ -132,7 +132,7 @@ def test_a_body_cannot_be_tied_to_itself() -> None:
 
 def test_an_unknown_discretisation_is_refused() -> None:
     with pytest.raises(
-        InvalidInputError, match=r"Tie.discretisation must be 'node' or 'mortar', got 'x': \"node\" ties"
+        InvalidInputError, match=r"Tie.discretisation must be 'best' or 'node' or 'mortar', got 'x'"
     ):
         Tie(Surface("a", "s"), Surface("b", "s"), discretisation="x")  # type: ignore[arg-type]
 

@@ -84,9 +84,9 @@ def touching_blocks() -> Cut:
         supports=[Support("lower", "z0"), Support("upper", "y0", (0.05, None, None))],
         loads=[Traction("upper", "z1", (0.02, 0.01, -0.3)), BodyForce("third", (0.1, 0.0, -2.0))],
         contacts=[
-            ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), Coulomb(0.3)),
+            ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), Coulomb(0.3), discretisation="node"),
             ContactPair(Surface("third", "z0"), floor, Tresca(0.4)),
-            ContactPair(Surface("third", "x0"), Surface("lower", "x1")),
+            ContactPair(Surface("third", "x0"), Surface("lower", "x1"), discretisation="node"),
         ],
     ), {
         "lower": box_partition(lower, (2, 2, 1)),

@@ -42,7 +42,7 @@ def on_a_ramp(
         {"lower": Body(lower, PLASTIC), "upper": Body(upper, RUBBER)},
         [Support("lower", "z0")],
         [BodyForce("upper", (0.0, 0.0, -1.0))],
-        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), Coulomb(friction))],
+        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), Coulomb(friction), "node")],
     )
     wanted = (aim * 1.74 * 1.02 * 0.8) ** 2 / 10.0
 

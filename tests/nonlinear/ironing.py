@@ -31,7 +31,8 @@ def ironing(friction: float, way: tuple[float, float], quarter: bool = False) ->
     x, y = way
     move = (-y, x) if quarter else (x, y)
     block = turned(rectangle((0.0, 0.0), (6.0, 4.0), (24, 12)), quarter)
-    pair = ContactPair(Surface("die", "y0"), Surface("block", "y1"), Coulomb(friction) if friction else None)
+    law = Coulomb(friction) if friction else None
+    pair = ContactPair(Surface("die", "y0"), Surface("block", "y1"), law, discretisation="node")
     return Scene(
         {
             "block": Body(block, NeoHooke(1.0, 0.32)),

@@ -42,7 +42,7 @@ def on_arch(kind: str, *, master_cells: int = 8, radius: float = 1.5, geometry: 
     low = BodyMesh(arched(low.points, radius), low.cells, low.surfaces)
     high = BodyMesh(arched(high.points, radius), high.cells, high.surfaces)
     bodies = {"high": Body(high, material), "low": Body(low, material)}
-    pair = ContactPair(Surface("high", under), Surface("low", top), geometry=geometry)
+    pair = ContactPair(Surface("high", under), Surface("low", top), geometry=geometry, discretisation="node")
     return Scene(bodies, contacts=[pair])
 
 
@@ -55,7 +55,8 @@ def half_on_arch(kind: str) -> Scene:
         for name, mesh in (("high", high), ("low", low))
     }
     rollers = [Support(name, "x0", (0.0, None, None)) for name in bodies]
-    return Scene(bodies, rollers, contacts=[ContactPair(Surface("high", "z0"), Surface("low", "z1"))])
+    pair = ContactPair(Surface("high", "z0"), Surface("low", "z1"), discretisation="node")
+    return Scene(bodies, rollers, contacts=[pair])
 
 
 def ring(kind: str, sides: tuple[str, str] = ("roof", "floor")) -> Scene:

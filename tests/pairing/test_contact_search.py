@@ -33,7 +33,7 @@ def stacked(shift: float, cell: str = "hexahedron") -> Scene:
     upper = Body(block((shift, 0.0, 1.05), (shift + 0.8, 0.7, 2), (3, 2, 2), cell), STEEL)
     return Scene(
         {"lower": lower, "upper": upper},
-        contacts=[ContactPair(Surface("upper", "z0"), Surface("lower", "z1"))],
+        contacts=[ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), discretisation="node")],
     )
 
 
@@ -64,7 +64,7 @@ def test_a_pair_that_does_not_meet_is_refused() -> None:
     with pytest.raises(InvalidInputError, match=message):
         torn(stacked(3.0))
     scene = stacked(0.1)
-    same_way = ContactPair(Surface("upper", "z1"), Surface("lower", "z1"))
+    same_way = ContactPair(Surface("upper", "z1"), Surface("lower", "z1"), discretisation="node")
     with pytest.raises(InvalidInputError, match="none of the 12 movable nodes of 'z1' meets it: check"):
         torn(Scene(scene.bodies, contacts=[same_way]))
 

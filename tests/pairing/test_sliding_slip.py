@@ -51,7 +51,7 @@ def test_slip_over_several_facets_is_the_way() -> None:
     high = block((0.3, 0.2, 0.0), (1.1, 0.8, 0.4), (4, 3, 1))
     scene = Scene(
         {"high": Body(high, material), "low": Body(low, material)},
-        contacts=[ContactPair(Surface("high", "z0"), Surface("low", "z1"))],
+        contacts=[ContactPair(Surface("high", "z0"), Surface("low", "z1"), discretisation="node")],
     )
     contact, x, way = sliding(scene), scene.points.copy(), np.array([1.5, 0.13, 0.0])
     now = contact.at(x)

@@ -40,7 +40,7 @@ def stacked(push: float = 0.001) -> Sample:
         },
         [Support("lower", "z0")],
         [Traction("upper", "z1", (push, 0.0, -0.003))],
-        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), Coulomb(0.5))],
+        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), Coulomb(0.5), discretisation="node")],
     )
     return Sample(-1, "stacked", scene, None, 1e-8)
 

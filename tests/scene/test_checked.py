@@ -112,7 +112,7 @@ WRONG: list[tuple[Any, str]] = [
     (lambda: ContactPair(FACE, "floor"), "master must be Surface.* or a RigidObstacle with distance"),
     (lambda: Tie(FACE, FLOOR), r"Tie.master must be Surface\(body, name\), got RigidPlane.*: surface of"),
     (lambda: Tie(FACE, OTHER, 1), "Tie.sliding must be True or False, got 1: whether the surfaces"),
-    (lambda: ContactPair(FACE, FLOOR, None, "Mortar"), "discretisation must be 'node' or 'mortar', got 'Mor"),
+    (lambda: ContactPair(FACE, FLOOR, None, "Mortar"), "must be 'best' or 'node' or 'mortar', got 'Mortar"),
     (lambda: Coulomb(True), "must be a number or a function, got True: friction coefficient μ ≥ 0"),
     (lambda: Coulomb("0.3"), "must be a number or a function, got '0.3': friction coefficient μ ≥ 0"),
     (lambda: IsotropicElasticity("steel", 0.3), "IsotropicElasticity.young_modulus must be a number, got 's"),

@@ -69,13 +69,15 @@ def test_descriptions_and_fingerprints_contain_it() -> None:
         name: Body(block((0, 0, low), (1, 1, low + 1), (1, 1, 1)), IsotropicElasticity(1.0, 0.3))
         for name, low in (("a", 1), ("b", 0))
     }
-    contact = ContactPair(Surface("a", "z0"), Surface("b", "z1"), interference="measured", adjust=0.5)
+    sides = Surface("a", "z0"), Surface("b", "z1")
+    contact = ContactPair(*sides, discretisation="best", interference="measured", adjust=0.5)
     scene = Scene(bodies, contacts=[contact])
     (entry,) = described_scene(scene, {"a": 1, "b": 1})["contacts"]
     assert (entry["gap"], entry["interference"], entry["adjust"]) == (None, "measured", 0.5)
+    assert (entry["discretisation"], entry["reason"]) == ("node", "node, as the meshes match")
     assert "a z0 on b z1, without friction, interference measured" in repr(scene)
     assert str(scene.plan().contacts[0]).startswith(
-        "flat on flat; interference measured, in touch within 0.5; facets miss nothing"
+        "flat on flat; node, as the meshes match; interference measured, in touch within 0.5; facets miss no"
     )
 
 

@@ -62,7 +62,7 @@ def block_on_block(
         {"lower": Body(lower, PLASTIC), "upper": Body(upper, RUBBER)},
         [Support("lower", "z0")],
         [Traction("upper", "z1", load), BodyForce("upper", (0.1, 0.0, -1.0))],
-        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), friction)],
+        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), friction, discretisation="node")],
     )
 
 

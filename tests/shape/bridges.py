@@ -40,7 +40,7 @@ def bridge(cell: str, counts: tuple[int, int, int] = COUNTS) -> Scene:
             Support("pier", "z0"),
         ],
         [BodyForce("beam", (0.0, 0.0, -1.0))],
-        [ContactPair(Surface("pier", "z1"), Surface("beam", "z0"), Coulomb(0.3))],
+        [ContactPair(Surface("pier", "z1"), Surface("beam", "z0"), Coulomb(0.3), discretisation="node")],
     )  # fmt: skip
 
 

@@ -64,7 +64,7 @@ def chain(friction: Friction, geometry: Geometry = "best", pull: float = PULL) -
         {"link1": Body(links.first.mesh, BRONZE), "link2": Body(links.second.mesh, BRONZE)},
         [Support("link1", "grip"), *guide],
         [TotalForce("link2", "grip", (pull, 0.0, 0.0))],
-        [ContactPair(Surface("link2", "contact"), Surface("link1", "contact"), friction, geometry=geometry)],
+        [ContactPair(Surface("link2", "contact"), Surface("link1", "contact"), friction, "node", geometry)],
     )
 
 

@@ -62,7 +62,7 @@ def on_block(friction: Friction, cell: str, order: int = 1) -> Scene:
         {"lower": Body(lower, PLASTIC), "block": Body(upper, RUBBER)},
         [Support("lower", "y0")],
         [Traction("block", "y1", (0.6, -2.0)), BodyForce("block", (0.1, -1.0))],
-        [ContactPair(Surface("block", "y0"), Surface("lower", "y1"), friction)],
+        [ContactPair(Surface("block", "y0"), Surface("lower", "y1"), friction, discretisation="node")],
     )
 
 

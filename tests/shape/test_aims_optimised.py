@@ -34,7 +34,7 @@ def punch() -> Scene:
         },
         [Support("layer", "y0")],
         [Traction("punch", "y1", (0.0, -MEAN))],
-        [ContactPair(Surface("punch", "y0"), Surface("layer", "y1"), Coulomb(0.2))],
+        [ContactPair(Surface("punch", "y0"), Surface("layer", "y1"), Coulomb(0.2), discretisation="node")],
     )
 
 

@@ -104,7 +104,7 @@ def scene_in(force: float, length: float) -> Scene:
         },
         [Support("lower", "z0")],
         [Traction("upper", "z1", push), BodyForce("upper", (0.1 * stress / length, 0.0, -stress / length))],
-        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), Coulomb(0.38))],
+        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), Coulomb(0.38), discretisation="node")],
     )
 
 

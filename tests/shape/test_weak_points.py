@@ -158,7 +158,7 @@ def test_points_over_facet_edges_are_counted() -> None:
         scene = Scene(
             bodies,
             [Support("lower", "z0"), Support("upper", "z1", (0.0, 0.0, -0.01))],
-            contacts=[ContactPair(Surface("upper", "z0"), Surface("lower", "z1"))],
+            contacts=[ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), discretisation="node")],
         )
         cuts = {name: np.zeros(body.mesh.n_cells, dtype=int) for name, body in bodies.items()}
         state = solve_scene(scene, MPI.COMM_SELF, partitions=cuts, tolerance=1e-6)

@@ -139,7 +139,7 @@ def rubber_that_keeps_its_volume_drawn_over_the_same_rubber() -> Case:
     rubber = NeoHooke(1.0, 0.4999, mean_dilatation=True)
     low = rectangle((-0.5, -1.0), (2.0, 0.0), (14, 6))
     block_on = rounded(rubber, 0.3).bodies["block"]
-    pair = ContactPair(Surface("block", "y0"), Surface("low", "y1"), Coulomb(0.3))
+    pair = ContactPair(Surface("block", "y0"), Surface("low", "y1"), Coulomb(0.3), discretisation="node")
     bodies = {"low": Body(low, rubber), "block": block_on}
     below = Support("low", "y0")
     scene = Scene(bodies, [below, *top(0.0, 0.0)], contacts=[pair])

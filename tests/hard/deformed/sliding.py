@@ -47,7 +47,7 @@ def on_bed(
             "slider": Body(slider(cells[1]), NeoHooke(ratio, 0.3)),
         },
         held(0.0, 0.0),
-        contacts=[ContactPair(Surface("slider", "y0"), Surface("bed", "y1"), law)],
+        contacts=[ContactPair(Surface("slider", "y0"), Surface("bed", "y1"), law, discretisation="node")],
     )
 
 
@@ -84,7 +84,7 @@ def a_corner_pressed_into_a_bed() -> Case:
     scene = Scene(
         {"bed": Body(bed, SOFT), "square": Body(mesh, HARD)},
         [Support("bed", "y0"), Support("square", "top")],
-        contacts=[ContactPair(Surface("square", "rim"), Surface("bed", "y1"))],
+        contacts=[ContactPair(Surface("square", "rim"), Surface("bed", "y1"), discretisation="node")],
     )
 
     def symmetric(states: States) -> None:
@@ -164,8 +164,8 @@ def a_stack_of_three_that_is_sheared() -> Case:
         for level, (name, (a, b, n)) in enumerate(widths.items())
     }
     pairs = [
-        ContactPair(Surface("middle", "y0"), Surface("low", "y1"), Coulomb(0.3)),
-        ContactPair(Surface("high", "y0"), Surface("middle", "y1"), Coulomb(0.3)),
+        ContactPair(Surface("middle", "y0"), Surface("low", "y1"), Coulomb(0.3), discretisation="node"),
+        ContactPair(Surface("high", "y0"), Surface("middle", "y1"), Coulomb(0.3), discretisation="node"),
     ]
 
     def top(way: float, depth: float) -> list[Support]:

@@ -89,8 +89,8 @@ def jaws(pull: float, squeeze: float = 0.01, friction: float = 0.3) -> Scene:
         [Support("left", "x0"), Support("right", "x1", (-squeeze, 0.0, 0.0))],
         [force(0.0, 0.0, pull)],
         [
-            ContactPair(Surface("block", "x0"), Surface("left", "x1"), law),
-            ContactPair(Surface("block", "x1"), Surface("right", "x0"), law),
+            ContactPair(Surface("block", "x0"), Surface("left", "x1"), law, discretisation="node"),
+            ContactPair(Surface("block", "x1"), Surface("right", "x0"), law, discretisation="node"),
         ],
     )
 

@@ -159,8 +159,8 @@ def a_node_that_is_slave_of_two_pairs_and_master_of_a_third() -> Trial:
         [TotalForce("top", "z1", (0.2, 0.05, -2.0)), TotalForce("base", "x0", (0.8, 0.0, 0.0))],
         [
             ContactPair(Surface("base", "z0"), FLOOR, law),
-            ContactPair(Surface("base", "x1"), Surface("side", "x0"), Coulomb(0.2)),
-            ContactPair(Surface("top", "z0"), Surface("base", "z1"), law),
+            ContactPair(Surface("base", "x1"), Surface("side", "x0"), Coulomb(0.2), discretisation="node"),
+            ContactPair(Surface("top", "z0"), Surface("base", "z1"), law, discretisation="node"),
         ],
     )
 

@@ -67,7 +67,7 @@ def tower_pairs(bodies: dict[str, Body], friction: Friction) -> list[ContactPair
         # The surface inside the other one is the slave.
         smaller = np.ptp(bodies[above].mesh.points[high], axis=(0, 1)).sum()
         larger = np.ptp(bodies[below].mesh.points[low], axis=(0, 1)).sum()
-        pairs.append(ContactPair(*(slave if smaller <= larger else slave[::-1]), friction))
+        pairs.append(ContactPair(*(slave if smaller <= larger else slave[::-1]), friction, "node"))
     return pairs
 
 

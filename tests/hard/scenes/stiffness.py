@@ -92,7 +92,7 @@ def fine_on_coarse(ratio: float, cells: int) -> Trial:
         {"lower": Body(lower, soft), "upper": Body(crowned(upper, 0.005), stiff)},
         [Support("lower", "z0")],
         [Traction("upper", "z1", (0.003, 0.0, -0.01))],
-        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), FRICTION)],
+        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), FRICTION, discretisation="node")],
     )
     return Trial(scene, cut=boxes(scene, (2, 2, 2)), other=ragged(scene, 4))
 
@@ -188,7 +188,7 @@ def drawn(thickness: float) -> Scene:
         {"lower": Body(lower, STEEL), "upper": Body(upper.moved(smaller), STEEL)},
         [Support("lower", "z0"), Support("upper", "x1", (1e-4, 0.0, None))],
         [Traction("upper", "z1", (0.0, 0.0, -1.0))],
-        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), Coulomb(0.3))],
+        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), Coulomb(0.3), discretisation="node")],
     )
 
 

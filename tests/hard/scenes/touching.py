@@ -162,7 +162,7 @@ def shaft_in_hub(inside: int, outside: int, friction: float) -> Scene:
     """A polygonal shaft in a polygonal bush of the same radius: corners of one lie inside the other."""
     shaft, hub = ring(0.4, 1.0, inside, 1.2), ring(1.0, 1.5, outside, 1.3)
     material = PlaneStrain(1000.0, 0.3)
-    pair = ContactPair(Surface("shaft", "y1"), Surface("hub", "y0"), Coulomb(friction), geometry="faceted")
+    pair = ContactPair(Surface("shaft", "y1"), Surface("hub", "y0"), Coulomb(friction), "node", "faceted")
     return Scene(
         {"shaft": Body(shaft, material), "hub": Body(hub, material)},
         [Support("hub", "y1", (0.0, 0.0))],
