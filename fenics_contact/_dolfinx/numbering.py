@@ -34,6 +34,11 @@ def scalar_space(mesh: dolfinx.mesh.Mesh, degree: int) -> dolfinx.fem.FunctionSp
     return _space(mesh, scalar_element(cell_type) if degree == 1 else cellwise_element(cell_type))
 
 
+def cellwise_space_on(mesh: dolfinx.mesh.Mesh, shape: tuple[int, ...]) -> dolfinx.fem.FunctionSpace:
+    """Return the space of scalars, or vectors, on ``mesh`` that are constant on each cell."""
+    return _space(mesh, cellwise_element(cell_type_of_mesh(mesh), shape))
+
+
 def nodal_space_on(mesh: dolfinx.mesh.Mesh, size: int) -> dolfinx.fem.FunctionSpace:
     """Return the space of nodal fields with a number of components on ``mesh``, of the cells' degree."""
     cell_type = cell_type_of_mesh(mesh)

@@ -78,6 +78,6 @@ def nodal_space(cell_type: str) -> ufl.FunctionSpace:
 
 
 @lru_cache(maxsize=16)
-def cellwise_space(cell_type: str) -> ufl.FunctionSpace:
-    """Return the template's space of scalars that are constant on each cell."""
-    return ufl.FunctionSpace(template(cell_type), cellwise_element(cell_type))
+def cellwise_space(cell_type: str, shape: tuple[int, ...] = ()) -> ufl.FunctionSpace:
+    """Return the template's space of scalars, or vectors, that are constant on each cell."""
+    return ufl.FunctionSpace(template(cell_type), cellwise_element(cell_type, shape))

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from fenics_contact import _dolfinx
+from fenics_contact.fem.cell_polynomials import CellPolynomials
 from fenics_contact.fem.templates import quadrature_degree
 from fenics_contact.mesh import CELL_TYPES, jacobians, quadrature
 
@@ -20,14 +23,15 @@ class Dilatation:
             cell_type: Of the mesh.
             points: Coordinates by block, shape (n, dim), [length].
         """
-        self._positions, self._weights = quadrature(CELL_TYPES[cell_type], quadrature_degree(cell_type))
+        self._positions, _ = quadrature(CELL_TYPES[cell_type], quadrature_degree(cell_type))
         self._points, self._cells = points, _dolfinx.vtk_cell_dofs(space)
         self._undeformed = jacobians(points, self._cells, self._positions)
+        self._cell_type = cell_type
 
-    @property
-    def volumes(self) -> np.ndarray:
-        """Volume of each undeformed cell, shape (n_cells,), [length^dim]."""
-        return self._integral(self._undeformed)
+    @cached_property
+    def polynomials(self) -> CellPolynomials:
+        """The polynomials of the undeformed cells."""
+        return CellPolynomials(self._points, self._cells, self._cell_type)
 
     def least(self, displacement: np.ndarray) -> float:
         """Return the smallest det F of all Gauss points.
@@ -35,16 +39,9 @@ class Dilatation:
         Args:
             displacement: By dof, shape (dim n,), [length].
         """
-        return float((self._deformed(displacement) / self._undeformed).min())
+        return float(self.at(displacement).min())
 
-    def means(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the mean det F of each cell, its volume divided by the undeformed one, shape (n_cells,)."""
-        return self._integral(self._deformed(displacement)) / self.volumes
-
-    def _deformed(self, displacement: np.ndarray) -> np.ndarray:
+    def at(self, displacement: np.ndarray) -> np.ndarray:
+        """Return det F, shape (n_cells, n_gauss), of linear simplices (n_cells, 1)."""
         moved = self._points + displacement.reshape(self._points.shape)
-        return jacobians(moved, self._cells, self._positions)
-
-    def _integral(self, jacobian: np.ndarray) -> np.ndarray:
-        # In a linear simplex there is one value for all points.
-        return np.asarray(np.broadcast_to(jacobian, (len(jacobian), len(self._weights))) @ self._weights)
+        return np.asarray(jacobians(moved, self._cells, self._positions) / self._undeformed)

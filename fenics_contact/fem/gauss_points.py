@@ -8,7 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact import _dolfinx
-from fenics_contact.fem.mean_strain import MeanStrain
+from fenics_contact.fem.cell_polynomials import UNSEEN, CellPolynomials
+from fenics_contact.fem.mean_strain import MeanStrain, held_share
 from fenics_contact.fem.templates import quadrature_degree
 from fenics_contact.mesh import CELL_TYPES, determinants, quadrature, shape_gradients
 
@@ -28,6 +29,7 @@ class GaussPoints:
         positions, weights = quadrature(cell, quadrature_degree(cell_type))
         reference = shape_gradients(cell, positions)
         self._shape, self._cells = points.shape, _dolfinx.vtk_cell_dofs(space)
+        self._points, self._cell_type = points, cell_type
         jacobian = np.einsum("cai,qaj->cqij", points[self._cells], reference)
         self._gradients = reference @ np.linalg.inv(jacobian)
         self._weights = weights * determinants(jacobian)
@@ -61,9 +63,15 @@ class GaussPoints:
         nodal = (self._gradients[cells] @ weighted.swapaxes(2, 3)).sum(axis=1)
         return np.bincount(self._dofs[cells].ravel(), nodal.ravel(), minlength=int(np.prod(self._shape)))
 
-    def mean_strain(self, cells: np.ndarray) -> MeanStrain:
-        """Return the means of changes of volume in some cells."""
-        return MeanStrain(self._gradients[cells], self._weights[cells])
+    def mean_strain(self, cells: np.ndarray, moduli: np.ndarray) -> MeanStrain:
+        """Return the means of changes of volume in some cells.
+
+        Args:
+            cells: Numbers of the cells.
+            moduli: Of the material at rest, by Voigt components, shape (6, 6), [force / length²].
+        """
+        share = held_share(moduli) if self._cell_type in UNSEEN else 0.0
+        return MeanStrain(self._gradients[cells], self._polynomials.of(cells), share)
 
     def stiffness(
         self, tangent: np.ndarray, cells: np.ndarray, means: MeanStrain | None = None
@@ -108,6 +116,11 @@ class GaussPoints:
     def entries(self) -> int:
         """Number of entries of the matrix."""
         return len(self._pattern[1])
+
+    @cached_property
+    def _polynomials(self) -> CellPolynomials:
+        """Those on which changes of volume are projected."""
+        return CellPolynomials(self._points, self._cells, self._cell_type)
 
     @cached_property
     def _dofs(self) -> np.ndarray:

@@ -73,7 +73,9 @@ class HistoryMechanics:
             if not len(cells):
                 continue
             shape, size = (len(cells), gradient.shape[1]), material.history_size
-            means = self._gauss.mean_strain(cells) if has_mean_dilatation(material) else None
+            means = None
+            if has_mean_dilatation(material):
+                means = self._gauss.mean_strain(cells, material.moduli)
             given = gradient[cells] if means is None else means.averaged(gradient[cells])
             end = material.answer(
                 given.reshape(-1, 3, 3), before[cells, :, :size].reshape(-1, size), duration

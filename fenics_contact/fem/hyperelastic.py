@@ -11,7 +11,7 @@ from fenics_contact import _dolfinx
 from fenics_contact.fem.composition import Composition, material_sets
 from fenics_contact.fem.deformation import Dilatation
 from fenics_contact.fem.deformed_forms import FORMS, have_mean_energy, prepare_forms
-from fenics_contact.fem.mean_dilatation import MeanDilatation, assembled
+from fenics_contact.fem.mean_dilatation import MeanDilatation, assembled, mean_fields
 from fenics_contact.fem.mechanics import Response
 from fenics_contact.fem.templates import Templates
 from fenics_contact.scene import HistoryMaterial, Scene, is_nonlinear
@@ -35,8 +35,7 @@ class HyperelasticMechanics:
         self._mesh, self._points = space.mesh, points
         self._dilatation = Dilatation(space, cell_type, by_block)
         self._displacement = _dolfinx.fem.Function(space)
-        means = _dolfinx.fem.Function(_dolfinx.scalar_space(space.mesh, 0))
-        fields = (self._displacement, means)
+        fields = [self._displacement, *mean_fields(space.mesh, cell_type)]
         self._energy, self._force, self._tangent = (
             templates[kind, parts.materials, cell_type].bind(
                 [space] * number, parts.parameters, fields, mesh=space.mesh, cells=parts.cells
@@ -81,7 +80,8 @@ class HyperelasticMechanics:
 
     def least_jacobian(self, displacement: np.ndarray) -> float:
         """Return the smallest det F; see `Mechanics.least_jacobian`."""
-        return self._dilatation.least(displacement)
+        least = self._dilatation.least(displacement)
+        return least if self._mean is None else min(least, self._mean.least(displacement))
 
 
 def prepare_mechanics(templates: Templates, scene: Scene) -> None:

@@ -14,13 +14,15 @@ from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
     IsotropicElasticity,
+    J2Plasticity,
     Material,
     MooneyRivlin,
     NeoHooke,
+    Ogden,
     Scene,
     Support,
 )
-from tests.models.bodies import in_halves
+from tests.models.bodies import box, in_halves
 from tests.models.deformed import derivative_errors, equilibrium, patch_of, skew_patch, smooth_field
 
 SHEAR, BULK = 80.1938, 400_942.0
@@ -38,18 +40,62 @@ LONG = (pytest.mark.slow, pytest.mark.claim)
     [
         "quadrilateral",
         "triangle6",
+        "quadrilateral9",
         pytest.param("hexahedron", marks=LONG),
         pytest.param("tetrahedron10", marks=LONG),
+        pytest.param("hexahedron27", marks=LONG),
     ],
 )
 def test_forces_and_tangents_of_mean_dilatations_are_derivatives(cell: str) -> None:
-    patch = patch_of(Body(skew_patch(cell), NeoHooke(10.0, 0.499, mean_dilatation=True)))
+    patch = patch_of(Body(skew_patch(cell), MooneyRivlin(1.0, 0.5, 1e3, mean_dilatation=True)))
     u = smooth_field(patch.points, 0.2)
     in_force, in_stiffness = derivative_errors(patch, u)
     assert in_force < 1e-8
     assert in_stiffness < 1e-8
     found = patch.at(u).stiffness
     assert np.abs(found - found.T).max() < 1e-13 * np.abs(found).max()
+
+
+QUADRATIC = ("triangle6", "quadrilateral9", "tetrahedron10", "hexahedron27")
+BY_CELLS = {
+    "neo-Hooke": NeoHooke(1.0, 0.49, mean_dilatation=True),
+    "Mooney-Rivlin": MooneyRivlin(0.2, 0.05, 50.0, mean_dilatation=True),
+    "Ogden": Ogden((0.6,), (1.8,), 50.0, mean_dilatation=True),
+    "J2": J2Plasticity(1.0, 0.3, 1e-3, 1e-3, mean_dilatation=True),
+}
+OBLIQUE = np.array([[1.0, 0.2, 0.1], [0.1, 0.9, -0.1], [0.05, 0.1, 1.1]])
+
+
+def one_cell(cell: str) -> BodyMesh:
+    """One oblique cell."""
+    linear = cell.rstrip("0123456789")
+    mesh = box(linear, (1, 1, 1))
+    A = OBLIQUE[: mesh.dim, : mesh.dim]
+    nodes, first = np.unique(mesh.cells[0], return_inverse=True)
+    alone = BodyMesh(mesh.points[nodes] @ A.T, first.reshape(1, -1))
+    return alone if linear == cell else quadratic(alone)
+
+
+@pytest.mark.parametrize("cell", ["quadrilateral", "hexahedron", *QUADRATIC])
+@pytest.mark.parametrize(
+    "material", ["neo-Hooke", "Mooney-Rivlin", "J2", pytest.param("Ogden", marks=pytest.mark.slow)]
+)
+def test_only_rigid_motions_of_a_cell_are_without_energy(cell: str, material: str) -> None:
+    patch = patch_of(Body(one_cell(cell), BY_CELLS[material]))
+    stiffness = patch.at(np.zeros(patch.points.shape)).stiffness.toarray()
+    stiff = np.linalg.eigvalsh((stiffness + stiffness.T) / 2)
+    rigid = 3 if patch.points.shape[1] == 2 else 6
+    assert np.abs(stiff[:rigid]).max() < 1e-12 * stiff[-1]
+    assert stiff[rigid] > 1e-6 * stiff[-1]
+
+
+def test_the_dilatation_of_a_hexahedron27_is_linear_and_feels_what_is_conformal() -> None:
+    patch = patch_of(Body(one_cell("hexahedron27"), BY_CELLS["Mooney-Rivlin"]))
+    x, b = patch.points - patch.points.mean(axis=0), 1e-4 * np.array([0.3, -0.5, 0.8])
+    u = 2 * (x @ b)[:, None] * x - (x**2).sum(axis=1)[:, None] * b
+    edges = np.diag([2.0, 1.0, 1.0]) @ OBLIQUE.T  # one a row
+    moments = np.linalg.det(edges) / 12 * edges.T @ edges
+    assert patch.at(u).energy == pytest.approx(50.0 / 2 * 36 * b @ moments @ b, rel=2e-3)
 
 
 def test_in_a_homogeneous_deformation_the_mean_dilatation_is_the_dilatation() -> None:

@@ -45,11 +45,19 @@ class IsotropicRubber(NearlyIncompressible):
             tangent += sum(ufl.diff(slope, one) * b * a for one, b in zip(own, along_du, strict=True))
         return tangent
 
-    def _moduli(self, dim: int, parameters: tuple[ufl.Constant, ...]) -> Expr:
-        """Return ∂²W/∂F² at F = I, of the shear modulus 2 (∂/∂Ī₁ + ∂/∂Ī₂) and the bulk modulus U''(1)."""
+    def unseen_modulus(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return 2G/3: changes of volume have no shape energy."""
+        return 2 * self._shear_modulus(parameters) / 3
+
+    def _shear_modulus(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return 2 (∂/∂Ī₁ + ∂/∂Ī₂) at F = I."""
         own = [ufl.variable(ufl.as_ufl(3.0)) for _ in range(2)]
         energy = self.invariant_energy(own[0], own[1], parameters)
-        shear = 2 * sum(ufl.diff(energy, one) for one in own)
+        return 2 * sum(ufl.diff(energy, one) for one in own)
+
+    def _moduli(self, dim: int, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return ∂²W/∂F² at F = I, of the shear modulus and the bulk modulus U''(1)."""
+        shear = self._shear_modulus(parameters)
         bulk, I = self.bulk_modulus_at(ufl.as_ufl(1.0), parameters), ufl.Identity(dim)  # noqa: E741
         i, j, k, l = ufl.indices(4)  # noqa: E741
         symmetric = I[i, k] * I[j, l] + I[i, l] * I[j, k]

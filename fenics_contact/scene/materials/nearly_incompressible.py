@@ -66,6 +66,19 @@ class NearlyIncompressible(Hyperelasticity):
         dilatation = ufl.variable(J)
         return ufl.diff(ufl.diff(self.volume_energy(dilatation, parameters), dilatation), dilatation)
 
+    def unseen_modulus(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return what the shape energy lacks of the bulk modulus 2G/3 at F = I, [force / length²].
+
+        With it the shape energy of small strains is G ε : ε, as in Lamé's form: no strain is without energy.
+        """
+        size = ufl.variable(ufl.as_ufl(0.0))
+        shear = ufl.as_tensor([[1.0, size, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        along_shear, along_volume = (
+            ufl.diff(ufl.diff(self.shape_energy(F, parameters), size), size)
+            for F in (shear, (1.0 + size) * ufl.Identity(3))
+        )
+        return ufl.max_value(2 * along_shear / 3 - along_volume / 9, 0)
+
 
 def cofactor(F: Expr) -> Expr:
     """Return ∂ det F/∂F."""
