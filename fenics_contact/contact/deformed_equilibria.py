@@ -58,7 +58,12 @@ class DeformedEquilibria:
     """
 
     def __init__(
-        self, scene: Scene, decomposition: Decomposition, steps: AutomaticSteps | None, timer: PhaseTimer
+        self,
+        scene: Scene,
+        decomposition: Decomposition,
+        steps: AutomaticSteps | None,
+        timer: PhaseTimer,
+        beside: DeformedEquilibria | None = None,
     ) -> None:
         """Prepare the forms of all materials. Collective.
 
@@ -67,6 +72,7 @@ class DeformedEquilibria:
             decomposition: Its subdomains.
             steps: How loads are followed; None for the default.
             timer: Collects the wall time.
+            beside: Those of another geometry, whose unchanged parts are reused.
 
         Raises:
             InvalidInputError: If the scene has a rigid surface that is free to move.
@@ -75,7 +81,7 @@ class DeformedEquilibria:
         self.scene, self._steps = scene, steps or AutomaticSteps()
         self._decomposition, self._timer = decomposition, timer
         self._equations = Equations(scene, decomposition)
-        self._assembled: TornSystem | None = None
+        self._assembled: TornSystem | None = None if beside is None else beside._assembled
         self._unresisted: tuple[UnheldMotion, ...] | None = None
         moves = any(body.deforms_much for body in scene.bodies.values())
         self._turned, self._doubts = TurnedBodies(), ContactDoubts()

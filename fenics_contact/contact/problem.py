@@ -281,7 +281,9 @@ class ContactProblem:
 
         equilibria = self._deformed_equilibria
         if equilibria is None or not scene.has_meshes_of(equilibria.scene):
-            equilibria = DeformedEquilibria(scene, self._decomposed(scene), self.steps, self.timer)
+            equilibria = DeformedEquilibria(
+                scene, self._decomposed(scene), self.steps, self.timer, beside=equilibria
+            )
             self._deformed_equilibria = equilibria
         return equilibria
 

@@ -7,7 +7,13 @@ import numpy as np
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.contact_rows import Relations
 from fenics_contact.feti.decomposition import Decomposition
-from fenics_contact.pairing import HELD, ContactPoints, find_contact_points
+from fenics_contact.pairing import (
+    HELD,
+    ContactPoints,
+    find_contact_points,
+    find_tied_points,
+    join_points,
+)
 from fenics_contact.scene import Scene
 
 #: Supports hold a point along its normal if the free fraction is no larger than this: normals of facets are
@@ -39,6 +45,31 @@ def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
         )
 
 
+def meeting_points(
+    scene: Scene, decomposition: Decomposition, *, overlap: bool, told: bool = False
+) -> tuple[ContactPoints, ContactPoints]:
+    """Search for contact and tied points, only where the scene has pairs. Collective.
+
+    Args:
+        scene: The scene.
+        decomposition: Its subdomains.
+        overlap: Whether bodies may overlap.
+        told: Whether doubts about the surfaces were told, as of another design.
+
+    Raises:
+        InvalidInputError: As `check_no_penetration`.
+    """
+    tearing, fixed, comm = decomposition.tearing, decomposition.fixed, decomposition.comm
+    points = ties = join_points([], scene.dim, tearing.n_nodes)
+    if scene.contacts:
+        points = find_contact_points(scene, fixed, comm, told=told)
+        if not overlap:
+            check_no_penetration(scene, points)
+    if scene.ties:
+        ties = find_tied_points(scene, fixed, comm, told=told)
+    return points, ties
+
+
 def check_apart(scene: Scene, decomposition: Decomposition) -> None:
     """Search for contact and reject bodies that overlap at the start. Collective.
 
@@ -46,7 +77,8 @@ def check_apart(scene: Scene, decomposition: Decomposition) -> None:
         InvalidInputError: As `check_no_penetration`.
     """
     if scene.contacts:
-        check_no_penetration(scene, find_contact_points(scene, decomposition.fixed, decomposition.comm))
+        points = find_contact_points(scene, decomposition.fixed, decomposition.comm, told=True)
+        check_no_penetration(scene, points)
 
 
 def gap_with_room(normal: Relations, fixed: np.ndarray, prescribed: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ from fenics_contact.feti.contact_rows import (
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.free_motions import NO_MOTIONS, FreeMotions, free_motions
 from fenics_contact.feti.gluing import prescribed_displacements
-from fenics_contact.feti.initial_gap import check_no_penetration, gap_with_room
+from fenics_contact.feti.initial_gap import gap_with_room, meeting_points
 from fenics_contact.feti.nodal_mean import nodal_mean_at
 from fenics_contact.feti.numbering import DualNumbering
 from fenics_contact.feti.rows import Rows, stack
@@ -30,9 +30,7 @@ from fenics_contact.feti.subdomain import Subdomain, assemble
 from fenics_contact.pairing import (
     ContactPoints,
     find_contact_points,
-    find_tied_points,
     friction_data,
-    join_points,
 )
 from fenics_contact.qp import ContactLayout, CoulombLaw, SlipLaw, TrescaLaw
 from fenics_contact.scene import Scene
@@ -302,7 +300,8 @@ def _joined(
     prescribed: np.ndarray,
 ) -> TornSystem:
     """Search for contact and build B; the right side is left empty. Collective."""
-    points, ties = _meeting_points(scene, decomposition, overlap)
+    told = previous is not None and previous.scene.has_surfaces_of(scene)
+    points, ties = meeting_points(scene, decomposition, overlap=overlap, told=told)
     known = None if previous is None else previous.numbering
     system = _with_rows(scene, decomposition, subdomains, (points, ties), known, prescribed)
     if decomposition.comm.rank == 0:
@@ -367,21 +366,6 @@ def _log_held(rows: Relations, fixed: np.ndarray) -> None:
     if held:
         words = "%d of %d friction rows are left to the supports, which hold slip there"
         tell(_LOG.info, words, held, rows.count)
-
-
-def _meeting_points(
-    scene: Scene, decomposition: Decomposition, overlap: bool
-) -> tuple[ContactPoints, ContactPoints]:
-    """Search for contact and tied points, only where the scene has pairs. Collective."""
-    tearing, fixed, comm = decomposition.tearing, decomposition.fixed, decomposition.comm
-    points = ties = join_points([], scene.dim, tearing.n_nodes)
-    if scene.contacts:
-        points = find_contact_points(scene, fixed, comm)
-        if not overlap:
-            check_no_penetration(scene, points)
-    if scene.ties:
-        ties = find_tied_points(scene, fixed, comm)
-    return points, ties
 
 
 def _own_part(

@@ -41,7 +41,12 @@ _LOG = logging.getLogger(__name__)
 
 
 def find_contact_points(
-    scene: Scene, fixed: np.ndarray, comm: MPI.Comm | None = None, *, finer: bool = False
+    scene: Scene,
+    fixed: np.ndarray,
+    comm: MPI.Comm | None = None,
+    *,
+    finer: bool = False,
+    told: bool = False,
 ) -> ContactPoints:
     """Find the contact points of every contact pair. Collective on ``comm``.
 
@@ -53,16 +58,19 @@ def find_contact_points(
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         comm: Communicator of the ranks that share the work; this rank alone by default.
         finer: Use better representations of surfaces than requested by the scene, see `true_surface`.
+        told: Whether doubts about the surfaces were told.
 
     Raises:
         InvalidInputError: If no node of a slave surface faces its master.
     """
-    return _points_of_pairs(scene, scene.contacts, fixed, comm or MPI.COMM_SELF, finer)
+    return _points_of_pairs(scene, scene.contacts, fixed, comm or MPI.COMM_SELF, finer, told)
 
 
-def find_tied_points(scene: Scene, fixed: np.ndarray, comm: MPI.Comm | None = None) -> ContactPoints:
+def find_tied_points(
+    scene: Scene, fixed: np.ndarray, comm: MPI.Comm | None = None, *, told: bool = False
+) -> ContactPoints:
     """Find the points of tied surfaces, as `find_contact_points`; ``pair`` numbers the ties. Collective."""
-    return _points_of_pairs(scene, scene.ties, fixed, comm or MPI.COMM_SELF)
+    return _points_of_pairs(scene, scene.ties, fixed, comm or MPI.COMM_SELF, told=told)
 
 
 def without_rounding(gap: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -116,15 +124,18 @@ def _points_of_pairs(
     fixed: np.ndarray,
     comm: MPI.Comm,
     finer: bool = False,
+    told: bool = False,
 ) -> ContactPoints:
-    parts = []
+    parts, told = [], told or finer
     for index, pair in enumerate(pairs):
         if isinstance(pair, ContactPair) and pair.within_body:
             continue  # no part of an undeformed body is near another one
-        points = _measured(scene, pair, index, fixed, comm, finer)
+        points = _measured(scene, pair, index, fixed, comm, finer, told=told)
         if isinstance(pair, ContactPair) and pair.given_gap:
             origin, mesh = scene.origin, scene.bodies[pair.slave.body].mesh.origin
-            first = points if origin is scene else _measured(origin, pair, index, fixed, comm, finer)
+            first = points
+            if origin is not scene:
+                first = _measured(origin, pair, index, fixed, comm, finer, told=True)
             slave = first.slave - NodeNumbers.of(scene).first_of(pair.slave.body)
             points = with_given_gaps(points, first, pair, mesh.points[slave], comm)
         parts.append(in_free_frames(points, fixed))
@@ -132,14 +143,20 @@ def _points_of_pairs(
 
 
 def _measured(
-    scene: Scene, pair: ContactPair | Tie, index: int, fixed: np.ndarray, comm: MPI.Comm, finer: bool
+    scene: Scene,
+    pair: ContactPair | Tie,
+    index: int,
+    fixed: np.ndarray,
+    comm: MPI.Comm,
+    finer: bool,
+    told: bool,
 ) -> ContactPoints:
     """Return the points of one pair with the gaps between its surfaces. Collective."""
     numbers = NodeNumbers.of(scene)
     slave = _Side.of(scene, pair.slave, pair.geometry, numbers, finer)
     movable = ~fixed[slave.nodes].all(axis=1)
     bearing = movable & (slave.surface.areas > 0.0) if isinstance(pair, ContactPair) else movable
-    if not finer:
+    if not told:
         warn_of_surface(scene, pair.slave, pair.geometry, slave.surface, comm)
     if not isinstance(pair.master, Surface):
         with together(comm):
@@ -148,7 +165,7 @@ def _measured(
         require_alike(comm, described((points.slave, points.normal, points.gap), name))
     else:
         master = _Side.of(scene, pair.master, pair.geometry, numbers, finer)
-        if not finer:
+        if not told:
             warn_of_surface(scene, pair.master, pair.geometry, master.surface, comm)
         if pair.discretisation == "mortar":
             points = _by_mortar(slave, bearing, master, comm, master_share(scene, pair))

@@ -216,6 +216,13 @@ class SceneParts:
         meshes = [[body.mesh for body in each.bodies.values()] for each in (self, other)]
         return len(meshes[0]) == len(meshes[1]) and all(map(operator.is_, *meshes))
 
+    def has_surfaces_of(self, other: SceneParts) -> bool:
+        """Return whether both have the same pairs, on meshes that were `reshaped` from the same ones."""
+        pairs = [[*each.contacts, *each.ties] for each in (self, other)]
+        meshes = [[body.mesh.origin for body in each.bodies.values()] for each in (self, other)]
+        alike = len(meshes[0]) == len(meshes[1]) and all(map(operator.is_, *meshes))
+        return alike and pairs[0] == pairs[1]
+
     def moved(self, points: Mapping[str, np.ndarray]) -> Self:
         """Return the scene with new coordinates for some bodies; topology and names stay.
 

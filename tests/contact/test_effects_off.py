@@ -12,7 +12,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, LoadSequence, State, solve_scene, static_admissibility
-from fenics_contact.feti import TornSystem, dual, torn
+from fenics_contact.feti import TornSystem, dual, initial_gap
 from fenics_contact.gallery import block
 from fenics_contact.pairing import contact_search, mortar
 from fenics_contact.partition import box_partition
@@ -40,9 +40,9 @@ PARTS: dict[str, tuple[Any, str]] = {
     "coarse problem": (dual, "CoarseSpace"),
     "preconditioner": (dual, "DirichletPreconditioner"),
     "faces": (face_newton.FaceNewton, "run"),
-    "search for contact": (torn, "find_contact_points"),
-    "check of overlap": (torn, "check_no_penetration"),
-    "search for ties": (torn, "find_tied_points"),
+    "search for contact": (initial_gap, "find_contact_points"),
+    "check of overlap": (initial_gap, "check_no_penetration"),
+    "search for ties": (initial_gap, "find_tied_points"),
     "projection on facets": (contact_search, "_by_projection"),
     "mortar": (mortar, "mortar_coupling"),
     "balance of floating bodies": (static_admissibility, "_check_balance"),

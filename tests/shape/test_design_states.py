@@ -29,6 +29,7 @@ from fenics_contact.scene import (
     Surface,
 )
 from fenics_contact.shape import LoadCases, Movement, Remeshed, ShapeProblem, SurfaceDesign
+from fenics_contact.surface_shapes import Plane
 
 STEEL, RUBBER = PlaneStrain(100.0, 0.3), NeoHooke(1.0, 0.3)
 #: A design whose middle lies inside the floor, by more than facets explain.
@@ -115,3 +116,19 @@ def test_overlaps_are_told_of_the_last_design_alone(caplog: pytest.LogCaptureFix
     cases = LoadCases({"one": problem, "two": problem.case(scene)})
     assert set(cases.remarks(result.x)) == set(problem.remarks(result.x))
     assert problem.remarks(-DEEP) == ()
+
+
+@pytest.mark.parametrize("material", [STEEL, RUBBER], ids=["steel", "rubber"])
+@pytest.mark.parametrize("given", [{}, {"gap": 0.0}])
+def test_doubts_about_a_surface_are_told_of_the_shape_given_alone(
+    given: dict[str, float], material: Material, caplog: pytest.LogCaptureFixture
+) -> None:
+    scene = pressed(material)
+    off = scene.bodies["b"].mesh.with_shapes({"y0": Plane((0.0, -1e-4), (0.0, -1.0))})
+    pair = replace(scene.contacts[0], **given)  # type: ignore[arg-type]
+    problem = designed(replace(scene, bodies={"b": Body(off, material)}, contacts=[pair]))
+    with caplog.at_level(logging.WARNING):
+        for size in (0.05, 0.1, 0.15):
+            problem.evaluate(size * DEEP)
+    words = [record.getMessage() for record in caplog.records if "off its shape" in record.getMessage()]
+    assert len(words) == 1

@@ -33,7 +33,7 @@ def with_given_offsets(
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         comm: Communicator of the ranks; all have the same pairs and points.
     """
-    first = find_contact_points(scene, fixed, comm)
+    first = find_contact_points(scene, fixed, comm, told=True)
     result = []
     for index, (meeting, pair) in enumerate(zip(meetings, scene.contacts, strict=True)):
         if not pair.given_gap:
