@@ -15,6 +15,7 @@ from fenics_contact.qp import (
     DualSolver,
     SolverStep,
     Start,
+    TrescaLaw,
     find_equilibrium,
     measure,
     solve,
@@ -125,10 +126,12 @@ class FixedPoint:
 def _first_slip_bound(problem: DualProblem, start: Start) -> np.ndarray:
     """Return slip bounds for which the first Tresca problem has an equilibrium. Collective.
 
-    Zero, the obvious choice, might leave a body unheld.
+    Zero, the obvious choice, might leave a body unheld, and so might the bounds of another load.
     """
     if not start.cold:
-        return problem.law.bound(start.iterate.multiplier)
+        bound = problem.law.bound(start.iterate.multiplier)
+        if find_equilibrium(problem.with_law(TrescaLaw(problem.layout, bound))).motion is None:
+            return bound
     return FIRST_MARGIN * problem.law.bound(find_equilibrium(problem).multiplier)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from fenics_contact.contact.dual_solve import solve_dual
 from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.feti import DualSystem, TornSystem
-from fenics_contact.qp import DualSolution, DualSolver
+from fenics_contact.qp import DualSolution, DualSolver, may_grip
 from fenics_contact.timing import PhaseTimer
 
 #: Parts of the change of the loads whose equilibria lead to that of all of it.
@@ -82,7 +82,11 @@ class FollowedLoads:
         sizes = (np.sum(coefficient * pressed), np.abs(change).sum())
         rubs, changes = system.torn.numbering.comm.allreduce(np.array(sizes))
         moved = np.abs(system.torn.free.load - self.before.torn.free.load).sum()
-        return bool(rubs > 0.0 and changes + moved > 0.0)
+        if rubs == 0.0 or changes + moved == 0.0:
+            return False
+        problem = system.problem
+        loaded = problem.norm(problem.coarse.particular()) > 0.0
+        return loaded or may_grip(problem.with_law(system.torn.law), start)
 
     @staticmethod
     def _falls(system: DualSystem, before: np.ndarray, after: np.ndarray) -> bool:

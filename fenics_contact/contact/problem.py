@@ -211,7 +211,8 @@ class ContactProblem:
 
         Args:
             scene: The scene with other loads, values of supports or coordinates; None: the original one.
-            start: State of a neighbouring geometry or load to start from, None for none.
+            start: State of a neighbouring geometry or load to start from, None for that from which slip is
+                measured, or none.
             slip_from: State from which slip is measured, that of the last load step; by default the
                 undeformed state.
             tolerance: Overrides the problem's tolerance.
@@ -245,7 +246,7 @@ class ContactProblem:
             self.state = self._equilibria(scene).solve(scene, slip_from, wanted, time, step, overlap=overlap)
             self._passing_bodies.warn(self.state)
             return self.state
-        previous = self.state if start == "last" else start
+        previous = (self.state if start == "last" else start) or slip_from
         decomposition = self._decomposed(scene)
         check_same_input(self.comm, scene, solver=self.solver, tolerance=wanted)
         with together(self.comm):

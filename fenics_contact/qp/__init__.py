@@ -8,7 +8,7 @@ distributed over the ranks of the problem's communicator.
 from __future__ import annotations
 
 from fenics_contact.qp.coarse import CoarseSpace
-from fenics_contact.qp.equilibrium import Equilibrium, find_equilibrium, require_equilibrium
+from fenics_contact.qp.equilibrium import Equilibrium, find_equilibrium, may_grip, require_equilibrium
 from fenics_contact.qp.face import STEEP, Face, Marks, classify, face_basis
 from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG
 from fenics_contact.qp.face_system import CoupledSystem, FaceSystem, FaceSystems, ObliqueProjector
@@ -75,6 +75,7 @@ __all__ = [
     "global_sum",
     "gmres",
     "iterate_at",
+    "may_grip",
     "measure",
     "projected_cg",
     "projected_gmres",

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from fenics_contact.errors import InfeasibleError
+from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.problem import DualProblem
-from fenics_contact.qp.reductions import Vector, global_sum
+from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
 #: A thin plate clamped at one edge needs forces as many times the load as its length is times its thickness.
 LARGEST_FORCE = 1e7
@@ -83,3 +85,35 @@ def require_equilibrium(problem: DualProblem) -> Equilibrium:
             "held; add a support, turn the load into the contact or raise the friction"
         )
     return equilibrium
+
+
+def may_grip(problem: DualProblem, multiplier: Vector) -> bool:
+    """Return whether friction may press bodies together that no load acts on; no product. Collective.
+
+    Without friction that grows with the normal force, forces without a load are unique. With it they may
+    remain, as in a wedge or a taper, unless it is proven that no admissible ones balance each other, those of
+    a block on its floor for one.
+
+    Args:
+        problem: Coarse space, layout and law are used; its load e is taken to be zero.
+        multiplier: Forces of the last load, owned; only the sum of the normal ones counts.
+    """
+    coarse, layout, comm = problem.coarse, problem.layout, problem.comm
+    if global_max(comm, float(problem.law.growth.max(initial=0.0))) == 0.0:
+        return False
+    rows, normal = layout.normal, multiplier[layout.normal]
+    squares, count, pressed = global_sum(
+        comm, coarse.matrix.power(2).sum(), len(rows), np.maximum(normal, 0.0).sum()
+    )
+    if pressed == 0.0:
+        return False
+    # One more equation, of the size of the others: the sum of the normal forces is what it was.
+    weight = float(np.sqrt(squares / count)) or 1.0
+    entries = (np.full(len(rows), weight), (np.zeros(len(rows), dtype=np.int64), rows))
+    total = sp.csr_matrix(entries, shape=(1, layout.size))
+    load = np.append(np.zeros(coarse.m), weight * pressed)
+    gripping = CoarseSpace(comm, sp.vstack([coarse.matrix, total]), load)
+    # Where the sum is the resultant on one body, the equations contradict each other.
+    if np.abs(gripping.unresisted()).max() > 1e-8 * load[-1]:
+        return False
+    return find_equilibrium(replace(problem, coarse=gripping)).motion is None

@@ -9,7 +9,7 @@ import numpy as np
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError, together
 from fenics_contact.progress import Task
-from fenics_contact.qp.equilibrium import require_equilibrium
+from fenics_contact.qp.equilibrium import may_grip, require_equilibrium
 from fenics_contact.qp.iterate import (
     Start,
     answer_at,
@@ -222,7 +222,7 @@ def _begin(
     else:
         iterate = iterate_fitted(problem, multiplier, product)
     begin = Start(iterate, operator, None if earlier is None else earlier.memory, cold=start is None)
-    if begin.cold or problem.norm(coarse.particular()) > 0.0 or _may_jam(problem, multiplier):
+    if begin.cold or problem.norm(coarse.particular()) > 0.0 or may_grip(problem, multiplier):
         return begin
     # No body is loaded: zero forces, free of cost, may be closer than those of another load.
     rest = _at_rest(problem, begin)
@@ -233,17 +233,6 @@ def _at_rest(problem: DualProblem, begin: Start) -> Start:
     """Return the start without any force. Collective."""
     nothing = np.zeros_like(begin.iterate.multiplier)
     return replace(begin, iterate=iterate_fitted(problem, nothing, nothing), cold=True)
-
-
-def _may_jam(problem: DualProblem, multiplier: Vector) -> bool:
-    """Return whether friction may hold bodies pressed together without a load. Collective.
-
-    Where it grows with the normal forces there are several equilibria without a load, and that of a load
-    step is the one near the last: a wedge that was driven in stays. Otherwise the answer is unique.
-    """
-    return problem.norm(problem.law.bound(multiplier) - problem.law.bound(np.zeros_like(multiplier))) > 0.0
-
-
 
 
 def _as_it_is(problem: DualProblem, start: Start, tolerance: float) -> DualSolution | None:

@@ -1,0 +1,94 @@
+"""Loads of exactly zero after others: what friction cannot hold without a load comes to rest at no cost."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import ContactProblem, FixedPoint, LoadSequence, State
+from fenics_contact.gallery import rectangle
+from fenics_contact.qp import DualSolver, FaceNewton, Smalse
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    Coulomb,
+    LoadStep,
+    PlaneStrain,
+    RigidPlane,
+    Scene,
+    Support,
+    Surface,
+    TotalForce,
+)
+
+MATERIAL = PlaneStrain(1000.0, 0.3)
+#: Inclination of the sides of the wedge; friction holds it where it is more than the tangent of this.
+SIDE = np.radians(5.0)
+SOLVERS = {
+    "face Newton": FaceNewton(1e-8),
+    "fixed point of face Newton": FixedPoint(FaceNewton(1e-8)),
+    "fixed point of SMALSE": FixedPoint(Smalse(1e-8)),
+}
+NAMES = [*list(SOLVERS)[:2], pytest.param(list(SOLVERS)[2], marks=pytest.mark.slow)]
+
+
+def load(force: float) -> list[TotalForce]:
+    return [TotalForce("wedge", "y1", (0.0, -force))]
+
+
+def wedge(friction: float) -> Scene:
+    """A wedge between two rigid walls, open above."""
+    straight = rectangle((-1.0, 0.0), (1.0, 6.0), (2, 4))
+    side, height = straight.points.T
+    mesh = straight.moved(np.column_stack([side * (2.0 + height * np.tan(SIDE)), height]))
+    across, along = np.cos(SIDE), np.sin(SIDE)
+    walls = {"x1": RigidPlane((2.0, 0.0), (-across, along)), "x0": RigidPlane((-2.0, 0.0), (across, along))}
+    pairs = [ContactPair(Surface("wedge", name), wall, Coulomb(friction)) for name, wall in walls.items()]
+    return Scene({"wedge": Body(mesh, MATERIAL)}, [], load(50.0), pairs)
+
+
+def followed(friction: float, solver: DualSolver, *forces: float) -> list[State]:
+    steps = LoadSequence(ContactProblem(wedge(friction), MPI.COMM_SELF, solver=solver))
+    return [steps.advance(LoadStep(f"{force:g}", loads=load(force))) for force in forces]
+
+
+@pytest.mark.parametrize("solver", NAMES)
+def test_a_wedge_that_friction_cannot_hold_comes_out_without_any_force(solver: str) -> None:
+    pressed, released = followed(0.5 * np.tan(SIDE), SOLVERS[solver], 50.0, 0.0)
+
+    assert pressed.contact.normal_force.min() > 0.0
+    assert not released.contact.normal_force.any()
+    assert not released.gather_displacement("wedge").any()
+    assert released.solution.products <= 1
+
+
+def test_a_step_without_another_start_begins_at_the_step_before() -> None:
+    problem = ContactProblem(wedge(0.3), MPI.COMM_SELF, tolerance=1e-8)
+    pressed = problem.solve()
+    scene = replace(problem.scene, loads=load(0.0))
+
+    again, anew = (problem.solve(scene, start=None, slip_from=each) for each in (pressed, None))
+
+    assert again.contact.normal_force.sum() > 0.5 * pressed.contact.normal_force.sum()
+    assert not anew.contact.normal_force.any()
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_block_that_was_released_has_no_force_and_can_be_pushed_again(solver: str) -> None:
+    floor, block = rectangle((0.0, 0.0), (3.0, 1.0), (6, 2)), rectangle((0.5, 1.0), (2.5, 2.0), (5, 3))
+    pair = ContactPair(Surface("block", "y0"), Surface("floor", "y1"), Coulomb(0.3), "node")
+    bodies = {"floor": Body(floor, MATERIAL), "block": Body(block, MATERIAL)}
+    scene = Scene(bodies, [Support("floor", "y0")], [], [pair])
+    steps = LoadSequence(ContactProblem(scene, MPI.COMM_SELF, solver=SOLVERS[solver]))
+    pushes = [[TotalForce("block", "y1", (0.2 * force, -force))] for force in (50.0, 0.0, 10.0)]
+
+    pressed, released, again = (steps.advance(LoadStep("push", loads=push)) for push in pushes)
+
+    assert not released.contact.normal_force.any()
+    assert not released.gather_displacement("block").any()
+    assert released.solution.products <= 1
+    sums = [state.contact.normal_force.sum() for state in (pressed, again)]
+    np.testing.assert_allclose(sums, [50.0, 10.0], rtol=1e-6)
