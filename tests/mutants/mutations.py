@@ -423,4 +423,11 @@ MUTATIONS = (
         "UNSEEN = ()",
         ("tests/models/test_nearly_incompressible.py::test_only_rigid_motions_of_a_cell_are_without_energy",),
     ),
+    Mutation(
+        "a yield stress that has fallen to zero still has a slope",
+        "scene/materials/return_mapping.py",
+        "np.where(stress > 0, slope, 0.0)",
+        "slope",
+        ("tests/scene/test_plasticity.py::test_the_tangent_of_metal_that_has_lost_its_yield_stress_is_exact",),
+    ),
 )

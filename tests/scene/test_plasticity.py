@@ -79,6 +79,14 @@ def test_perfect_plasticity_and_softening_keep_to_the_yield_stress() -> None:
     assert spent.history[0, 6] == pytest.approx(0.6)
 
 
+def test_the_tangent_of_metal_that_has_lost_its_yield_stress_is_exact() -> None:
+    metal, loaded = J2Plasticity(E, NU, YIELD, -1e4, 2e4), deformations(0.05)
+    end = metal.answer(loaded, at_rest(metal, 20), 0.0)
+    assert (end.history[:, 6] > YIELD / 1e4).all()
+    assert (metal.hardening.at(end.history[:, 6])[0] == 0.0).all()
+    assert tangent_error(metal, loaded, at_rest(metal, 20), 1e-7) < 1e-6
+
+
 def test_large_tension_follows_the_law_in_logarithmic_strain() -> None:
     stretches = np.array([0.0005, 0.1, 0.3, 0.6])
     nominal, history = in_tension(LARGE, stretches)
