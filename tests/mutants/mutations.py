@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from tests.mutants.copy_of_package import Mutation
 from tests.mutants.design_mutations import DESIGN_MUTATIONS, GIVEN
+from tests.mutants.large_mutations import LARGE_MUTATIONS
 
 CONIC = "tests/contact/test_conic.py::test_energies_and_contact_forces_equal_those_of_a_conic_solver"
 
 PARTS = "tests/accuracy/test_certificate_parts.py"
-ONE_STEP = (
-    "tests/nonlinear/test_parts.py::"
-    "test_friction_and_plastic_flow_do_not_depend_on_how_a_load_step_is_cut"
-)
 NARROW = "tests/surfaces/test_narrow_surfaces.py"
 RIGID = "tests/contact/test_rigid_surfaces.py"
 
 MUTATIONS = (
     *DESIGN_MUTATIONS,
+    *LARGE_MUTATIONS,
     Mutation(
         "friction drags the slave along its slip",
         "contact/result.py",
@@ -245,75 +243,6 @@ MUTATIONS = (
         ("tests/contact/test_far_from_origin.py::test_no_contact_point_is_lost_far_from_the_origin",),
     ),
     Mutation(
-        "pressures that follow are three percent softer than their forces say",
-        "nonlinear/loading.py",
-        "blocks[number] = blocks[number] + softening",
-        "blocks[number] = blocks[number] + 0.97 * softening",
-        (
-            "tests/nonlinear/test_following_pressure.py::test_newton_is_quadratic_where_rims_slide_in_planes_of"
-            "_symmetry_and_neighbours_pass_forces_on",
-        ),
-    ),
-    Mutation(
-        "slip of bodies that move far begins anew in every part of a load step",
-        "nonlinear/newton.py",
-        "None if at.meeting is None else at.meeting.start",
-        "None if at.meeting is None else at.meeting.stood",
-        (f"{ONE_STEP}[plane]",),
-    ),
-    Mutation(
-        "slip of bodies that do not move far begins anew in every part of a load step",
-        "nonlinear/load_steps.py",
-        "load = self._load(fraction, *self._origin)",
-        "load = self._load(fraction, self._at, self._torn)",
-        (f"{ONE_STEP}[metal]",),
-    ),
-    Mutation(
-        "plastic strain goes on from every part of a load step",
-        "nonlinear/newton.py",
-        "history=origin.history, time=origin.time",
-        "history=self.evaluation.history, time=origin.time",
-        (f"{ONE_STEP}[metal]",),
-    ),
-    Mutation(
-        "pressures that followed before stay whole while others take their place",
-        "nonlinear/loading.py",
-        "[((1.0 - part) * weight, each) for weight, each in first.following]",
-        "[(weight, each) for weight, each in first.following]",
-        ("tests/nonlinear/test_parts.py::test_on_the_way_to_another_pressure_the_old_one_goes_as_the_new_one_comes",),
-    ),
-    Mutation(
-        "pressures that follow and are functions of time grow in proportion to it",
-        "nonlinear/loading.py",
-        "mixed = replace(mixed, torn=torn, following=now.following)",
-        "mixed = replace(mixed, torn=torn)",
-        ("tests/nonlinear/test_parts.py::test_a_pressure_that_is_a_function_of_time_has_its_value_at_every_part",),
-    ),
-    Mutation(
-        "surfaces that slide have no curvature",
-        "pairing/sliding/contact.py",
-        'bend = np.einsum("nabd,nd->nab", at.second, at.normal)',
-        'bend = 0.0 * np.einsum("nabd,nd->nab", at.second, at.normal)',
-        ("tests/pairing/test_sliding_derivatives.py::test_stiffness_is_the_derivative_of_the_normal_forces",),
-    ),
-    Mutation(
-        "directions of friction do not turn with normals",
-        "pairing/sliding/differential.py",
-        "other = np.cross(change, unit) + np.cross(normal[:, None], turned)",
-        "other = np.cross(change, unit)",
-        (
-            "tests/pairing/test_sliding_derivatives.py::test_friction_stiffness_is_the_derivative_of_the_friction"
-            "_forces",
-        ),
-    ),
-    Mutation(
-        "nodes of a fold are slaves that are masters already",
-        "pairing/sliding/roles.py",
-        "& ~self._are_masters(found, last)",
-        "& (found.point >= 0)",
-        ("tests/pairing/test_sliding_contact.py::test_a_node_is_no_slave_where_it_is_the_master_of_one",),
-    ),
-    Mutation(
         "the tangent of plastic flow forgets that its direction turns",
         "scene/materials/return_mapping.py",
         "slope) - 1 + theta, 0.0)",
@@ -352,16 +281,6 @@ MUTATIONS = (
         (f"{NARROW}::test_a_narrow_strip_has_radial_normals_in_every_orientation",),
     ),
     Mutation(
-        "friction of parts with histories of their own is not added up",
-        "nonlinear/load_steps.py",
-        "self._rubbed += self._end.evaluation.rubbing",
-        "self._rubbed = 0.0",
-        (
-            "tests/nonlinear/test_reported_values.py::test_friction_to_and_fro_within_a_load_step_is_the_sum"
-            "_over_parts_with_histories_of_their_own",
-        ),
-    ),
-    Mutation(
         "moments are about undeformed places",
         "contact/deformed_state.py",
         "self.gather_displacement(name) if body.deforms_much else 0.0",
@@ -384,30 +303,6 @@ MUTATIONS = (
         "points.carry_slip(origin.contact.total_slip, stood)",
         "points.carry_tangential(origin.contact.total_slip, stood)",
         ("tests/nonlinear/test_reported_values.py::test_slip_of_earlier_steps_turns_about_the_normal",),
-    ),
-    Mutation(
-        "nodes that meet their master later have no given gap",
-        "pairing/sliding/given_offsets.py",
-        "near[:] = True",
-        "pass",
-        (
-            "tests/pairing/test_sliding_given_gaps.py::"
-            "test_nodes_that_meet_their_master_later_have_the_gap_of_those_beside_them",
-        ),
-    ),
-    Mutation(
-        "gradients of rubber hold weighted means where they are",
-        "pairing/sliding/points.py",
-        "total += motion.gap_rows(some, self.coordinates).T @ by",
-        "total += 0.0",
-        ("tests/shape/test_deformed_sensitivity.py::test_plane_blocks_that_meet_by_mortar",),
-    ),
-    Mutation(
-        "slip of weighted means begins where no design moves it",
-        "pairing/sliding/slip_origin.py",
-        "result = result - _of_nodes(width * now[met] + a, width * count).T @ rows",
-        "result = result - 0.0 * _of_nodes(width * now[met] + a, width * count).T @ rows",
-        ("tests/shape/test_deformed_sensitivity.py::test_plane_blocks_that_meet_by_mortar",),
     ),
     Mutation(
         "the dilatation of hexahedra27 is constant in a cell",

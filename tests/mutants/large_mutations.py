@@ -1,0 +1,102 @@
+"""Mistakes in large deformations, and the quick tests that must find them."""
+
+from __future__ import annotations
+
+from tests.mutants.copy_of_package import Mutation
+
+ONE_STEP = (
+    "tests/nonlinear/test_parts.py::"
+    "test_friction_and_plastic_flow_do_not_depend_on_how_a_load_step_is_cut"
+)
+
+LARGE_MUTATIONS = (
+    Mutation(
+        "pressures that follow are three percent softer than their forces say",
+        "nonlinear/loading.py",
+        "blocks[number] = blocks[number] + softening",
+        "blocks[number] = blocks[number] + 0.97 * softening",
+        (
+            "tests/nonlinear/test_following_pressure.py::test_newton_is_quadratic_where_rims_slide_in_planes_of"
+            "_symmetry_and_neighbours_pass_forces_on",
+        ),
+    ),
+    Mutation(
+        "slip of bodies that move far begins anew in every part of a load step",
+        "nonlinear/newton.py",
+        "None if at.meeting is None else at.meeting.start",
+        "None if at.meeting is None else at.meeting.stood",
+        (f"{ONE_STEP}[plane]",),
+    ),
+    Mutation(
+        "slip of bodies that do not move far begins anew in every part of a load step",
+        "nonlinear/load_steps.py",
+        "load = self._load(fraction, *self._origin)",
+        "load = self._load(fraction, self._at, self._torn)",
+        (f"{ONE_STEP}[metal]",),
+    ),
+    Mutation(
+        "plastic strain goes on from every part of a load step",
+        "nonlinear/newton.py",
+        "history=origin.history, time=origin.time",
+        "history=self.evaluation.history, time=origin.time",
+        (f"{ONE_STEP}[metal]",),
+    ),
+    Mutation(
+        "pressures that followed before stay whole while others take their place",
+        "nonlinear/loading.py",
+        "[((1.0 - part) * weight, each) for weight, each in first.following]",
+        "[(weight, each) for weight, each in first.following]",
+        ("tests/nonlinear/test_parts.py::test_on_the_way_to_another_pressure_the_old_one_goes_as_the_new_one_comes",),
+    ),
+    Mutation(
+        "pressures that follow and are functions of time grow in proportion to it",
+        "nonlinear/loading.py",
+        "mixed = replace(mixed, torn=torn, following=now.following)",
+        "mixed = replace(mixed, torn=torn)",
+        ("tests/nonlinear/test_parts.py::test_a_pressure_that_is_a_function_of_time_has_its_value_at_every_part",),
+    ),
+    Mutation(
+        "surfaces that slide have no curvature",
+        "pairing/sliding/contact.py",
+        'bend = np.einsum("nabd,nd->nab", at.second, at.normal)',
+        'bend = 0.0 * np.einsum("nabd,nd->nab", at.second, at.normal)',
+        ("tests/pairing/test_sliding_derivatives.py::test_stiffness_is_the_derivative_of_the_normal_forces",),
+    ),
+    Mutation(
+        "directions of friction do not turn with normals",
+        "pairing/sliding/differential.py",
+        "other = np.cross(change, unit) + np.cross(normal[:, None], turned)",
+        "other = np.cross(change, unit)",
+        (
+            "tests/pairing/test_sliding_derivatives.py::test_friction_stiffness_is_the_derivative_of_the_friction"
+            "_forces",
+        ),
+    ),
+    Mutation(
+        "nodes of a fold are slaves that are masters already",
+        "pairing/sliding/roles.py",
+        "& ~self._are_masters(found, last)",
+        "& (found.point >= 0)",
+        ("tests/pairing/test_sliding_contact.py::test_a_node_is_no_slave_where_it_is_the_master_of_one",),
+    ),
+    Mutation(
+        "friction of parts with histories of their own is not added up",
+        "nonlinear/load_steps.py",
+        "self._rubbed += self._end.evaluation.rubbing",
+        "self._rubbed = 0.0",
+        (
+            "tests/nonlinear/test_reported_values.py::test_friction_to_and_fro_within_a_load_step_is_the_sum"
+            "_over_parts_with_histories_of_their_own",
+        ),
+    ),
+    Mutation(
+        "nodes that meet their master later have no given gap",
+        "pairing/sliding/given_offsets.py",
+        "near[:] = True",
+        "pass",
+        (
+            "tests/pairing/test_sliding_given_gaps.py::"
+            "test_nodes_that_meet_their_master_later_have_the_gap_of_those_beside_them",
+        ),
+    ),
+)
