@@ -7,6 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import State, contact_area, solve_scene
+from fenics_contact.contact.area import _reach
 from fenics_contact.gallery import block, half_disc, hemisphere, rectangle
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
@@ -83,3 +84,9 @@ def test_a_face_that_is_pressed_all_over_touches_all_over(cell: str) -> None:
     assert contact_area(state) == pytest.approx(3.0 if plane else 6.0, rel=1e-12)
     assert state.contact.travel(np.array(down)) == 0.0
     assert state.contact.travel(-np.array(down)) == np.inf
+
+
+def test_the_rim_lies_where_pressure_and_gap_of_a_smooth_contact_place_it() -> None:
+    inside, length, size = np.array([0.1, 0.5, 0.9, 1.7]), 2.0, 3.0
+    pressure, spread = size * np.sqrt(inside), 4 / 3 * size * (length - inside) ** 1.5
+    np.testing.assert_allclose(_reach(pressure, spread, np.full(4, length)), inside / length, rtol=1e-9)
