@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from tests.random_scenes.judge import GOOD, Verdict
-from tests.random_scenes.runner import judged, table, work
+from tests.random_scenes.runner import JUDGES, judged, table, work
 
 
 def main() -> int:
@@ -21,14 +21,15 @@ def main() -> int:
         "--processes", type=int, default=2, help="how many at a time; 0: in this process, without a limit"
     )
     parser.add_argument("--limit", type=float, default=60.0, help="seconds of processor time for one scene")
+    parser.add_argument("--kind", choices=JUDGES, default="linear", help="which scenes")
     parser.add_argument("--output", type=Path, help="all verdicts as JSON, a line each")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.worker:
-        work()
+        work(JUDGES[options.kind])
         return 0
     seeds = options.seeds or range(options.first, options.first + options.count)
-    verdicts = judged(seeds, options.processes, options.limit, _tell)
+    verdicts = judged(seeds, options.processes, options.limit, _tell, options.kind)
     if options.output:
         text = "\n".join(json.dumps(verdict.written()) for verdict in verdicts)
         options.output.write_text(text + "\n", encoding="utf-8")

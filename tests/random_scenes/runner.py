@@ -17,16 +17,20 @@ from pathlib import Path
 from typing import IO
 
 from fenics_contact.launching import clean_environment
+from tests.random_scenes.deformed_judge import judge_history
 from tests.random_scenes.judge import Outcome, Verdict, judge
 
 ROOT = Path(__file__).parents[2]
 #: A process that waits and computes nothing hangs, too, if it does so for this many times the limit.
 PATIENCE = 40.0
+Judge = Callable[[int], Verdict]
+#: Scenes of small strain and linear materials, and histories of large deformations.
+JUDGES: dict[str, Judge] = {"linear": judge, "deformed": judge_history}
 #: Begins the lines that a worker writes; libraries may write others.
 MARK = "verdict: "
 
 
-def work() -> None:
+def work(judge: Judge) -> None:
     """Judge the scenes whose seeds come in, one a line, until there are no more."""
     warnings.simplefilter("error", RuntimeWarning)  # numbers that are none come from inside, too
     for line in sys.stdin:
@@ -34,7 +38,11 @@ def work() -> None:
 
 
 def judged(
-    seeds: Iterable[int], processes: int, limit: float, told: Callable[[Verdict], None] = lambda verdict: None
+    seeds: Iterable[int],
+    processes: int,
+    limit: float,
+    told: Callable[[Verdict], None] = lambda verdict: None,
+    kind: str = "linear",
 ) -> list[Verdict]:
     """Judge scenes in several processes.
 
@@ -43,6 +51,7 @@ def judged(
         processes: How many at a time; 0 judges in this process, without a limit.
         limit: Seconds of processor time for a scene.
         told: Gets every verdict as it comes.
+        kind: Which scenes, see `JUDGES`.
 
     Returns:
         By seed.
@@ -60,8 +69,8 @@ def judged(
 
     if processes == 0:
         for seed in iter_of(waiting):
-            note(judge(seed))
-    threads = [threading.Thread(target=_serve, args=(waiting, limit, note)) for _ in range(processes)]
+            note(JUDGES[kind](seed))
+    threads = [threading.Thread(target=_serve, args=(waiting, limit, note, kind)) for _ in range(processes)]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -78,13 +87,13 @@ def iter_of(waiting: queue.Queue[int]) -> Iterator[int]:
             return
 
 
-def _serve(waiting: queue.Queue[int], limit: float, note: Callable[[Verdict], None]) -> None:
+def _serve(waiting: queue.Queue[int], limit: float, note: Callable[[Verdict], None], kind: str) -> None:
     """Give the seeds that wait to one worker process; a new one where it dies or does not end in time."""
     # PETSc's handler, where it is loaded, would end this process when it writes to one that has died.
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGPIPE})
     worker: _Worker | None = None
     for seed in iter_of(waiting):
-        worker = worker or _Worker()
+        worker = worker or _Worker(kind)
         verdict = worker.judge(seed, limit)
         if verdict.outcome in (Outcome.HANG, Outcome.DIED):
             worker.end()
@@ -97,8 +106,8 @@ def _serve(waiting: queue.Queue[int], limit: float, note: Callable[[Verdict], No
 class _Worker:
     """A process that judges one scene after another."""
 
-    def __init__(self) -> None:
-        command = [sys.executable, "-m", "tests.random_scenes", "--worker"]
+    def __init__(self, kind: str) -> None:
+        command = [sys.executable, "-m", "tests.random_scenes", "--worker", "--kind", kind]
         self._process = subprocess.Popen(
             command,
             cwd=ROOT,

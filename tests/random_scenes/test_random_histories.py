@@ -1,0 +1,62 @@
+"""Random histories of large deformations: the same answer elsewhere, in other units and cut otherwise.
+
+`python -m tests.random_scenes --kind deformed --count 500` judges as many as wanted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import ContactResult
+from tests.random_scenes import deformed_judge
+from tests.random_scenes.deformed import KINDS, history
+from tests.random_scenes.deformed_judge import judge_history
+from tests.random_scenes.frame import Frame
+from tests.random_scenes.judge import GOOD, Outcome
+
+CLAIM = [pytest.mark.slow, pytest.mark.claim]
+#: Short ones of some kinds; the others are run with the claims.
+QUICK = (1, 9, 13)
+
+
+@pytest.mark.parametrize("seed", [*QUICK, *(pytest.param(n, marks=CLAIM) for n in range(24, 40))])
+def test_a_random_history_is_the_same_written_and_cut_otherwise(seed: int) -> None:
+    verdict = judge_history(seed)
+    assert verdict.outcome in GOOD, f"{verdict.detail}\n{verdict.words}"
+
+
+def test_seeds_meet_everything() -> None:
+    words = " ".join(history(seed).words for seed in range(300))
+    for part in (
+        *(kind.__name__.replace("_", " ") for kind in KINDS), "plane,", "space,", "mean dilatation", "Ogden",
+        "FinitePlasticity", "J2Plasticity", "quadrilateral9", "hexahedron27", "of true shape", "that turns",
+        "to and fro", "lifted", "by a remote point", "bed is slave", "one surface", "unheld", "dead",
+        "sliding tie", "linear E",
+    ):  # fmt: skip
+        assert part in words, part
+
+
+def test_a_frame_gives_back_what_it_was_given() -> None:
+    turn = np.array([[0.0, -1.0], [1.0, 0.0]])
+    frame = Frame(turn, np.array([3.0, 4.0]), 10.0, 2.0)
+    assert frame.way((0.5, None)) == (None, pytest.approx(5.0))
+    assert frame.back(np.array([frame.along((0.3, 0.7), 2.0)]), 2.0)[0] == pytest.approx([0.3, 0.7])
+    assert frame.point((1.0, 0.0)) == pytest.approx((30.0, 50.0))
+
+
+def test_answers_that_differ_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    force = ContactResult.force.fget  # type: ignore[attr-defined]
+    assert judge_history(QUICK[0]).outcome is Outcome.SOLVED
+    calls = []
+
+    def wrong(self: ContactResult) -> np.ndarray:
+        calls.append(self)
+        return np.asarray(force(self) * (1.0 + 1e-3 * (len(calls) % 2)))
+
+    monkeypatch.setattr(ContactResult, "force", property(wrong))
+    assert deformed_judge.judge_history(QUICK[0], MPI.COMM_SELF).outcome is Outcome.WRONG
+    assert replace(history(QUICK[0]), seed=1).recipe.dim in (2, 3)
