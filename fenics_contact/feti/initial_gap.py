@@ -13,6 +13,8 @@ from fenics_contact.pairing import (
     find_contact_points,
     find_tied_points,
     join_points,
+    warn_of_shared,
+    without_tied,
 )
 from fenics_contact.scene import Scene
 
@@ -67,6 +69,10 @@ def meeting_points(
             check_no_penetration(scene, points)
     if scene.ties:
         ties = find_tied_points(scene, fixed, comm, told=told)
+        if scene.contacts:
+            points = without_tied(points, ties, scene, fixed, told=told or comm.rank > 0)
+    if len(scene.contacts) > 1 and comm.rank == 0 and not told:
+        warn_of_shared(points, scene)
     return points, ties
 
 
