@@ -205,7 +205,7 @@ def test_a_bar_of_a_field_says_what_lies_beyond_its_colours(result: Path) -> Non
     assert [word for word in words if word.isalpha()] == ["stress", "xx", "smallest", "largest"]
     assert [float(words[3]), float(words[5])] == pytest.approx([float(least), float(most)], rel=1e-3)
     assert "smallest" not in titles["von_mises"], "the colours begin with the smallest value"
-    assert titles["von_mises"].startswith("von Mises stress\nlargest ")
+    assert titles["von_mises"].startswith("von Mises stress of cells\nlargest ")
 
 
 @pytest.mark.parametrize(

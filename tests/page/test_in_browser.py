@@ -114,7 +114,7 @@ def test_the_menu_changes_colours_and_numbers(chromium: Browser, pages: dict[str
     chromium.open(pages["space"])
     state = touching_blocks()
     first = drawn(chromium)
-    assert first["bar"] == "von Mises stress (MPa)"
+    assert first["bar"] == "von Mises stress at nodes (MPa)"
     chromium.choose("field", label_of(chromium, "displacement, magnitude"))
     second = drawn(chromium)
     largest = max(
