@@ -82,7 +82,7 @@ scene = Scene(
     supports=[Support("table", "z0")],
     loads=[TotalForce("tower", "z1", (3000.0, 0.0, -16000.0))],  # N
     contacts=[
-        ContactPair(slave=Surface("tower", "z0"), master=Surface("table", "z1"), friction=Coulomb(0.3))
+        ContactPair(Surface("tower", "z0"), Surface("table", "z1"), Coulomb(0.3), discretisation="node")
     ],
 )
 

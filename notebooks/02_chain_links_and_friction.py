@@ -68,7 +68,7 @@ def chain(friction_coefficient, pull=(0.25, 0.0, 0.0)):
     return Scene(
         bodies={"link 1": Body(links.first.mesh, steel), "link 2": Body(links.second.mesh, steel)},
         supports=[Support("link 1", "grip"), Support("link 2", "grip", pull)],
-        contacts=[ContactPair(*crowns, friction)],
+        contacts=[ContactPair(*crowns, friction, discretisation="node")],
     )
 
 

@@ -64,7 +64,7 @@ scene = Scene(
     bodies={"link 1": Body(links.first.mesh, steel), "link 2": Body(links.second.mesh, steel)},
     supports=[Support("link 1", "grip")],
     loads=[TotalForce("link 2", "grip", (60e3, 0.0, 0.0))],  # N
-    contacts=[ContactPair(*crowns, Coulomb(0.3))],
+    contacts=[ContactPair(*crowns, Coulomb(0.3), discretisation="node")],
 )
 
 # %% [markdown]

@@ -52,7 +52,7 @@ scene = Scene(
     bodies={"lower": Body(lower, steel), "upper": Body(upper, steel)},
     supports=[Support("lower", "y0", (0.0, 0.0))],
     loads=[TotalForce("upper", "y1", (450.0, -1000.0))],  # N a mm of thickness
-    contacts=[ContactPair(Surface("upper", "y0"), Surface("lower", "y1"), Coulomb(0.6))],
+    contacts=[ContactPair(Surface("upper", "y0"), Surface("lower", "y1"), Coulomb(0.6), "node")],
 )
 partitions = {"lower": box_partition(lower, (3, 1)), "upper": box_partition(upper, (2, 2))}
 

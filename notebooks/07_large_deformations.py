@@ -108,7 +108,7 @@ x, y = slider.points.T
 rim = 3.0 + 0.3 * (x - 1.6) ** 2
 slider = replace(slider, points=np.column_stack([x, rim + (4.0 - rim) * (y - 3.0)]))
 bodies = {"bed": Body(bed, rubber), "slider": Body(slider, Yeoh((5.0, 0.0, 50.0)))}
-rubbing = ContactPair(Surface("slider", "y0"), Surface("bed", "y1"), Coulomb(0.3))
+rubbing = ContactPair(Surface("slider", "y0"), Surface("bed", "y1"), Coulomb(0.3), "node")
 
 
 def moved(right, down):

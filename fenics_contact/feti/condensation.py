@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._libraries import PETSc
-from fenics_contact.feti.factor import require_factored, symmetric_matrix
+from fenics_contact.feti.factor import Factor, symmetric_matrix
 from fenics_contact.feti.petsc_calls import petsc_call
 from fenics_contact.linalg import dispose_with
 
@@ -32,7 +32,7 @@ class Condensation:
             pattern: Any matrix with the pattern, shape (n, n).
             interface: The dofs b, shape (n_b,).
         """
-        self._size = len(interface)
+        self._size, self._interface = len(interface), interface
         self._structure = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType))
         self._matrix = symmetric_matrix(pattern)
         self._pc = PETSc.PC().create(PETSc.COMM_SELF)
@@ -54,8 +54,18 @@ class Condensation:
         self._matrix.setValuesCSR(*self._structure, stiffness.data / unit)
         self._matrix.assemble()
         self._pc.setUp()
-        require_factored(self._factor)
+        if self._factor.getMumpsInfog(1) < 0:
+            return self._by_factor(stiffness)
         return unit * self._schur_complement()
+
+    def _by_factor(self, stiffness: sp.csr_matrix) -> np.ndarray:
+        """Return S by factors of K_ii: MUMPS may take too little memory where hardly a dof lies inside."""
+        inside = np.ones(stiffness.shape[0], dtype=bool)
+        inside[self._interface] = False
+        between = stiffness[inside][:, self._interface]
+        bent = Factor(stiffness[inside][:, inside].tocsr()).solve_many(between.toarray(order="F"))
+        own = stiffness[self._interface][:, self._interface].toarray(order="F")
+        return np.asfortranarray(own - between.T @ bent)
 
     def _schur_complement(self) -> np.ndarray:
         # petsc4py does not wrap this yet, so PETSc's own library is called.

@@ -11,8 +11,8 @@ from fenics_contact.feti import Factor, petsc_call, require_factored, symmetric_
 
 #: Largest residual of a solution with factors that are used, relative to its right side.
 WRONG = 1e-8
-#: Further memory that MUMPS may take where its estimate was too small, in percent, and its words for that.
-ROOM, NO_ROOM = (100, 400), (-8, -9)
+#: Further memory that MUMPS may take where its estimate was too small, in percent.
+ROOM = (100, 400)
 
 
 class RefillableFactor(Factor):
@@ -69,7 +69,7 @@ class IndefiniteFactor(RefillableFactor):
         factor.setMumpsIcntl(24, 1)
         pc.setUp()
         for percent in ROOM:
-            if factor.getMumpsInfog(1) in NO_ROOM:
+            if factor.getMumpsInfog(1) in (-8, -9):  # its words for too little memory
                 factor.setMumpsIcntl(14, percent)
                 petsc_call("MatCholeskyFactorNumeric", factor.handle, given.handle, None)
         require_factored(factor)
