@@ -35,14 +35,7 @@ def without_tied(
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         told: Whether nothing is to be logged.
     """
-    point, tied = _same_places(points, ties)
-    normal, axis = points.normal[point], ties.normal[tied]
-    sliding = np.array([tie.sliding for tie in scene.ties], dtype=bool)[ties.pair[tied]]
-    along = np.abs(np.einsum("nd,nd->n", normal, axis))
-    # A fixed tie holds all components but those that a support has on its slave.
-    bonded = np.linalg.norm(np.where(fixed[ties.slave[tied]], 0.0, normal), axis=1)
-    held = np.where(sliding, along, bonded) > PARALLEL
-    point, tied = point[held], tied[held]
+    point, tied = _tied(points, ties, scene, fixed)
     if not len(point):
         return points
     if not told:
@@ -54,6 +47,28 @@ def without_tied(
                 len(np.unique(point[which])), scene.contacts[pair].place, scene.ties[tie].place,
             )  # fmt: skip
     return points.part(np.setdiff1d(np.arange(points.count), point))
+
+
+def tied_keys(
+    points: ContactPoints, ties: ContactPoints, scene: Scene, fixed: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return pair and slave node of the points that `without_tied` leaves out."""
+    point = np.unique(_tied(points, ties, scene, fixed)[0])
+    return points.pair[point], points.slave[point]
+
+
+def _tied(
+    points: ContactPoints, ties: ContactPoints, scene: Scene, fixed: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the numbers of contact points and tied ones that hold the same displacement."""
+    point, tied = _same_places(points, ties)
+    normal, axis = points.normal[point], ties.normal[tied]
+    sliding = np.array([tie.sliding for tie in scene.ties], dtype=bool)[ties.pair[tied]]
+    along = np.abs(np.einsum("nd,nd->n", normal, axis))
+    # A fixed tie holds all components but those that a support has on its slave.
+    bonded = np.linalg.norm(np.where(fixed[ties.slave[tied]], 0.0, normal), axis=1)
+    held = np.where(sliding, along, bonded) > PARALLEL
+    return point[held], tied[held]
 
 
 def warn_of_shared(points: ContactPoints, scene: Scene) -> None:

@@ -17,6 +17,7 @@ from fenics_contact.scene import (
     ContactPair,
     Coulomb,
     Discretisation,
+    NeoHooke,
     PlaneStrain,
     RigidSurface,
     Scene,
@@ -74,6 +75,21 @@ def test_tied_nodes_of_a_contact_are_counted(caplog: pytest.LogCaptureFixture) -
         state = solved(half_tied(5, "node", sliding=False), (1, 1))
     assert "1 nodes of the contact of low free on up y0 are tied by low tied on up y0" in caplog.text
     assert state.contact_places[:, 0].min() > 1.01
+
+
+@pytest.mark.parametrize("gap", [None, 0.001])
+@pytest.mark.parametrize("discretisation", ["node", "mortar"])
+def test_a_tied_node_is_no_contact_point_where_bodies_deform_much(
+    discretisation: Discretisation, gap: float | None
+) -> None:
+    scene = half_tied(6, discretisation, sliding=False)
+    rubber = {name: replace(body, material=NeoHooke(1.0, 0.3)) for name, body in scene.bodies.items()}
+    held = [Support("low", "y0"), Support("up", "y1", (0.01, -0.02))]
+    pairs = [replace(scene.contacts[0], gap=gap)]
+    state = solved(replace(scene, bodies=rubber, supports=held, contacts=pairs), (1, 2))
+    assert state.contact.points.count == 3
+    assert state.contact_places[:, 0].min() > 1.1
+    assert state.contact.normal_force.min() > 0.0
 
 
 @pytest.mark.parametrize("side", ["x1", "y0"])

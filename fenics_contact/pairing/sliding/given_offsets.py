@@ -72,5 +72,6 @@ def _offsets(
 def _of_candidates(meeting: Meeting, points: ContactPoints, index: int) -> np.ndarray:
     """Return the distances of a pair's points at its candidates, NaN where these have none, [length]."""
     distance, mine = np.full(len(meeting.candidates), np.nan), points.pair == index
+    mine &= np.isin(points.slave, meeting.nodes)  # tied nodes are no candidates
     distance[np.searchsorted(meeting.nodes, points.slave[mine])] = points.distance[mine]
     return distance

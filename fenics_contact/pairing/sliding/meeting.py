@@ -10,7 +10,9 @@ from scipy.spatial import cKDTree
 
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import together
+from fenics_contact.pairing.contact_search import find_contact_points, find_tied_points
 from fenics_contact.pairing.node_numbers import NodeNumbers
+from fenics_contact.pairing.shared_nodes import tied_keys
 from fenics_contact.pairing.sliding.closest import ClosestPoints
 from fenics_contact.pairing.sliding.moved_surface import moved_surface
 from fenics_contact.pairing.sliding.patches import SmoothPatches
@@ -105,15 +107,24 @@ def meetings_of(scene: Scene, fixed: np.ndarray, comm: MPI.Comm) -> tuple[Meetin
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         comm: Communicator of the ranks.
     """
+    number = slave = np.zeros(0, dtype=np.int64)
+    if scene.contacts and scene.ties:
+        points, ties = (
+            find(scene, fixed, comm, told=True) for find in (find_contact_points, find_tied_points)
+        )
+        number, slave = tied_keys(points, ties, scene, fixed)
     with together(comm):
-        return tuple(_meeting(scene, pair, fixed) for pair in scene.contacts)
+        return tuple(
+            _meeting(scene, pair, fixed, slave[number == index]) for index, pair in enumerate(scene.contacts)
+        )
 
 
-def _meeting(scene: Scene, pair: ContactPair, fixed: np.ndarray) -> Meeting:
+def _meeting(scene: Scene, pair: ContactPair, fixed: np.ndarray, tied: np.ndarray) -> Meeting:
     numbers, dim = NodeNumbers.of(scene), scene.dim
     slave = surface_of(scene, pair.slave, "faceted")
     slave_nodes = numbers.global_nodes(pair.slave.body, slave.nodes)
-    candidates = np.flatnonzero(~fixed[slave_nodes].all(axis=1) & (slave.areas > 0.0))
+    bearing = ~fixed[slave_nodes].all(axis=1) & ~np.isin(slave_nodes, tied)
+    candidates = np.flatnonzero(bearing & (slave.areas > 0.0))
     offset, given = np.zeros(len(candidates)), np.zeros(len(candidates), dtype=bool)
     if not isinstance(pair.master, Surface):
         none = np.zeros(0, dtype=np.int64), np.zeros((0, dim), dtype=bool)
