@@ -6,31 +6,21 @@ the same answer.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact.gallery import half_disc, hemisphere, rectangle
-from fenics_contact.mesh import BodyMesh, quadratic
+from fenics_contact.gallery import rectangle
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.partition import bisection_partition, graph_partition
 from fenics_contact.scene import (
     AnySupport,
     Body,
     ContactPair,
-    Coulomb,
-    FinitePlasticity,
-    Friction,
-    IsotropicElasticity,
-    J2Plasticity,
     Load,
     LoadStep,
-    Material,
-    MooneyRivlin,
     MovingObstacle,
-    NeoHooke,
-    Ogden,
-    PlaneStrain,
     Pressure,
     RigidCylinder,
     RigidObstacle,
@@ -38,12 +28,23 @@ from fenics_contact.scene import (
     RigidSphere,
     RigidSurface,
     Scene,
-    StVenantKirchhoff,
     Support,
     Surface,
     Tie,
     TotalForce,
     Traction,
+)
+from tests.random_scenes.deformed_parts import (
+    any_material,
+    friction_law,
+    metal,
+    pad_mesh,
+    round_mesh,
+    rubber,
+    sides,
+    slotted,
+    stages,
+    vector,
 )
 from tests.random_scenes.dice import Dice
 from tests.random_scenes.frame import Frame
@@ -129,154 +130,26 @@ def cut(scene: Scene, pieces: tuple[str, int] | None) -> dict[str, np.ndarray] |
     return found
 
 
-# -------------------------------------------------------------------------------------------------- materials
-
-Made = Callable[[Frame], Material]
-
-
-def _rubber(dice: Dice, dim: int, size: float, mesh: BodyMesh) -> tuple[Made, bool]:
-    """Choose rubber of a size of stress; whether forces depend on the way."""
-    nu = dice.weighted({0.3: 4.0, 0.45: 2.0, 0.49: 1.0, 0.499: 0.7})
-    mu, bulk = size / (2 * (1 + nu)), size / (3 * (1 - 2 * nu))
-    mean = nu > 0.46 or dice.chance(0.2)
-    simple = mesh.cell_type.rstrip("0123456789") in ("triangle", "tetrahedron")
-    mean = mean and not simple
-    if simple and nu > 0.46:
-        nu, bulk = 0.45, size / 0.3
-    kind = dice.weighted({"NeoHooke": 4.0, "MooneyRivlin": 1.5, "Ogden": 1.5, "StVenantKirchhoff": 0.7})
-    dice.say(f"{kind} E={size:.3g} nu={nu}{' mean dilatation' if mean else ''}")
-    made: dict[str, Made] = {
-        "NeoHooke": lambda f: NeoHooke(size * f.stress_unit, nu, mean),
-        "MooneyRivlin": lambda f: MooneyRivlin(
-            0.4 * mu * f.stress_unit, 0.1 * mu * f.stress_unit, bulk * f.stress_unit, mean
-        ),
-        "Ogden": lambda f: Ogden((2 * mu / 1.8 * f.stress_unit,), (1.8,), bulk * f.stress_unit, mean),
-        "StVenantKirchhoff": lambda f: StVenantKirchhoff(size * f.stress_unit, 0.3),
-    }
-    return made[kind], False
-
-
-def _metal(dice: Dice, dim: int, size: float, mesh: BodyMesh, small: bool = True) -> tuple[Made, bool]:
-    kind = dice.weighted({"J2Plasticity": 2.0 if small else 0.0, "FinitePlasticity": 2.0})
-    strength, hard = size * dice.one_of((0.02, 0.05)), size * dice.one_of((0.05, 0.2))
-    dice.say(f"{kind} E={size:.3g} yields at {strength:.2g}")
-    if kind == "J2Plasticity":
-        kinematic = hard if dice.chance(0.5) else 0.0
-        return lambda f: J2Plasticity(
-            size * f.stress_unit,
-            0.3,
-            strength * f.stress_unit,
-            hard * f.stress_unit,
-            kinematic * f.stress_unit,
-        ), True
-    return lambda f: FinitePlasticity(
-        size * f.stress_unit, 0.3, strength * f.stress_unit, hard * f.stress_unit
-    ), True
-
-
-def _linear(dice: Dice, dim: int, size: float, mesh: BodyMesh) -> tuple[Made, bool]:
-    dice.say(f"linear E={size:.3g}")
-    law = PlaneStrain if dim == 2 else IsotropicElasticity
-    return lambda f: law(size * f.stress_unit, 0.3), False
-
-
-def _material(
-    dice: Dice, dim: int, mesh: BodyMesh, size: float = 1.0, *, soft: bool = False
-) -> tuple[Made, bool]:
-    weights = {_rubber: 5.0} if soft else {_rubber: 5.0, _metal: 2.0, _linear: 0.7}
-    return dice.weighted(weights)(dice, dim, size, mesh)
-
-
-def _friction(dice: Dice) -> tuple[Friction, bool]:
-    law = dice.weighted({None: 3.0, Coulomb(0.2): 2.0, Coulomb(0.5): 2.0, Coulomb(1.0): 0.5})
-    dice.say(f"friction {law.friction_coefficient}" if law else "frictionless")
-    return law, law is not None
-
-
-# ----------------------------------------------------------------------------------------------------- bodies
-
-
-def _pad(dice: Dice, dim: int, low: Sequence[float], high: Sequence[float], across: int) -> BodyMesh:
-    """Mesh a box with odd numbers of cells, of any type."""
-    cell = dice.weighted(
-        {"quadrilateral": 5.0, "triangle": 2.0, "quadrilateral9": 1.0, "triangle6": 1.0}
-        if dim == 2
-        else {"hexahedron": 5.0, "tetrahedron": 1.0, "hexahedron27": 0.7}
-    )
-    if cell.endswith(("7", "9", "6")):
-        across = max(across // 2, 2)
-    size = np.subtract(high, low)
-    counts = [max(round(across * s / size[0]), 2) for s in size]
-    if dim == 3:
-        counts = [
-            min(count, 5 if cell == "hexahedron" else 3 if cell == "tetrahedron" else 2) for count in counts
-        ]
-    lattice_cell = cell.rstrip("0123456789")
-    dice.say(f"{cell} {'x'.join(map(str, counts))}")
-    from fenics_contact.gallery import box_lattice, rectangle_lattice
-
-    ticks = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, counts, strict=True)]
-    mesh = (rectangle_lattice if dim == 2 else box_lattice)(ticks, lattice_cell)
-    return mesh if cell == lattice_cell else quadratic(mesh)
-
-
-def _round(dice: Dice, dim: int, radius: float) -> BodyMesh:
-    """Mesh half a disc or ball, its pole at the origin, with or without its true shape."""
-    n = dice.one_of((3, 4, 5) if dim == 2 else (2, 3))
-    mesh = (half_disc if dim == 2 else hemisphere)(radius, n)
-    true = dice.chance(0.6)
-    dice.say(f"half a {'disc' if dim == 2 else 'ball'} n={n}{' of true shape' if true else ''}")
-    if dice.chance(0.2):
-        mesh = quadratic(mesh)
-        dice.say("quadratic")
-    return mesh if true else mesh.with_shapes({})
-
-
-def _sides(dim: int) -> tuple[str, str]:
-    return ("y0", "y1") if dim == 2 else ("z0", "z1")
-
-
-def _vector(dim: int, along: float, up: float, aside: float = 0.0) -> tuple[float, ...]:
-    return (along, up) if dim == 2 else (along, aside, up)
-
-
-def _stages(dice: Dice, depth: float, way: float) -> list[tuple[float, float]]:
-    """Choose where a body goes: pressed, drawn, back, lifted."""
-    kind = dice.weighted({"pressed": 3.0, "drawn": 3.0, "to and fro": 2.0, "lifted": 1.5})
-    dice.say(f"{kind} by {depth:.3g}" + ("" if kind == "pressed" else f" and {way:.3g}"))
-    drawn = [(0.0, depth), (0.5 * way, depth), (way, depth)]
-    ends = {
-        "pressed": [(0.0, depth)],
-        "drawn": drawn,
-        "to and fro": [*drawn, (0.5 * way, depth), (0.0, depth)],
-        "lifted": [*drawn, (way, -0.3 * depth)],
-    }
-    return ends[kind]
-
-
-# ------------------------------------------------------------------------------------------------------ kinds
-
-
 def tool_on_pad(dice: Dice, dim: int) -> Recipe:
     """A rigid tool that moves is pressed into a pad, drawn along it, and lifted."""
-    pad = _pad(dice, dim, (0.0,) * dim, _vector(dim, 3.0, 1.0, 1.0), dice.one_of((7, 9, 11)))
+    pad = pad_mesh(dice, dim, (0.0,) * dim, vector(dim, 3.0, 1.0, 1.0), dice.one_of((7, 9, 11)))
     made, plastic = (
-        _metal(dice, dim, 1.0, pad, small=False) if dice.chance(0.25) else _rubber(dice, dim, 1.0, pad)
+        metal(dice, dim, 1.0, pad, small=False) if dice.chance(0.25) else rubber(dice, dim, 1.0, pad)
     )
-    law, rubs = _friction(dice)
+    law, rubs = friction_law(dice)
     radius, depth, way = dice.between(0.5, 1.5), dice.between(0.05, 0.2), dice.between(0.1, 0.6)
     shape = dice.weighted({"plane": 1.0, "ball": 3.0, "bar": 1.0 if dim == 3 else 0.0})
     turns = dice.one_of((0.0, 0.0, 0.5)) if shape != "plane" else 0.0
-    start = _vector(dim, dice.between(1.0, 2.0), 1.0, 0.5)
+    start = vector(dim, dice.between(1.0, 2.0), 1.0, 0.5)
     dice.say(f"rigid {shape} of {radius:.3g}{' that turns' if turns else ''}")
-    ends = [(0.0, 0.0), *_stages(dice, depth, way)]
-    bottom, top = _sides(dim)
+    ends = [(0.0, 0.0), *stages(dice, depth, way)]
+    bottom, top = sides(dim)
 
     def build(frame: Frame) -> Built:
-        centre = np.add(start, _vector(dim, 0.0, radius))
+        centre = np.add(start, vector(dim, 0.0, radius))
         tool: RigidObstacle
         if shape == "plane":
-            tool = RigidPlane(frame.point(start), frame.along(_vector(dim, 0.0, -1.0)))
+            tool = RigidPlane(frame.point(start), frame.along(vector(dim, 0.0, -1.0)))
         elif shape == "ball":
             tool = RigidSphere(frame.point(centre), frame.length * radius)
         else:
@@ -285,7 +158,7 @@ def tool_on_pad(dice: Dice, dim: int) -> Recipe:
         def path(time: float) -> tuple[object, object]:
             number = np.arange(len(ends))
             x, d = (float(np.interp(time, number, values)) for values in zip(*ends, strict=True))
-            shift = np.asarray(frame.along(_vector(dim, x, -d), frame.length))
+            shift = np.asarray(frame.along(vector(dim, x, -d), frame.length))
             if not turns:
                 return None, tuple(shift)
             c, s = np.cos(turns * time), np.sin(turns * time)
@@ -304,26 +177,27 @@ def tool_on_pad(dice: Dice, dim: int) -> Recipe:
 
 def slider_on_bed(dice: Dice, dim: int) -> Recipe:
     """A body is pressed on another one and drawn along it, by its top or by a remote point, in cycles."""
-    bed = _pad(dice, dim, (0.0,) * dim, _vector(dim, 3.0, 1.0, 1.0), dice.one_of((7, 9, 13)))
-    upper = _pad(dice, dim, _vector(dim, 0.9, 1.0, 0.1), _vector(dim, 1.9, 1.8, 0.8), dice.one_of((3, 5, 7)))
-    below, plastic = _material(dice, dim, bed)
-    above, more = _material(dice, dim, upper, dice.one_of((1.0, 3.0, 30.0)), soft=True)
-    law, rubs = _friction(dice)
+    bed = pad_mesh(dice, dim, (0.0,) * dim, vector(dim, 3.0, 1.0, 1.0), dice.one_of((7, 9, 13)))
+    corners = vector(dim, 0.9, 1.0, 0.1), vector(dim, 1.9, 1.8, 0.8)
+    upper = pad_mesh(dice, dim, *corners, dice.one_of((3, 5, 7)))
+    below, plastic = any_material(dice, dim, bed)
+    above, more = any_material(dice, dim, upper, dice.one_of((1.0, 3.0, 30.0)), soft=True)
+    law, rubs = friction_law(dice)
     depth, way, turn = dice.between(0.03, 0.12), dice.between(0.05, 0.3), dice.between(-0.1, 0.1)
     remote, kind = dice.chance(0.35), _chosen(dice, bed, upper)
     lower_slave = dice.chance(0.15)
     dice.say(f"{'by a remote point' if remote else 'by its top'}{', bed is slave' if lower_slave else ''}")
-    ends = _stages(dice, depth, way)
-    bottom, top = _sides(dim)
+    ends = stages(dice, depth, way)
+    bottom, top = sides(dim)
 
     def build(frame: Frame) -> Built:
         def supports(along: float, down: float) -> list[AnySupport]:
-            motion = frame.way(_vector(dim, along, -down))
+            motion = frame.way(vector(dim, along, -down))
             if not remote:
                 return [Support("bed", bottom), Support("slider", top, motion)]
             angle = turn * down / depth
             spin = angle if dim == 2 else frame.along((0.0, angle, 0.0))
-            at = frame.point(_vector(dim, 1.4, 2.5, 0.45))
+            at = frame.point(vector(dim, 1.4, 2.5, 0.45))
             return [Support("bed", bottom), RigidSurface("slider", top, at, motion, spin)]
 
         surfaces = (Surface("slider", bottom), Surface("bed", top))
@@ -345,25 +219,25 @@ def _chosen(dice: Dice, *meshes: BodyMesh) -> dict[str, str]:
 
 def round_on_bed(dice: Dice, dim: int) -> Recipe:
     """Half a disc or ball is pressed into a bed and rolled or drawn."""
-    bed = _pad(
-        dice, dim, _vector(dim, -1.5, -1.0, -0.5), _vector(dim, 1.5, 0.0, 0.5), dice.one_of((7, 9, 13))
+    bed = pad_mesh(
+        dice, dim, vector(dim, -1.5, -1.0, -0.5), vector(dim, 1.5, 0.0, 0.5), dice.one_of((7, 9, 13))
     )
-    ball = _round(dice, dim, 1.0)
-    below, plastic = _material(dice, dim, bed)
-    above, more = _material(dice, dim, ball, dice.one_of((1.0, 10.0)), soft=True)
-    law, rubs = _friction(dice)
+    ball = round_mesh(dice, dim, 1.0)
+    below, plastic = any_material(dice, dim, bed)
+    above, more = any_material(dice, dim, ball, dice.one_of((1.0, 10.0)), soft=True)
+    law, rubs = friction_law(dice)
     depth, way, roll = dice.between(0.03, 0.12), dice.between(0.05, 0.3), dice.one_of((0.0, 0.0, 0.2))
     kind = _chosen(dice, bed, ball)
-    ends = _stages(dice, depth, way)
+    ends = stages(dice, depth, way)
     dice.say("rolled" if roll else "not turned")
-    bottom, top = _sides(dim)
+    bottom, top = sides(dim)
 
     def build(frame: Frame) -> Built:
         def supports(along: float, down: float) -> list[AnySupport]:
-            motion = frame.way(_vector(dim, along, -down))
+            motion = frame.way(vector(dim, along, -down))
             angle = -roll * along / way
             spin = angle if dim == 2 else frame.along((0.0, -angle, 0.0))
-            at = frame.point(_vector(dim, 0.0, 1.0))
+            at = frame.point(vector(dim, 0.0, 1.0))
             return [Support("bed", bottom), RigidSurface("ball", "top", at, motion, spin)]
 
         pair = ContactPair(Surface("ball", "contact"), Surface("bed", top), law, **kind)
@@ -380,9 +254,9 @@ def fold(dice: Dice, dim: int) -> Recipe:
     whole = rectangle((0.0, 0.0), (3.0, 1.4), (columns, rows))
     x, y = whole.points[whole.cells].mean(axis=1).T
     keep = ~((np.abs(y - 0.7) < 0.7 / rows + 0.01) & (x > 0.8))
-    mesh = _part(whole, keep)
-    made, plastic = _rubber(dice, 2, 1.0, mesh)
-    law, rubs = _friction(dice)
+    mesh = slotted(whole, keep)
+    made, plastic = rubber(dice, 2, 1.0, mesh)
+    law, rubs = friction_law(dice)
     ends = [dice.between(0.15, 0.3), dice.between(0.3, 0.45)]
     whole_slot = dice.chance(0.5)
     dice.say(
@@ -404,45 +278,18 @@ def fold(dice: Dice, dim: int) -> Recipe:
     return Recipe(2, build, remembers=plastic or rubs)
 
 
-def _part(whole: BodyMesh, keep: np.ndarray) -> BodyMesh:
-    """Return some cells of a plane mesh; new rims are "slot", and above and below "roof" and "ground"."""
-    from fenics_contact.mesh import boundary_faces
-
-    cells = whole.cells[keep]
-    used, flat = np.unique(cells, return_inverse=True)
-    points, cells = whole.points[used], flat.reshape(cells.shape)
-    number = np.full(whole.n_nodes, -1)
-    number[used] = np.arange(len(used))
-    old = {
-        name: facets[(facets >= 0).all(axis=1)]
-        for name, facets in ((n, number[f]) for n, f in whole.surfaces.items())
-    }
-    rim, _ = boundary_faces(cells, 2)
-    outer = {tuple(sorted(facet)) for facet in rim}
-    old = {name: np.array([f for f in facets if tuple(sorted(f)) in outer]) for name, facets in old.items()}
-    known = {tuple(sorted(facet)) for facets in old.values() for facet in facets}
-    slot = np.array([facet for facet in rim if tuple(sorted(facet)) not in known])
-    middle = points[slot].mean(axis=1)
-    level = np.abs(points[slot[:, 0], 1] - points[slot[:, 1], 1]) < 1e-9
-    half = 0.5 * (middle[level, 1].min() + middle[level, 1].max())
-    top = old["y1"]
-    tip = top[points[top].mean(axis=1)[:, 0] > 2.0]
-    roof, ground = (slot[level & (sign * (middle[:, 1] - half) > 0.0)] for sign in (1.0, -1.0))
-    return BodyMesh(points, cells, {**old, "slot": slot, "roof": roof, "ground": ground, "tip": tip})
-
-
 def blown_on_plane(dice: Dice, dim: int) -> Recipe:
     """A pad on a plane under a pressure that follows, in cycles, drawn by a shear."""
-    pad = _pad(dice, dim, (0.0,) * dim, _vector(dim, 2.0, 1.0, 1.0), dice.one_of((5, 7, 9)))
-    made, _ = _material(dice, dim, pad)
-    law, _ = _friction(dice)
+    pad = pad_mesh(dice, dim, (0.0,) * dim, vector(dim, 2.0, 1.0, 1.0), dice.one_of((5, 7, 9)))
+    made, _ = any_material(dice, dim, pad)
+    law, _ = friction_law(dice)
     pressure, dead = dice.between(0.005, 0.03), dice.chance(0.3)
     gap = dice.one_of((0.0, 0.0, 0.02))
     up = dice.chance(0.5)
     dice.say(
         f"pressure {pressure:.3g}{' dead' if dead else ''}, gap {gap}{', two levels and back' if up else ''}"
     )
-    bottom, top = _sides(dim)
+    bottom, top = sides(dim)
     levels = [1.0, 2.0, 0.5] if up else [1.0]
     rollers = dice.chance(0.5)
 
@@ -450,7 +297,7 @@ def blown_on_plane(dice: Dice, dim: int) -> Recipe:
         def loads(level: float) -> list[Load]:
             return [Pressure("pad", top, level * pressure * frame.stress_unit, dead=dead)]
 
-        plane = RigidPlane(frame.point(_vector(dim, 0.0, -gap)), frame.along(_vector(dim, 0.0, 1.0)))
+        plane = RigidPlane(frame.point(vector(dim, 0.0, -gap)), frame.along(vector(dim, 0.0, 1.0)))
         value = (0.0,) + (None,) * (dim - 1) if rollers else (0.0,) * dim
         held: list[AnySupport] = [Support("pad", "x0", frame.way(value))]
         if rollers and dim == 3:
@@ -464,11 +311,11 @@ def blown_on_plane(dice: Dice, dim: int) -> Recipe:
 
 def pressed_by_force(dice: Dice, dim: int) -> Recipe:
     """One body on another under dead forces, with a guide or without: some are not held."""
-    bed = _pad(dice, dim, (0.0,) * dim, _vector(dim, 3.0, 1.0, 1.0), dice.one_of((7, 9)))
-    upper = _pad(dice, dim, _vector(dim, 0.9, 1.0, 0.1), _vector(dim, 1.9, 1.8, 0.8), dice.one_of((3, 5)))
-    below, plastic = _material(dice, dim, bed)
-    above, more = _material(dice, dim, upper, soft=True)
-    law, rubs = _friction(dice)
+    bed = pad_mesh(dice, dim, (0.0,) * dim, vector(dim, 3.0, 1.0, 1.0), dice.one_of((7, 9)))
+    upper = pad_mesh(dice, dim, vector(dim, 0.9, 1.0, 0.1), vector(dim, 1.9, 1.8, 0.8), dice.one_of((3, 5)))
+    below, plastic = any_material(dice, dim, bed)
+    above, more = any_material(dice, dim, upper, soft=True)
+    law, rubs = friction_law(dice)
     guided = dice.chance(0.6) or law is None
     unheld = dice.chance(0.12)
     size, shear = dice.between(0.01, 0.05), dice.between(-0.05, 0.05)
@@ -476,12 +323,12 @@ def pressed_by_force(dice: Dice, dim: int) -> Recipe:
     total = dice.chance(0.5)
     dice.say("unheld" if unheld else "guided" if guided else "held by friction")
     dice.say(f"{'force' if total else 'traction'} {size:.2g}")
-    bottom, top = _sides(dim)
+    bottom, top = sides(dim)
     levels = dice.one_of(([1.0], [1.0, 2.0], [1.0, 2.0, 0.3]))
 
     def build(frame: Frame) -> Built:
         def loads(level: float) -> list[Load]:
-            push = _vector(dim, 0.0 if guided and not unheld else shear * size, -size)
+            push = vector(dim, 0.0 if guided and not unheld else shear * size, -size)
             area = 1.0 if dim == 2 else 0.7
             if total:
                 return [TotalForce("upper", top, frame.along(push, level * area * frame.force))]
@@ -502,23 +349,23 @@ def pressed_by_force(dice: Dice, dim: int) -> Recipe:
 
 def tie_beside_contact(dice: Dice, dim: int) -> Recipe:
     """Half of a surface is tied, its other half may slide and open."""
-    bed = _pad(dice, dim, (0.0,) * dim, _vector(dim, 3.0, 1.0, 1.0), dice.one_of((7, 9)))
-    upper = _pad(dice, dim, _vector(dim, 0.3, 1.0, 0.1), _vector(dim, 2.7, 1.8, 0.9), dice.one_of((5, 7)))
-    facets = bed.surfaces[_sides(dim)[1]]
+    bed = pad_mesh(dice, dim, (0.0,) * dim, vector(dim, 3.0, 1.0, 1.0), dice.one_of((7, 9)))
+    upper = pad_mesh(dice, dim, vector(dim, 0.3, 1.0, 0.1), vector(dim, 2.7, 1.8, 0.9), dice.one_of((5, 7)))
+    facets = bed.surfaces[sides(dim)[1]]
     left = bed.points[facets].mean(axis=1)[:, 0] < 1.5
     bed = replace(bed, surfaces={**bed.surfaces, "tied": facets[left], "loose": facets[~left]})
-    below, _ = _material(dice, dim, bed)
-    above, _ = _material(dice, dim, upper, soft=True)
-    law, _ = _friction(dice)
+    below, _ = any_material(dice, dim, bed)
+    above, _ = any_material(dice, dim, upper, soft=True)
+    law, _ = friction_law(dice)
     sliding = dice.chance(0.3)
     lift = dice.one_of((-0.05, 0.05))
     kind = _chosen(dice, bed, upper) if bed.order == upper.order == 1 else {"discretisation": "node"}
     dice.say(f"{'sliding ' if sliding else ''}tie, {'pressed' if lift > 0 else 'lifted'}")
-    bottom, top = _sides(dim)
+    bottom, top = sides(dim)
 
     def build(frame: Frame) -> Built:
         def supports(down: float) -> list[AnySupport]:
-            return [Support("bed", bottom), Support("upper", top, frame.way(_vector(dim, 0.3 * down, -down)))]
+            return [Support("bed", bottom), Support("upper", top, frame.way(vector(dim, 0.3 * down, -down)))]
 
         bodies = {"bed": Body(frame.mesh(bed), below(frame)), "upper": Body(frame.mesh(upper), above(frame))}
         pair = ContactPair(Surface("bed", "loose"), Surface("upper", bottom), law)

@@ -20,7 +20,7 @@ from tests.random_scenes.judge import GOOD, Outcome
 
 CLAIM = [pytest.mark.slow, pytest.mark.claim]
 #: Short ones of some kinds; the others are run with the claims.
-QUICK = (1, 9, 13)
+QUICK = (9, 1, 13)
 
 
 @pytest.mark.parametrize("seed", [*QUICK, *(pytest.param(n, marks=CLAIM) for n in range(24, 40))])
