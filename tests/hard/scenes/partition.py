@@ -190,6 +190,13 @@ def two_pairs_with_the_same_slave_surface_and_floors_one_below_the_other() -> Tr
 
 @trial(GROUP)
 def the_same_pair_given_twice() -> Trial:
-    """Every node has two equal rows: forces are shared between them in any way, their sum is unique."""
+    """Every node has two equal rows: forces are shared between them in any way, their sum is unique.
+
+    Under one name it is refused: its facets have a second one.
+    """
     scene = block_on_plane(Coulomb(0.6))
-    return cut_trial(replace(scene, contacts=[*scene.contacts, *scene.contacts]), forces=False)
+    body, (pair,) = scene.bodies["block"], scene.contacts
+    mesh = replace(body.mesh, surfaces={**body.mesh.surfaces, "again": body.mesh.surfaces["z0"]})
+    again = replace(pair, slave=Surface("block", "again"))
+    bodies = {"block": Body(mesh, body.material)}
+    return cut_trial(replace(scene, bodies=bodies, contacts=[pair, again]), forces=False)
