@@ -65,7 +65,8 @@ class FollowedLoads:
                     between = DualSystem(self._partly(system.torn, part), self.timer, previous=system)
                 found, before = solve_dual(between, solver, start), start
                 start = found.multiplier
-                system.products += between.products if between is not system else 0
+                if between is not system:
+                    system.products += between.products
                 if part == PARTS[0] and self._falls(system, before, start):
                     return None
         except (ConvergenceError, InfeasibleError):
@@ -85,13 +86,12 @@ class FollowedLoads:
         if rubs == 0.0 or changes + moved == 0.0:
             return False
         problem = system.problem
-        loaded = problem.norm(problem.coarse.particular()) > 0.0
-        return loaded or may_grip(problem.with_law(system.torn.law), start)
+        return problem.is_loaded or may_grip(problem.with_law(system.torn.law), start)
 
     @staticmethod
     def _falls(system: DualSystem, before: np.ndarray, after: np.ndarray) -> bool:
         """Return whether contact forces have fallen as all loads would that are taken off. Collective."""
-        if system.problem.norm(system.problem.coarse.particular()) > 0.0:
+        if system.problem.is_loaded:
             return False
         rows = system.problem.layout.normal
         was, now = (system.problem.norm(forces[rows]) for forces in (before, after))

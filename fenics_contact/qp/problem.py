@@ -99,6 +99,11 @@ class DualProblem:
         """The law of `friction`; without one all slip bounds are zero."""
         return self.friction or TrescaLaw(self.layout, np.zeros(self.layout.n_friction))
 
+    @cached_property
+    def is_loaded(self) -> bool:
+        """Whether loads drive motions of bodies. Collective on first use."""
+        return self.norm(self.coarse.particular()) > 0.0
+
     def with_law(self, law: SlipLaw) -> DualProblem:
         """Return the same problem under another law of friction."""
         return replace(self, friction=law)

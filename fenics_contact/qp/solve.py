@@ -131,9 +131,7 @@ def _run(problem: DualProblem, solver: DualSolver, begin: Start) -> DualSolution
 
 def _released(problem: DualProblem, begin: Start, tolerance: float) -> DualSolution | None:
     """Return the solution without any force, None if there is none. Collective."""
-    if problem.norm(problem.coarse.particular()) > 0.0:
-        return None
-    return _as_it_is(problem, _at_rest(problem, begin), tolerance)
+    return None if problem.is_loaded else _as_it_is(problem, _at_rest(problem, begin), tolerance)
 
 
 def _solve_scaled(
@@ -222,7 +220,7 @@ def _begin(
     else:
         iterate = iterate_fitted(problem, multiplier, product)
     begin = Start(iterate, operator, None if earlier is None else earlier.memory, cold=start is None)
-    if begin.cold or problem.norm(coarse.particular()) > 0.0 or may_grip(problem, multiplier):
+    if begin.cold or problem.is_loaded or may_grip(problem, multiplier):
         return begin
     # No body is loaded: zero forces, free of cost, may be closer than those of another load.
     rest = _at_rest(problem, begin)

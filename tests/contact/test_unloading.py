@@ -8,25 +8,25 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, FixedPoint, LoadSequence, State
+from fenics_contact.contact import ContactProblem, FixedPoint, LoadSequence
 from fenics_contact.gallery import rectangle
-from fenics_contact.qp import DualSolver, FaceNewton, Smalse
+from fenics_contact.qp import FaceNewton, Smalse
 from fenics_contact.scene import (
     Body,
     ContactPair,
     Coulomb,
     LoadStep,
     PlaneStrain,
-    RigidPlane,
     Scene,
     Support,
     Surface,
     TotalForce,
 )
+from tests.contact.wedges import driven, follow, wedge
 
 MATERIAL = PlaneStrain(1000.0, 0.3)
-#: Inclination of the sides of the wedge; friction holds it where it is more than the tangent of this.
-SIDE = np.radians(5.0)
+#: Inclination of the sides of the wedge in degrees; friction holds it where it is more than its tangent.
+SIDE = 5.0
 SOLVERS = {
     "face Newton": FaceNewton(1e-8),
     "fixed point of face Newton": FixedPoint(FaceNewton(1e-8)),
@@ -35,29 +35,10 @@ SOLVERS = {
 NAMES = [*list(SOLVERS)[:2], pytest.param(list(SOLVERS)[2], marks=pytest.mark.slow)]
 
 
-def load(force: float) -> list[TotalForce]:
-    return [TotalForce("wedge", "y1", (0.0, -force))]
-
-
-def wedge(friction: float) -> Scene:
-    """A wedge between two rigid walls, open above."""
-    straight = rectangle((-1.0, 0.0), (1.0, 6.0), (2, 4))
-    side, height = straight.points.T
-    mesh = straight.moved(np.column_stack([side * (2.0 + height * np.tan(SIDE)), height]))
-    across, along = np.cos(SIDE), np.sin(SIDE)
-    walls = {"x1": RigidPlane((2.0, 0.0), (-across, along)), "x0": RigidPlane((-2.0, 0.0), (across, along))}
-    pairs = [ContactPair(Surface("wedge", name), wall, Coulomb(friction)) for name, wall in walls.items()]
-    return Scene({"wedge": Body(mesh, MATERIAL)}, [], load(50.0), pairs)
-
-
-def followed(friction: float, solver: DualSolver, *forces: float) -> list[State]:
-    steps = LoadSequence(ContactProblem(wedge(friction), MPI.COMM_SELF, solver=solver))
-    return [steps.advance(LoadStep(f"{force:g}", loads=load(force))) for force in forces]
-
-
 @pytest.mark.parametrize("solver", NAMES)
 def test_a_wedge_that_friction_cannot_hold_comes_out_without_any_force(solver: str) -> None:
-    pressed, released = followed(0.5 * np.tan(SIDE), SOLVERS[solver], 50.0, 0.0)
+    loose = wedge(SIDE, 0.5 * np.tan(np.radians(SIDE)))
+    pressed, released = follow(loose, (50.0, 0.0), solver=SOLVERS[solver])
 
     assert pressed.contact.normal_force.min() > 0.0
     assert not released.contact.normal_force.any()
@@ -66,9 +47,9 @@ def test_a_wedge_that_friction_cannot_hold_comes_out_without_any_force(solver: s
 
 
 def test_a_step_without_another_start_begins_at_the_step_before() -> None:
-    problem = ContactProblem(wedge(0.3), MPI.COMM_SELF, tolerance=1e-8)
+    problem = ContactProblem(replace(wedge(SIDE), loads=driven(50.0)), MPI.COMM_SELF, tolerance=1e-8)
     pressed = problem.solve()
-    scene = replace(problem.scene, loads=load(0.0))
+    scene = replace(problem.scene, loads=driven(0.0))
 
     again, anew = (problem.solve(scene, start=None, slip_from=each) for each in (pressed, None))
 
