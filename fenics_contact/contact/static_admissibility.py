@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -36,8 +37,8 @@ def check_held(torn: TornSystem) -> None:
 
     Checks whether support reactions, reactions of the material itself (an elastic bed) and admissible contact
     forces (compressive, inside the friction cone or disc) exist that balance the load on every body. If not,
-    the dual problem is infeasible: there is a rigid motion that nothing resists and on which the load does
-    work. If that takes all friction but a fraction `MARGIN`, forces exist, but the amount of sliding along
+    the dual problem is infeasible: there is a rigid motion along which the load does more work than friction
+    takes. If that takes all friction but a fraction `MARGIN`, forces exist, but the amount of sliding along
     that motion is undetermined.
 
     Args:
@@ -66,12 +67,17 @@ def _check_balance(torn: TornSystem, bodies: list[RigidBody], loads: np.ndarray)
     reactions, right = sp.hstack([support, tied]), -loads.ravel() / scale
     contact = sp.vstack([body.contact_wrenches(torn) for body in bodies])
     bound = torn.tresca_bound / scale
-    ray = _unresisted_motion(reactions, contact, right, torn, (1.0 - MARGIN, bound))
-    if ray is None:
+    balance = _Balance(torn, reactions, contact, right, bound)
+    left = balance.left(1.0 - MARGIN)
+    if left is None:
         return
-    without_margin = _unresisted_motion(reactions, contact, right, torn, (1.0, bound))
-    motion = (ray if without_margin is None else without_margin).reshape(len(bodies), -1)
-    raise InfeasibleError(_describe(motion, bodies, loads, only_just=without_margin is None))
+    without_margin = balance.left(1.0)
+    part, left = (1.0 - MARGIN, left) if without_margin is None else (1.0, without_margin)
+    motion, rubs = balance.motion(part, left)
+    words = _describe(
+        motion.reshape(len(bodies), -1), bodies, loads, only_just=without_margin is None, rubs=rubs
+    )
+    raise InfeasibleError(words)
 
 
 class RigidBody:
@@ -146,53 +152,96 @@ def _both(supports: np.ndarray, material: np.ndarray) -> np.ndarray:
     return np.asarray(basis[:, size > RANK_TOLERANCE])
 
 
-def _unresisted_motion(
-    support: sp.spmatrix,
-    contact: sp.spmatrix,
-    right: np.ndarray,
-    torn: TornSystem,
-    friction: tuple[float, np.ndarray],
-) -> np.ndarray | None:
-    """Minimise ‖[support contact] x − right‖ over x = (reactions, λ_N, τ) in its cones.
+@dataclass(frozen=True)
+class _Left:
+    """The direction of what no forces balance, (n_wrenches,), and the forces that come closest, (n,)."""
 
-    The smallest distance, unlike feasibility, is well determined also where forces only just suffice.
+    motion: np.ndarray
+    forces: np.ndarray
 
-    Args:
+
+@dataclass(frozen=True)
+class _Balance:
+    """Forces that are to balance a load on rigid bodies.
+
+    Attributes:
+        torn: The torn system with its friction coefficients.
         support: Wrenches that act in both directions, shape (n_wrenches, n).
         contact: Wrenches of unit contact forces, shape (n_wrenches, n_contact + (dim - 1) n_friction).
         right: The wrench to balance, shape (n_wrenches,).
-        torn: The torn system with its friction coefficients.
-        friction: The fraction of the friction that may be used, and Tresca bounds in the unit of force of
-            ``right``, shape (n_friction,).
-
-    Returns:
-        None if the load is balanced, else the rigid motion that nothing resists, shape (n_wrenches,).
+        tresca_bound: Tresca bounds in the unit of force of ``right``, shape (n_friction,).
     """
-    import clarabel  # only needed if some loaded body floats
 
-    forces, admissible, limit, cones = _admissible(support.shape[1], torn, friction)
-    # Unknowns: x, the distance t and the remainder y; ‖y‖ ≤ t.
-    size, left = forces.size, np.arange(len(right))
-    balance = sp.hstack([support, contact, sp.csr_matrix((len(left), 1)), sp.identity(len(left))])
-    distance = sp.hstack([sp.csr_matrix((1 + len(left), size)), -sp.identity(1 + len(left))])
-    admissible = sp.hstack([admissible, sp.csr_matrix((admissible.shape[0], 1 + len(left)))])
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 0.1 * LEFT
-    solution = clarabel.DefaultSolver(
-        sp.csc_matrix((balance.shape[1],) * 2),
-        np.concatenate([SMALL * forces, [1.0], np.zeros(len(left))]),
-        sp.vstack([balance, admissible, distance], format="csc"),
-        np.concatenate([right, limit, np.zeros(1 + len(left))]),
-        [clarabel.ZeroConeT(len(left)), *cones, clarabel.SecondOrderConeT(1 + len(left))],
-        settings,
-    ).solve()
-    if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
-        raise ConvergenceError(
-            "the check whether every body is held needs an answer, the conic solver ended with "
-            f"{solution.status}: check the scale of loads and lengths"
+    torn: TornSystem
+    support: sp.spmatrix
+    contact: sp.spmatrix
+    right: np.ndarray
+    tresca_bound: np.ndarray
+
+    def left(self, part: float, speed: np.ndarray | float = 0.0) -> _Left | None:
+        """Minimise ‖[support contact] x − right‖ + Σ μ s λ_N over x = (reactions, λ_N, τ) in its cones.
+
+        The smallest distance, unlike feasibility, is well determined also where forces only just suffice.
+
+        Args:
+            part: The fraction of the friction that may be used.
+            speed: Sliding speeds s for the associated law to be freed of lift-off, shape (n_friction,).
+
+        Returns:
+            None if the load is balanced, else the direction of what is left.
+        """
+        import clarabel  # only needed if some loaded body floats
+
+        torn, right = self.torn, self.right
+        forces, admissible, limit, cones = _admissible(self.support.shape[1], torn, (part, self.tresca_bound))
+        # Unknowns: x, the distance t and the remainder y; ‖y‖ ≤ t.
+        size, left = forces.size, np.arange(len(right))
+        cost = SMALL * forces
+        cost[self.support.shape[1] + torn.frictional] += part * torn.friction_coefficient * speed
+        balance = sp.hstack(
+            [self.support, self.contact, sp.csr_matrix((len(left), 1)), sp.identity(len(left))]
         )
-    return None if solution.x[size] <= LEFT else np.array(solution.z[: len(left)])
+        distance = sp.hstack([sp.csr_matrix((1 + len(left), size)), -sp.identity(1 + len(left))])
+        admissible = sp.hstack([admissible, sp.csr_matrix((admissible.shape[0], 1 + len(left)))])
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 0.1 * LEFT
+        solution = clarabel.DefaultSolver(
+            sp.csc_matrix((balance.shape[1],) * 2),
+            np.concatenate([cost, [1.0], np.zeros(len(left))]),
+            sp.vstack([balance, admissible, distance], format="csc"),
+            np.concatenate([right, limit, np.zeros(1 + len(left))]),
+            [clarabel.ZeroConeT(len(left)), *cones, clarabel.SecondOrderConeT(1 + len(left))],
+            settings,
+        ).solve()
+        if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
+            raise ConvergenceError(
+                "the check whether every body is held needs an answer, the conic solver ended with "
+                f"{solution.status}: check the scale of loads and lengths"
+            )
+        if solution.x[size] <= LEFT:
+            return None
+        return _Left(np.array(solution.z[: len(left)]), np.array(solution.x[:size]))
+
+    def motion(self, part: float, left: _Left) -> tuple[np.ndarray, bool]:
+        """Return the motion on which bodies set off, and whether friction acts against it.
+
+        The direction v of what is left obeys the associated law, v_N ≥ μ (|v_T| − s), by which what slides
+        lifts off where s = 0. Where s = |v_T|, v_N ≥ 0 ⊥ λ_N and what slides stays on: a fixed point in v.
+
+        Reference: V. Acary, F. Cadoux, G. Goeleven, J. Malick, *A formulation of the linear discrete
+        Coulomb friction problem via convex optimization*, ZAMM 91 (2011) 155–175.
+        """
+        torn, before = self.torn, None
+        slip = self.contact[:, torn.points.count :]
+        for _ in range(50):  # most settle within five times
+            if (digits := _digits(left.motion).tolist()) == before:
+                break
+            velocity = (slip.T @ left.motion).reshape(len(torn.frictional), torn.dim - 1)
+            before, left = digits, self.left(part, np.linalg.norm(velocity, axis=1)) or left
+        tangential = left.forces[self.support.shape[1] + torn.points.count :]
+        lost = float(tangential @ (slip.T @ left.motion))
+        return left.motion, abs(lost) > MARGIN * abs(float(self.right @ left.motion))
 
 
 def _admissible(
@@ -225,12 +274,19 @@ def _admissible(
     return normal, sp.vstack([press, cone], format="csr"), limit, cones
 
 
-def _describe(motion: np.ndarray, bodies: list[RigidBody], loads: np.ndarray, *, only_just: bool) -> str:
+def _digits(motion: np.ndarray) -> np.ndarray:
+    """Return what words say of a motion, relative to its largest part."""
+    return np.round(motion / np.abs(motion).max(), 3) + 0.0  # no -0
+
+
+def _describe(
+    motion: np.ndarray, bodies: list[RigidBody], loads: np.ndarray, *, only_just: bool, rubs: bool
+) -> str:
     # The certificate points against the right side, which is minus the load. The pushed body may take others
     # along: it is the one on which the load does most work.
     pushed = int(np.argmax(np.einsum("bm,bm->b", motion, loads)))
-    free = np.round(motion[pushed] / np.abs(motion[pushed]).max(), 3) + 0.0  # no -0
-    words = motion_in_words(free)
+    words = motion_in_words(_digits(motion[pushed]))
+    against = "too little friction" if rubs else "no resistance"
     name = repr(bodies[pushed].name)
     if only_just:
         return (
@@ -240,6 +296,6 @@ def _describe(motion: np.ndarray, bodies: list[RigidBody], loads: np.ndarray, *,
         )
     return (
         f"every body must be held by supports, contact or friction, but body {name} can move "
-        f"away under the load: {words} meets no resistance. Support it, let it touch something in the "
+        f"away under the load: {words} meets {against}. Support it, let it touch something in the "
         "direction of the load, or raise the friction coefficient"
     )

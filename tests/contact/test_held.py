@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scipy.spatial.transform import Rotation
 
 from fenics_contact.contact import Status, check_held, solve_scene
 from fenics_contact.errors import ConvergenceError, InfeasibleError
@@ -17,6 +18,7 @@ from fenics_contact.partition import graph_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,
+    BodyForce,
     ContactPair,
     Coulomb,
     IsotropicElasticity,
@@ -32,6 +34,7 @@ from tests.contact.gallery import (
     FLOOR,
     SOFT,
     block_on_plane,
+    cornered_block,
     guided,
     partitions,
     pressed_block,
@@ -79,7 +82,42 @@ def test_a_body_pushed_harder_than_friction_holds_slides_where_it_is_pushed(dire
     body, translation, _ = refused(pulled(block_on_plane(Coulomb(0.3)), "block", (0.31 * x, 0.31 * y, -1.0)))
     assert body == "block"
     assert translation[:2] / np.linalg.norm(translation[:2]) == pytest.approx(direction, abs=0.02)
-    assert translation[2] > 0  # dilation: along the normal of the friction cone
+    assert translation[2] == 0.0
+
+
+@pytest.mark.parametrize(("slope", "friction"), [(30, 0.3), (30, 0.57), (60, 1.5), (5, 0.0)])
+def test_a_block_that_slides_down_a_slope_is_told_to_move_along_it(slope: float, friction: float) -> None:
+    """The motion normal to the cone of friction would be at 47 degrees on a slope of 30."""
+    mesh = block((0.0, 0.0, 0.0), (4.0, 2.0, 1.0), (4, 2, 2))
+    axes = Rotation.from_euler("y", slope, degrees=True).as_matrix()
+    scene = Scene(
+        {"block": Body(mesh.moved(mesh.points @ axes.T), SOFT)},
+        loads=[BodyForce("block", (0.0, 0.0, -1.0))],
+        contacts=[ContactPair(Surface("block", "z0"), RigidPlane((0, 0, 0), axes[:, 2]), Coulomb(friction))],
+    )
+    _, translation, rotation = refused(scene)
+    assert translation / np.linalg.norm(translation) == pytest.approx(axes[:, 0], abs=0.01)
+    assert not rotation.any()
+
+
+def test_a_block_between_floor_and_wall_leaves_neither_where_it_slides_along_both() -> None:
+    scene = cornered_block(Coulomb(0.1))
+    _, translation, rotation = refused(pulled(scene, "block", (1.0, 1.0, -1.0)))
+    assert translation.tolist() == [0.0, 1.0, 0.0]
+    assert not rotation.any()
+
+
+def test_words_tell_friction_that_is_too_weak_from_a_motion_without_any() -> None:
+    for friction in (Coulomb(0.3), Tresca(0.15)):
+        with pytest.raises(InfeasibleError, match=r"translation \(1, 0, 0\) meets too little friction\."):
+            check(pulled(block_on_plane(friction), "block", (0.31, 0.0, -1.0)))
+    for scene, force in (
+        (block_on_plane(None), (0.3, 0.0, -1.0)),
+        (block_on_plane(Coulomb(5.0)), (1.1, 0.0, -1.0)),  # tips
+        (block_on_plane(Coulomb(0.3)), (0.31, 0.0, 1.0)),  # leaves the floor
+    ):
+        with pytest.raises(InfeasibleError, match=r"translation .* meets no resistance\."):
+            check(pulled(scene, "block", force))
 
 
 @pytest.mark.parametrize("friction", [Coulomb(0.3), Tresca(0.15)])
