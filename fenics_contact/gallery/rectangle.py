@@ -10,7 +10,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery.block import box_sides, checked_ticks
 from fenics_contact.gallery.memory import require_room
 from fenics_contact.gallery.structured import check_cell_type, repeated_regions, structured_cells
-from fenics_contact.mesh import BodyMesh
+from fenics_contact.mesh import CELL_TYPES, BodyMesh
 from fenics_contact.surface_shapes import tensor_grid
 
 
@@ -83,7 +83,7 @@ def split_quadrilaterals(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> 
     cells = mesh.cells
     if mirrored is not None:
         cells = np.where(mirrored[:, None], np.roll(cells, -1, axis=1), cells)
-    triangles = cells[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    triangles = cells[:, CELL_TYPES["quadrilateral"].simplices].reshape(-1, 3)
     grid = None if mesh.grid is None else np.repeat(mesh.grid, 2, axis=0)
     regions = repeated_regions(mesh, 2)
     return BodyMesh(mesh.points, triangles, mesh.surfaces, grid, regions, mesh.coincident_nodes, mesh.shapes)

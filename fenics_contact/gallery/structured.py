@@ -9,9 +9,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import CELL_TYPES, BodyMesh, boundary_faces, match_faces, orient
 from fenics_contact.surface_shapes import tensor_grid
 
-KUHN_TETRAHEDRA = np.array(
-    [[0, 1, 2, 6], [0, 3, 7, 6], [0, 4, 5, 6], [0, 5, 1, 6], [0, 2, 3, 6], [0, 7, 4, 6]], dtype=np.int64
-)
+KUHN_TETRAHEDRA = CELL_TYPES["hexahedron"].simplices
 """Six tetrahedra around the diagonal from vertex 0 to vertex 6 of a hexahedron."""
 
 REFLECTIONS = np.array(
@@ -112,4 +110,4 @@ def _split_facets(facets: np.ndarray, boundary: np.ndarray) -> np.ndarray:
     """Cut quadrilaterals along the diagonal of the tetrahedra's boundary."""
     first = match_faces(facets[:, [0, 1, 2]], boundary) >= 0
     turned = np.where(first[:, None], facets, np.roll(facets, -1, axis=1))
-    return turned[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    return turned[:, CELL_TYPES["quadrilateral"].simplices].reshape(-1, 3)

@@ -10,7 +10,7 @@ import numpy as np
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.io.moved_bodies import moved_body
 from fenics_contact.io.replacing import replacing
-from fenics_contact.mesh import boundary_faces
+from fenics_contact.mesh import FACET_TYPES, boundary_faces
 
 if TYPE_CHECKING:
     from fenics_contact.mesh import BodyMesh
@@ -64,7 +64,6 @@ def write_stl(
 def _triangles(mesh: BodyMesh) -> tuple[np.ndarray, np.ndarray]:
     """Return the points of the boundary and its triangles, outward."""
     facets, _ = boundary_faces(mesh.linear.cells, mesh.dim)
-    quadrilaterals = facets.shape[1] == 4
-    triangles = facets[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3) if quadrilaterals else facets
+    triangles = facets[:, FACET_TYPES[facets.shape[1], 3].simplices].reshape(-1, 3)
     nodes, numbers = np.unique(triangles, return_inverse=True)
     return mesh.points[nodes], numbers.reshape(-1, 3)

@@ -59,6 +59,11 @@ class CellType:
         return self.dim > 1 and len(self.edges) == self.dim + 1
 
     @property
+    def simplices(self) -> np.ndarray:
+        """Local vertices of the simplices that make up a linear cell, around its diagonal from vertex 0."""
+        return np.arange(self.dim + 1)[None] if self.is_simplex else _AROUND_DIAGONAL[self.dim]
+
+    @property
     def is_affine(self) -> bool:
         """Whether the map from the reference cell is affine."""
         return self.order == 1 and self.is_simplex
@@ -109,6 +114,11 @@ def _quadratic(
 _SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
 _HALF = [[0.5, 0.0], [1.0, 0.5], [0.5, 1.0], [0.0, 0.5]]
 _QUARTERS = [[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]]
+
+_AROUND_DIAGONAL = {
+    2: _table([[0, 1, 2], [0, 2, 3]]),
+    3: _table([[0, 1, 2, 6], [0, 3, 7, 6], [0, 4, 5, 6], [0, 5, 1, 6], [0, 2, 3, 6], [0, 7, 4, 6]]),
+}
 
 EDGE = _linear("edge", "edges", [[0.0], [1.0]], [[0], [1]], [[1], [0]], 1.0)
 """A facet of plane cells, not a cell."""

@@ -70,6 +70,7 @@ from fenics_contact.scene.scene import Scene
 from fenics_contact.scene.steps import LoadStep
 from fenics_contact.scene.supports import Support
 from fenics_contact.scene.true_surfaces import surface_of
+from fenics_contact.scene.unpaired import bodies_near, outline_of, unpaired
 from fenics_contact.scene.values import OfPosition, ScalarValue, Ufl, VectorValue, evaluate, gradients_of
 
 __all__ = [
@@ -134,6 +135,7 @@ __all__ = [
     "VectorValue",
     "VolumeLoad",
     "bodies_from",
+    "bodies_near",
     "can_expand",
     "choose_solver",
     "cofactor",
@@ -150,11 +152,13 @@ __all__ = [
     "master_share",
     "material_axes",
     "mirrored",
+    "outline_of",
     "point_loads",
     "read_field",
     "resisted_motions",
     "rigid_body_modes",
     "strain",
     "surface_of",
+    "unpaired",
     "volume_change",
 ]

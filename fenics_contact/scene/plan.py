@@ -18,6 +18,7 @@ from fenics_contact.scene.held import held_by_supports
 from fenics_contact.scene.pair_geometry import PairGeometry, pair_geometry
 from fenics_contact.scene.pairs import Surface
 from fenics_contact.scene.rigid_surfaces import RigidSurface
+from fenics_contact.scene.unpaired import unpaired_bodies
 from fenics_contact.surfaces import bears_on_midpoints
 
 if TYPE_CHECKING:
@@ -65,6 +66,8 @@ class Plan:
         memory: Expected memory of all ranks together without their libraries, [bytes].
         contacts: Between which surfaces the gaps of each contact pair are measured, and where it is enforced.
         ties: Where each tie is enforced, and why.
+        unpaired: Which bodies touch or overlap without a pair or tie, or will where supports move them as if
+            they were rigid, and what to do.
     """
 
     effects: tuple[Effect, ...]
@@ -79,6 +82,7 @@ class Plan:
     memory: float
     contacts: tuple[PairGeometry, ...]
     ties: tuple[str, ...]
+    unpaired: tuple[str, ...]
 
     def __str__(self) -> str:
         """Return one line for each decision."""
@@ -100,6 +104,7 @@ class Plan:
             "memory": f"{self.memory / 1e6:.0f} MB",
             **{f"pair {number}": str(pair) for number, pair in enumerate(self.contacts)},
             **{f"tie {number}": tie for number, tie in enumerate(self.ties)},
+            **({"no pair": "; ".join(self.unpaired)} if self.unpaired else {}),
         }
 
 
@@ -135,6 +140,7 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
         memory=factors + BYTES_PER_UNKNOWN * unknowns + 8.0 * motions**2,
         contacts=tuple(pair_geometry(scene, pair) for pair in scene.contacts),
         ties=tuple(f"{tie.place}; {in_words(tie)}" for tie in scene.ties),
+        unpaired=unpaired_bodies(scene),
     )
 
 

@@ -3,33 +3,18 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 
 import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
-from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, Scene, Support, Surface, Tie
+from fenics_contact.scene import Scene
+from tests.contact.passing import pressed
 
-STEEL = IsotropicElasticity(1000.0, 0.3)
-
-
-def pressed(gap: float, force: float, *, pair: str = "none", side: float = 0.0) -> Scene:
-    """A block over a wider plate, pressed down, and a post beside them that is in nobody's way."""
-    cells = (2, 2, 2)
-    upper = block((side, 0, 1 + gap), (side + 1, 1, 2 + gap), cells)
-    half = upper.surfaces["z0"][upper.points[upper.surfaces["z0"]][..., 0].max(axis=1) < side + 0.6]
-    upper = BodyMesh(upper.points, upper.cells, {**upper.surfaces, "half": half})
-    bodies = {
-        "upper": Body(upper, STEEL),
-        "lower": Body(block((-0.5, -0.5, 0), (1.5, 1.5, 1), (3, 3, 2)), STEEL),
-        "post": Body(block((4, 4, 0), (5, 5, 1), (1, 1, 1)), STEEL),
-    }
-    supports = [Support("upper", "z1", (0.0, 0.0, -force)), Support("lower", "z0"), Support("post", "z0")]
-    sides = Surface("upper", "half" if pair == "half" else "z0"), Surface("lower", "z1")
-    contacts = [ContactPair(*sides, discretisation="node")] if pair in ("whole", "half") else []
-    return Scene(bodies, supports, [], contacts, ties=[Tie(*sides)] if pair == "tie" else [])
+TOUCHING = (
+    "bodies 'upper' and 'lower' touch at 5 facets, without a pair or tie between them: add a ContactPair or"
+)
 
 
 def told(scene: Scene, caplog: pytest.LogCaptureFixture) -> list[str]:
@@ -41,19 +26,30 @@ def told(scene: Scene, caplog: pytest.LogCaptureFixture) -> list[str]:
 @pytest.mark.parametrize(
     ("scene", "words"),
     [
-        (pressed(0.0, 0.0), "facets of bodies 'upper' and 'lower' touch, without a pair or tie between them"),
-        (pressed(0.01, 0.1), "'upper' and 'lower' pass into each other, without a pair or tie"),
-        (pressed(-0.3, 0.0), "'upper' and 'lower' overlap unloaded, without a pair or tie"),
-        (pressed(0.0, 0.1, pair="half"), "'upper' and 'lower' pass into each other, outside the surfaces"),
+        (pressed(0.0, 0.0), TOUCHING),
+        (pressed(0.01, 0.1), "'upper' and 'lower' pass into each other at 5 facets, without a pair or tie"),
+        (pressed(-0.3, 0.0), "'upper' and 'lower' overlap unloaded at 13 facets, without a pair or tie"),
+        (pressed(0.0, 0.1, pair="half"), "'upper' and 'lower' pass into each other at 2 facets, outside the surfaces"),
     ],
     ids=["touching", "passing", "overlapping", "half a surface"],
 )
 def test_bodies_that_nothing_keeps_apart_are_told_of(
     scene: Scene, words: str, caplog: pytest.LogCaptureFixture
 ) -> None:
+    """By the plan before, which knows where supports move them, and in a warning after.
+
+    How far a pair of too small surfaces lets them is known after alone.
+    """
     (found,) = told(scene, caplog)
     assert words in found
     assert "add a ContactPair" in found or "name more of their facets" in found
+    if "outside" in found:
+        assert scene.plan().unpaired == ()
+        return
+    as_supports = words.replace("pass into each other", "pass into each other as their supports move them")
+    (planned,) = scene.plan().unpaired
+    assert as_supports in planned
+    assert f"\nno pair         {planned}" in str(scene.plan())
 
 
 @pytest.mark.parametrize(
@@ -63,3 +59,21 @@ def test_bodies_that_nothing_keeps_apart_are_told_of(
 )
 def test_bodies_that_keep_apart_are_not_told_of(scene: Scene, caplog: pytest.LogCaptureFixture) -> None:
     assert told(scene, caplog) == []
+    assert scene.plan().unpaired == ()
+    assert "no pair" not in str(scene.plan())
+
+
+ON_RANKS = """
+    import logging, sys
+    from mpi4py import MPI
+    from fenics_contact.contact import solve_scene
+    from tests.contact.passing import pressed
+
+    logging.basicConfig(stream=sys.stdout, format="%(message)s", level=logging.WARNING)
+    solve_scene(pressed(0.0, 0.0), MPI.COMM_WORLD)
+"""
+
+
+def test_ranks_share_the_facets_and_one_of_them_tells(mpirun: Callable[..., str]) -> None:
+    (found,) = mpirun(ON_RANKS, 2).splitlines()
+    assert found.startswith(TOUCHING)
