@@ -66,7 +66,7 @@ class Automatic(Sequence[ContactPair]):
 
     friction: Friction = None
     distance: float | None = None
-    discretisation: AnyDiscretisation = "node"
+    discretisation: AnyDiscretisation = "best"
     geometry: Geometry = "best"
     self_contact: tuple[str, ...] = ()
 

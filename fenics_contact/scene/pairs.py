@@ -98,9 +98,9 @@ class ContactPair:
         friction: Law of friction; without one (None) contact is frictionless.
         discretisation: ``"node"`` keeps the gap of every slave node non-negative; ``"mortar"`` does so for
             weighted means of the gap. The former is simple. The latter (dual basis, integration over the
-            common segments of both meshes) passes the contact patch test on non-matching meshes. ``"best"``:
-            the scene takes mortar between bodies of linear cells whose meshes do not match, and nodes
-            elsewhere. Contact with a rigid obstacle is always nodal.
+            common segments of both meshes) passes the contact patch test on non-matching meshes. By default,
+            ``"best"``, the scene takes mortar between bodies of linear cells whose meshes do not match, and
+            nodes elsewhere. Contact with a rigid obstacle is always nodal.
         geometry: What gaps and normals are measured between: ``"best"``, true shapes that the meshes know,
             else smooth surfaces through the nodes; ``"reconstructed"``, always the latter; ``"faceted"``, the
             flat facets, for comparison. Between round bodies the error of facets is often larger than the
@@ -127,7 +127,7 @@ class ContactPair:
     slave: Surface
     master: Surface | RigidObstacle
     friction: Friction = None
-    discretisation: AnyDiscretisation = "node"
+    discretisation: AnyDiscretisation = "best"
     geometry: Geometry = "best"
     gap: float | OfPosition | None = None
     interference: float | OfPosition | Literal["measured"] | None = None
@@ -226,14 +226,14 @@ class Tie:
         master: Surface of another body.
         sliding: Whether the surfaces may slide along each other: contact known to be closed.
         discretisation: ``"node"`` ties every slave node to its master facet, ``"mortar"`` ties weighted
-            means, ``"best"`` leaves it to the scene. See `ContactPair`.
+            means, ``"best"``, the default, leaves it to the scene. See `ContactPair`.
         reason: As in `ContactPair`.
     """
 
     slave: Surface
     master: Surface
     sliding: bool = False
-    discretisation: AnyDiscretisation = "mortar"
+    discretisation: AnyDiscretisation = "best"
     reason: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:

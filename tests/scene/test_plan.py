@@ -231,7 +231,7 @@ def test_the_plan_tells_by_how_much_facets_miss_a_ball(symmetry: Literal["xy", "
 def test_the_plan_names_the_geometry_that_was_asked_for(geometry: Geometry, names: str) -> None:
     best, found = (ball("xy", geometry=each).plan().contacts[0].height for each in ("best", geometry))
     assert found == pytest.approx(best, rel=0.05)
-    assert f"{names}; node; facets miss it by up to" in str(ball("xy", geometry=geometry).plan())
+    assert f"{names}; mortar, as the meshes do not match; facets miss it by up to" in str(ball("xy", geometry=geometry).plan())
 
 
 def test_facets_of_a_slave_count_where_gaps_are_means() -> None:
@@ -272,7 +272,7 @@ def test_the_plan_knows_lines_of_contact() -> None:
 def test_an_approach_may_be_prescribed_or_unknown() -> None:
     flat = stack(contacts=pair()).plan().contacts[0]
     assert (flat.slave, flat.master, flat.height, flat.approach) == ("flat", "flat", 0.0, None)
-    assert str(flat) == "flat on flat; node; facets miss nothing"
+    assert str(flat) == "flat on flat; node, as the meshes match; facets miss nothing"
     lowered = [*ball("xy").supports, Support("ball", "top", (None, None, -0.5))]
     (found,) = replace(ball("xy"), supports=lowered, loads=[]).plan().contacts
     assert found.approach == 0.5
