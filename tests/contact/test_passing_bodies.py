@@ -29,7 +29,10 @@ def told(scene: Scene, caplog: pytest.LogCaptureFixture) -> list[str]:
         (pressed(0.0, 0.0), TOUCHING),
         (pressed(0.01, 0.1), "'upper' and 'lower' pass into each other at 5 facets, without a pair or tie"),
         (pressed(-0.3, 0.0), "'upper' and 'lower' overlap unloaded at 13 facets, without a pair or tie"),
-        (pressed(0.0, 0.1, pair="half"), "'upper' and 'lower' pass into each other at 2 facets, outside the surfaces"),
+        (
+            pressed(0.0, 0.1, pair="half"),
+            "'upper' and 'lower' pass into each other at 2 facets, outside the surfaces",
+        ),
     ],
     ids=["touching", "passing", "overlapping", "half a surface"],
 )
