@@ -69,9 +69,9 @@ bodies = {
     "bolt": Body(screw, bolt_steel),
 }
 
-# Four contacts with friction. The plates' meshes match: there contact is node by node. Those under head and nut
-# do not: mortar. The plan says so. The spacer is bonded to both straps. Bolt and plate are held by contact
-# alone.
+# Four contacts with friction. The plates' meshes match: there contact is node by node. Those under head and
+# nut do not: mortar. The plan says so. The spacer is bonded to both straps. Bolt and plate are held by
+# contact alone.
 
 friction = Coulomb(0.3)
 contacts = [
