@@ -13,7 +13,8 @@ from fenics_contact.pairing import (
     find_contact_points,
     find_tied_points,
     join_points,
-    warn_of_shared,
+    shared_once,
+    tied_once,
     without_tied,
 )
 from fenics_contact.scene import Scene
@@ -69,10 +70,12 @@ def meeting_points(
             check_no_penetration(scene, points)
     if scene.ties:
         ties = find_tied_points(scene, fixed, comm, told=told)
+        if len(scene.ties) > 1:
+            ties = tied_once(ties, scene, fixed)
         if scene.contacts:
             points = without_tied(points, ties, scene, fixed, told=told or comm.rank > 0)
-    if len(scene.contacts) > 1 and comm.rank == 0 and not told:
-        warn_of_shared(points, scene)
+    if len(scene.contacts) > 1:
+        points = shared_once(points, scene, told=told or comm.rank > 0)
     return points, ties
 
 

@@ -10,7 +10,7 @@ from fenics_contact.pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact.pairing.friction import friction_data
 from fenics_contact.pairing.mortar_points import MortarPoints
 from fenics_contact.pairing.node_numbers import NodeNumbers
-from fenics_contact.pairing.shared_nodes import warn_of_shared, without_tied
+from fenics_contact.pairing.shared_nodes import shared_once, tied_once, without_tied
 from fenics_contact.pairing.sliding_contact import sliding_contact
 
 if TYPE_CHECKING:
@@ -32,7 +32,8 @@ __all__ = [
     "join_points",
     "movable",
     "reference_axes",
+    "shared_once",
     "sliding_contact",
-    "warn_of_shared",
+    "tied_once",
     "without_tied",
 ]

@@ -41,6 +41,8 @@ class ContactPoints:
             [length].
         given: Whether the pair says what the gap is, by a value or by declaring the measured overlap an
             interference, shape (n,).
+        taken: Slave nodes plus one of other pairs that have a point in the same place, which is left out, on
+            a surface beside: their areas are part of that of the point. Shape (n, n_pairs); None: none are.
     """
 
     pair: np.ndarray
@@ -56,6 +58,7 @@ class ContactPoints:
     symmetric: np.ndarray
     distance: np.ndarray
     given: np.ndarray
+    taken: sp.csr_matrix | None = None
 
     @property
     def count(self) -> int:
@@ -64,7 +67,23 @@ class ContactPoints:
 
     def part(self, chosen: np.ndarray) -> ContactPoints:
         """Return some of the points, by indices or a mask."""
-        return ContactPoints(**{each.name: getattr(self, each.name)[chosen] for each in fields(self)})
+        names = [each.name for each in fields(self) if getattr(self, each.name) is not None]
+        return ContactPoints(**{name: getattr(self, name)[chosen] for name in names})
+
+    def of_surface(self, pair: int, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return slave nodes of a pair whose areas belong to points, ascending, with values of these points.
+
+        Args:
+            pair: Number of the pair.
+            values: A value for each point, shape (n,).
+        """
+        mine = np.flatnonzero(self.pair == pair)
+        if self.taken is None:
+            return self.slave[mine], values[mine]
+        other = self.taken[:, [pair]].tocoo()
+        nodes = np.concatenate([self.slave[mine], other.data - 1])
+        order = np.argsort(nodes)
+        return nodes[order], np.concatenate([values[mine], values[other.row]])[order]
 
     @cached_property
     def jump(self) -> sp.csr_matrix:
@@ -89,10 +108,16 @@ def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> Conta
     def strung(name: str) -> np.ndarray:
         return np.concatenate([getattr(part, name) for part in parts])
 
+    taken = None
+    if some := [part.taken for part in parts if part.taken is not None]:
+        none = [sp.csr_matrix((part.count, some[0].shape[1])) for part in parts]
+        each = [zero if part.taken is None else part.taken for part, zero in zip(parts, none, strict=True)]
+        taken = sp.vstack(each, format="csr")
+
     return ContactPoints(
         strung("pair"), strung("slave"), sp.vstack([part.master for part in parts], format="csr"),
         strung("normal"), strung("tangents"), strung("gap"), strung("area"), strung("facet"), strung("local"),
-        strung("axes"), strung("symmetric"), strung("distance"), strung("given"),
+        strung("axes"), strung("symmetric"), strung("distance"), strung("given"), taken,
     )  # fmt: skip
 
 

@@ -67,9 +67,9 @@ def contact_by_shape(
     for index, pair in enumerate(torn.scene.contacts):
         mine = np.flatnonzero(points.pair == index)
         if isinstance(pair.master, Surface) and pair.discretisation == "mortar":
-            result += _by_mortar(torn, pair, rows, mine, by_area[mine])
+            result += _by_mortar(torn, index, rows, by_area)
             continue
-        add_areas(result, torn, pair, mine, by_area[mine])
+        add_areas(result, torn, index, by_area)
         if not isinstance(pair.master, Surface):
             result[points.slave[mine]] += _by_obstacle(torn, pair.master, rows, mine)
         else:
@@ -77,27 +77,37 @@ def contact_by_shape(
     return result
 
 
-def add_areas(
-    result: np.ndarray, torn: TornSystem, pair: ContactPair, mine: np.ndarray, by_area: np.ndarray
-) -> None:
-    """Add the derivative by the nodes from that by the areas of the points of a pair."""
-    if by_area.any():
+def add_areas(result: np.ndarray, torn: TornSystem, index: int, by_area: np.ndarray) -> None:
+    """Add the derivative by the nodes through the areas on the slave surface of a pair.
+
+    Args:
+        result: By the nodes of all bodies, shape (n_nodes, dim).
+        torn: The torn system.
+        index: Number of the pair.
+        by_area: By the areas of all points, shape (n_points,).
+    """
+    pair = torn.scene.contacts[index]
+    slave, given = torn.points.of_surface(index, by_area)
+    if given.any():
         surface = surface_of(torn.scene, pair.slave, "faceted")
         nodes = torn.decomposition.tearing.global_nodes(pair.slave.body, surface.nodes)
         by_areas = np.zeros(len(nodes))
-        by_areas[np.searchsorted(nodes, torn.points.slave[mine])] = by_area
+        by_areas[np.searchsorted(nodes, slave)] = given
         result[nodes] += areas_pulled_back(surface, by_areas)
 
 
-def _by_mortar(
-    torn: TornSystem, pair: ContactPair, rows: RowFields, mine: np.ndarray, by_area: np.ndarray
-) -> np.ndarray:
+def _by_mortar(torn: TornSystem, index: int, rows: RowFields, by_area: np.ndarray) -> np.ndarray:
     """Return the derivative by all nodes through points of mortar contact, (n_nodes, dim). Collective."""
-    by = _by_point(torn.points, rows, mine)
-    turned = frames_pulled_back(torn.points.normal[mine], by.tangents, by.axes)
-    pulled = _pulled_master(torn.points, rows, mine)
-    given = MortarDerivatives(pulled, by.normal + turned, by.gap, by_area)
-    return mortar_by_shape(torn, pair, torn.points.slave[mine], rows, given)
+    points, mine = torn.points, np.flatnonzero(torn.points.pair == index)
+    by = _by_point(points, rows, mine)
+    turned = frames_pulled_back(points.normal[mine], by.tangents, by.axes)
+    # Nodes that have no point of this pair only give their areas to others.
+    slave, areas = points.of_surface(index, by_area)
+    own = np.isin(slave, points.slave[mine])
+    pulled, normal, gap = np.zeros((2, len(slave), torn.dim)), np.zeros((len(slave), torn.dim)), 0.0 * areas
+    pulled[:, own], normal[own], gap[own] = _pulled_master(points, rows, mine), by.normal + turned, by.gap
+    given = MortarDerivatives(pulled, normal, gap, areas)
+    return mortar_by_shape(torn, torn.scene.contacts[index], slave, rows, given)
 
 
 def _by_obstacle(torn: TornSystem, obstacle: RigidObstacle, rows: RowFields, mine: np.ndarray) -> np.ndarray:

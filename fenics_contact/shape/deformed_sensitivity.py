@@ -122,9 +122,8 @@ def deformed_contact_by_shape(
     by_area = bounds_by_area(torn, by_bound) + partials.by_area
     with together(torn.decomposition.comm):
         np.add.at(result, torn.points.slave, bounds_by_place(torn, normal, by_bound))
-    for index, pair in enumerate(torn.scene.contacts):
-        mine = np.flatnonzero(torn.points.pair == index)
-        add_areas(result, torn, pair, mine, by_area[mine])
+    for index in range(len(torn.scene.contacts)):
+        add_areas(result, torn, index, by_area)
     return result
 
 

@@ -9,49 +9,20 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
+from fenics_contact.contact import solve_scene
 from fenics_contact.gallery import rectangle
-from fenics_contact.partition import graph_partition
 from fenics_contact.scene import (
     Body,
     ContactPair,
-    Coulomb,
     Discretisation,
     NeoHooke,
-    PlaneStrain,
-    RigidSurface,
     Scene,
     Support,
     Surface,
     Tie,
     Traction,
 )
-
-MATERIAL = PlaneStrain(1.0, 0.3)
-TOP, TIED, FREE = Surface("up", "y0"), Surface("low", "tied"), Surface("low", "free")
-
-
-def half_tied(columns: int, discretisation: Discretisation, sliding: bool) -> Scene:
-    """A block on a strip, tied on its left half and in contact with friction on its right one."""
-    low, up = rectangle((0, 0), (2, 0.4), (6, 2)), rectangle((0, 0.4), (2, 1.2), (columns, 3))
-    facets = low.surfaces["y1"]
-    left = low.points[facets].mean(axis=1)[:, 0] < 1.0
-    low = replace(low, surfaces={**low.surfaces, "tied": facets[left], "free": facets[~left]})
-    return Scene(
-        {"low": Body(low, MATERIAL), "up": Body(up, MATERIAL)},
-        [
-            Support("low", "y0"),
-            RigidSurface("up", "y1", (0.7, 1.5), force=(1e-3, -1e-2), moment=-4e-4),
-        ],
-        contacts=[ContactPair(FREE, TOP, Coulomb(0.4), discretisation)],
-        ties=[Tie(TIED, TOP, sliding=sliding, discretisation=discretisation)],
-    )
-
-
-def solved(scene: Scene, parts: tuple[int, int]) -> State:
-    counts = dict(zip(scene.bodies, parts, strict=True))
-    cut = {name: graph_partition(body.mesh, counts[name]) for name, body in scene.bodies.items()}
-    return solve_scene(scene, MPI.COMM_SELF, partitions=cut, tolerance=1e-10)
+from tests.contact.half_tied import MATERIAL, half_tied, solved
 
 
 @pytest.mark.parametrize(
@@ -73,7 +44,8 @@ def test_an_edge_between_tie_and_contact_has_one_answer_for_every_partition(
 def test_tied_nodes_of_a_contact_are_counted(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.INFO, "fenics_contact"):
         state = solved(half_tied(5, "node", sliding=False), (1, 1))
-    assert "1 nodes of the contact of low free on up y0 are tied by low tied on up y0" in caplog.text
+    words = "1 nodes of the contact of low free on up y0 are no contact points: low tied on up y0 ties them"
+    assert words in caplog.text
     assert state.contact_places[:, 0].min() > 1.01
 
 
@@ -114,15 +86,3 @@ def test_a_corner_between_tie_and_contact_stays_a_contact_point(side: str) -> No
 
 def solved_points(scene: Scene) -> np.ndarray:
     return solve_scene(scene, MPI.COMM_SELF).contact.points.pair
-
-
-@pytest.mark.parametrize("right", [0.4, 0.1])
-def test_an_edge_between_contacts_of_different_friction_is_told(
-    right: float, caplog: pytest.LogCaptureFixture
-) -> None:
-    scene = half_tied(5, "node", sliding=False)
-    beside = ContactPair(TIED, TOP, Coulomb(right), "node")
-    with caplog.at_level(logging.WARNING, "fenics_contact"):
-        solve_scene(replace(scene, ties=[], contacts=[*scene.contacts, beside]), MPI.COMM_SELF)
-    words = "1 nodes belong to the contacts of both low free on up y0 and low tied on up y0"
-    assert (words in caplog.text) == (right == 0.1)

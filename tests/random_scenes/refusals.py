@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import clarabel
 import numpy as np
@@ -181,8 +181,7 @@ def _torn(made: Sample) -> TornSystem:
     torn = build_torn_system(scene, decompose(scene, one, MPI.COMM_SELF), overlap=True)
     points = torn.points
     kept = np.flatnonzero(moving(points, Whole(scene)))
-    names = [field.name for field in fields(points)]
-    return replace(torn, points=replace(points, **{name: getattr(points, name)[kept] for name in names}))
+    return replace(torn, points=points.part(kept))
 
 
 def _held_after_all(made: Sample) -> str:

@@ -25,6 +25,7 @@ from fenics_contact.pairing.sliding.given_offsets import with_given_offsets
 from fenics_contact.pairing.sliding.means import MovingMeans
 from fenics_contact.pairing.sliding.meeting import Meeting, meetings_of
 from fenics_contact.pairing.sliding.points import SlidingPoints
+from fenics_contact.pairing.sliding.shared import shared_once
 from fenics_contact.pairing.sliding.slip import LastPoints, MaterialPoints
 from fenics_contact.scene import MovingObstacle, Scene
 from fenics_contact.surface_shapes import asked
@@ -91,10 +92,10 @@ class SlidingContact:
             reach: Distance beyond which nodes need no point, [length].
         """
         comm = comm or MPI.COMM_SELF
-        meetings = meetings_of(scene, fixed, comm)
+        meetings = shared_once(meetings_of(scene, fixed, comm), scene)
         if any(pair.given_gap for pair in scene.contacts):
             origin = scene.origin
-            first = meetings if origin is scene else meetings_of(origin, fixed, comm)
+            first = meetings if origin is scene else shared_once(meetings_of(origin, fixed, comm), origin)
             stood = cls(origin, fixed, comm, np.inf, first).at(origin.points)
             meetings = with_given_offsets(meetings, origin, stood.points, fixed, comm)
         return cls(scene, fixed, comm, reach, meetings)
@@ -249,11 +250,12 @@ def _points(
 ) -> ContactPoints:
     """Return points at candidates, not yet numbered by pair and without facets."""
     count, axes = len(chosen), reference_axes(normal)
-    area = meeting.slave.areas[meeting.candidates[chosen]]
+    taken = None if meeting.taken is None else meeting.taken[chosen]
     return ContactPoints(
         np.zeros(count, dtype=np.int64), meeting.nodes[chosen], weights, normal, tangent_frames(normal, axes),
-        distance + meeting.offset[chosen], area, np.full(count, -1), np.zeros((count, normal.shape[1] - 1)),
-        axes, np.zeros(normal.shape, dtype=bool), distance, meeting.given[chosen],
+        distance + meeting.offset[chosen], meeting.area[chosen], np.full(count, -1),
+        np.zeros((count, normal.shape[1] - 1)), axes, np.zeros(normal.shape, dtype=bool), distance,
+        meeting.given[chosen], taken,
     )  # fmt: skip
 
 

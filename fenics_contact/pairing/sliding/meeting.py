@@ -32,6 +32,7 @@ class Meeting:
         offset: What is added to the gap of each of them, as the pair gives it, shape (n_candidates,),
             [length].
         given: Whether it is, shape (n_candidates,).
+        area: Area that belongs to each of them, shape (n_candidates,), [length^(dim - 1)].
         patches: The smooth surface of the master; None for a rigid obstacle and for mortar contact.
         facets: The master in the reference configuration for mortar contact; None for other pairs.
         master_nodes: Nodes of the master among those of all bodies; none for a rigid obstacle.
@@ -41,6 +42,7 @@ class Meeting:
             (n_candidates, n_facets); None where bodies meet others.
         reach: Distance beyond which no candidate needs a point, [length].
         roles: Which candidates are slaves, where a surface meets itself; None where all are.
+        taken: Whose areas they have, too, see `ContactPoints.taken`.
     """
 
     slave: FacetedSurface
@@ -48,6 +50,7 @@ class Meeting:
     candidates: np.ndarray
     offset: np.ndarray
     given: np.ndarray
+    area: np.ndarray
     patches: SmoothPatches | None
     facets: FacetedSurface | None
     master_nodes: np.ndarray
@@ -56,11 +59,18 @@ class Meeting:
     apart: sp.csr_matrix | None = None
     reach: float = np.inf
     roles: Roles | None = None
+    taken: sp.csr_matrix | None = None
 
     @property
     def nodes(self) -> np.ndarray:
         """Nodes that may carry a multiplier among those of all bodies, ascending, shape (n_candidates,)."""
         return np.asarray(self.slave_nodes[self.candidates])
+
+    def part(self, chosen: np.ndarray) -> Meeting:
+        """Return the pair with some of its candidates, by their positions; not of a body with itself."""
+        names = ("candidates", "offset", "given", "area")
+        taken = None if self.taken is None else self.taken[chosen]
+        return replace(self, taken=taken, **{name: getattr(self, name)[chosen] for name in names})
 
     def normals(self, coordinates: np.ndarray) -> np.ndarray:
         """Return the outward normals of the candidates as the bodies lie now, shape (n_candidates, dim)."""
@@ -125,16 +135,16 @@ def _meeting(scene: Scene, pair: ContactPair, fixed: np.ndarray, tied: np.ndarra
     slave_nodes = numbers.global_nodes(pair.slave.body, slave.nodes)
     bearing = ~fixed[slave_nodes].all(axis=1) & ~np.isin(slave_nodes, tied)
     candidates = np.flatnonzero(bearing & (slave.areas > 0.0))
-    offset, given = np.zeros(len(candidates)), np.zeros(len(candidates), dtype=bool)
+    own = np.zeros(len(candidates)), np.zeros(len(candidates), dtype=bool), slave.areas[candidates]
     if not isinstance(pair.master, Surface):
         none = np.zeros(0, dtype=np.int64), np.zeros((0, dim), dtype=bool)
-        return Meeting(slave, slave_nodes, candidates, offset, given, None, None, *none, pair.master)
+        return Meeting(slave, slave_nodes, candidates, *own, None, None, *none, pair.master)
     master = surface_of(scene, pair.master, "faceted")
     by_means = pair.discretisation == "mortar"
     patches = None if by_means else SmoothPatches.of(master, smooth=pair.geometry != "faceted")
     nodes = numbers.global_nodes(pair.master.body, master.nodes)
     met = Meeting(
-        slave, slave_nodes, candidates, offset, given, patches, master if by_means else None, nodes,
+        slave, slave_nodes, candidates, *own, patches, master if by_means else None, nodes,
         master.mirrored, None,
     )  # fmt: skip
     return _within_body(met, master) if pair.within_body else met
