@@ -26,15 +26,14 @@ from fenics_contact.pairing.node_numbers import NodeNumbers
 from fenics_contact.pairing.shared_projection import shared_projection
 from fenics_contact.pairing.surface_doubts import warn_of_surface
 from fenics_contact.pairing.tied_edges import warn_of_edge
+from fenics_contact.pairing.uneven_pressure import warn_of_uneven_pressure
 from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie, master_share, surface_of
 from fenics_contact.surface_shapes import asked
 from fenics_contact.surfaces import (
     FacetedSurface,
     Geometry,
     Projection,
-    bears_on_midpoints,
-    shape_functions,
-    shape_weights,
+    node_weights,
 )
 
 _LOG = logging.getLogger(__name__)
@@ -109,13 +108,8 @@ class _Side:
 
     def weights(self, hit: Projection) -> sp.csr_matrix:
         """Return the weights of the nodes of all bodies at projections on this side, (n, n_nodes)."""
-        values, _ = shape_functions(hit.local, self.surface.corners)
-        nodes, whole = self.surface.facets[hit.facet], self.surface.whole
-        if whole is not None and bears_on_midpoints(whole):
-            nodes, values = shape_weights(whole, hit.facet, values)
-        nodes = self.nodes[nodes]
-        row = np.repeat(np.arange(len(nodes)), nodes.shape[1])
-        return sp.csr_matrix((values.ravel(), (row, nodes.ravel())), shape=(len(nodes), self.n_nodes))
+        own = node_weights(self.surface, hit)
+        return sp.csr_matrix((own.data, self.nodes[own.indices], own.indptr), (own.shape[0], self.n_nodes))
 
 
 def _points_of_pairs(
@@ -171,6 +165,8 @@ def _measured(
             points = _by_mortar(slave, bearing, master, comm, master_share(scene, pair))
         else:
             points = _by_projection(slave, bearing, master, comm)
+            if not told:
+                warn_of_uneven_pressure(scene, pair, slave.surface, master.surface, comm)
             if isinstance(pair, Tie):
                 held = ~movable | np.isin(slave.nodes, points.slave)
                 warn_of_edge(pair, slave.surface, held, master.surface, comm)

@@ -19,6 +19,7 @@ from fenics_contact.surfaces.facets import (
     shape_functions,
 )
 from fenics_contact.surfaces.midpoints import (
+    bearing_areas,
     bearing_pulled_back,
     bears_on_midpoints,
     filled_at_corners,
@@ -34,6 +35,7 @@ from fenics_contact.surfaces.projection import (
     join,
     nearest_facets,
     newton_matrix,
+    node_weights,
     project,
 )
 from fenics_contact.surfaces.relief import corner_normals, edges_at_corners, height_functions, heights, slopes
@@ -48,6 +50,7 @@ __all__ = [
     "Relief",
     "SurfaceMoments",
     "SurfaceTangents",
+    "bearing_areas",
     "bearing_pulled_back",
     "bears_on_midpoints",
     "best_projections",
@@ -68,6 +71,7 @@ __all__ = [
     "nearest_facets",
     "newton_matrix",
     "nodal_areas",
+    "node_weights",
     "outside",
     "project",
     "quadrature_areas",

@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from fenics_contact.mesh import coordinate_rounding
 from fenics_contact.surfaces.facets import FacetedSurface, outside, shape_functions
+from fenics_contact.surfaces.midpoints import bears_on_midpoints, shape_weights
 from fenics_contact.surfaces.relief import heights
 
 #: Facets tried for each point in the first round, nearest centroids first.
@@ -57,6 +59,16 @@ class Projection:
 
 
 _EACH = ("point", "facet", "local", "gap", "normal", "beside")
+
+
+def node_weights(surface: FacetedSurface, hit: Projection) -> sp.csr_matrix:
+    """Return the weights of a surface's nodes at projections on it, shape (n, n_nodes); rows sum to one."""
+    values, _ = shape_functions(hit.local, surface.corners)
+    nodes, whole = surface.facets[hit.facet], surface.whole
+    if whole is not None and bears_on_midpoints(whole):
+        nodes, values = shape_weights(whole, hit.facet, values)
+    row = np.repeat(np.arange(len(nodes)), nodes.shape[1])
+    return sp.csr_matrix((values.ravel(), (row, nodes.ravel())), shape=(len(nodes), len(surface.nodes)))
 
 
 def interpolated_normal(weights: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

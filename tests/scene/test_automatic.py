@@ -11,7 +11,7 @@ from mpi4py import MPI
 from fenics_contact.contact import solve_scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import near_surfaces
+from fenics_contact.mesh import near_surfaces, quadratic
 from fenics_contact.scene import (
     Automatic,
     Body,
@@ -65,6 +65,14 @@ def test_the_finer_side_is_the_slave_then_the_softer_one() -> None:
     assert scene((1, 1, 1)).contacts[0].slave.body == "plate"
     assert scene((2, 2, 2)).contacts[0].slave.body == "plate"  # alike: as named
     assert scene((2, 2, 2), material=RUBBER).contacts[0].slave.body == "punch"
+
+
+def test_the_coarser_side_is_the_slave_where_cells_are_quadratic() -> None:
+    for high, slave in (((4, 4, 2), "plate"), ((1, 1, 1), "punch"), ((2, 2, 2), "plate")):
+        meshes = {"plate": LOW, "punch": block((0.5, 0.5, 1.0), (2.5, 2.5, 2.0), high)}
+        bodies = {name: Body(quadratic(mesh), STEEL) for name, mesh in meshes.items()}
+        found = Scene(bodies, [Support("plate", "z0")], contacts=Automatic())
+        assert found.contacts[0].slave.body == slave
 
 
 def test_a_side_whose_nodes_are_all_held_is_the_master() -> None:

@@ -1,0 +1,122 @@
+"""Warnings about pairs by nodes of quadratic cells whose meshes do not match: uniform pressures are missed.
+
+Slave nodes exert a uniform pressure p by forces p a, with the areas a that belong to them. These reach the
+master as p Wᵀ a, with the weights W of its nodes in their counterparts, but the same pressure on the master
+makes p b. So its nodes move by what r = Wᵀ a − b does to them, and forces of the slave change by p λ until
+surfaces fit again. With the compliance of each node alone, C = h / (E g) for a size h and an area g, as
+that of a flat punch, and with a constant c, by which the bodies come closer:
+
+    (C_s + W C_m Wᵀ) λ = c − W C_m r,    Σ λ = 0.
+
+λ / a is the relative error of the pressures. That of the whole bodies is about the same, as it changes its
+sign from node to node and so does not reach into them.
+"""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import cg
+
+from fenics_contact._libraries import MPI
+from fenics_contact.errors import tell, together
+from fenics_contact.pairing.shared_projection import shared_projection
+from fenics_contact.scene import ContactPair, Scene, Tie, master_share
+from fenics_contact.surfaces import FacetedSurface, Projection, bearing_areas, nodal_areas, node_weights
+
+#: Errors of a uniform pressure up to this are told to nobody.
+EVEN = 0.1
+
+_LOG = logging.getLogger(__name__)
+
+
+def warn_of_uneven_pressure(
+    scene: Scene, pair: ContactPair | Tie, slave: FacetedSurface, master: FacetedSurface, comm: MPI.Comm
+) -> None:
+    """Say by how much a uniform pressure will be missed, and whether less with slave and master swapped.
+
+    Only of quadratic cells: linear ones have mortar. Collective.
+
+    Args:
+        scene: The scene.
+        pair: A pair by nodes, or a tie.
+        slave: Its slave.
+        master: Its master.
+        comm: Communicator of the ranks that share the work; rank 0 logs.
+    """
+    if slave.whole is None and master.whole is None:
+        return
+    there = shared_projection(slave, np.arange(len(slave.nodes)), master, comm)
+    back = shared_projection(master, np.arange(len(master.nodes)), slave, comm)
+    with together(comm):
+        share = master_share(scene, pair)
+        error = unevenness(slave, there, master, back, share) if comm.rank == 0 else 0.0
+        if error <= EVEN:
+            return
+        swapped = unevenness(master, back, slave, there, 1.0 - share)
+    better = "swap them" if swapped < error else "it would not help to swap them"
+    tell(
+        _LOG.warning,
+        "%s are by nodes, of quadratic cells, and their meshes do not match: where a pressure is uniform, "
+        "that of single nodes is off by up to about %.0f %%, and by %.0f %% with slave and master swapped: "
+        "%s; meshes that match have no such error, and linear cells have mortar",
+        f"surfaces of {pair.place}", 100.0 * error, 100.0 * swapped, better,
+    )  # fmt: skip
+
+
+def unevenness(
+    slave: FacetedSurface, there: Projection, master: FacetedSurface, back: Projection, share: float
+) -> float:
+    """Return the estimate of the largest relative error of a uniform pressure at nodes of a slave.
+
+    Facets near the end of the other surface are left out. Pressures do not fall below zero.
+
+    Args:
+        slave: The slave.
+        there: Projections of its nodes on the master.
+        master: The master.
+        back: Projections of the master's nodes on the slave.
+        share: The master's share of the compliance of both.
+    """
+    met, reached = (np.isin(np.arange(len(s.nodes)), h.point) for s, h in ((slave, there), (master, back)))
+    spread = sp.eye(len(met), format="csc")[:, there.point]
+    weights = (spread @ node_weights(master, there)).tocsr()
+    inside, areas = _areas(slave, weights @ master.points, met)
+    covered, wanted = _areas(master, master.points, reached)
+    sure = covered & (abs(weights[met & ~inside]).sum(axis=0).A1 == 0.0)
+    excess = np.where(sure, weights.T @ areas - wanted, 0.0)
+    bears = met & (areas > 0.0)
+    if not bears.any():
+        return 0.0
+    weights, areas = weights[bears], areas[bears]
+    own, other = (1.0 - share) * _compliance(slave)[bears], share * _compliance(master)
+    matrix = sp.diags(own) + weights @ sp.diags(other) @ weights.T
+    forced, _ = cg(matrix, -(weights @ (other * excess)), atol=0.0)
+    closed, _ = cg(matrix, np.ones(len(areas)), atol=0.0)
+    force = forced - closed * (forced.sum() / closed.sum())
+    error = np.maximum(force / areas, -1.0)
+    return float(np.abs(error).max(initial=0.0))
+
+
+def _areas(surface: FacetedSurface, places: np.ndarray, met: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which nodes have facets alone that meet the other surface, and the areas that these bear on.
+
+    Args:
+        surface: A surface.
+        places: Places of its nodes on that surface between which areas are measured, shape (n, dim).
+        met: Which of its nodes meet the other surface, shape (n,).
+    """
+    facets = surface.facets if surface.whole is None else surface.whole
+    full = met[facets].all(axis=1)
+    areas = np.bincount(facets[full].ravel(), bearing_areas(places, facets[full]).ravel(), minlength=len(met))
+    return ~np.isin(np.arange(len(met)), facets[~full]), areas
+
+
+def _compliance(surface: FacetedSurface) -> np.ndarray:
+    """Return size over area of the linear pieces around each node, up to a constant, shape (n,)."""
+    facets, corners = surface.facets, surface.corners
+    around = np.bincount(facets.ravel(), np.repeat(nodal_areas(surface.points, facets).sum(axis=1), corners))
+    mean = around / np.bincount(facets.ravel())
+    return (mean * 6 / {2: 6, 3: 3, 4: 6}[corners]) ** (1.0 / (surface.dim - 1)) * corners / around
