@@ -99,4 +99,18 @@ LARGE_MUTATIONS = (
             "test_nodes_that_meet_their_master_later_have_the_gap_of_those_beside_them",
         ),
     ),
+    Mutation(
+        "forces a thousand times the rounding of positions are none",
+        "nonlinear/residuals.py",
+        "ROUNDED = 4.0 *",
+        "ROUNDED = 4000.0 *",
+        ("tests/nonlinear/test_limits.py::test_rounding_alone_hides_nothing_of_a_small_load",),
+    ),
+    Mutation(
+        "a tenth of what would strain bodies by their displacement counts as no force",
+        "nonlinear/residuals.py",
+        "FORCE_FLOOR = 1e-4",
+        "FORCE_FLOOR = 1e-1",
+        ("tests/nonlinear/test_mortar.py::test_ironing_converges_quadratically",),
+    ),
 )

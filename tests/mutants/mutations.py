@@ -333,4 +333,11 @@ MUTATIONS = (
         ("tests/contact/test_contact_area.py::"
          "test_the_rim_lies_where_pressure_and_gap_of_a_smooth_contact_place_it",),
     ),
+    Mutation(
+        "ten millionths of what would close the gaps count as no force",
+        "qp/solution.py",
+        "FORCE_FLOOR = 1e-10",
+        "FORCE_FLOOR = 1e-7",
+        ("tests/qp/test_solve.py::test_a_gap_between_supports_excuses_errors_of_its_own_point_alone",),
+    ),
 )

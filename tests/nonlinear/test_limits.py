@@ -76,6 +76,17 @@ def test_contact_at_small_load_is_that_of_small_strains(mesh: BodyMesh, linear: 
     assert len(state.solution.history) <= 5, "nothing is nonlinear but contact"
 
 
+def test_rounding_alone_hides_nothing_of_a_small_load() -> None:
+    """Forces of 1e-12 of stiffness times cell are a thousand times what positions are rounded by."""
+    mesh, load = rectangle((0, 0), (1, 1), (4, 4)), [Traction("block", "x1", (3e-12, 1e-11))]
+    found, small = (
+        solve_scene(Scene({"block": Body(mesh, material)}, [Support("block", "x0")], load), MPI.COMM_SELF)
+        for material in (NeoHooke(1.0, 0.3), PlaneStrain(1.0, 0.3))
+    )
+    moved = small.gather_displacement("block")
+    assert np.abs(found.gather_displacement("block") - moved).max() < 1e-3 * np.abs(moved).max()
+
+
 def turned(points: np.ndarray, angle: float) -> np.ndarray:
     """Displacement of points that turn about an axis through the centre of the unit cube."""
     c, s = np.cos(angle), np.sin(angle)
