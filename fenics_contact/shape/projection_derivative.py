@@ -10,7 +10,6 @@ from fenics_contact.pairing import reference_axes
 from fenics_contact.shape.surface_derivative import normals_pulled_back, rotated_back, slopes_pulled_back
 from fenics_contact.surfaces import (
     FacetedSurface,
-    bears_on_midpoints,
     heights,
     interpolated_normal,
     newton_matrix,
@@ -125,10 +124,10 @@ def carriers(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> t
     """
     values, gradients = shape_functions(local, surface.corners)
     whole = surface.whole
-    if whole is None or not bears_on_midpoints(whole):
+    if whole is None:
         return surface.facets[facet], gradients
     nodes, _ = shape_weights(whole, facet, values)
-    return nodes, shape_weight_gradients(facet, values, gradients)
+    return nodes, shape_weight_gradients(whole, facet, values, gradients)
 
 
 def _tangential(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:

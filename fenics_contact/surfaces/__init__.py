@@ -23,8 +23,6 @@ from fenics_contact.surfaces.midpoints import (
     bearing_pulled_back,
     bears_on_midpoints,
     filled_at_corners,
-    shape_weight_gradients,
-    shape_weights,
     share_areas,
 )
 from fenics_contact.surfaces.projection import (
@@ -38,6 +36,7 @@ from fenics_contact.surfaces.projection import (
     node_weights,
     project,
 )
+from fenics_contact.surfaces.quadratic_facets import shape_weight_gradients, shape_weights
 from fenics_contact.surfaces.relief import corner_normals, edges_at_corners, height_functions, heights, slopes
 from fenics_contact.surfaces.tangents import SurfaceTangents, surface_tangents
 from fenics_contact.surfaces.true_surface import Geometry, height_over, true_surface

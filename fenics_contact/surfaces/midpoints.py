@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.mesh import FACET_TYPES, BodyMesh, CellType, shape_gradients, shape_values
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.surfaces.facet_areas import nodal_areas
 
 #: The nodes of a quadratic triangle.
@@ -82,43 +82,3 @@ def filled_at_corners(facets: np.ndarray, values: np.ndarray) -> np.ndarray:
     mine = np.flatnonzero(count)
     result[mine] = (total[mine].T / count[mine]).T
     return result
-
-
-def shape_weights(
-    facets: np.ndarray, facet: np.ndarray, weights: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nodes of quadratic triangles and their weights at points of their linear pieces.
-
-    Args:
-        facets: Node numbers of the quadratic triangles, (n, 6).
-        facet: Numbers of linear pieces, four consecutive ones a triangle, (m,).
-        weights: Linear shape functions of the pieces at the points, (m, 3).
-
-    Returns:
-        Node numbers and quadratic shape functions, (m, 6) each.
-    """
-    kind, corners = _pieces(facet)
-    places = np.einsum("mk,mkd->md", weights, corners)
-    return facets[facet // len(kind.pieces)], shape_values(kind, places)
-
-
-def shape_weight_gradients(facet: np.ndarray, weights: np.ndarray, gradients: np.ndarray) -> np.ndarray:
-    """Return the derivatives of the weights that `shape_weights` returns by the pieces' local coordinates.
-
-    Args:
-        facet: Numbers of linear pieces, (m,).
-        weights: Linear shape functions of the pieces at the points, (m, 3).
-        gradients: Their derivatives, (m, 3, 2).
-
-    Returns:
-        Shape (m, 6, 2).
-    """
-    kind, corners = _pieces(facet)
-    by_place = shape_gradients(kind, np.einsum("mk,mkd->md", weights, corners))
-    return np.asarray(by_place @ np.einsum("mka,mkd->mda", gradients, corners))
-
-
-def _pieces(facet: np.ndarray) -> tuple[CellType, np.ndarray]:
-    """Return the type of quadratic triangles and the reference corners of pieces, (m, 3, 2)."""
-    kind = FACET_TYPES[_MIDPOINTS.stop, 3]
-    return kind, kind.nodes[kind.pieces[facet % len(kind.pieces)]]

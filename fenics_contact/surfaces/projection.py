@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from fenics_contact.mesh import coordinate_rounding
 from fenics_contact.surfaces.facets import FacetedSurface, outside, shape_functions
-from fenics_contact.surfaces.midpoints import bears_on_midpoints, shape_weights
+from fenics_contact.surfaces.quadratic_facets import shape_weights
 from fenics_contact.surfaces.relief import heights
 
 #: Facets tried for each point in the first round, nearest centroids first.
@@ -62,10 +62,10 @@ _EACH = ("point", "facet", "local", "gap", "normal", "beside")
 
 
 def node_weights(surface: FacetedSurface, hit: Projection) -> sp.csr_matrix:
-    """Return the weights of a surface's nodes at projections on it, shape (n, n_nodes); rows sum to one."""
+    """Return the weights of nodes in the motion of a surface at projections, (n, n_nodes); rows sum to one."""
     values, _ = shape_functions(hit.local, surface.corners)
     nodes, whole = surface.facets[hit.facet], surface.whole
-    if whole is not None and bears_on_midpoints(whole):
+    if whole is not None:
         nodes, values = shape_weights(whole, hit.facet, values)
     row = np.repeat(np.arange(len(nodes)), nodes.shape[1])
     return sp.csr_matrix((values.ravel(), (row, nodes.ravel())), shape=(len(nodes), len(surface.nodes)))

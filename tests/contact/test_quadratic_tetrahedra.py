@@ -14,7 +14,6 @@ from fenics_contact.mesh import quadratic
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,
-    BodyForce,
     ContactPair,
     Coulomb,
     IsotropicElasticity,
@@ -22,7 +21,6 @@ from fenics_contact.scene import (
     Scene,
     Support,
     Surface,
-    Tie,
     TotalForce,
 )
 from fenics_contact.study.scenes.hertz import POISSON, RADIUS, YOUNG, round_block
@@ -104,36 +102,6 @@ def test_values_at_corners_are_those_of_quadratic_fields() -> None:
     np.testing.assert_allclose(filled_at_corners(facets, given)[0], values[0])
     np.testing.assert_array_equal(filled_at_corners(facets, given)[7:], values[7:])
     np.testing.assert_array_equal(filled_at_corners(facets[:, :3], given), given)
-
-
-def test_a_quadratic_displacement_passes_a_tie_between_meshes_that_do_not_match() -> None:
-    """u = (x², x y, x z) / 100 on the boundary of two blocks, and its body force; the meshes are nested."""
-    lower = quadratic(block((0, 0, -1), (1, 1, 0), (1, 1, 1), cell="tetrahedron"))
-    upper = quadratic(block((0, 0, 0), (1, 1, 1), (2, 2, 2), cell="tetrahedron"))
-    shear, lame = 100.0 / 2.6, 100.0 * 0.3 / 1.3 / 0.4
-
-    def exact(points: np.ndarray) -> np.ndarray:
-        return np.asarray(1e-2 * points[:, :1] * points)
-
-    force = (-1e-2 * (shear * 6 + lame * 4), 0.0, 0.0)
-    meshes = {"lower": lower, "upper": upper}
-    supports = [
-        Support(body, side, tuple((lambda x, k=k: exact(x)[:, k]) for k in range(3)))
-        for body, joint in (("lower", "z1"), ("upper", "z0"))
-        for side in meshes[body].surfaces
-        if side != joint
-    ]
-    scene = Scene(
-        {name: Body(mesh, IsotropicElasticity(100.0, 0.3)) for name, mesh in meshes.items()},
-        supports,
-        [BodyForce(name, force) for name in meshes],
-        ties=[Tie(Surface("upper", "z0"), Surface("lower", "z1"), discretisation="node")],
-    )
-    state = solve_scene(scene, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-11))
-    inside = np.all((upper.points[:, :2] > 0) & (upper.points[:, :2] < 1), axis=1) & (upper.points[:, 2] == 0)
-    assert np.count_nonzero(inside) > 4
-    for name, mesh in meshes.items():
-        np.testing.assert_allclose(state.gather_displacement(name), exact(mesh.points), atol=1e-9)
 
 
 def test_a_pushed_block_rubs_and_its_supports_bear_the_rest() -> None:

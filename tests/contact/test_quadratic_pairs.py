@@ -1,0 +1,107 @@
+"""Two bodies of quadratic cells by nodes: the master moves as its quadratic facets do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import solve_scene
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.mesh import BodyMesh, quadratic
+from fenics_contact.qp import FaceNewton
+from fenics_contact.scene import (
+    Body,
+    BodyForce,
+    ContactPair,
+    IsotropicElasticity,
+    PlaneStrain,
+    Pressure,
+    Scene,
+    Support,
+    Surface,
+    Tie,
+)
+
+#: Young's modulus, and Lamé's constants for Poisson's ratio 0.3.
+YOUNG, SHEAR, LAME = 100.0, 100.0 / 2.6, 100.0 * 0.3 / 1.3 / 0.4
+CELLS = ["tetrahedron", "hexahedron", "triangle", "quadrilateral"]
+
+
+def stacked(cell: str, below: int, above: int) -> dict[str, BodyMesh]:
+    """Two unit cubes or squares of so many quadratic cells a side, one on the other."""
+    build, plane = (rectangle, 1) if cell in {"triangle", "quadrilateral"} else (block, 2)
+    places = {"lower": (-1.0, 0.0, below), "upper": (0.0, 1.0, above)}
+    return {
+        name: quadratic(build((0.0,) * plane + (z0,), (1.0,) * plane + (z1,), (n,) * (plane + 1), cell=cell))
+        for name, (z0, z1, n) in places.items()
+    }
+
+
+def bodies(meshes: dict[str, BodyMesh], poisson: float) -> dict[str, Body]:
+    law = IsotropicElasticity if meshes["lower"].dim == 3 else PlaneStrain
+    return {name: Body(mesh, law(YOUNG, poisson)) for name, mesh in meshes.items()}
+
+
+def faces(dim: int) -> tuple[Surface, Surface]:
+    """Names of the faces where upper and lower body meet."""
+    return Surface("upper", "yz"[dim - 2] + "0"), Surface("lower", "yz"[dim - 2] + "1")
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_quadratic_displacement_passes_a_tie_between_meshes_that_do_not_match(cell: str) -> None:
+    """u = (x², x y, x z) / 100 on the boundary of two bodies, and its body force; the meshes are nested."""
+    meshes = stacked(cell, 1, 2)
+    dim = meshes["lower"].dim
+
+    def exact(points: np.ndarray) -> np.ndarray:
+        return np.asarray(1e-2 * points[:, :1] * points)
+
+    force = (-1e-2 * (2 * SHEAR + (dim + 1) * (LAME + SHEAR)), *[0.0] * (dim - 1))
+    upper, lower = faces(dim)
+    supports = [
+        Support(body.body, side, tuple((lambda x, k=k: exact(x)[:, k]) for k in range(dim)))
+        for body in (upper, lower)
+        for side in meshes[body.body].surfaces
+        if side != body.name
+    ]
+    scene = Scene(
+        bodies(meshes, 0.3),
+        supports,
+        [BodyForce(name, force) for name in meshes],
+        ties=[Tie(upper, lower, discretisation="node")],
+    )
+    state = solve_scene(scene, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-11))
+    places = meshes["upper"].points
+    inside = np.all((places[:, :-1] > 0) & (places[:, :-1] < 1), axis=1) & (places[:, -1] == 0)
+    assert np.count_nonzero(inside) > (4 if dim == 3 else 2)
+    for name, mesh in meshes.items():
+        np.testing.assert_allclose(state.gather_displacement(name), exact(mesh.points), atol=1e-9)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_forces_on_the_master_are_those_of_its_shape_functions(cell: str) -> None:
+    """A uniform pressure stays so on matching meshes; on others it varies, but no node opens.
+
+    With weights of linear pieces, on three cells over two of hexahedra it went from 0 to 1.56.
+    """
+    for below, above, largest in ((2, 2, 1e-7), (2, 3, 0.33)):
+        meshes = stacked(cell, below, above)
+        dim = meshes["lower"].dim
+        upper, lower = faces(dim)
+        rollers = [
+            Support(name, "xy"[d] + "0", tuple(0.0 if k == d else None for k in range(dim)))
+            for name in meshes
+            for d in range(dim - 1)
+        ]
+        floor = Support("lower", lower.name[0] + "0", (None,) * (dim - 1) + (0.0,))
+        scene = Scene(
+            bodies(meshes, 0.0),
+            [*rollers, floor],
+            [Pressure("upper", upper.name[0] + "1", 1.0)],
+            [ContactPair(upper, lower, discretisation="node")],
+        )
+        contact = solve_scene(scene, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-10)).contact
+        assert contact.normal_force.sum() == pytest.approx(1.0)
+        assert np.abs(contact.pressure - 1.0).max() < largest
+        assert len(contact.pressure) > 4
