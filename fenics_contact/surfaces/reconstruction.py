@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import comb
 from typing import ClassVar
 
 import numpy as np
@@ -12,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from fenics_contact.surface_shapes import tangent_bases
 from fenics_contact.surfaces.facets import FacetedSurface, Relief, corner_products
+from fenics_contact.surfaces.fitting import PolynomialFit, powers_of
 from fenics_contact.surfaces.relief import edges_at_corners, slopes
 
 #: Angle between the normals of neighbouring facets above which their common edge is a crease, in degrees.
@@ -24,8 +24,6 @@ ALIKE = 0.9
 ROUNDING = 1e-6
 #: Surfaces with a slope above this at the end of an edge have a cusp there, or fold.
 STEEPEST = 1.0
-#: Eigenvectors of the fit whose eigenvalue is below this fraction of the largest are left as in the facets.
-UNKNOWN = 1e-6
 
 
 def reconstructed(surface: FacetedSurface, order: int = 2) -> FacetedSurface:
@@ -113,11 +111,26 @@ class Wedges:
         of_corner: Wedge of each corner, shape (n_facets, corners).
         node: Node of each wedge, shape (n_wedges,).
         mirrored: Planes of symmetry across which it continues smoothly, shape (n_wedges, dim).
+        rim: Whether it ends at an edge, the surface's or a crease, shape (n_wedges,).
     """
 
     of_corner: np.ndarray
     node: np.ndarray
     mirrored: np.ndarray
+    rim: np.ndarray
+
+    def patches(self, order: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the wedges within so many rings of facets around each, and which patches are narrow.
+
+        Args:
+            order: Number of rings.
+
+        Returns:
+            Pairs of wedges as from `rings_of`, and whether all of a patch lies at the rim, shape (n_wedges,).
+        """
+        centre, around = rings_of(self.of_corner, len(self.node), order)
+        inside = np.bincount(centre, ~self.rim[around], len(self.node)) > 0
+        return centre, around, self.rim & ~inside
 
 
 def wedges_of(surface: FacetedSurface) -> Wedges:
@@ -134,12 +147,16 @@ def wedges_of(surface: FacetedSurface) -> Wedges:
     node = np.zeros(number, dtype=np.int64)
     node[wedge] = surface.facets.ravel()
     mirrored = np.zeros((number, surface.dim), dtype=bool)
-    start = len(joints.angle)
+    start = stop = len(joints.angle)
     for axis, image in enumerate(images):
-        stop = start + len(image.angle)
-        mirrored[wedge[image.corners[smooth[start:stop], 0].ravel()], axis] = True
-        start = stop
-    return Wedges(wedge.reshape(surface.facets.shape), node, mirrored)
+        begin, stop = stop, stop + len(image.angle)
+        mirrored[wedge[image.corners[smooth[begin:stop], 0].ravel()], axis] = True
+    # Every corner has two edges, of plane bodies one end of an edge; both sides of an image are the same.
+    first = np.arange(len(smooth)) < start
+    joined = [every.corners[smooth & first].ravel(), every.corners[smooth & ~first, 0].ravel()]
+    edges = np.bincount(wedge, minlength=number) * min(surface.corners - 1, 2)
+    rim = np.bincount(wedge[np.concatenate(joined)], minlength=number) < edges
+    return Wedges(wedge.reshape(surface.facets.shape), node, mirrored, rim)
 
 
 def _joints_with_images(surface: FacetedSurface) -> list[_Joints]:
@@ -244,7 +261,7 @@ def _fitted(surface: FacetedSurface, wedges: Wedges, order: int) -> tuple[np.nda
     np.add.at(summed, wedges.of_corner, corner_products(surface.points, surface.facets))
     summed[mirrored] = 0.0
     mean = summed / np.linalg.norm(summed, axis=1)[:, None]
-    centre, around = rings_of(wedges.of_corner, count, order)
+    centre, around, narrow = wedges.patches(order)
     away = surface.points[node[around]] - surface.points[node[centre]]
     away, centre = _with_mirror_images(away, centre, mirrored)
     size = np.zeros(count)
@@ -254,7 +271,7 @@ def _fitted(surface: FacetedSurface, wedges: Wedges, order: int) -> tuple[np.nda
     place = np.einsum("nad,nd->na", axes[centre], away) / size[centre][:, None]
     height = np.einsum("nd,nd->n", mean[centre], away) / size[centre]
     powers = powers_of(dim - 1, order)
-    coefficients = _coefficients(place, height, centre, count, powers)
+    coefficients = PolynomialFit.of(place, height, centre, narrow, order).coefficients(height)
     slope, bend = coefficients[:, : dim - 1], np.zeros((count, dim - 1, dim - 1))
     for power, coefficient in zip(powers, coefficients.T, strict=True):
         if sum(power) == 2:
@@ -265,13 +282,6 @@ def _fitted(surface: FacetedSurface, wedges: Wedges, order: int) -> tuple[np.nda
     normal[mirrored] = 0.0
     in_space = np.einsum("nab,nad,nbe->nde", bend, axes, axes) / size[:, None, None]
     return normal / np.linalg.norm(normal, axis=1)[:, None], in_space
-
-
-def powers_of(dim: int, order: int) -> list[tuple[int, ...]]:
-    """List the powers of the coordinates in a polynomial without constant, those of degree one first."""
-    if dim == 1:
-        return [(k,) for k in range(1, order + 1)]
-    return [(k - second, second) for k in range(1, order + 1) for second in range(k + 1)]
 
 
 def rings_of(wedge: np.ndarray, count: int, rings: int) -> tuple[np.ndarray, np.ndarray]:
@@ -295,27 +305,3 @@ def _with_mirror_images(
         image = away[across] * np.where(np.arange(away.shape[1]) == axis, -1.0, 1.0)
         away, centre = np.concatenate([away, image]), np.concatenate([centre, centre[across]])
     return away, centre
-
-
-def _coefficients(
-    place: np.ndarray, height: np.ndarray, centre: np.ndarray, count: int, powers: list[tuple[int, ...]]
-) -> np.ndarray:
-    """Fit polynomials by weighted least squares, shape (count, number of powers).
-
-    Where the nodes do not determine a polynomial, as on a surface one layer of facets wide, it is the one of
-    the smallest norm. That of Bombieri, in which the powers of a degree count by one over their binomial
-    coefficient, is the same in all axes; in the plain one, normals would depend on a turn of the axes.
-    """
-    scale = np.sqrt([comb(sum(power), power[-1]) for power in powers])
-    terms = scale * np.column_stack([np.prod(place**power, axis=1) for power in powers])
-    weight = 1.0 / np.maximum((place**2).sum(axis=1), 1e-12)
-    size = len(powers)
-    columns = np.concatenate([terms, height[:, None]], axis=1)
-    products = terms[:, :, None] * columns[:, None]
-    over_centres = sp.csr_matrix((weight, (centre, np.arange(len(centre)))), shape=(count, len(centre)))
-    summed = (over_centres @ products.reshape(len(centre), -1)).reshape(count, size, size + 1)
-    matrix, right = summed[:, :, :-1], summed[:, :, -1]
-    values, vectors = np.linalg.eigh(matrix)
-    known = values > UNKNOWN * values[:, -1:]
-    inverse = np.where(known, 1.0 / np.where(known, values, 1.0), 0.0)
-    return scale * np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, right)

@@ -9,7 +9,8 @@ import scipy.sparse as sp
 
 from fenics_contact.surface_shapes import tangent_bases
 from fenics_contact.surfaces.facets import FacetedSurface, corner_products
-from fenics_contact.surfaces.reconstruction import Wedges, powers_of, rings_of, wedges_of
+from fenics_contact.surfaces.fitting import PolynomialFit
+from fenics_contact.surfaces.reconstruction import Wedges, wedges_of
 from fenics_contact.surfaces.relief import edges_at_corners
 
 
@@ -76,7 +77,7 @@ def surface_tangents(surface: FacetedSurface, order: int = 2, steepest: float = 
 
 
 def _tangent_operators(
-    surface: FacetedSurface, wedges: Wedges, order: int, ridge: float = 1e-9
+    surface: FacetedSurface, wedges: Wedges, order: int
 ) -> tuple[np.ndarray, sp.csr_matrix]:
     """Return axes of the tangent plane of each wedge and the derivatives of positions along them.
 
@@ -84,7 +85,6 @@ def _tangent_operators(
         surface: The surface.
         wedges: Its wedges.
         order: Degree of the polynomials.
-        ridge: Weight of higher degrees: where nodes are too few, linear functions remain exact.
 
     Returns:
         Axes, shape (n_wedges, dim − 1, dim), and weights of the nodes, shape (n_wedges · (dim − 1), n_nodes).
@@ -92,23 +92,16 @@ def _tangent_operators(
     node, count, dim = wedges.node, len(wedges.node), surface.dim
     summed = np.zeros((count, dim))
     np.add.at(summed, wedges.of_corner, corner_products(surface.points, surface.facets))
-    axes = tangent_bases(summed / np.linalg.norm(summed, axis=1)[:, None])
-    centre, around = rings_of(wedges.of_corner, count, order)
+    mean = summed / np.linalg.norm(summed, axis=1)[:, None]
+    axes = tangent_bases(mean)
+    centre, around, narrow = wedges.patches(order)
     away = surface.points[node[around]] - surface.points[node[centre]]
     size = np.zeros(count)
     np.maximum.at(size, centre, np.linalg.norm(away, axis=1))
-    place = np.einsum("nad,nd->na", axes[centre], away) / size[centre][:, None]
-    powers = powers_of(dim - 1, order)
-    terms = np.column_stack([np.prod(place**power, axis=1) for power in powers])
-    weighted = terms / np.maximum((place**2).sum(axis=1), 1e-12)[:, None]
-    products = (weighted[:, :, None] * terms[:, None]).reshape(len(centre), -1)
-    sums = sp.csr_matrix((np.ones(len(centre)), (centre, np.arange(len(centre)))), shape=(count, len(centre)))
-    matrix = (sums @ products).reshape(count, len(powers), -1)
-    higher = np.array([float(sum(power) > 1) for power in powers])
-    matrix += ridge * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.diag(higher)
-    unit = np.eye(len(powers))[:, : dim - 1]
-    first = np.linalg.solve(matrix, np.broadcast_to(unit, (count, *unit.shape)))
-    value = np.einsum("npa,np->na", first[centre], weighted) / size[centre][:, None]
+    away /= size[centre][:, None]
+    place, height = np.einsum("nad,nd->na", axes[centre], away), np.einsum("nd,nd->n", mean[centre], away)
+    fit = PolynomialFit.of(place, height, centre, narrow, order)
+    value = fit.slope_weights(dim - 1) / size[centre][:, None]
     row = ((dim - 1) * centre[:, None] + np.arange(dim - 1)).ravel()
     ends = (np.repeat(node[around], dim - 1), np.repeat(node[centre], dim - 1))
     entries = (np.concatenate([value.ravel(), -value.ravel()]), (np.tile(row, 2), np.concatenate(ends)))
