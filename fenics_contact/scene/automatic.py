@@ -33,9 +33,9 @@ class Automatic(Sequence[ContactPair]):
 
     The scene looks for facets that face another body within a distance, names them "near B" on A and "near
     A" on B, and makes a pair of them; look at ``scene.contacts`` and at pictures before trusting it. The
-    slave is the side with the smaller facets, of quadratic cells with the larger ones; between facets alike
-    to a tenth, that of the softer body. A side whose nodes are all held is the master. Bodies named in
-    ``self_contact`` may meet themselves wherever they fold.
+    slave is the side with the smaller facets; between facets alike to a tenth, that of the softer body. A
+    side whose nodes are all held is the master. Bodies named in ``self_contact`` may meet themselves wherever
+    they fold.
 
     Attributes:
         friction: The law of all pairs, see `ContactPair`.
@@ -135,10 +135,7 @@ class Automatic(Sequence[ContactPair]):
         sizes = [_size(scene.bodies[side.body].mesh, side.name) for side in sides]
         held = [bool(scene.fixed(side.body)[np.unique(scene.facets(side))].all()) for side in sides]
         alike = max(sizes) <= 1.1 * min(sizes)
-        quadratic = any(
-            scene.bodies[side.body].mesh.order > 1 for side in sides
-        )  # by nodes, see `ContactPair`
-        other_is_better = master_share(scene, pair) > 0.5 if alike else (sizes[1] < sizes[0]) != quadratic
+        other_is_better = master_share(scene, pair) > 0.5 if alike else sizes[1] < sizes[0]
         if held[0] != held[1]:  # nodes that cannot move carry no multipliers
             other_is_better = held[0]
         return replace(pair, slave=sides[1], master=sides[0]) if other_is_better else pair

@@ -92,8 +92,7 @@ class ContactPair:
     """Two surfaces that may touch. The slave may not penetrate the master.
 
     Attributes:
-        slave: Surface whose nodes carry the contact forces: the finer or softer one, of quadratic cells the
-            coarser or softer one.
+        slave: Surface whose nodes carry the contact forces: the finer or softer one.
         master: Surface of another body, or a rigid obstacle; another one of the same body where it
             deforms so much that these meet.
         friction: Law of friction; without one (None) contact is frictionless.
@@ -223,8 +222,7 @@ class Tie:
     An initial gap between their meshes stays as it is.
 
     Attributes:
-        slave: Surface whose nodes carry the forces; the finer mesh is the better slave, of quadratic cells
-            the coarser one.
+        slave: Surface whose nodes carry the forces; the finer mesh is the better slave.
         master: Surface of another body.
         sliding: Whether the surfaces may slide along each other: contact known to be closed.
         discretisation: ``"node"`` ties every slave node to its master facet, ``"mortar"`` ties weighted

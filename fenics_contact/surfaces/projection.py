@@ -62,7 +62,7 @@ _EACH = ("point", "facet", "local", "gap", "normal", "beside")
 
 
 def node_weights(surface: FacetedSurface, hit: Projection) -> sp.csr_matrix:
-    """Return the weights of nodes in the motion of a surface at projections, (n, n_nodes); rows sum to one."""
+    """Return the weights of nodes in the motion of a surface at projections, shape (n, n_nodes)."""
     values, _ = shape_functions(hit.local, surface.corners)
     nodes, whole = surface.facets[hit.facet], surface.whole
     if whole is not None:

@@ -125,7 +125,7 @@ def test_areas_that_differ_by_curvature_are_no_error(caplog: pytest.LogCaptureFi
     assert told(caplog, arcs(4, 4)) == []
     (words,) = told(caplog, arcs(4, 6))
     (flat,) = told(caplog, pressed(boxes("quadrilateral", 4, 6)))
-    assert named(words) == pytest.approx(named(flat), rel=0.15)
+    assert named(words) == pytest.approx(named(flat), rel=0.3)
 
 
 @pytest.mark.parametrize("slave", ["a", "b"])
@@ -168,4 +168,4 @@ def test_one_rank_tells_what_all_have_found(mpirun: Callable[..., str]) -> None:
         build_torn_system(scene, decompose(scene, scene.partition(2), MPI.COMM_WORLD))
     """
     (words,) = mpirun(code, 2).strip().splitlines()
-    assert named(words) == (0.17, 0.48)
+    assert named(words) == (0.16, 0.13)
