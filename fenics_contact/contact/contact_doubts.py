@@ -6,6 +6,7 @@ import logging
 
 import numpy as np
 
+from fenics_contact.contact.coarse_peaks import coarse_peak
 from fenics_contact.contact.state import State
 from fenics_contact.errors import InvalidInputError, tell
 from fenics_contact.feti import TornSystem
@@ -79,8 +80,10 @@ class ContactDoubts:
                 continue  # nothing moves
             nearest = np.minimum(before, after) + np.minimum(change[mine], 0.0)
             error = float(np.abs(change[mine][nearest <= moved]).max(initial=0.0))
-            if error > SHARE * moved:
+            if error > SHARE * moved:  # which points press is not known then
                 found.append((number, "facets", _words_of_facets(pair, error, moved)))
+            else:
+                found += coarse_peak(state, number, pressed_in)
             overlap = -float(before[touching].min(initial=0.0))
             if overlap > max(error, SHARE * moved):
                 found.append((number, "overlap", _words_of_overlap(pair, overlap, moved)))
