@@ -146,3 +146,9 @@ def _sequence(values: Sequence[Any] | Set[Any], inside: bool) -> str:
 
 def _more(count: int) -> list[str]:
     return [f"… {count - ENTRIES} more"] if count > ENTRIES else []
+
+
+def force_units(force: str, length: str, dim: int) -> tuple[str, str]:
+    """Return the units of forces, and of moments and energies; those of plane bodies are per thickness."""
+    per = f"/{length}" if dim == 2 else ""
+    return f"{force}{per}", f"{force} {length}{per}"

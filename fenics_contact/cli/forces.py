@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
+from fenics_contact.display import force_units
 from fenics_contact.io import listed_forces, scales_of
 from fenics_contact.linalg import ROUNDING
 
@@ -22,7 +23,8 @@ def forces_table(forces: Mapping[str, Any], units: Mapping[str, str] | None = No
     balance, names = forces["balance"], units or {}
     force, length = names.get("force", "force"), names.get("length", "length")
     plane = np.ndim(balance["loads"]["moment"]) == 0
-    table = Table(title=f"forces ({force}) and moments ({force} {length})", title_justify="left", box=None)
+    force, moment = force_units(force, length, 2 if plane else 3)
+    table = Table(title=f"forces ({force}) and moments ({moment})", title_justify="left", box=None)
     table.pad_edge = False
     table.caption_justify = "left"
     table.caption = (

@@ -27,6 +27,7 @@ from fenics_contact.cli.pictures import Gallery, can_draw, draw_state
 from fenics_contact.cli.plans import show_outputs, show_plan
 from fenics_contact.cli.resumable import resumable
 from fenics_contact.contact import pairs_in_words
+from fenics_contact.display import force_units
 from fenics_contact.io import ResultSeries, only_run_in, write_optimisation_result
 from fenics_contact.optimize import Result
 from fenics_contact.progress import show_progress
@@ -114,7 +115,8 @@ def _facts(file: SceneFile, task: ShapeTask, result: Result) -> dict[str, str]:
         rows[f"constraint {one.name}"] = f"{one.value:.6g}{', active' if one.active else ''}"
     for name, point in (("before", before), ("after", after)):
         state = point.state
-        for number, words in enumerate(pairs_in_words(state.scene, state.contact, units.force, units.stress)):
+        force, _ = force_units(units.force, units.length, state.scene.dim)
+        for number, words in enumerate(pairs_in_words(state.scene, state.contact, force, units.stress)):
             rows[f"contact {number} {name}"] = words
     volume, start = problem.volume(result.x)[0], problem.volume(task.start)[0]
     rows["volume"] = f"{volume / start:.6f} of that at the start"

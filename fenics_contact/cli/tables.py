@@ -10,6 +10,7 @@ from rich import box
 from rich.table import Table
 
 from fenics_contact.contact import State, Status, pairs_in_words
+from fenics_contact.display import force_units
 from fenics_contact.scene_file import SceneFile
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 def state_facts(state: State, units: UnitNames) -> dict[str, str]:
     """Return a summary of a state as text, without energies that are not known. Collective."""
-    counts, energy = state.counts, f"{units.force} {units.length}"
+    counts, (force, energy) = state.counts, force_units(units.force, units.length, state.scene.dim)
     rows = {
         "unknowns": f"{counts['torn_unknowns']} in {counts['subdomains']} subdomains",
         "work": f"{counts['solver_steps']} steps, {counts['f_products']} products with F",
@@ -28,7 +29,7 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
         "total potential": f"{state.energies.total_potential:.6g} {energy}",
         "displacement": f"up to {_largest_displacement(state):.4g} {units.length}",
     }
-    for number, words in enumerate(pairs_in_words(state.scene, state.contact, units.force, units.stress)):
+    for number, words in enumerate(pairs_in_words(state.scene, state.contact, force, units.stress)):
         rows[f"contact {number}"] = words
     for number, motion in enumerate(state.rigid_motions()):
         rows[f"rigid surface {number}"] = str(motion).replace("[length]", units.length)
@@ -58,14 +59,15 @@ def step_row(number: int, name: str, state: State) -> tuple[str, ...]:
 def step_table(rows: Sequence[tuple[str, ...]], file: SceneFile) -> Table:
     """Return one row for every load step."""
     units = file.document.units
+    force, _ = force_units(units.force, units.length, file.scene.dim)
     table = Table(
         title=f"{file.title}: load steps", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
     )
     table.add_column("", justify="right")
     table.add_column("step", no_wrap=True)
     for name in (
-        "iterations", "products", "open", "stick", "slip", f"normal force\n({units.force})",
-        f"friction\n({units.force})", f"largest pressure\n({units.stress})",
+        "iterations", "products", "open", "stick", "slip", f"normal force\n({force})",
+        f"friction\n({force})", f"largest pressure\n({units.stress})",
     ):  # fmt: skip
         table.add_column(name, justify="right")
     for row in rows:

@@ -39,10 +39,11 @@ def listed_forces(forces: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any
     single = [(f"{words[kind]} {k}", entry) for kind in words for k, entry in enumerate(forces[kind])]
     balance = forces["balance"]
     sums = {name: entry for name, entry in balance.items() if isinstance(entry, Mapping)}
-    return [
-        *single,
-        *((f"sum of {name}", {**entry, "about": balance["about"]}) for name, entry in sums.items()),
+    whole = [
+        (f"sum {'across' if name == 'gaps' else 'of'} {name}", {**entry, "about": balance["about"]})
+        for name, entry in sums.items()
     ]
+    return [*single, *whole]
 
 
 def scales_of(forces: Mapping[str, Any]) -> dict[str, float]:

@@ -277,7 +277,10 @@ class _Walk:
         return len(found.history)
 
     def _count(self, history: Sequence[SolverStep], products: int, factorisations: int) -> None:
-        self._history += [replace(line, outer=len(self._fractions)) for line in history]
+        part = len(self._fractions)
+        self._history += [
+            replace(line, products=self._products + line.products, outer=part) for line in history
+        ]
         self._products += products
         self._factorisations += factorisations
 

@@ -9,7 +9,7 @@ Newton's method finds the equilibrium without it.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -148,14 +148,16 @@ class Snapping:
         try:
             found = newton.solve(self._equations, self._contact, load, at, self._timer, known)
         except ConvergenceError as failure:
-            self.history += failure.history
-            self.products += failure.history[-1].products if failure.history else 0
-            self.factorisations += len(failure.history)
+            products = failure.history[-1].products if failure.history else 0
+            self._count(failure.history, products, len(failure.history))
             return None
-        self.history += found.history
-        self.products += found.products
-        self.factorisations += found.factorisations
+        self._count(found.history, found.products, found.factorisations)
         return found
+
+    def _count(self, history: Sequence[SolverStep], products: int, factorisations: int) -> None:
+        self.history += [replace(line, products=self.products + line.products) for line in history]
+        self.products += products
+        self.factorisations += factorisations
 
     def _dragged(self, drag: Drag, at: Configuration, found: NonlinearEquilibrium) -> float:
         """Add the work of a stage; return the drag, relative to all forces. Collective."""

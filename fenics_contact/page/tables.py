@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from fenics_contact.display import force_units
 from fenics_contact.io import listed_forces, scales_of
 from fenics_contact.viz import Units
 
@@ -65,20 +66,34 @@ def _rows(facts: Mapping[str, Any]) -> str:
 
 def _summary(record: Record, units: Units) -> dict[str, Any]:
     scene, counts, solver = (record.get(name) or {} for name in ("scene", "counts", "solver"))
-    energies, work = record.get("energies") or {}, f"{units.force} {units.length}"
+    energies, (_, work) = record.get("energies") or {}, _force_units(record, units)
     facts: dict[str, Any] = {
         f"body {name}": f"{number(body['cells'])} cells ({body['cell_type']}), {number(body['nodes'])} nodes"
         for name, body in (scene.get("bodies") or {}).items()
     }
     facts |= {name.replace("f_", "F-").replace("_", " "): value for name, value in counts.items()}
     facts |= {
-        f"energy, {name.replace('_', ' ')}": f"{number(value)} {work}" for name, value in energies.items()
+        f"energy, {name.replace('_', ' ')}": f"{number(value)} {work}"
+        for name, value in energies.items()
+        if value is not None
     }
     facts["solver"] = ", ".join([*solver.get("methods", ()), solver.get("reason") or ""]).strip(", ")
-    facts["tolerance"] = solver.get("tolerance")
+    facts["tolerance"] = _tolerance(solver.get("tolerance"))
     facts["held by nothing"] = "; ".join(record.get("unheld") or ())
     objective = (record.get("optimisation") or {}).get("objective") or {}
     return facts | {f"objective, {name.replace('_', ' ')}": value for name, value in objective.items()}
+
+
+def _tolerance(given: Any) -> Any:
+    """Return a tolerance; one that follows the mesh in words."""
+    if not isinstance(given, Mapping) or "share" not in given:
+        return given
+    return f"solver's error at most {100 * given['share']:.3g} % of the discretisation's"
+
+
+def _force_units(record: Record, units: Units) -> tuple[str, str]:
+    """Return the units of forces, and of moments and energies."""
+    return force_units(units.force, units.length, 2 if _plane(record) else 3)
 
 
 def _accuracy(record: Record) -> dict[str, Any]:
@@ -96,7 +111,7 @@ def _accuracy(record: Record) -> dict[str, Any]:
 
 
 def _contact(record: Record, units: Units) -> str:
-    entries = record.get("contact") or []
+    entries, (force, _) = record.get("contact") or [], _force_units(record, units)
     names = (record.get("scene") or {}).get("contacts") or [{}] * len(entries)
     rows: list[tuple[str, str]] = []
     for pair, entry in zip(names, entries, strict=True):
@@ -107,7 +122,7 @@ def _contact(record: Record, units: Units) -> str:
         rows += [
             (words, f"{number(entry[name])} {unit}")
             for name, words, unit in (
-                ("normal_force", "normal force", units.force),
+                ("normal_force", "normal force", force),
                 ("peak_pressure", "largest pressure", units.stress),
                 ("area", "area in contact", units.length if _plane(record) else f"{units.length}²"),
                 ("smallest_gap", "smallest gap", units.length),
@@ -146,10 +161,11 @@ def _steps(record: Record, units: Units) -> str:
     steps = (record.get("more") or {}).get("steps")
     if not isinstance(steps, Mapping) or "name" not in steps:
         return ""
+    force, _ = _force_units(record, units)
     named = {
         "number": "", "name": "step", "iterations": "iterations", "products": "products", "open": "open",
-        "stick": "stick", "slip": "slip", "normal_force": f"normal force ({units.force})",
-        "friction_force": f"friction ({units.force})", "peak_pressure": f"largest pressure ({units.stress})",
+        "stick": "stick", "slip": "slip", "normal_force": f"normal force ({force})",
+        "friction_force": f"friction ({force})", "peak_pressure": f"largest pressure ({units.stress})",
     }  # fmt: skip
     columns = [name for name in named if name in steps]
     rows = list(zip(*(steps[name] for name in columns), strict=True))
@@ -174,18 +190,18 @@ def _forces(record: Record, units: Units) -> str:
     if not forces:
         return ""
     scales, imbalance = scales_of(forces), forces["balance"]["imbalance"]
+    names = _force_units(record, units)
     entries = [
         (f"{what} {_side(entry)}" if "surface" in entry else what, entry)
         for what, entry in listed_forces(forces)
     ]
-    rows = [row for name, entry in entries for row in _force_rows(name, entry, scales, units)]
+    rows = [row for name, entry in entries for row in _force_rows(name, entry, scales, names)]
     words = f"<p>Imbalance of all forces and moments: {escape(number(imbalance))}.</p>"
-    axes = ("x", "y", "z")[: 2 if _plane(record) else 3]
-    return _table(("", "", *axes), rows, words=2) + words
+    return _table(("", "", "x", "y", "z"), rows, words=2) + words
 
 
 def _force_rows(
-    name: str, entry: Record, given: Mapping[str, float], units: Units, rounding: float = 1e-8
+    name: str, entry: Record, given: Mapping[str, float], units: tuple[str, str], rounding: float = 1e-8
 ) -> list[tuple[Any, ...]]:
     """Return a row for a force and one for its moment; none if both are zero but for rounding."""
     scales = {**given, "about": given["moment"] / given["force"] if given["force"] else 0.0}
@@ -196,10 +212,14 @@ def _force_rows(
     if not any([*force, *moment]):
         return []
     # In the plane a moment is one number, about the axis across it.
-    padded = [*[""] * (len(force) - len(moment)), *moment]
     return [
-        (name, f"force ({units.force})", *force),
-        (f"about {', '.join(map(number, about))}", f"moment ({units.force} {units.length})", *padded),
+        (name, f"force ({units[0]})", *force, *[""] * (3 - len(force))),
+        (
+            f"about {', '.join(map(number, about))}",
+            f"moment ({units[1]})",
+            *[""] * (3 - len(moment)),
+            *moment,
+        ),
     ]
 
 

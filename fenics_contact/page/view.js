@@ -233,7 +233,13 @@ function direction() {
 function room(narrow) {
   const wide = $("view").clientWidth - (narrow ? 0 : 130),
     high = $("view").clientHeight - (narrow ? 70 : 0);
-  return { wide, high, free: [wide - (narrow ? 130 : 150), high - (narrow ? 100 : 130)] };
+  // In the plane names lie beside the ends of axes, on both sides as the view is centred.
+  const names = page.plane ? (narrow ? 20 : 60) : 0;
+  return {
+    wide,
+    high,
+    free: [wide - (narrow ? 130 : 150) - names, high - (narrow ? 100 : 130) - names],
+  };
 }
 
 // Length in the scene of a unit of length, so that a plane scene fills the view, 2.17 high in this projection.

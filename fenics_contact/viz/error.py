@@ -72,7 +72,7 @@ def plot_error(
     total = float(np.sqrt(sum(np.sum(part**2) for part in values.values())))
     facts = f"estimated discretisation error {written(100 * total, 3)} % in energy norm, by cell"
     norm = LogNorm(*(given or error_range(values)), clip=False)
-    label, words = "part of a cell, relative to the energy norm of the displacement", headline(title, facts)
+    label, words = "part of a cell, relative", headline(title, facts)
     bodies = drawn_bodies(state)
     shown = {name: np.repeat(part, bodies[name].n_cells // len(part)) for name, part in values.items()}
     paints = Paints(shown, ERROR_MAP, norm, label, words, 1.0, reach, units or Units(), width)

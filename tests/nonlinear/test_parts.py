@@ -91,6 +91,9 @@ def test_friction_and_plastic_flow_do_not_depend_on_how_a_load_step_is_cut(
     for one, cut, history in zip(whole, parts, finer, strict=True):
         assert one.fractions == (1.0,)
         assert len(cut.fractions) == len(history.fractions) > 1
+        products = [line.products for line in cut.solution.history]
+        assert min(np.diff(products)) > 0, "they are counted on from part to part"
+        assert products[-1] == cut.counts["f_products"]
         assert one.contact.slip_bound @ np.abs(one.contact.slip) > 0.0, "something slips"
         np.testing.assert_allclose(cut.contact.slip, one.contact.slip, atol=1e-8)
         assert difference(one, cut) < 1e-7

@@ -88,6 +88,9 @@ def test_an_arch_that_snaps_rests_where_a_finger_pushes_it() -> None:
     assert not before.snaps
     assert 0.0 < snap.fraction <= 1.0
     assert snap.stages > 3
+    products = [line.products for line in after.solution.history]
+    assert min(np.diff(products)) >= 0
+    assert products[-1] == after.counts["f_products"]
     assert after.since >= snap.fraction, "histories begin anew where bodies snapped"
     finger = MovingObstacle(RigidSphere((10.0, 4.0), 2.0), lambda time: (None, (0.0, -time)))
     touched = Scene({"arch": arch()}, crown(None), contacts=[ContactPair(Surface("arch", "y1"), finger)])

@@ -14,8 +14,8 @@ from fenics_contact.contact import Status
 from fenics_contact.io import ResultSeries, write_result
 from fenics_contact.page import result_page
 from tests.page.browser import CHROMIUM, DRIVER, MISSING, Browser, browser
-from tests.viz.plane_states import plane_block
-from tests.viz.states import touching_blocks
+from tests.viz.plane_states import flat_pad, plane_block, tall_pad
+from tests.viz.states import pixels, touching_blocks
 
 pytestmark = pytest.mark.skipif(DRIVER is None or CHROMIUM is None, reason=MISSING)
 
@@ -108,6 +108,31 @@ def test_a_page_asks_for_nothing_and_nothing_is_cut_off(
     """
     assert chromium.run(wider) == []
     require_no_trouble(chromium, pages[name])
+
+
+@pytest.mark.parametrize("width", [1280, 400])
+@pytest.mark.parametrize("name", ["flat", "tall"])
+def test_names_of_plane_axes_stand_whole_in_the_view(
+    name: str, width: int, chromium: Browser, tmp_path: Path
+) -> None:
+    """They are what changes in the picture where they are left out."""
+    result_page({"flat": flat_pad, "tall": tall_pad}[name](), tmp_path / "page.html")
+    chromium.open(tmp_path / "page.html", width)
+    images = []
+    for axes in (["x (mm)", "y (mm)"], ["", "y (mm)"], ["x (mm)", ""]):
+        words = {f"scene.{axis}axis.title.text": text for axis, text in zip("xy", axes, strict=True)}
+        chromium.run("return Plotly.relayout('view', arguments[0]).then(() => 1)", words)
+        chromium.picture(tmp_path / "page.png")
+        images.append(pixels(tmp_path / "page.png"))
+    left, top, right, bottom = chromium.run(
+        "const b = document.getElementById('view').getBoundingClientRect();"
+        "return [b.left, b.top, b.right, b.bottom]"
+    )
+    for axis, without in zip("xy", images[1:], strict=True):
+        rows, columns = np.nonzero(np.abs(images[0] - without).max(axis=2) > 0.25)
+        assert len(rows) > 30, f"{axis} has no name"
+        assert min(columns.min() - left, right - columns.max()) > 4, f"the name of {axis} is cut off"
+        assert min(rows.min() - top, bottom - rows.max()) > 4, f"the name of {axis} is cut off"
 
 
 def test_the_menu_changes_colours_and_numbers(chromium: Browser, pages: dict[str, Path]) -> None:

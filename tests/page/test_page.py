@@ -197,10 +197,31 @@ def test_moments_in_the_plane_are_one_number_and_rounding_is_zero() -> None:
     reaction = state.reactions()[0]
     force = " ".join(f"{part:.5g}".replace("-", "−") for part in reaction.force)
     moment = f"{reaction.moment:.5g}".replace("-", "−")
-    assert f"force (N) {force}" in told
-    assert f"moment (N mm) {moment}" in told
+    assert "x y z reaction 0 block y1" in told
+    assert f"force (N/mm) {force} about" in told
+    assert f"moment (N mm/mm) {moment}" in told
+    assert f"energy, strain {state.energies.strain:.5g} N mm/mm" in told
+    assert f"normal force {state.contact.normal_force.sum():.5g} N/mm" in told
     forces = told.partition("Forces and moments")[2].partition("Imbalance")[0]
     assert "e−1" not in forces, "rounding is told"
+
+
+def test_moments_of_plane_bodies_stand_under_z_and_energies_that_are_unknown_nowhere() -> None:
+    page = result_page(plane_block()).html
+    assert page is not None
+    moment = re.search(r"moment \(N mm/mm\)</td>(.*?)</tr>", page)
+    assert moment is not None
+    assert [cell != "" for cell in re.findall(r"<td[^>]*>(.*?)</td>", moment[1])] == [False, False, True]
+    told = sections({"energies": {"strain": 1.0, "dual": None}}, Units())
+    assert "energy, strain" in told
+    assert "dual" not in told
+
+
+def test_a_tolerance_that_follows_the_mesh_is_told_in_words() -> None:
+    balanced = {"type": "Balanced", "share": 0.1, "loosest": 1e-3, "finest": 1e-10, "rounds": 4}
+    told = sections({"solver": {"tolerance": balanced}}, Units())
+    assert "solver&#x27;s error at most 10 % of the discretisation&#x27;s" in told
+    assert "loosest" not in told
 
 
 def test_motions_of_rigid_surfaces_are_told() -> None:

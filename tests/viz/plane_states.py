@@ -50,6 +50,27 @@ def plane_block(cell: str = "quadrilateral", friction: float = 0.4) -> State:
     return state
 
 
+def flat_pad() -> State:
+    """A pad three times as long as high, pressed on a floor."""
+    return _pad(6.0, 2.0)
+
+
+def tall_pad() -> State:
+    """A pad three times as high as long, pressed on a floor."""
+    return _pad(2.0, 6.0)
+
+
+@lru_cache(maxsize=2)
+def _pad(width: float, height: float) -> State:
+    cells = round(2 * width), round(2 * height)
+    scene = Scene(
+        {"pad": Body(rectangle((0.0, 0.0), (width, height), cells), PlaneStrain(100.0, 0.3))},
+        [Support("pad", "y1", (0.01, -0.02))],
+        contacts=[ContactPair(Surface("pad", "y0"), FLOOR, Coulomb(0.3))],
+    )
+    return solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)
+
+
 @lru_cache(maxsize=1)
 def hung_block() -> State:
     """A plane block pressed against a ceiling."""

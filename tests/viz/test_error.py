@@ -11,7 +11,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz import plot_error
 from fenics_contact.viz.colours import ERROR_MAP
 from fenics_contact.viz.error import error_range
-from tests.viz.plane_states import plane_block
+from tests.viz.plane_states import flat_pad, plane_block
 from tests.viz.states import contains, painted, pixels, touching_blocks
 
 SMALL = 320
@@ -43,6 +43,13 @@ def test_cells_of_plane_bodies_have_the_colour_of_their_part(cell: str, tmp_path
     assert contains(left_half, low, 0.06)
     assert contains(right_half, high, 0.06)
     assert not contains(left_half, high, 0.06)
+
+
+def test_the_label_of_the_colours_fits_beside_a_flat_picture(tmp_path: Path) -> None:
+    image = pixels(plot_error(flat_pad(), tmp_path / "error.png", width=1600))
+    assert image.shape[0] < 0.45 * image.shape[1]
+    edges = (image[:3], image[-3:], image[:, :3], image[:, -3:])
+    assert [bool((edge > 0.99).all()) for edge in edges] == [True] * 4
 
 
 def test_the_default_range_holds_the_parts_that_matter() -> None:

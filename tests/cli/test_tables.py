@@ -1,0 +1,22 @@
+"""Tables of plane scenes name forces, moments and energies per thickness."""
+
+from __future__ import annotations
+
+from fenics_contact.cli.forces import forces_table
+from fenics_contact.cli.tables import state_facts
+from fenics_contact.io import forces_record
+from fenics_contact.scene_file import UnitNames
+from tests.viz.plane_states import flat_pad
+from tests.viz.states import touching_blocks
+
+
+def test_forces_and_energies_have_the_units_of_their_dimension() -> None:
+    units = {"force": "N", "length": "mm"}
+    for state, force, moment in (
+        (flat_pad(), "N/mm", "N mm/mm"),
+        (touching_blocks(), "N", "N mm"),
+    ):
+        assert forces_table(forces_record(state), units).title == f"forces ({force}) and moments ({moment})"
+        facts = state_facts(state, UnitNames())
+        assert facts["strain energy"].endswith(f"{state.energies.strain:.6g} {moment}")
+        assert f" {force}, friction " in facts["contact 0"]
