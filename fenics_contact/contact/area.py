@@ -15,6 +15,7 @@ NEWTON_STEPS = 60
 def contact_area(state: State, pair: int = 0) -> float:
     """Return the area in which the surfaces of a pair touch, in the plane the length, [length²] or [length].
 
+    It is measured on the slave, on the deformed one where its material is made for large deformations.
     Its rim runs between closed and open nodes and is located by pressure and gap: at a distance d inside the
     rim of a smooth contact the pressure is K √d, at a distance d outside the gap is 4/3 K d^(3/2) / E* with
     the same K. The sum of closed nodes' areas would jump from node to node, by a quarter where only a few are
@@ -41,13 +42,15 @@ def contact_area(state: State, pair: int = 0) -> float:
     whole = np.searchsorted(surface.nodes, scene.bodies[slave.body].mesh.surfaces[slave.name])
     pressure, spread = filled_at_corners(whole, pressure), np.maximum(filled_at_corners(whole, spread), 0.0)
     closed = pressure > 0.0
-    total = 0.0
+    total, places = 0.0, surface.points
+    if scene.bodies[slave.body].deforms_much:
+        places = places + state.gather_displacement(slave.body)[surface.nodes]
     for corners, weight in _simplices(surface.corners):
         facets = surface.facets[:, corners]
-        edges = surface.points[facets[:, 1:]] - surface.points[facets[:, :1]]
+        edges = places[facets[:, 1:]] - places[facets[:, :1]]
         gram = np.linalg.det(edges @ np.swapaxes(edges, 1, 2))
         size = np.sqrt(np.maximum(gram, 0.0)) / (len(corners) - 1)
-        total += weight * float(size @ _closed_share(surface.points, facets, closed, pressure, spread))
+        total += weight * float(size @ _closed_share(places, facets, closed, pressure, spread))
     return total
 
 

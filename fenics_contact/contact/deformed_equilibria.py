@@ -83,10 +83,9 @@ class DeformedEquilibria:
         self._equations = Equations(scene, decomposition)
         self._assembled: TornSystem | None = None if beside is None else beside._assembled
         self._unresisted: tuple[UnheldMotion, ...] | None = None
-        moves = any(body.deforms_much for body in scene.bodies.values())
         self._turned, self._doubts = TurnedBodies(), ContactDoubts()
         self._contact: Contact = StillContact()
-        if scene.contacts and moves:
+        if scene.contacts and scene.deforms_much:
             self._contact = MovingContact(scene, decomposition)
 
     def solve(
@@ -273,7 +272,7 @@ def _state_after(
     with timer.phase("state"):
         contact = contact_result(system, solution, at.displacement)
         if evaluation.meeting.points is not None and path.start is not None:
-            contact = _with_slip(contact, evaluation.meeting, path.start, origin)
+            contact = _of_moved(contact, evaluation.meeting, path.start, origin)
         if known is not None:
             contact = replace(contact, slip=known[0], slip_before=known[1])
         energies = _energies(evaluation, path.rubbed)
@@ -284,16 +283,17 @@ def _state_after(
     )  # fmt: skip
 
 
-def _with_slip(
+def _of_moved(
     contact: ContactResult, meeting: Meeting, start: MaterialPoints, origin: State | None
 ) -> ContactResult:
-    """Return the contact of moved bodies with the slip of its load step and of all before."""
+    """Return the contact of moved bodies with its areas, the slip of its load step and of all before."""
     slip, points = meeting.slip(start), meeting.points
     assert points is not None
     before = np.zeros_like(slip)
     if isinstance(origin, DeformedState) and (stood := origin.equilibrium.evaluation.meeting.points):
         before = points.carry_slip(origin.contact.total_slip, stood)
-    return replace(contact, slip=slip, slip_before=before)
+    areas = points.areas(meeting.torn.scene)
+    return replace(contact, slip=slip, slip_before=before, area=areas.true, nominal_area=areas.nominal)
 
 
 def _energies(evaluation: Evaluation, rubbed: float) -> Energies:

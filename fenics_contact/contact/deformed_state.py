@@ -14,7 +14,7 @@ from fenics_contact.contact.history_stress import put_history_stress
 from fenics_contact.contact.nodal_forces import NodalForces, nodal_forces
 from fenics_contact.contact.state import State
 from fenics_contact.display import displayed
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, collectively
 from fenics_contact.fem import History
 from fenics_contact.scene import HistoryMaterial
 
@@ -108,6 +108,17 @@ class DeformedState(State):
                     fields[name], self.torn, name, self.equilibrium.evaluation.responses, quantity
                 )
         return fields
+
+    @cached_property
+    @collectively(
+        "DeformedState.contact_nominal_pressure", lambda state, *_, **__: state.torn.decomposition.comm
+    )
+    def contact_nominal_pressure(self) -> dict[str, dolfinx.fem.Function]:
+        """Contact force by area of the undeformed slave as a Function, [force / length²].
+
+        Laid out as `contact_pressure`, the force by area of the deformed slave. Collective on first use.
+        """
+        return self._contact_functions("contact_nominal_pressure")
 
     @cached_property
     def errors(self) -> StateErrors:  # type: ignore[override]

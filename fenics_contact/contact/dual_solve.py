@@ -59,4 +59,6 @@ def contact_result(system: DualSystem, solution: DualSolution, displacement: np.
         spread(-minus_slip, torn.sliding(displacement) - torn.slid),
         spread(origin.reshape(-1, torn.dim - 1), torn.slid),
         status,
+        torn.points.area,
+        torn.points.area,
     )

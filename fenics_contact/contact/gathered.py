@@ -47,8 +47,9 @@ def contact_fields(
     Returns:
         ``contact_status``, (n_nodes,) int: the value of `Status`, −1 on nodes that are not contact points;
         and, zero on those, ``contact_pressure``, (n_nodes,), [force / length²], ``contact_force`` on the
-        slave and ``contact_slip``, (n_nodes, 3), [force] and [length]. At the corners of quadratic triangles
-        pressure and slip are interpolated, see `filled_at_corners`. A node that belongs to several pairs has
+        slave and ``contact_slip``, (n_nodes, 3), [force] and [length]; where a body of the scene deforms much
+        ``contact_nominal_pressure``, too. At the corners of quadratic triangles pressures and slip are
+        interpolated, see `filled_at_corners`. A node that belongs to several pairs has
         their sum, and the status of the last.
     """
     start, end = numbers.node_offset[numbers.body_names.index(body) :][:2]
@@ -67,9 +68,12 @@ def contact_fields(
 
     status = np.full(count, -1, dtype=np.int32)
     status[nodes[mine]] = contact.status[mine]
+    pressures = {"contact_pressure": contact.pressure}
+    if scene.deforms_much:
+        pressures["contact_nominal_pressure"] = contact.nominal_pressure
     return {
         "contact_status": status,
-        "contact_pressure": np.maximum(summed(contact.pressure, filled=True), 0.0),
+        **{name: np.maximum(summed(values, filled=True), 0.0) for name, values in pressures.items()},
         "contact_force": summed(contact.force),
         "contact_slip": summed(contact.slip_in_space, filled=True),
     }

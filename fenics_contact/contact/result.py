@@ -40,6 +40,10 @@ class ContactResult:
             frictionless and open points, shape (n, dim - 1), [length].
         slip_before: The same of all load steps before, shape (n, dim - 1), [length].
         status: `Status` of each point, shape (n,). A closed point without friction slips.
+        area: Area that belongs to each point, of mortar contact the part of it that faces the master: where
+            the slave's material is made for large deformations that of the deformed slave, else
+            ``nominal_area``, shape (n,), [length²] or in the plane [length].
+        nominal_area: The same of the undeformed slave, shape (n,).
     """
 
     points: ContactPoints
@@ -50,6 +54,8 @@ class ContactResult:
     slip: np.ndarray
     slip_before: np.ndarray
     status: np.ndarray
+    area: np.ndarray
+    nominal_area: np.ndarray
 
     def _facts(self) -> dict[str, Any]:
         normal = self.normal_force
@@ -69,8 +75,26 @@ class ContactResult:
 
     @property
     def pressure(self) -> np.ndarray:
-        """Normal force over nodal area, shape (n,), [force / length²]."""
-        return self.normal_force / self.points.area
+        """True pressure, normal force over `area`, shape (n,), [force / length²].
+
+        It is what the Cauchy stress beside it presses with. Where bodies deform little it is the nominal one.
+        """
+        return self.normal_force / self.area
+
+    @property
+    def nominal_pressure(self) -> np.ndarray:
+        """Normal force over `nominal_area`, of the undeformed slave, shape (n,), [force / length²]."""
+        return self.normal_force / self.nominal_area
+
+    @property
+    def traction(self) -> np.ndarray:
+        """True friction force over `area`, in the points' tangents, shape (n, dim - 1), [force / length²]."""
+        return np.asarray(self.friction_force / self.area[:, None])
+
+    @property
+    def nominal_traction(self) -> np.ndarray:
+        """Friction force over `nominal_area`, as `traction`, shape (n, dim - 1), [force / length²]."""
+        return np.asarray(self.friction_force / self.nominal_area[:, None])
 
     @property
     def force(self) -> np.ndarray:
@@ -125,5 +149,6 @@ def no_contact(points: ContactPoints) -> ContactResult:
     """Return the result of a scene without contact points."""
     nothing, vectors = np.zeros(0), np.zeros((0, points.normal.shape[1] - 1))
     return ContactResult(
-        points, nothing, vectors, nothing, nothing, vectors, vectors, np.zeros(0, dtype=np.int64)
-    )
+        points, nothing, vectors, nothing, nothing, vectors, vectors, np.zeros(0, dtype=np.int64), nothing,
+        nothing,
+    )  # fmt: skip

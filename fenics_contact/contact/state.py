@@ -224,7 +224,9 @@ class State:
         At the nodes of slave surfaces it is that of the contact points, at all other nodes, also on masters,
         zero. Collective on first use.
         """
-        key = "contact_pressure"
+        return self._contact_functions("contact_pressure")
+
+    def _contact_functions(self, key: str) -> dict[str, dolfinx.fem.Function]:
         return {
             name: nodal_function(u.function_space.mesh, key, self._contact_fields(name)[key])
             for name, u in self.displacement.items()
@@ -365,10 +367,9 @@ class State:
 
         Returns:
             A ``pyvista.MultiBlock`` with an ``UnstructuredGrid`` for each body under its name, which holds
-            the fields that `io.write_vtu` writes: on points ``displacement``, ``nodal_stress``,
-            ``nodal_principal_stress``, ``nodal_von_mises``, ``contact_status``,
-            ``contact_pressure``, ``contact_force`` and ``contact_slip``, on cells ``von_mises``, ``stress``,
-            ``principal_stress`` and ``subdomain``; see `GatheredFields`. Plane bodies lie in the plane z = 0.
+            the fields of `GatheredFields`, which `io.write_vtu` writes: on points ``displacement``, stresses
+            ``nodal_...`` and contact ``contact_...``, on cells ``von_mises``, ``stress``,
+            ``principal_stress`` and ``subdomain``. Plane bodies lie in the plane z = 0.
 
         Raises:
             InvalidInputError: If ``deformed`` is not finite.

@@ -63,6 +63,9 @@ def pairs_in_words(scene: Scene, contact: ContactResult, force: str = "", stress
         if pair.has_friction:
             resultant += f", friction {_size(contact.force[mine] - pressing, force)}"
         pressure = f"{contact.pressure[mine].max(initial=0.0):.5g} {stress}".rstrip()
+        if scene.deforms_much:
+            nominal = contact.nominal_pressure[mine].max(initial=0.0)
+            pressure += f", nominal {nominal:.5g} {stress}".rstrip()
         rows.append(
             f"{pair.place}: {len(mine)} points, {_kinds(pair, contact.status[mine])}; "
             f"{resultant}, pressure up to {pressure}"

@@ -65,8 +65,8 @@ lists, one entry per step of the solver; empty for a state that was read from a 
 None where materials dissipate or are nonlinear |
     | ``errors`` | ``algebraic``, ``friction``, ``discretisation``, ``by_body``; None if unknown |
     | ``contact`` | one entry per pair: ``points``, ``open``, ``stick``, ``slip``, ``force`` on the slave, \
-``normal_force``, ``peak_pressure``, ``smallest_gap``, ``largest_slip`` in the last load step; without \
-friction closed points count as ``slip`` |
+``normal_force``, ``peak_pressure``, where bodies deform much ``peak_nominal_pressure``, ``area``, \
+``smallest_gap``, ``largest_slip`` in the last load step; without friction closed points count as ``slip`` |
     | ``unheld`` | rigid motions that nothing resists and nothing loads, in words; `State.unheld` |
     | ``forces`` | ``reactions`` of the supports, ``contacts`` and ``ties`` (on the slave): each with body, \
 surface, ``force``, ``moment`` and the point ``about`` which it is; ``balance`` of all with the loads, its \
@@ -254,12 +254,15 @@ def _pair(state: State, number: int) -> dict[str, Any]:
     contact = state.contact
     mine = contact.on_pair(number)
     known = {status.name.lower(): int(np.sum(contact.status[mine] == status)) for status in Status}
+    largest = float(contact.nominal_pressure[mine].max(initial=0.0))
+    nominal = {"peak_nominal_pressure": largest} if state.scene.deforms_much else {}
     return {
         "points": len(mine),
         **known,
         "force": contact.force[mine].sum(axis=0),
         "normal_force": float(contact.normal_force[mine].sum()),
         "peak_pressure": float(contact.pressure[mine].max(initial=0.0)),
+        **nominal,
         "area": contact_area(state, number),
         "smallest_gap": float(contact.gap[mine].min()) if len(mine) else None,
         "largest_slip": float(np.linalg.norm(contact.slip[mine], axis=1).max(initial=0.0)),

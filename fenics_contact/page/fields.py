@@ -25,6 +25,7 @@ _KNOWN = {
     "nodal_principal_stress": ("at nodes", "principal stress", "stress"),
     "contact_status": ("contact", "contact status", ""),
     "contact_pressure": ("contact", "contact pressure", "stress"),
+    "contact_nominal_pressure": ("contact", "contact pressure by undeformed area", "stress"),
     "contact_force": ("contact", "contact force of a node", "force"),
     "contact_slip": ("contact", "slip in the last load step", "length"),
     "von_mises": ("means over cells", "von Mises stress of cells", "stress"),

@@ -124,6 +124,7 @@ def _contact(record: Record, units: Units) -> str:
             for name, words, unit in (
                 ("normal_force", "normal force", force),
                 ("peak_pressure", "largest pressure", units.stress),
+                ("peak_nominal_pressure", "largest nominal pressure", units.stress),
                 ("area", "area in contact", units.length if _plane(record) else f"{units.length}²"),
                 ("smallest_gap", "smallest gap", units.length),
                 ("largest_slip", "largest slip of the last step", units.length),

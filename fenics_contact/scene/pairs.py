@@ -67,8 +67,8 @@ class Tresca:
     surfaces are known to touch.
 
     Attributes:
-        traction: Largest tangential traction, ≥ 0, [force / length²]; a number, or a function of points as
-            for `Coulomb`.
+        traction: Largest tangential traction by undeformed area, ≥ 0, [force / length²]; a number, or a
+            function of points as for `Coulomb`.
     """
 
     traction: float | OfPosition

@@ -65,6 +65,11 @@ class SceneParts:
         _require_different(self.ties)
 
     @property
+    def deforms_much(self) -> bool:
+        """Whether one of its bodies does."""
+        return any(body.deforms_much for body in self.bodies.values())
+
+    @property
     def following_pressures(self) -> tuple[Pressure, ...]:
         """The pressures that follow their surfaces, those on bodies that deform much."""
         return tuple(

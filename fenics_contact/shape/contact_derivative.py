@@ -77,7 +77,9 @@ def contact_by_shape(
     return result
 
 
-def add_areas(result: np.ndarray, torn: TornSystem, index: int, by_area: np.ndarray) -> None:
+def add_areas(
+    result: np.ndarray, torn: TornSystem, index: int, by_area: np.ndarray, places: np.ndarray | None = None
+) -> None:
     """Add the derivative by the nodes through the areas on the slave surface of a pair.
 
     Args:
@@ -85,12 +87,15 @@ def add_areas(result: np.ndarray, torn: TornSystem, index: int, by_area: np.ndar
         torn: The torn system.
         index: Number of the pair.
         by_area: By the areas of all points, shape (n_points,).
+        places: Where all nodes lie, shape (n_nodes, dim), [length]; undeformed by default.
     """
     pair = torn.scene.contacts[index]
     slave, given = torn.points.of_surface(index, by_area)
     if given.any():
         surface = surface_of(torn.scene, pair.slave, "faceted")
         nodes = torn.decomposition.tearing.global_nodes(pair.slave.body, surface.nodes)
+        if places is not None:
+            surface = replace(surface, points=places[nodes])
         by_areas = np.zeros(len(nodes))
         by_areas[np.searchsorted(nodes, slave)] = given
         result[nodes] += areas_pulled_back(surface, by_areas)

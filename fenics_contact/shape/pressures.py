@@ -12,6 +12,7 @@ from fenics_contact.contact import State
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
 from fenics_contact.linalg import ROUNDING
 from fenics_contact.scene import Scene
+from fenics_contact.shape.area_derivative import by_true_areas
 from fenics_contact.shape.contact_forces import on_rows
 from fenics_contact.shape.forms import ShapeForms
 from fenics_contact.shape.objective import Partials
@@ -26,7 +27,8 @@ OfPoints = tuple[float, np.ndarray, np.ndarray]
 class OfPressures(Weighable, ABC):
     """J = φ(λ_N, A), a function of normal forces and areas of the slave's nodes.
 
-    A node's pressure is its force over its area. Nodes on the rim of a surface have small areas: where facets
+    A node's pressure is its force over its area, that of the deformed slave where it deforms much, as of
+    `ContactResult.pressure`. Nodes on the rim of a surface have small areas: where facets
     are wide, their pressure is less certain than that of the others.
 
     Attributes:
@@ -54,14 +56,15 @@ class OfPressures(Weighable, ABC):
         return self._evaluated(state)[0]
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
-        """Return the derivatives by forces and areas; raises as `value` does."""
+        """Return the derivatives by forces and areas; raises as `value` does. Collective."""
         value, by_force, by_area = self._evaluated(state)
-        return Partials.of(state, value, by_multiplier=on_rows(state, by_force, None), by_area=by_area)
+        by_areas = by_true_areas(state, by_area)
+        return Partials.of(state, value, by_multiplier=on_rows(state, by_force, None), **by_areas)
 
     def _evaluated(self, state: State) -> OfPoints:
         contact = state.contact
         mine = points_of(state, type(self).__name__, self.pair)
-        force, area = contact.normal_force[mine], contact.points.area[mine]
+        force, area = contact.normal_force[mine], contact.area[mine]
         if not (force > 0.0).any():
             where = "no contact pair" if self.pair is None else f"not contact pair {self.pair}"
             raise InvalidDesignError(

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.surfaces.midpoints import bearing_areas
 
 #: Local coordinates of the corners of quadrilaterals.
 _S, _T = np.array([-1.0, 1.0, 1.0, -1.0]), np.array([-1.0, -1.0, 1.0, 1.0])
@@ -161,6 +162,17 @@ class FacetedSurface:
         """Dimension of the space around it: 3 or 2."""
         return int(self.points.shape[1])
 
+    def areas_at(self, points: np.ndarray) -> np.ndarray:
+        """Return the areas that belong to the nodes where these lie elsewhere, shape (n,).
+
+        Args:
+            points: Coordinates of the nodes, shape (n, dim), [length].
+        """
+        if self.whole is None:
+            return _linear_areas(points, self.facets)
+        bearing = bearing_areas(points, self.whole)
+        return np.bincount(self.whole.ravel(), bearing.ravel(), minlength=len(points))
+
 
 def faceted_surface(
     points: np.ndarray, facets: np.ndarray, mirrored: np.ndarray | None = None
@@ -195,9 +207,15 @@ def faceted_surface(
     # A surface that lies in the plane itself is not cut by it.
     flat &= (np.linalg.norm(within, axis=1) > CUT * np.linalg.norm(summed, axis=1))[:, None]
     summed[flat] = 0.0
-    areas = np.zeros(len(nodes))
+    areas = _linear_areas(own, local)
+    return FacetedSurface(nodes, local, own, summed / np.linalg.norm(summed, axis=1)[:, None], areas, flat)
+
+
+def _linear_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
+    """Distribute the areas of linear facets evenly over their corners."""
+    corners = facets.shape[1]
     # The corner products of a quadrilateral add up to four times its area vector, those of a triangle to six,
     # those of an edge to two.
-    share = np.linalg.norm(products.sum(axis=1), axis=1) / {2: 2, 3: 6, 4: 4}[corners] / corners
-    np.add.at(areas, local, np.broadcast_to(share[:, None], local.shape))
-    return FacetedSurface(nodes, local, own, summed / np.linalg.norm(summed, axis=1)[:, None], areas, flat)
+    total = np.linalg.norm(corner_products(points, facets).sum(axis=1), axis=1)
+    share = total / {2: 2, 3: 6, 4: 4}[corners] / corners
+    return np.bincount(facets.ravel(), np.repeat(share, corners), minlength=len(points))

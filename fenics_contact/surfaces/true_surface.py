@@ -13,7 +13,6 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh, computed_rounding
 from fenics_contact.surface_shapes import Joined, SurfaceShape, asked
 from fenics_contact.surfaces.facets import FacetedSurface, Relief, facet_shape_values, faceted_surface
-from fenics_contact.surfaces.midpoints import bearing_areas
 from fenics_contact.surfaces.projection import interpolated_normal
 from fenics_contact.surfaces.reconstruction import reconstructed
 from fenics_contact.surfaces.relief import edges_at_corners, heights, slopes
@@ -73,9 +72,8 @@ def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str) -> FacetedSu
     if mesh.order == 1:
         return surface
     facets = mesh.surfaces[name]
-    areas = np.bincount(facets.ravel(), bearing_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
-    whole = np.searchsorted(surface.nodes, facets)
-    return replace(surface, areas=areas[surface.nodes], whole=whole)
+    surface = replace(surface, whole=np.searchsorted(surface.nodes, facets))
+    return replace(surface, areas=surface.areas_at(surface.points))
 
 
 def _relief(

@@ -83,7 +83,7 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
     shear = np.einsum("nd,nd->n", shear, forward[points])
     slip = np.einsum("nd,nd->n", contact.slip_in_space[chosen], forward[points])
     values = np.zeros((3, len(order)))
-    area = contact.points.area[chosen]
+    area = contact.area[chosen]
     values[:, points] = np.stack([contact.normal_force[chosen], shear, contact.slip_bound[chosen]]) / area
     return ContactTrace(
         f"{slave.body}, {slave.name}", axis, places, starts[1:] - 1, values[0], values[1], values[2],

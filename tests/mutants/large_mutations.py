@@ -113,4 +113,28 @@ LARGE_MUTATIONS = (
         "FORCE_FLOOR = 1e-1",
         ("tests/nonlinear/test_mortar.py::test_ironing_converges_quadratically",),
     ),
+    Mutation(
+        "pressures of bodies that deform much are by undeformed area",
+        "pairing/sliding/point_areas.py",
+        "np.where(self.much, self.now, self.before) * self.share",
+        "self.before * self.share",
+        ("tests/nonlinear/test_true_pressure.py::test_an_incompressible_block_presses_with_its_stress",),
+    ),
+    Mutation(
+        "points at the rim of the master have all of their area",
+        "pairing/sliding/point_areas.py",
+        "met.coupling.area / areas.now[mine]",
+        "1.0",
+        (
+            "tests/nonlinear/test_true_pressure.py::"
+            "test_pressures_beyond_the_rim_of_the_master_are_those_of_small_strain",
+        ),
+    ),
+    Mutation(
+        "gradients of pressures hold deformed areas where displacements move them",
+        "shape/area_derivative.py",
+        "np.where(np.isnan(moved.prescribed), by_places, 0.0)",
+        "0.0 * by_places",
+        ("tests/shape/test_deformed_sensitivity.py::test_plane_blocks",),
+    ),
 )

@@ -25,8 +25,8 @@ MUTATIONS = (
     Mutation(
         "pressures are too large by 0.4 percent",
         "contact/result.py",
-        "return self.normal_force / self.points.area",
-        "return 1.004 * self.normal_force / self.points.area",
+        "return self.normal_force / self.area",
+        "return 1.004 * self.normal_force / self.area",
         ("tests/contact/test_state.py::test_pressures_integrate_to_the_load",),
     ),
     Mutation(

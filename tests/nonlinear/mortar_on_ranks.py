@@ -12,4 +12,5 @@ from tests.nonlinear.mortar_scenes import followed, pressed_and_pushed
 (state,) = followed(pressed_and_pushed(np.eye(3))[1:], MPI.COMM_WORLD)
 answer = {name: state.gather_displacement(name) for name in ("low", "high")}
 if MPI.COMM_WORLD.rank == 0:
-    np.savez(sys.argv[1], force=state.contact.force, **answer)
+    forces = {name: getattr(state.contact, name) for name in ("force", "pressure", "nominal_pressure")}
+    np.savez(sys.argv[1], **forces, **answer)

@@ -115,6 +115,18 @@ def test_fields_have_words_units_and_ranges() -> None:
     assert parts == ["at nodes", "means over cells", "more"]
 
 
+def test_pages_of_bodies_that_deform_much_have_two_pressures() -> None:
+    state, linear = pressed_by_a_lid(), touching_blocks()
+    data, _ = content(result_page(state).html)
+    nominal = field(data, "contact pressure by undeformed area")
+    assert nominal["extremes"][0][1] == pytest.approx(state.contact.nominal_pressure.max())
+    (entry,) = result_record(state)["contact"]
+    assert entry["peak_nominal_pressure"] == state.contact.nominal_pressure.max()
+    assert "largest nominal pressure" in result_page(state).html
+    assert "nominal pressure" not in result_page(linear).html
+    assert "peak_nominal_pressure" not in result_record(linear)["contact"][0]
+
+
 def test_the_mesh_of_all_load_steps_is_kept_once() -> None:
     state = touching_blocks()
     one, _ = content(result_page(state).html)

@@ -11,7 +11,13 @@ from fenics_contact._libraries import MPI
 from fenics_contact.linalg import scaled_rows
 from fenics_contact.mesh import coordinate_rounding
 from fenics_contact.pairing.contact_points import ContactPoints
-from fenics_contact.pairing.mortar import MortarCoupling, mortar_coupling, weight_derivatives
+from fenics_contact.pairing.coupling_derivatives import CouplingDerivatives
+from fenics_contact.pairing.mortar import (
+    MortarCoupling,
+    mortar_coupling,
+    mortar_pulled_back,
+    weight_derivatives,
+)
 from fenics_contact.pairing.sliding.differential import spread
 from fenics_contact.pairing.sliding.mean_motion import MeanMotion, MeanTangents, interleaved
 from fenics_contact.pairing.sliding.meeting import Meeting
@@ -75,6 +81,20 @@ class MovingMeans:
         same = apart <= coordinate_rounding(np.concatenate([slave.points, master.points]))
         np.logical_or.at(result, met.row, slave.mirrored[node] & master.mirrored[met.col] & same)
         return result
+
+    def areas_pulled_back(self, by_area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the derivatives by the nodes of slave and master from that by the coupling's areas.
+
+        Collective.
+
+        Args:
+            by_area: Shape (n,).
+        """
+        count, dim = self.coupling.normal.shape
+        none = np.zeros((count, 0)), np.zeros((len(self.master.nodes), 0))
+        by = CouplingDerivatives(by_area, *none, np.zeros((count, dim)), np.zeros(count))
+        by_slave, by_master = mortar_pulled_back(self.slave, self.master, self.coupling, by, self.comm)
+        return by_slave.points, by_master.points
 
     def tangents(
         self,

@@ -13,6 +13,7 @@ from fenics_contact.pairing.contact_points import ContactPoints
 from fenics_contact.pairing.sliding.differential import Differential, frame_changes, point_motion, spread
 from fenics_contact.pairing.sliding.mean_motion import MeanTangents, interleaved, placed
 from fenics_contact.pairing.sliding.means import MovingMeans
+from fenics_contact.pairing.sliding.point_areas import PointAreas
 from fenics_contact.pairing.sliding.slip import LAST, MaterialPoints
 from fenics_contact.pairing.sliding.slip_origin import slip_by_start, slip_by_start_of_means
 from fenics_contact.pairing.sliding.stiffness import (
@@ -21,6 +22,7 @@ from fenics_contact.pairing.sliding.stiffness import (
     friction_stiffness,
     geometric_stiffness,
 )
+from fenics_contact.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -123,6 +125,27 @@ class SlidingPoints:
             if new is not None and old is not None:
                 rotation[self.points.pair == index] = new[0] @ old[0].T
         return rotation
+
+    def areas(self, scene: Scene) -> PointAreas:
+        """Return the areas that belong to the points, given the scene in its reference configuration."""
+        return PointAreas.of(scene, self.points, self.coordinates, self.means)
+
+    def met_areas_pulled_back(self, by_met: np.ndarray) -> np.ndarray:
+        """Return the derivative by the coordinates from that by parts that face masters. Collective.
+
+        Args:
+            by_met: Derivative by the areas of the slave that face the master, of mortar contact alone, (n,).
+
+        Returns:
+            Shape (n_nodes, dim).
+        """
+        result = np.zeros_like(self.coordinates)
+        for mine, means in self._by_means:
+            if by_met[mine].any():
+                by_slave, by_master = means.areas_pulled_back(by_met[mine])
+                result[means.slave_nodes] += by_slave
+                result[means.master_nodes] += by_master
+        return result
 
     def stiffness(self, multiplier: np.ndarray) -> GeometricStiffness:
         """Return the derivative of the normal forces by the coordinates, see `geometric_stiffness`."""
