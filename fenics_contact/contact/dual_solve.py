@@ -6,10 +6,11 @@ import numpy as np
 
 from fenics_contact.contact.coulomb import FixedPoint
 from fenics_contact.contact.result import ContactResult, Status
+from fenics_contact.contact.unheld import motion_in_words, rigid_motions
 from fenics_contact.feti import (
     DualSystem,
 )
-from fenics_contact.qp import DualSolution, DualSolver, Smalse, contact_step, solve
+from fenics_contact.qp import DualSolution, DualSolver, SlidingError, Smalse, contact_step, solve
 
 
 def solve_dual(
@@ -21,11 +22,22 @@ def solve_dual(
         system: The system.
         solver: `FaceNewton` and `FixedPoint` handle Coulomb's law; `Smalse` is wrapped in a `FixedPoint`.
         start: Earlier solution, or multiplier to start from, owned, or None.
+
+    Raises:
+        SlidingError: The load is more than friction bears; names the bodies and how they move.
+        InfeasibleError: Otherwise no equilibrium exists.
+        ConvergenceError: The tolerance was not met.
     """
     tresca, coefficient = system.torn.friction
     if coefficient is not None and isinstance(solver, Smalse):
         solver = FixedPoint(solver)
-    return solve(system.problem, tresca, solver, start, friction_coefficient=coefficient)
+    try:
+        return solve(system.problem, tresca, solver, start, friction_coefficient=coefficient)
+    except SlidingError as error:
+        (motion,) = rigid_motions(system.torn, (system.kernel @ error.motion)[:, None])
+        rounded = {name: np.round(own, 3) + 0.0 for name, own in motion.bodies.items()}
+        words = ", ".join(f"{name!r} by {motion_in_words(own)}" for name, own in rounded.items() if own.any())
+        raise error.named(f"the load makes slide {words}") from error.__cause__
 
 
 def contact_result(system: DualSystem, solution: DualSolution, displacement: np.ndarray) -> ContactResult:

@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
 from fenics_contact.display import displayed
-from fenics_contact.feti import DualSystem
+from fenics_contact.feti import DualSystem, TornSystem
 from fenics_contact.scene import rigid_body_modes
 
 #: Parts of a motion below this fraction of the largest are rounding.
@@ -18,7 +19,7 @@ ROUNDING = 1e-9
 @displayed
 @dataclass(frozen=True, eq=False)
 class UnheldMotion:
-    """A rigid motion that no support, tie or contact resists and no load drives.
+    """A rigid motion, such as one that no support, tie or contact resists and no load drives.
 
     Attributes:
         bodies: Body name -> coefficients of its `rigid_body_modes`, translations first, shape (3,) in the
@@ -41,10 +42,17 @@ def unheld_motions(system: DualSystem) -> tuple[UnheldMotion, ...]:
     Args:
         system: The system.
     """
-    count = system.unheld.shape[1]
-    if count == 0:
-        return ()
-    torn, coefficients = system.torn, []
+    return rigid_motions(system.torn, system.unheld) if system.unheld.shape[1] else ()
+
+
+def rigid_motions(torn: TornSystem, fields: sp.spmatrix) -> tuple[UnheldMotion, ...]:
+    """Return rigid displacements of bodies as motions. Collective.
+
+    Args:
+        torn: The torn system.
+        fields: Torn displacements of this rank, one a column, shape (torn_size, n).
+    """
+    count, coefficients, fields = fields.shape[1], [], sp.csr_matrix(fields)
     starts = np.cumsum([0] + [part.mesh.size for part in torn.subdomains])
     for name, body in torn.scene.bodies.items():
         modes = rigid_body_modes(body.mesh.points)
@@ -53,7 +61,7 @@ def unheld_motions(system: DualSystem) -> tuple[UnheldMotion, ...]:
         for part, start in zip(torn.subdomains, starts, strict=False):
             if part.mesh.body == name:
                 own = modes[part.mesh.nodes].reshape(part.mesh.size, size)
-                moved = system.unheld[start : start + part.mesh.size].toarray()
+                moved = fields[start : start + part.mesh.size].toarray()
                 sums += own.T @ np.hstack([own, moved])
         sums = torn.numbering.comm.allreduce(sums)
         coefficients.append(np.linalg.solve(sums[:, :size], sums[:, size:]))

@@ -17,6 +17,7 @@ from fenics_contact.qp.iterate import Start, apply_unless_zero, iterate_at
 from fenics_contact.qp.krylov import FaceStep, Kept, Stop, gmres, projected_cg, projected_gmres
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.mpgp import Mpgp
+from fenics_contact.qp.not_held import SlidingError
 from fenics_contact.qp.problem import EVEN, CountedOperator, DualProblem, FacePreconditioner, Scaling
 from fenics_contact.qp.reductions import Vector, global_max, global_min, global_sum
 from fenics_contact.qp.slip_law import CoulombLaw, SlipLaw, TrescaLaw
@@ -57,6 +58,7 @@ __all__ = [
     "ProjectedCG",
     "Residuals",
     "Scaling",
+    "SlidingError",
     "SlipLaw",
     "Smalse",
     "SmalseMemory",

@@ -11,7 +11,6 @@ from fenics_contact.qp.forcing import Forcing
 from fenics_contact.qp.iterate import Certificate, Iterate, Start, certify
 from fenics_contact.qp.newton_steps import NewtonState, NewtonSteps
 from fenics_contact.qp.not_held import (
-    HARDLY_WEDGED,
     FrictionAlone,
     error_without_contact,
     without_contact,
@@ -225,10 +224,12 @@ class _Run:
         """Continue from the best iterate improved by a rescue. Collective.
 
         Raises:
-            InfeasibleError: Friction is far from sufficient.
+            InfeasibleError: Friction is far from sufficient, or everything slides and goes on to do so.
         """
         if state.rescues + 1 == DOUBT:
             self.friction_alone.require_enough()
+        if state.rescues == 1 and slides(state.history):
+            self._require_enough_sliding()
         operator, last = self.start.operator, state.last_rescue
         origin = self._rescue_start(state.best)
         # If Newton made no progress from the last rescue, the next one must go further.
@@ -260,10 +261,15 @@ class _Run:
         failure = ConvergenceError(self._failed(state), state.history)
         if state.rescues >= DOUBT:
             try:
-                self.friction_alone.require_enough(HARDLY_WEDGED)
+                self._require_enough_sliding()
             except InfeasibleError as reason:
                 raise reason from failure
         raise failure
+
+    def _require_enough_sliding(self) -> None:
+        """Reject a problem whose friction does not stop what slides. Collective."""
+        start = None if self.start.cold else self.start.iterate.multiplier
+        self.friction_alone.require_enough_sliding(start)
 
     def _rescue_start(self, best: Iterate) -> Iterate:
         """Return the start of a rescue: the first iterate if the best one is far from equilibrium.

@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
+from fenics_contact.contact import State, Status, solve_scene
+from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.gallery import rectangle
+from fenics_contact.qp import FaceNewton, face_newton
 from fenics_contact.scene import (
     Body,
     ContactPair,
     Discretisation,
     NeoHooke,
+    RigidSurface,
     Scene,
     Support,
     Surface,
@@ -39,6 +42,36 @@ def test_an_edge_between_tie_and_contact_has_one_answer_for_every_partition(
         found = other.gather_displacement("up")
         np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-7 * np.abs(expected).max())
         np.testing.assert_allclose(other.contact.normal_force, force, rtol=0.0, atol=1e-6 * force.max())
+
+
+@pytest.mark.parametrize("parts", [(1, 1), (6, 5)])
+def test_a_drag_beyond_what_friction_bears_beside_a_sliding_tie_is_refused(parts: tuple[int, int]) -> None:
+    """A tie in tension could press the contact without end: only deformed bodies show that it does not."""
+    scene = half_tied(5, "node", sliding=True)
+
+    def dragged(force: float) -> State:
+        top = RigidSurface("up", "y1", (0.7, 1.5), force=(force, -1e-2), moment=-4e-4)
+        return solved(replace(scene, supports=[scene.supports[0], top]), parts)
+
+    assert dragged(1.275e-3).contact.count(Status.STICK) == 1
+    for force, share in ((1.295e-3, 99.2), (2e-3, 68.9)):
+        words = rf"the load makes slide 'up' by translation \(1, 0\), and friction bears only {share} %"
+        with pytest.raises(InfeasibleError, match=words):
+            dragged(force)
+
+
+def test_a_solver_that_has_tried_all_says_that_friction_does_not_suffice(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As where discs stick and slip in turn, so that nothing calls for the test before."""
+    monkeypatch.setattr(face_newton, "slides", lambda history: False)
+    scene = half_tied(5, "node", sliding=True)
+    top = RigidSurface("up", "y1", (0.7, 1.5), force=(2e-3, -1e-2), moment=-4e-4)
+    hasty = FaceNewton(1e-10, max_products=450)
+    with pytest.raises(InfeasibleError, match=r"friction bears only 68\.9 %") as caught:
+        solve_scene(replace(scene, supports=[scene.supports[0], top]), MPI.COMM_SELF, solver=hasty)
+    assert isinstance(caught.value.__cause__, ConvergenceError)
+    assert caught.value.__cause__.history
 
 
 def test_tied_nodes_of_a_contact_are_counted(caplog: pytest.LogCaptureFixture) -> None:

@@ -37,6 +37,8 @@ def unjust(error: FenicsContactError, made: Sample) -> str:
         return _some_contact_closes(made)
     if isinstance(error, InfeasibleError) and "friction needs surfaces that are pressed" in str(error):
         return _pressed_enough(made, str(error))
+    if isinstance(error, InfeasibleError) and "friction bears only" in str(error):
+        return _borne_after_all(made)
     if isinstance(error, InfeasibleError):
         return _held_after_all(made)
     assert isinstance(error, InvalidInputError), error
@@ -128,6 +130,13 @@ def _some_contact_closes(made: Sample) -> str:
     moved = points.jump @ u.reshape(-1, scene.dim)
     gap = points.gap + np.einsum("nd,nd->n", moved, points.normal)
     return f"a contact closes by {-gap.min():.1e}" if gap.min() < -1e-3 * np.abs(moved).max() else ""
+
+
+def _borne_after_all(made: Sample) -> str:
+    """Press the bodies together without friction, and balance the loads by nearly what it then bears."""
+    whole, torn = Whole(made.scene), _torn(made)
+    left = _left_over(whole, torn, WEDGED * _frictionless(whole, torn), WEDGED)
+    return f"{WEDGED:g} times the friction leaves {left:.1e} of the loads" if left <= LEFT else ""
 
 
 def _pressed_enough(made: Sample, message: str) -> str:
