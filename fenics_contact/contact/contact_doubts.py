@@ -7,6 +7,7 @@ import logging
 import numpy as np
 
 from fenics_contact.contact.coarse_peaks import coarse_peak
+from fenics_contact.contact.passing_nodes import passing_nodes
 from fenics_contact.contact.state import State
 from fenics_contact.errors import InvalidInputError, tell
 from fenics_contact.feti import TornSystem
@@ -78,6 +79,7 @@ class ContactDoubts:
             moved = _largest_motion(after - before, pressed_in[mine], touching)
             if moved <= computed_rounding(torn.scene.bodies[pair.slave.body].mesh.points):
                 continue  # nothing moves
+            found += passing_nodes(state, number, moved, SHARE)
             nearest = np.minimum(before, after) + np.minimum(change[mine], 0.0)
             error = float(np.abs(change[mine][nearest <= moved]).max(initial=0.0))
             if error > SHARE * moved:  # which points press is not known then
