@@ -11,6 +11,7 @@ from rich.table import Table
 
 from fenics_contact.contact import State, Status, pairs_in_words
 from fenics_contact.display import force_units
+from fenics_contact.linalg import ROUNDING
 from fenics_contact.scene_file import SceneFile
 
 if TYPE_CHECKING:
@@ -76,10 +77,12 @@ def step_table(rows: Sequence[tuple[str, ...]], file: SceneFile) -> Table:
 
 
 def _resultant(state: State) -> float:
-    """Return the magnitude of the sum of all friction forces, [force]."""
+    """Return the magnitude of the sum of all friction forces, zero below what the solver left, [force]."""
     contact = state.contact
     tangential = contact.force - contact.normal_force[:, None] * contact.points.normal
-    return float(np.linalg.norm(tangential.sum(axis=0)))
+    size = float(np.linalg.norm(tangential.sum(axis=0)))
+    left = max(ROUNDING, float(np.nan_to_num(state.solution.natural_residual)))
+    return size if size > left * float(np.abs(contact.force).sum()) else 0.0
 
 
 def _largest_displacement(state: State) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from fenics_contact.feti import (
     FIXING_NODES,
@@ -30,8 +30,8 @@ SPREAD = 4.0
 SOFT, GRIP, LEAST_GRIP = 0.5, 3.0, 0.1
 #: New vectors in the search for soft motions, and iterations of the first search and of later ones.
 PROBES, FIRST_SWEEPS, SWEEPS = 4, 6, 2
-#: Accuracy of eigenvectors: any columns will do.
-ROUGH = 1e-2
+#: Accuracy of eigenvectors, and restarts of the search for them: any columns will do.
+ROUGH, RESTARTS = 1e-2, 20
 
 
 class TangentOperator(FactoredOperator):
@@ -163,13 +163,17 @@ def _softest(
         basis, _ = np.linalg.qr(factor.solve_many(basis))
     values, factors = np.linalg.eigh(_symmetric(basis.T @ (held @ basis)))
     if np.count_nonzero(values < 0.0) < factor.negative:
-        basis, _ = np.linalg.qr(np.hstack([basis, _negative(factor, start.sum(axis=1))]))
+        basis, _ = np.linalg.qr(np.hstack([basis, _negative(held, factor, start.sum(axis=1))]))
         values, factors = np.linalg.eigh(_symmetric(basis.T @ (held @ basis)))
     return values, basis @ factors
 
 
-def _negative(factor: IndefiniteFactor, start: np.ndarray) -> np.ndarray:
-    """Return approximate eigenvectors of all negative eigenvalues, shape (n, k)."""
+def _negative(held: sp.csr_matrix, factor: IndefiniteFactor, start: np.ndarray) -> np.ndarray:
+    """Return approximate eigenvectors of the negative eigenvalues, shape (n, k).
+
+    The inverse separates those next to zero, and has large ones amid a cluster: these the matrix separates.
+    There are both where few cells have lost their strength, as beyond a limit of stretch.
+    """
 
     def invert(right: np.ndarray) -> np.ndarray:
         factor.solve(np.ascontiguousarray(right, dtype=np.float64).ravel(), out := np.empty(factor.size))
@@ -177,8 +181,17 @@ def _negative(factor: IndefiniteFactor, start: np.ndarray) -> np.ndarray:
 
     inverse = LinearOperator((factor.size, factor.size), matvec=invert, dtype=np.float64)
     count = min(factor.negative, factor.size - 1)
-    _, vectors = eigsh(inverse, k=count, which="SA", v0=start, tol=ROUGH)
-    return np.asarray(vectors)
+    near = _lowest(inverse, count, start)
+    missing = count - near.shape[1]
+    return np.hstack([near, _lowest(held, missing, start)]) if missing else near
+
+
+def _lowest(operator: sp.csr_matrix | LinearOperator, count: int, start: np.ndarray) -> np.ndarray:
+    """Return those approximate eigenvectors of the lowest eigenvalues that are found soon, shape (n, k)."""
+    try:
+        return np.asarray(eigsh(operator, count, which="SA", v0=start, tol=ROUGH, maxiter=RESTARTS)[1])
+    except ArpackNoConvergence as found:
+        return np.asarray(found.eigenvectors)
 
 
 def _symmetric(matrix: np.ndarray) -> np.ndarray:

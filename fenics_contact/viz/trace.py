@@ -56,14 +56,19 @@ class ContactTrace:
         return np.insert(values, self.breaks + 1, np.nan)
 
     def window(self, reach: float | None) -> tuple[float, float]:
-        """Return the visible range of positions: the closed part with a margin, or the given extent."""
+        """Return the visible range of positions, or the given extent around the middle of the closed part.
+
+        It is the closed part with a margin and the open nodes beside it, where the pressure has come to zero.
+        """
         closed = np.flatnonzero(self.pressure > 0)
         closed = closed if len(closed) else np.arange(len(self.places))
         low, high = float(self.places[closed].min()), float(self.places[closed].max())
         if reach is not None:
             return (low + high) / 2 - reach, (low + high) / 2 + reach
         room = 0.12 * max(high - low, float(np.ptp(self.places)) / 20)
-        return max(low - room, float(self.places[0])), min(high + room, float(self.places[-1]))
+        before, after = max(closed[0] - 1, 0), min(closed[-1] + 1, len(self.places) - 1)
+        low, high = min(low - room, self.places[before]), max(high + room, self.places[after])
+        return max(float(low), float(self.places[0])), min(float(high), float(self.places[-1]))
 
 
 def contact_trace(state: State, pair: int) -> ContactTrace:

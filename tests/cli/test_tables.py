@@ -1,9 +1,9 @@
-"""Tables of plane scenes name forces, moments and energies per thickness."""
+"""Tables name units of their dimension, and what the solver left as zero."""
 
 from __future__ import annotations
 
 from fenics_contact.cli.forces import forces_table
-from fenics_contact.cli.tables import state_facts
+from fenics_contact.cli.tables import state_facts, step_row
 from fenics_contact.io import forces_record
 from fenics_contact.scene_file import UnitNames
 from tests.viz.plane_states import flat_pad
@@ -20,3 +20,11 @@ def test_forces_and_energies_have_the_units_of_their_dimension() -> None:
         facts = state_facts(state, UnitNames())
         assert facts["strain energy"].endswith(f"{state.energies.strain:.6g} {moment}")
         assert f" {force}, friction " in facts["contact 0"]
+
+
+def test_friction_below_what_the_solver_left_is_zero_in_the_table_of_load_steps() -> None:
+    """A pad that is pressed alone spreads alike to both sides."""
+    *_, friction, _ = step_row(0, "pressed", flat_pad(push=0.0))
+    assert friction == "0"
+    *_, friction, _ = step_row(1, "pushed", flat_pad())
+    assert float(friction) > 0.01

@@ -11,6 +11,7 @@ from fenics_contact.nonlinear.indefinite_factor import (
     mostly_positive,
     with_inertia,
 )
+from fenics_contact.nonlinear.tangent_operator import _softest
 
 
 def stiffness(shift: float) -> sp.csr_matrix:
@@ -70,3 +71,19 @@ def test_factors_that_mumps_cannot_complete_are_refused():
     matrix.data[:] = np.nan
     with pytest.raises(ConvergenceError, match=r"must have factors, but MUMPS ends with INFOG\(1\) = -"):
         with_inertia(matrix, None)
+
+
+def test_negative_motions_are_found_next_to_zero_and_far_below_it():
+    """The inverse has the latter amid a cluster: some cells have lost their strength, a body buckles."""
+    values = np.concatenate([[-1e9, -3e8, -2e7, -0.02, -0.01], np.geomspace(0.05, 1e7, 395)])
+    mixing = np.linalg.qr(np.random.default_rng(1).standard_normal((20, 20)))[0]
+    turned = sp.kron(sp.identity(20), mixing).tocsr()[:, np.random.default_rng(2).permutation(400)]
+    matrix = (turned @ sp.diags(values) @ turned.T).tocsr()
+    factor = with_inertia(matrix, None)
+    assert factor.negative == 5
+    probes = np.random.default_rng(0).standard_normal((400, 4))
+    found, vectors = _softest(matrix, factor, probes, 2)
+    negative = vectors[:, found < 0.0]
+    assert negative.shape[1] == 5
+    held = matrix + 2e9 * negative @ negative.T
+    assert np.linalg.eigvalsh(held).min() > 0.0

@@ -50,22 +50,22 @@ def plane_block(cell: str = "quadrilateral", friction: float = 0.4) -> State:
     return state
 
 
-def flat_pad() -> State:
-    """A pad three times as long as high, pressed on a floor."""
-    return _pad(6.0, 2.0)
+def flat_pad(push: float = 0.01) -> State:
+    """A pad three times as long as high, pressed on a floor and pushed along it."""
+    return _pad(6.0, 2.0, push)
 
 
 def tall_pad() -> State:
     """A pad three times as high as long, pressed on a floor."""
-    return _pad(2.0, 6.0)
+    return _pad(2.0, 6.0, 0.01)
 
 
-@lru_cache(maxsize=2)
-def _pad(width: float, height: float) -> State:
+@lru_cache(maxsize=3)
+def _pad(width: float, height: float, push: float) -> State:
     cells = round(2 * width), round(2 * height)
     scene = Scene(
         {"pad": Body(rectangle((0.0, 0.0), (width, height), cells), PlaneStrain(100.0, 0.3))},
-        [Support("pad", "y1", (0.01, -0.02))],
+        [Support("pad", "y1", (push, -0.02))],
         contacts=[ContactPair(Surface("pad", "y0"), FLOOR, Coulomb(0.3))],
     )
     return solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +67,13 @@ def test_the_window_of_a_trace_holds_what_is_closed() -> None:
     assert closed.max() - 1e-12 < high <= trace.places[-1]
     low, high = trace.window(0.1)
     assert high - low == pytest.approx(0.2)
+
+
+def test_the_window_of_a_small_contact_holds_the_open_nodes_beside_it() -> None:
+    """So that curves end at zero, not in the air."""
+    trace = contact_trace(plane_block(), 0)
+    small = replace(trace, pressure=np.where(np.isin(np.arange(25), (10, 11, 12)), 1.0, 0.0))
+    assert small.window(None) == (trace.places[9], trace.places[13])
 
 
 def test_the_trace_of_a_ring_runs_along_it() -> None:
