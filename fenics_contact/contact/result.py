@@ -40,9 +40,9 @@ class ContactResult:
             frictionless and open points, shape (n, dim - 1), [length].
         slip_before: The same of all load steps before, shape (n, dim - 1), [length].
         status: `Status` of each point, shape (n,). A closed point without friction slips.
-        area: Area that belongs to each point, of mortar contact the part of it that faces the master: where
-            the slave's material is made for large deformations that of the deformed slave, else
-            ``nominal_area``, shape (n,), [length²] or in the plane [length].
+        area: Area that belongs to each point, of mortar contact the part of it that faces the master (no less
+            than a half of it with large deformations): where the slave's material is made for these that of
+            the deformed slave, else ``nominal_area``, shape (n,), [length²] or in the plane [length].
         nominal_area: The same of the undeformed slave, shape (n,).
     """
 

@@ -20,20 +20,21 @@ class PointAreas:
     """Areas of the deformed and of the undeformed slave that belong to contact points.
 
     By nodes these are whole areas of the nodes. By mortar they are the parts that face the master, on which
-    the pressure of a point acts.
+    the pressure of a point acts, but no less than halves: what holds a node hardly over the rim of the
+    master has no area there, and its force does not vanish with it.
 
     Attributes:
         now: a, area of the node on the slave as it lies now, shape (n,), [length²] or in the plane [length].
         before: A, area of the node on the undeformed slave, shape (n,).
-        share: What of the node's area faces the master where they meet by mortar, else 1, shape (n,).
-        by_mortar: Whether they do, shape (n,).
+        share: What of the node's area counts, shape (n,).
+        facing: Whether it is the part that faces the master, shape (n,).
         much: Whether the slave's material is made for large deformations, shape (n,).
     """
 
     now: np.ndarray
     before: np.ndarray
     share: np.ndarray
-    by_mortar: np.ndarray
+    facing: np.ndarray
     much: np.ndarray
 
     @classmethod
@@ -62,8 +63,8 @@ class PointAreas:
             mine = points.pair == index
             areas.much[mine] = scene.bodies[body].deforms_much
             if met is not None:
-                areas.by_mortar[mine] = True
-                areas.share[mine] = met.coupling.area / areas.now[mine]
+                part = met.coupling.area / areas.now[mine]
+                areas.share[mine], areas.facing[mine] = np.maximum(part, 0.5), part > 0.5
         return areas
 
     @property
@@ -80,13 +81,13 @@ class PointAreas:
         return self.before * self.share
 
     def pulled_back(self, by_true: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the derivatives by a, A and the parts share · a that face the master, shape (n,) each.
+        """Return the derivatives by a, A and the parts of a that face the master, shape (n,) each.
 
-        By nodes the last is zero.
+        The last is zero by nodes, and where another part counts.
 
         Args:
             by_true: Derivative by `true`, shape (n,).
         """
-        ratio = np.where(self.by_mortar, np.where(self.much, 1.0, self.before / self.now), 0.0)
+        ratio = np.where(self.facing, np.where(self.much, 1.0, self.before / self.now), 0.0)
         by_part = by_true * self.share
         return by_part * (self.much - ratio), by_part * ~self.much, by_true * ratio
