@@ -12,6 +12,8 @@ from fenics_contact.surfaces import FacetedSurface
 
 #: Gaps that grow by this share of how far the point of the largest pressure is pressed in are curved.
 CURVED = 0.1
+#: The kind of doubt that is no more than a remark.
+ROUGH = "rough peak"
 #: By how much the largest pressure may be off, by the edges of facets from its point to the next open one.
 OFF = {1: "by a half or more", 2: "by a tenth"}
 
@@ -48,7 +50,9 @@ def coarse_peak(state: State, number: int, pressed_in: np.ndarray) -> list[tuple
         if len(opened):
             grown = opened.min() - contact.points.gap[mine[top]]
             if grown > CURVED * pressed_in[mine[top]]:
-                return [(number, "peak", _in_words(pair, int(pressing.sum()), steps))]
+                return [
+                    (number, "peak" if steps == 1 else ROUGH, _in_words(pair, int(pressing.sum()), steps))
+                ]
             break
     return []
 

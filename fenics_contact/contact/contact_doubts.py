@@ -6,7 +6,7 @@ import logging
 
 import numpy as np
 
-from fenics_contact.contact.coarse_peaks import coarse_peak
+from fenics_contact.contact.coarse_peaks import ROUGH, coarse_peak
 from fenics_contact.contact.passing_nodes import passing_nodes
 from fenics_contact.contact.state import State
 from fenics_contact.errors import InvalidInputError, tell
@@ -93,7 +93,7 @@ class ContactDoubts:
 
     def _tell(self, torn: TornSystem, pair: int, kind: str, words: str) -> None:
         if (pair, kind) not in self._told and torn.decomposition.comm.rank == 0:
-            tell(_LOG.warning, "%s", words)
+            tell(_LOG.info if kind == ROUGH else _LOG.warning, "%s", words)
         self._told.add((pair, kind))
 
 

@@ -35,7 +35,10 @@ def passing_nodes(state: State, number: int, moved: float, share: float) -> list
 
 
 def _depth(state: State, number: int, pair: ContactPair, other: Surface) -> float:
-    """Return the largest depth of master nodes below the slave around nodes that press, [length]."""
+    """Return the largest depth of master nodes below facets of the slave that press, [length].
+
+    Zero where no more master nodes meet these than they have nodes: the slave is the finer surface.
+    """
     contact, scene = state.contact, state.scene
     mine = contact.on_pair(number)
     mine = mine[contact.normal_force[mine] > 0.0]
@@ -50,7 +53,10 @@ def _depth(state: State, number: int, pair: ContactPair, other: Surface) -> floa
     away, _ = cKDTree(slave.points[presses]).query(master.points, distance_upper_bound=reach)
     near = np.flatnonzero(np.isfinite(away))
     hit = project(master.points[near], master.normals[near], slave)
+    inside = presses[slave.facets[hit.facet]].all(axis=1)
+    if np.count_nonzero(inside) <= np.count_nonzero(presses):
+        return 0.0
     own = state.gather_displacement(pair.slave.body)[slave.nodes]
     moves = state.gather_displacement(other.body)[master.nodes[near[hit.point]]]
     gap = hit.gap + np.einsum("nd,nd->n", hit.normal, moves - node_weights(slave, hit) @ own)
-    return -float(gap.min(initial=0.0))
+    return -float(gap[inside].min(initial=0.0))

@@ -9,8 +9,17 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
-from fenics_contact.gallery import rectangle, rectangle_lattice
-from fenics_contact.scene import Body, ContactPair, PlaneStrain, Scene, Support, Surface
+from fenics_contact.gallery import block, rectangle, rectangle_lattice
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    IsotropicElasticity,
+    PlaneStrain,
+    Pressure,
+    Scene,
+    Support,
+    Surface,
+)
 from tests.contact.round_bodies import pressed
 
 
@@ -71,3 +80,19 @@ def test_masters_that_bulge_beside_a_punch_are_not_told(caplog: pytest.LogCaptur
     state, words = solved(caplog, scene)
     assert state.contact.normal_force.min() > 0.0
     assert words == []
+
+
+def test_finer_slaves_are_not_told_that_are_coarser_along_an_axis(caplog: pytest.LogCaptureFixture) -> None:
+    meshes = {
+        "upper": block((0.0, 0.0, 1.0), (1.0, 1.0, 2.0), (5, 3, 2), "tetrahedron"),
+        "lower": block((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (3, 4, 2), "tetrahedron"),
+    }
+    sides = {"x0": (0.0, None, None), "y0": (None, 0.0, None)}
+    rollers = [Support(name, side, value) for name in meshes for side, value in sides.items()]
+    scene = Scene(
+        {name: Body(mesh, IsotropicElasticity(1e3, 0.3)) for name, mesh in meshes.items()},
+        [*rollers, Support("lower", "z0", (None, None, 0.0))],
+        [Pressure("upper", "z1", 1.0)],
+        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), discretisation="node")],
+    )
+    assert solved(caplog, scene)[1] == []
