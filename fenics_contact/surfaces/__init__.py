@@ -11,6 +11,7 @@ from fenics_contact.surfaces.facet_areas import (
 from fenics_contact.surfaces.facets import (
     FacetedSurface,
     Relief,
+    corner_places,
     corner_products,
     edge_distance,
     facet_shape_values,
@@ -54,6 +55,7 @@ __all__ = [
     "bears_on_midpoints",
     "best_projections",
     "corner_normals",
+    "corner_places",
     "corner_products",
     "edge_distance",
     "edges_at_corners",

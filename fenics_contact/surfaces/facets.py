@@ -57,6 +57,13 @@ def shape_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.nda
     return values, 0.25 * np.stack([_S * v, u * _T], axis=2)
 
 
+def corner_places(corners: int) -> np.ndarray:
+    """Return the local coordinates of the corners of a facet, shape (corners, dim − 1)."""
+    if corners == 3:
+        return np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
+    return np.stack([_S, _T], axis=1) if corners == 4 else np.array([(-1.0,), (1.0,)])
+
+
 def outside(local: np.ndarray, corners: int) -> np.ndarray:
     """Return by how much local coordinates lie outside the facet, shape (n,); zero inside."""
     if corners == 2:

@@ -8,8 +8,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.surface_shapes import tangent_bases
-from fenics_contact.surfaces.facets import FacetedSurface, corner_products
+from fenics_contact.surfaces.facets import FacetedSurface, corner_places, corner_products, shape_functions
 from fenics_contact.surfaces.fitting import PolynomialFit
+from fenics_contact.surfaces.quadratic_facets import shape_weight_gradients, shape_weights
 from fenics_contact.surfaces.reconstruction import Wedges, wedges_of
 from fenics_contact.surfaces.relief import edges_at_corners
 
@@ -51,10 +52,14 @@ def surface_tangents(surface: FacetedSurface, order: int = 2, steepest: float = 
         steepest: Cosine of the angle between edge and tangent plane below which the edge stays straight.
     """
     wedges = wedges_of(surface)
-    axes, derivatives = _tangent_operators(surface, wedges, order)
+    axes = _axes(surface, wedges)
+    if surface.whole is None:
+        derivatives = _fitted_derivatives(surface, wedges, axes, order)
+    else:
+        derivatives = _mean_derivatives(surface, surface.whole, wedges, axes)
     of_corner, width = wedges.of_corner[:, :, None], surface.dim - 1
     edges = edges_at_corners(surface.points[surface.facets])
-    along = np.einsum("nkad,nked->nkea", axes[wedges.of_corner], edges)
+    along = np.einsum("nkad,nked->nkea", axes[wedges.of_corner][:, :, :-1], edges)
     tangents = (derivatives @ surface.points).reshape(len(wedges.node), width, surface.dim)
     tangent = np.einsum("nkea,nkad->nked", along, tangents[wedges.of_corner])
     length, chord = np.linalg.norm(tangent, axis=3), np.linalg.norm(edges, axis=3)
@@ -76,33 +81,63 @@ def surface_tangents(surface: FacetedSurface, order: int = 2, steepest: float = 
     return SurfaceTangents(bends, derivatives, wedges.of_corner, shares, smooth)
 
 
-def _tangent_operators(
-    surface: FacetedSurface, wedges: Wedges, order: int
-) -> tuple[np.ndarray, sp.csr_matrix]:
-    """Return axes of the tangent plane of each wedge and the derivatives of positions along them.
+def _axes(surface: FacetedSurface, wedges: Wedges) -> np.ndarray:
+    """Return axes of the tangent plane of each wedge and its normal, shape (n_wedges, dim, dim)."""
+    summed = np.zeros((len(wedges.node), surface.dim))
+    np.add.at(summed, wedges.of_corner, corner_products(surface.points, surface.facets))
+    normal = summed / np.linalg.norm(summed, axis=1)[:, None]
+    return np.concatenate([tangent_bases(normal), normal[:, None]], axis=1)
+
+
+def _fitted_derivatives(
+    surface: FacetedSurface, wedges: Wedges, axes: np.ndarray, order: int
+) -> sp.csr_matrix:
+    """Return weights of the nodes in the derivatives of fitted positions along the axes of wedges.
 
     Args:
         surface: The surface.
         wedges: Its wedges.
+        axes: Their axes, see `_axes`.
         order: Degree of the polynomials.
 
     Returns:
-        Axes, shape (n_wedges, dim − 1, dim), and weights of the nodes, shape (n_wedges · (dim − 1), n_nodes).
+        Shape (n_wedges · (dim − 1), n_nodes).
     """
     node, count, dim = wedges.node, len(wedges.node), surface.dim
-    summed = np.zeros((count, dim))
-    np.add.at(summed, wedges.of_corner, corner_products(surface.points, surface.facets))
-    mean = summed / np.linalg.norm(summed, axis=1)[:, None]
-    axes = tangent_bases(mean)
     centre, around, narrow = wedges.patches(order)
     away = surface.points[node[around]] - surface.points[node[centre]]
     size = np.zeros(count)
     np.maximum.at(size, centre, np.linalg.norm(away, axis=1))
-    away /= size[centre][:, None]
-    place, height = np.einsum("nad,nd->na", axes[centre], away), np.einsum("nd,nd->n", mean[centre], away)
-    fit = PolynomialFit.of(place, height, centre, narrow, order)
+    place = np.einsum("nad,nd->na", axes[centre], away) / size[centre][:, None]
+    fit = PolynomialFit.of(place[:, :-1], place[:, -1], centre, narrow, order)
     value = fit.slope_weights(dim - 1) / size[centre][:, None]
     row = ((dim - 1) * centre[:, None] + np.arange(dim - 1)).ravel()
     ends = (np.repeat(node[around], dim - 1), np.repeat(node[centre], dim - 1))
     entries = (np.concatenate([value.ravel(), -value.ravel()]), (np.tile(row, 2), np.concatenate(ends)))
-    return axes, sp.csr_matrix(entries, shape=((dim - 1) * count, len(surface.points)))
+    return sp.csr_matrix(entries, shape=((dim - 1) * count, len(surface.points)))
+
+
+def _mean_derivatives(
+    surface: FacetedSurface, whole: np.ndarray, wedges: Wedges, axes: np.ndarray
+) -> sp.csr_matrix:
+    """Return the same of quadratic facets: the mean of those around a node, at the rim that of its facet.
+
+    Args:
+        surface: The surface.
+        whole: Its quadratic facets, rows of positions in its nodes, shape (n, nodes of a facet).
+        wedges: Its wedges.
+        axes: Their axes, see `_axes`.
+    """
+    (count, corners), width = surface.facets.shape, surface.dim - 1
+    _, slopes = shape_functions(corner_places(corners), corners)
+    facet, at = np.repeat(np.arange(count), corners), wedges.of_corner.ravel()
+    shares, slopes = np.tile(np.eye(corners), (count, 1)), np.tile(slopes, (count, 1, 1))
+    nodes, _ = shape_weights(whole, facet, shares)
+    slopes = shape_weight_gradients(whole, facet, shares, slopes)
+    by_local = np.einsum("mqa,mqd->mda", slopes, surface.points[nodes])
+    by_axes = np.linalg.inv(axes[at, :width] @ by_local)
+    values = np.swapaxes(slopes @ by_axes, 1, 2) / np.bincount(at)[at][:, None, None]
+    row = np.broadcast_to((width * at[:, None] + np.arange(width))[:, :, None], values.shape)
+    column = np.broadcast_to(nodes[:, None], values.shape)
+    shape = width * len(wedges.node), len(surface.points)
+    return sp.csr_matrix((values.ravel(), (row.ravel(), column.ravel())), shape=shape)

@@ -15,6 +15,7 @@ from fenics_contact.scene import (
     BodyForce,
     ContactPair,
     IsotropicElasticity,
+    NeoHooke,
     PlaneStrain,
     Pressure,
     Scene,
@@ -22,6 +23,7 @@ from fenics_contact.scene import (
     Surface,
     Tie,
 )
+from fenics_contact.surfaces import Geometry
 
 #: Young's modulus, and Lamé's constants for Poisson's ratio 0.3.
 YOUNG, SHEAR, LAME = 100.0, 100.0 / 2.6, 100.0 * 0.3 / 1.3 / 0.4
@@ -105,3 +107,41 @@ def test_forces_on_the_master_are_those_of_its_shape_functions(cell: str) -> Non
         assert contact.normal_force.sum() == pytest.approx(1.0)
         assert np.abs(contact.pressure - 1.0).max() < largest
         assert len(contact.pressure) > 4
+
+
+def squeezed(cell: str, law: type, geometry: Geometry) -> np.ndarray:
+    """Pressures between flat plates, three cells on two, of which hardly anything moves."""
+    plane = cell in {"triangle", "quadrilateral"}
+    build, flat = (rectangle, 1) if plane else (block, 2)
+    parts = {
+        name: quadratic(
+            build((0.0,) * flat + (z0,), (1.0,) * flat + (z0 + 0.6,), (n,) * flat + (1,), cell=cell)
+        )
+        for name, z0, n in (("lower", -0.6, 2), ("upper", 0.0, 3))
+    }
+    upper, lower = faces(flat + 1)
+    still = (None,) * flat
+    supports = [
+        Support(name, "xy"[d] + "0", tuple(0.0 if k == d else None for k in range(flat + 1)))
+        for name in parts
+        for d in range(flat)
+    ]
+    supports += [Support("lower", lower.name[0] + "0", (*still, 0.0))]
+    supports += [Support("upper", upper.name[0] + "1", (*still, -1e-6))]
+    pair = ContactPair(upper, lower, geometry=geometry, discretisation="node")
+    held = {name: Body(mesh, law(1.0, 0.3)) for name, mesh in parts.items()}
+    scene = Scene(held, supports, contacts=[pair])
+    return solve_scene(scene, MPI.COMM_SELF, tolerance=1e-9).contact.pressure
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_surfaces_that_slide_and_small_strains_agree_where_hardly_anything_moves(cell: str) -> None:
+    """On the facets themselves but for 1e-6 of strain; smooth surfaces are as near to a uniform pressure."""
+    small = IsotropicElasticity if cell in {"tetrahedron", "hexahedron"} else PlaneStrain
+    facets, slid, smooth = (
+        squeezed(cell, law, geometry)
+        for law, geometry in ((small, "faceted"), (NeoHooke, "faceted"), (NeoHooke, "best"))
+    )
+    np.testing.assert_allclose(slid, facets, rtol=1e-4)
+    assert np.abs(smooth / smooth.mean() - 1.0).max() < 1.2 * np.abs(facets / facets.mean() - 1.0).max()
+    assert np.abs(smooth - facets).max() > 1e-3 * facets.mean(), "smooth surfaces have edges"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh
+from fenics_contact.mesh import BodyMesh, quadratic
 from fenics_contact.pairing.sliding import SlidingContact, SlidingPoints
 from fenics_contact.scene import (
     Body,
@@ -29,7 +29,9 @@ def arched(points: np.ndarray, radius: float = 1.5) -> np.ndarray:
     return bent
 
 
-def on_arch(kind: str, *, master_cells: int = 8, radius: float = 1.5, geometry: str = "best") -> Scene:
+def on_arch(
+    kind: str, *, master_cells: int = 8, radius: float = 1.5, geometry: str = "best", order: int = 1
+) -> Scene:
     """Return a small slave above an arched master that is longer and wider."""
     if kind in ("hexahedron", "tetrahedron"):
         low = block((-1.0, -0.6, -0.5), (1.0, 0.6, 0.0), (master_cells, 5, 1), kind)
@@ -39,6 +41,8 @@ def on_arch(kind: str, *, master_cells: int = 8, radius: float = 1.5, geometry: 
         low = rectangle((-1.0, -0.5), (1.0, 0.0), (master_cells, 1), kind)
         high = rectangle((-0.43, 0.03), (0.37, 0.4), (5, 1), kind)
         material, top, under = PlaneStrain(10.0, 0.3), "y1", "y0"
+    if order > 1:
+        low, high = quadratic(low), quadratic(high)
     low = BodyMesh(arched(low.points, radius), low.cells, low.surfaces)
     high = BodyMesh(arched(high.points, radius), high.cells, high.surfaces)
     bodies = {"high": Body(high, material), "low": Body(low, material)}

@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.mesh import FACET_TYPES, BodyMesh, quadratic, quadrature
 from fenics_contact.pairing.sliding.closest import patch_points
-from fenics_contact.pairing.sliding.patch_functions import patch_functions
+from fenics_contact.pairing.sliding.patch_functions import n_functions, patch_functions
 from fenics_contact.pairing.sliding.patches import SmoothPatches
-from fenics_contact.pairing.sliding.turning_functions import CORNERS, turning_functions
+from fenics_contact.pairing.sliding.turning_functions import turning_functions
+from fenics_contact.surfaces import corner_places, nodal_areas, true_surface
 from tests.pairing.sliding_scenes import on_arch, shaken, sliding
 
 CELLS = ("hexahedron", "tetrahedron")
@@ -18,9 +21,9 @@ CELLS = ("hexahedron", "tetrahedron")
 ALONG = np.array([0.0, 0.01, 0.3, 0.5, 0.8, 1.0])
 
 
-def shaken_patches(kind: str) -> tuple[SmoothPatches, np.ndarray]:
+def shaken_patches(kind: str, order: int) -> tuple[SmoothPatches, np.ndarray]:
     """Return the patches of an arch and its nodes out of shape, unevenly."""
-    scene = on_arch(kind)
+    scene = on_arch(kind, master_cells=8 // order, order=order)
     meeting = sliding(scene).meetings[0]
     assert meeting.patches is not None
     x = shaken(scene)[meeting.master_nodes]
@@ -39,7 +42,7 @@ def shared_edges(patches: SmoothPatches) -> tuple[np.ndarray, np.ndarray]:
 
 def on_edge(patches: SmoothPatches, place: np.ndarray, t: float) -> np.ndarray:
     """Return local coordinates at t of edges."""
-    corners = CORNERS[patches.corners]
+    corners = corner_places(patches.corners)
     return (1 - t) * corners[place] + t * corners[(place + 1) % patches.corners]
 
 
@@ -56,19 +59,20 @@ def largest_jump(patches: SmoothPatches, x: np.ndarray) -> float:
     return jump
 
 
+@pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("kind", CELLS)
-def test_normals_agree_on_both_sides_of_edges_out_of_shape(kind: str) -> None:
-    patches, x = shaken_patches(kind)
+def test_normals_agree_on_both_sides_of_edges_out_of_shape(kind: str, order: int) -> None:
+    patches, x = shaken_patches(kind, order)
     assert largest_jump(patches, x) < 1e-11
-    size = 5 * patches.corners
-    edges_alone = np.arange(patches.control.shape[0]) % size < 3 * patches.corners
+    size = n_functions(patches.corners, order)
+    edges_alone = np.arange(patches.control.shape[0]) % size < size - 2 * patches.corners
     without = patches.control.multiply(edges_alone[:, None]).tocsr()
     assert largest_jump(replace(patches, control=without), x) > 0.01
 
 
 @pytest.mark.parametrize("corners", [3, 4])
 def test_a_turning_function_turns_its_own_edge_alone(corners: int) -> None:
-    place, t = CORNERS[corners], np.linspace(0.0, 1.0, 7)
+    place, t = corner_places(corners), np.linspace(0.0, 1.0, 7)
     wanted = np.stack([3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t)], axis=1)
     for edge in range(corners):
         after, across = np.roll(place, -1, axis=0)[edge], np.roll(place, 1, axis=0)[edge] - place[edge]
@@ -80,15 +84,46 @@ def test_a_turning_function_turns_its_own_edge_alone(corners: int) -> None:
         assert np.abs(np.delete(turn, [2 * edge, 2 * edge + 1], axis=1)).max() < 1e-13
 
 
+@pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("corners", [3, 4])
-def test_derivatives_of_patch_functions_are_those_of_difference_quotients(corners: int) -> None:
+def test_derivatives_of_patch_functions_are_those_of_difference_quotients(corners: int, order: int) -> None:
     local = np.random.default_rng(3).uniform(0.1, 0.4, (6, 2)) - (0.9 if corners == 4 else 0.0)
-    step, at = 1e-6, patch_functions(local, corners)
+    step, at = 1e-6, patch_functions(local, corners, order)
     for axis in range(2):
-        ahead, behind = (patch_functions(local + s * step * np.eye(2)[axis], corners) for s in (1, -1))
+        ahead, behind = (
+            patch_functions(local + s * step * np.eye(2)[axis], corners, order) for s in (1, -1)
+        )
         value, first = (
             (f - g) / (2 * step) for f, g in ((ahead.value, behind.value), (ahead.first, behind.first))
         )
         assert at.first[:, :, axis] == pytest.approx(value, abs=1e-8)
         assert at.second[:, :, :, axis] == pytest.approx(first, abs=1e-8)
     assert np.abs(at.second[:, 3 * corners :]).max() > 0.1
+
+
+def plates(cell: str) -> tuple[BodyMesh, str]:
+    """A body of quadratic cells of unequal sides, and the name of its top."""
+    if cell in CELLS:
+        return quadratic(block((0, 0, 0), (2, 1, 1), (3, 2, 1), cell)), "z1"
+    return quadratic(rectangle((0, 0), (2, 1), (3, 1), cell)), "y1"
+
+
+@pytest.mark.parametrize("cell", [*CELLS, "quadrilateral", "triangle"])
+def test_a_uniform_pressure_on_smooth_patches_has_the_forces_of_quadratic_facets(cell: str) -> None:
+    """None at the corners of triangles; patches through all nodes alike would have a sixth there."""
+    mesh, top = plates(cell)
+    surface = true_surface(mesh, top, "faceted")
+    patches = SmoothPatches.of(surface)
+    assert surface.whole is not None
+    kind = FACET_TYPES[patches.corners, mesh.dim]
+    places, weights = quadrature(kind, 16)
+    local = places if patches.corners == 3 else 2 * places - 1
+    count = len(patches.facets)
+    facet = np.repeat(np.arange(count), len(places))
+    at = patches.weights(facet, patches.functions(np.tile(local, (count, 1))).value)
+    area = nodal_areas(surface.points, surface.facets).sum(axis=1) / weights.sum()
+    forces = at.T @ (np.repeat(area, len(places)) * np.tile(weights, count))
+    expected = np.zeros(len(surface.nodes))
+    np.add.at(expected, surface.whole, nodal_areas(surface.points, surface.whole))
+    assert np.abs(at - at.multiply(at > 0)).max() > 0.01, "not only the facets themselves"
+    np.testing.assert_allclose(forces, expected, atol=2e-5)

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from fenics_contact.mesh import coordinate_rounding
-from fenics_contact.pairing.sliding.patch_functions import PatchValues
+from fenics_contact.pairing.sliding.patch_functions import PatchValues, n_values
 from fenics_contact.pairing.sliding.patches import SmoothPatches
 from fenics_contact.surfaces import (
     Projection,
@@ -169,7 +169,7 @@ class ClosestPoints:
         # Relative to the facet's own corner it is as exact far from the origin as near it.
         start = self.points[self.patches.facets[facet, 0]]
         target, coefficients = targets[point] - start, self.coefficients[facet].copy()
-        coefficients[:, : self.patches.corners] -= start[:, None]
+        coefficients[:, : n_values(self.patches.corners, self.patches.order)] -= start[:, None]
         local = self._iterated(coefficients, target, local.copy())
         at = patch_points(self.patches, coefficients, local)
         away = target - at.place

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.pairing.sliding.patch_functions import edge_functions
-from fenics_contact.pairing.sliding.turning_functions import CORNERS
+from fenics_contact.pairing.sliding.patch_functions import edge_derivatives
 from fenics_contact.surfaces import SurfaceTangents
 
 #: Where derivatives along an edge are compared, and the coefficients of 3t(1 − t)² and 3t²(1 − t) from there.
@@ -14,7 +13,7 @@ AT = (1 / 3, 2 / 3)
 FITTED = ((3.0, -1.5), (-1.5, 3.0))
 
 
-def edge_turns(tangents: SurfaceTangents, control: sp.csr_matrix) -> sp.csr_matrix:
+def edge_turns(tangents: SurfaceTangents, control: sp.csr_matrix, order: int) -> sp.csr_matrix:
     """Return the weights of the functions that give neighbouring patches one tangent plane along their edge.
 
     Along an edge with the curve C(t), the patches on both sides get derivatives across it that are
@@ -29,7 +28,8 @@ def edge_turns(tangents: SurfaceTangents, control: sp.csr_matrix) -> sp.csr_matr
     Args:
         tangents: The tangents at the corners, of a surface in space.
         control: Weights of the nodes in the patches' functions along edges, see `edge_functions`, shape
-            (n_facets · 3 · corners, n_nodes).
+            (n_facets · functions, n_nodes).
+        order: As for `edge_functions`.
 
     Returns:
         Shape (n_facets · corners · 2, n_nodes): of both functions of each edge, see `turning_functions`; zero
@@ -51,11 +51,11 @@ def edge_turns(tangents: SurfaceTangents, control: sp.csr_matrix) -> sp.csr_matr
     lacking = []
     for t in AT:
         p, q = (sp.diags(((1 - t) * a + t * b).ravel()) for a, b in ((p0, p1), (q0, q1)))
-        along, across = (_derivatives(control, first.shape[1], t, way) for way in (1, -1))
+        along, across = (edge_derivatives(control, first.shape[1], order, t, way) for way in (1, -1))
         lacking.append(sp.diags(smooth) @ (p @ ((1 - t) * here + t * there) + q @ along - across))
     both = [sum(f * rows for f, rows in zip(line, lacking, strict=True)) for line in FITTED]
-    order = np.arange(2 * len(smooth)).reshape(2, -1).T.ravel()
-    return sp.vstack(both, format="csr")[order]
+    in_turn = np.arange(2 * len(smooth)).reshape(2, -1).T.ravel()
+    return sp.vstack(both, format="csr")[in_turn]
 
 
 def _split(edge: np.ndarray, across: np.ndarray, pair: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -79,12 +79,3 @@ def _combined(tangents: SurfaceTangents, wedge: np.ndarray, shares: np.ndarray) 
     column = (2 * wedge.reshape(-1, 1) + np.arange(2)).ravel()
     shape = (wedge.size, tangents.derivatives.shape[0])
     return (sp.csr_matrix((shares.ravel(), (row, column)), shape=shape) @ tangents.derivatives).tocsr()
-
-
-def _derivatives(control: sp.csr_matrix, corners: int, t: float, way: int) -> sp.csr_matrix:
-    """Return weights of the nodes in derivatives at t of all edges, towards their next or last corner."""
-    place, after = CORNERS[corners], np.roll(CORNERS[corners], -1, axis=0)
-    step = np.roll(place, -way, axis=0) - place
-    values = np.einsum("eba,ea->eb", edge_functions((1 - t) * place + t * after, corners).first, step)
-    facets = sp.identity(control.shape[0] // values.shape[1])
-    return (sp.kron(facets, sp.csr_matrix(values)) @ control).tocsr()

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-#: Local coordinates of the corners of facets with so many, as for `fenics_contact.surfaces.shape_functions`.
-CORNERS = {
-    3: np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]),
-    4: np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]),
-}
+from fenics_contact.surfaces import corner_places
 
 
 def turning_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -48,7 +44,7 @@ def turning_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.n
 
 def _coordinates(corners: int) -> tuple[np.ndarray, np.ndarray]:
     """Return b and c at the origin, shape (2, 2 · corners), and their gradients, (2, 2 · corners, 2)."""
-    place = CORNERS[corners]
+    place = corner_places(corners)
     along, across = np.roll(place, -1, axis=0) - place, np.roll(place, 1, axis=0) - place
     # Barycentric in triangles, from 0 to 1 in quadrilaterals: dual to the edge and the way across it.
     dual = np.linalg.inv(np.stack([along, across], axis=2))
