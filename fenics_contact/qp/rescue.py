@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fenics_contact.linalg import ROUNDING
 from fenics_contact.qp.forcing import Forcing
 from fenics_contact.qp.iterate import Iterate, Start, certify, iterate_at, iterate_between
 from fenics_contact.qp.newton_steps import Damped, NewtonState, NewtonSteps, Safeguards
@@ -217,13 +218,14 @@ class Rescue:
 
     def _by_proximal_points(self, start: Start, limit: int, further: bool) -> tuple[Iterate, SolverStep]:
         """Take Newton steps with springs, and move their centre whenever they converge. Collective."""
-        path = self._first_centre(start)
+        path, best = self._first_centre(start), start.iterate
         for number in range(PROXIMAL_STEPS):
             newton, line = path.steps.step(path.newton, number)
             iterate = path.point.leave(newton.iterate)
-            if not iterate.residuals.worst < DIVERGED:
-                iterate = start.iterate
+            if not iterate.residuals.worst < DIVERGED or _stands(path.newton.iterate, newton.iterate):
+                iterate = best
                 break
+            best = iterate if iterate.residuals.worst < best.residuals.worst else best
             improved = _improved(iterate.residuals, start.iterate.residuals, further)
             solved = iterate.residuals.within(self.forcing.tolerance)
             if improved or solved or start.operator.products >= limit:
@@ -291,6 +293,12 @@ class _ProximalPath:
     steps: NewtonSteps
     newton: NewtonState
     since: int = 0
+
+
+def _stands(before: Iterate, after: Iterate) -> bool:
+    """Return whether a step was cut to nothing: all steps behind it would be the same."""
+    worst = after.residuals.worst
+    return abs(worst - before.residuals.worst) <= ROUNDING * worst
 
 
 def _improved(after: Residuals, before: Residuals, further: bool) -> bool:
