@@ -160,7 +160,7 @@ class Evaluation:
         # Of these rows B D⁻¹ Bᵀ is diagonal.
         size = torn.numbering.to_owned(torn.B.multiply(torn.B) @ flexibility)
         glued = torn.numbering.owned < torn.n_gluing
-        taken[glued] = (torn.jump(flexibility * left) / size)[glued]
+        taken[glued] = torn.jump(flexibility * left)[glued] / size[glued]
         return taken
 
     def linearised(self, timer: PhaseTimer, known: Linearisation | None) -> Linearisation:

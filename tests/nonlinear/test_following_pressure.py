@@ -19,13 +19,17 @@ from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
 from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
+    ContactPair,
+    Coulomb,
     EffectName,
     IsotropicElasticity,
     NeoHooke,
     PlaneStrain,
     Pressure,
+    RigidPlane,
     Scene,
     Support,
+    Surface,
     Ufl,
 )
 from tests.models.deformed import rotation, skew_patch, smooth_field
@@ -68,6 +72,20 @@ def test_stiffness_is_the_derivative_of_the_force_and_turns_with_the_body(cell: 
     dead = assemble(mesh, body, [load], forms).load.reshape(points.shape)
     assert np.abs(dead @ R.T - dead - more.reshape(points.shape)).max() < 1e-13
     assert np.abs(more).max() > 0.01
+
+
+def test_friction_where_supports_hold_a_node_along_a_plane_passes_nothing_on() -> None:
+    """Rows of friction there are zero: nothing is divided by their size."""
+    floor = ContactPair(Surface("pad", "y0"), RigidPlane((0, 0), (0, 1)), Coulomb(0.5))
+    scene = Scene(
+        {"pad": Body(rectangle((0, 0), (2, 1), (3, 2)), RUBBER)},
+        [Support("pad", "x0", (0.0, None))],
+        [Pressure("pad", "y1", 0.02)],
+        [floor],
+    )
+    state = solve_scene(scene, MPI.COMM_SELF, partitions={"pad": np.zeros(6, dtype=int)})
+    assert state.balance().imbalance < 1e-8
+    assert state.contact.points.count == 4
 
 
 def quarter(around: int, through: int) -> tuple[BodyMesh, np.ndarray]:
