@@ -46,6 +46,7 @@ from fenics_contact._dolfinx.reading import (
 )
 from fenics_contact._dolfinx.templates import (
     cellwise_space,
+    constant_symbol,
     displacement_space,
     field_symbols,
     nodal_space,
@@ -68,6 +69,7 @@ __all__ = [
     "cellwise_space",
     "cellwise_space_on",
     "coefficient",
+    "constant_symbol",
     "degree",
     "dimension",
     "displacement_space",

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import count
 
 import ufl
 
 from fenics_contact._dolfinx.cells import degree, dimension
 from fenics_contact._dolfinx.cells import shape as shape_of
 from fenics_contact._dolfinx.loading import old
+
+_NUMBERS = count(10**9)
 
 
 def _element(cell_type: str, shape: tuple[int, ...]) -> ufl.finiteelement.AbstractFiniteElement:
@@ -69,6 +72,16 @@ def field_symbols(cell_type: str, count: int) -> list[ufl.Coefficient]:
     on.
     """
     return [ufl.Coefficient(displacement_space(cell_type), count=number) for number in range(count)]
+
+
+def constant_symbol(cell_type: str, shape: tuple[int, ...] = ()) -> ufl.Constant:
+    """Return a UFL constant on the template, to be bound to a number later.
+
+    UFL sorts the terms of sums by the names of constants, and "9" comes after "10": numbers of one length
+    keep their order, however many constants a rank has made before. Forms are then the same on all ranks, and
+    those of other runs are found in the cache.
+    """
+    return ufl.Constant(template(cell_type), shape=shape, count=next(_NUMBERS))
 
 
 @lru_cache(maxsize=16)

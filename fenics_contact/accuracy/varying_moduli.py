@@ -33,12 +33,11 @@ def _write(material: Material, cell_type: str) -> Written:
     materials may resist displacements, too.
     """
     dim = _dolfinx.dimension(cell_type)
-    template = _dolfinx.template(cell_type)
     u, *rows = _dolfinx.field_symbols(cell_type, dim + 1)
     q = ufl.TestFunction(_dolfinx.cellwise_space(cell_type))
     parameters = scalar_constants(cell_type, len(material.parameters))
-    x = ufl.SpatialCoordinate(template)
-    c, d = ufl.Constant(template, shape=(dim, dim)), ufl.Constant(template, shape=(dim,))
+    x = ufl.SpatialCoordinate(_dolfinx.template(cell_type))
+    c, d = (_dolfinx.constant_symbol(cell_type, shape) for shape in ((dim, dim), (dim,)))
     trial = ufl.dot(c, x) - d
     density = expand_derivatives(material.stiffness(trial, trial, parameters))
     difference = ufl.as_tensor([[row[j] for j in range(dim)] for row in rows]) - ufl.grad(u)

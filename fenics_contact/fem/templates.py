@@ -171,7 +171,7 @@ def _text(
 
 def scalar_constants(cell_type: str, count: int) -> Constants:
     """Return ``count`` UFL constants on the template."""
-    return tuple(ufl.Constant(_dolfinx.template(cell_type)) for _ in range(count))
+    return tuple(_dolfinx.constant_symbol(cell_type) for _ in range(count))
 
 
 def volume_measure(cell_type: str, degree: int | None = None) -> ufl.Measure:

@@ -134,6 +134,11 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
 
 
 def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> None:
+    if not isinstance(partitions, Mapping):
+        raise InvalidInputError(
+            f"partitions must give the subdomain of each cell by the names of bodies, got {partitions!r}: "
+            "leave them out, or cut bodies by graph_partition or box_partition of fenics_contact.partition"
+        )
     for name, body in scene.bodies.items():
         if name not in partitions:
             raise InvalidInputError(
@@ -141,10 +146,12 @@ def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> Non
                 "pass the subdomain of each of its cells"
             )
         partition = partitions[name]
-        if partition.shape != (body.mesh.n_cells,):
+        if not isinstance(partition, np.ndarray) or partition.shape != (body.mesh.n_cells,):
+            given = partition.shape if isinstance(partition, np.ndarray) else repr(partition)
             raise InvalidInputError(
-                f"the partition of body {name!r} must have shape ({body.mesh.n_cells},), one subdomain per "
-                f"cell, got {partition.shape}"
+                f"the partition of body {name!r} must have shape ({body.mesh.n_cells},), one "
+                f"subdomain per cell, got {given}: graph_partition or box_partition of "
+                "fenics_contact.partition cuts a mesh into a number of subdomains"
             )
         check_face_connected(body.mesh, partition)
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from fenics_contact import _dolfinx
+from fenics_contact.contact import solve_scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.gallery import block
@@ -20,6 +23,22 @@ def test_a_body_without_partition_is_refused() -> None:
     message = r"every body needs a partition, got them for \['lower', 'third'\] but not for 'upper': pass"
     with pytest.raises(InvalidInputError, match=message):
         decompose(scene, partitions, MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize(
+    ("partitions", "message"),
+    [
+        (
+            {"block": 4},
+            r"the partition of body 'block' must have shape \(64,\), .* got 4: graph_partition",
+        ),
+        (4, "partitions must give the subdomain of each cell by the names of bodies, got 4: leave them out"),
+    ],
+)
+def test_a_number_of_subdomains_is_no_partition(partitions: Any, message: str) -> None:
+    scene, _ = lone_block("hexahedron")
+    with pytest.raises(InvalidInputError, match=message):
+        solve_scene(scene, MPI.COMM_SELF, partitions=partitions)
 
 
 def test_a_partition_of_another_mesh_is_refused() -> None:
