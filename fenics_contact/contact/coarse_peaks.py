@@ -67,9 +67,10 @@ def _beside(surface: FacetedSurface) -> tuple[sp.csr_matrix, np.ndarray]:
 
 
 def _in_words(pair: ContactPair, count: int, steps: int) -> str:
+    points = f"{count} points press" if count > 1 else "one point presses"
     cells = "one cell" if steps == 1 else "two cells"
     return (
-        f"the contact of {pair.place} is too small for its cells: {count} points press, and it ends within "
+        f"the contact of {pair.place} is too small for its cells: {points}, and it ends within "
         f"{cells} of the largest pressure, which may be off {OFF[steps]}; four cells on the half width of a "
         "contact have it to about a percent: refine the meshes there"
     )

@@ -50,6 +50,7 @@ def test_what_is_told_is_the_error_of_the_peak(
         off = 0.61 if "by a half or more" in said[-1] else 0.1 if "by a tenth" in said[-1] else 0.03
         assert abs(largest / peak - 1.0) < off
     assert "by a half or more" in said[0]
+    assert f": {'2 points press' if axis else 'one point presses'}, and it ends within one cell" in said[0]
     assert said[1]
     assert said[2] == ""
 
