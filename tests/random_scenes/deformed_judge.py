@@ -23,10 +23,10 @@ AGREE, FORCES = 1e-5, 1e-4
 LAWS = 1e-4
 
 
-def judge_history(seed: int, comm: MPI.Comm = MPI.COMM_SELF) -> Verdict:
+def judge_history(seed: int, comm: MPI.Comm = MPI.COMM_WORLD) -> Verdict:
     """Solve a history, recompute its laws, and solve it otherwise: elsewhere, in other units, cut otherwise.
 
-    The twin is solved on all ranks of ``comm``. Collective.
+    The twin is solved on all ranks of ``comm``, whose verdicts must be the same. Collective.
     """
     start = time.perf_counter()
     made = history(seed)
@@ -34,6 +34,9 @@ def judge_history(seed: int, comm: MPI.Comm = MPI.COMM_SELF) -> Verdict:
         warnings.simplefilter("ignore", UserWarning)
         logging.disable(logging.WARNING)
         outcome, detail, products = _ended(made, comm)
+    each = comm.allgather(outcome)
+    if len(set(each)) > 1:
+        outcome, detail = Outcome.WRONG, f"on ranks {[one.value for one in each]}: {detail}"
     return Verdict(seed, outcome, made.words, detail, round(time.perf_counter() - start, 3), products)
 
 

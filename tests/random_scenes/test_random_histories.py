@@ -5,7 +5,11 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -27,6 +31,23 @@ QUICK = (9, 1, 13)
 def test_a_random_history_is_the_same_written_and_cut_otherwise(seed: int) -> None:
     verdict = judge_history(seed)
     assert verdict.outcome in GOOD, f"{verdict.detail}\n{verdict.words}"
+
+
+def test_a_random_history_is_the_same_on_two_ranks_and_told_once(
+    mpirun: Callable[..., str], tmp_path: Path
+) -> None:
+    lines, run = tmp_path / "verdicts", "from tests.random_scenes.__main__ import main; main()"
+    given = f"--kind deformed --processes 0 --seeds {QUICK[1]} --output {lines}"
+    told = mpirun(run, 2, *given.split())
+    assert [json.loads(line)["outcome"] for line in lines.read_text().splitlines()] == ["solved"], told
+    assert told.count("1 scenes") == 1
+
+
+def test_verdicts_of_ranks_that_differ_are_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    comm = SimpleNamespace(allgather=lambda mine: [mine, Outcome.REFUSED])
+    monkeypatch.setattr(deformed_judge, "_ended", lambda made, comm: (Outcome.SOLVED, "", 1))
+    verdict = judge_history(0, comm)  # type: ignore[arg-type]
+    assert (verdict.outcome, verdict.detail) == (Outcome.WRONG, "on ranks ['solved', 'refused']: ")
 
 
 def test_seeds_meet_everything() -> None:
