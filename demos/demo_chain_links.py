@@ -298,9 +298,9 @@ if comm.rank == 0:
         print(f"  {word:14s}{found['before']:14.1f} {found['after']:14.1f} {change:+14.1%} {unit}")
     print(f"  Hertz (before): {hertz.peak_pressure:.1f} MPa on {hertz.area:.1f} mm²")
     print(f"  objective       {aim:>14s}       lower by {drop:.2f} %" + " (published: 12.39 %)" * published)
-    print(f"  retreat         {retreat['after']:14.4f} mm    gains {by_retreat:.5e} N mm of potential")
+    print(f"  retreat         {retreat['after']:14.4f} mm    gains {by_retreat:.1f} N mm of potential")
     if published:
-        print(f"  by shape        {by_shape:14.5e} N mm, {by_shape / abs(potential['before']):.2%} of it")
+        print(f"  by shape        {by_shape:14.1f} N mm, {by_shape / abs(potential['before']):.2%} of it")
     print(f"  volume          {volume_final / volume - 1:+14.1e}")
     print(f"  Hertz' radius                                 {hertz.semi_axes[0]:14.3f} mm")
     print(f"  iterations      {result.iterations:14d}       {result.evaluations} evaluations")

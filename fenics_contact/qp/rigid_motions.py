@@ -194,6 +194,24 @@ class _Springs:
         local += np.einsum("iak,ial->kl", self.rows[pairs], self._slipped(balance, growth, moved))
         return np.asarray(self.problem.comm.allreduce(local), dtype=np.float64)
 
+    def let_go(self, direction: Vector, bound: Vector) -> bool:
+        """Whether the load drives a motion for ever against a frozen bound: none balances it. Collective.
+
+        Along it the potential falls without end: no contact is pressed, and friction takes less than the load
+        does.
+
+        Args:
+            direction: The direction, shape (k,).
+            bound: The bound, owned.
+        """
+        direction = direction / (np.linalg.norm(direction) or 1.0)
+        along = self.rows @ direction
+        layout = self.problem.layout
+        pressed = self.step[layout.normal] @ np.maximum(along[layout.normal], 0.0) ** 2
+        rubbed = bound @ np.linalg.norm(along[layout.tangential], axis=1)
+        pressed, rubbed = global_sum(self.problem.comm, pressed, rubbed)
+        return bool(pressed <= ROUNDING and rubbed < self.load @ direction)
+
     def _slipped(self, balance: _Balance, growth: Vector | None, moved: Vector) -> Vector:
         """Return the change of the friction forces when the trial ones change by ``moved``, (n, t, k)."""
         layout = self.problem.layout
@@ -261,6 +279,8 @@ def _minimise(springs: _Springs, balance: _Balance, target: float) -> _Balance:
         following = _descend(springs, balance, step, bound)
         if following is None:
             damping = max(100.0 * damping, 1e-8)
+        elif not following.size < 0.5 * balance.size and springs.let_go(step, bound):
+            return following
         else:
             balance, damping = following, max(0.1 * damping, 1e-12)
     return balance

@@ -63,9 +63,9 @@ def plot_contact_status(
     for name, state in states.items():
         if state.scene.dim == 2 or not 0 <= pair < len(state.scene.contacts):
             raise InvalidInputError(
-                f"maps of the status need states in space with a contact pair {pair}, got {name!r} with "
-                f"{len(state.scene.contacts)} pairs in {state.scene.dim} dimensions: plot_contact_pressure "
-                "draws plane states"
+                f"maps of the status need states in space with a contact pair {pair}, got {name!r} in "
+                f"{state.scene.dim} dimensions, number of pairs {len(state.scene.contacts)}: "
+                "plot_contact_pressure draws plane states"
             )
     comm = next(iter(states.values())).torn.decomposition.comm
 

@@ -129,9 +129,9 @@ def test_points_without_friction_have_no_arrows() -> None:
 def test_status_maps_refuse_what_they_cannot_show(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match=r"maps of the status need a state, got none"):
         plot_contact_status({}, tmp_path / "maps.png")
-    with pytest.raises(InvalidInputError, match=r"contact pair 1, got 'a' with 1 pairs in 3 dimensions"):
+    with pytest.raises(InvalidInputError, match=r"pair 1, got 'a' in 3 dimensions, number of pairs 1"):
         plot_contact_status({"a": touching_blocks()}, tmp_path / "maps.png", pair=1)
-    with pytest.raises(InvalidInputError, match=r"got 'flat' with 1 pairs in 2 dimensions"):
+    with pytest.raises(InvalidInputError, match=r"got 'flat' in 2 dimensions, number of pairs 1"):
         plot_contact_status({"flat": plane_block()}, tmp_path / "maps.png")
     assert not list(tmp_path.iterdir())
 
