@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
@@ -151,7 +152,7 @@ def _side(side: Any) -> str:
         return "?"
     if "surface" in side:
         return f"{side['body']} {side['surface']}"
-    return str(side.get("type", "obstacle"))
+    return re.sub(r"(?<!^)(?=[A-Z])", " ", str(side.get("type", "obstacle"))).lower()
 
 
 def _plane(record: Record) -> bool:

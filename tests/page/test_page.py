@@ -210,6 +210,7 @@ def test_moments_in_the_plane_are_one_number_and_rounding_is_zero() -> None:
     force = " ".join(f"{part:.5g}".replace("-", "−") for part in reaction.force)
     moment = f"{reaction.moment:.5g}".replace("-", "−")
     assert "x y z reaction 0 block y1" in told
+    assert "contact block y0 on rigid plane" in told
     assert f"force (N/mm) {force} about" in told
     assert f"moment (N mm/mm) {moment}" in told
     assert f"energy, strain {state.energies.strain:.5g} N mm/mm" in told
