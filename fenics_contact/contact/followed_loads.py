@@ -47,7 +47,7 @@ class FollowedLoads:
             if found is None:
                 raise
         else:
-            if system.problem.norm(solution.multiplier) > 0.0:
+            if solution.released or system.problem.norm(solution.multiplier) > 0.0:
                 return solution
             found = self._followed(system, solver, start) or solution
         return replace(found, products=system.products - spent)

@@ -53,12 +53,14 @@ class Start:
         operator: F with its counter, to be used for the whole solve.
         memory: Estimates from an earlier SMALSE, or None.
         cold: Whether λ is the shortest multiplier in equilibrium, Gᵀ(G Gᵀ)⁻¹e.
+        released: Whether λ is zero because no load acts and friction cannot grip, see `may_grip`.
     """
 
     iterate: Iterate
     operator: CountedOperator
     memory: SmalseMemory | None = None
     cold: bool = True
+    released: bool = False
 
     def reached(self, step: SolverStep) -> None:
         """Report what a step of the solver has reached."""

@@ -227,6 +227,7 @@ class DualSolution:
         history: One record per step, oldest first.
         reason: Why the solver stopped, in words.
         memory: Estimates of SMALSE, None if it did not run.
+        released: Whether all forces are zero because no load acts and friction cannot grip without one.
     """
 
     problem: DualProblem
@@ -241,6 +242,7 @@ class DualSolution:
     history: tuple[SolverStep, ...]
     reason: str
     memory: SmalseMemory | None = None
+    released: bool = False
 
     @property
     def natural_residual(self) -> float:

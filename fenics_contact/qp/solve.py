@@ -99,7 +99,7 @@ def _solve_as_given(
         begin = _begin(problem, operator, start, same)
         answer = _as_it_is(problem, begin, solver.tolerance)
         if answer is not None:
-            return answer
+            return replace(answer, released=begin.released)
         solution = _run(problem, solver, begin)
     if not solution.residuals.within(solver.tolerance):
         raise ConvergenceError(
@@ -224,7 +224,7 @@ def _begin(
         return begin
     # No body is loaded: zero forces, free of cost, may be closer than those of another load.
     rest = _at_rest(problem, begin)
-    return rest if rest.iterate.residuals.worst <= iterate.residuals.worst else begin
+    return replace(rest, released=True) if rest.iterate.residuals.worst <= iterate.residuals.worst else begin
 
 
 def _at_rest(problem: DualProblem, begin: Start) -> Start:
@@ -243,7 +243,8 @@ def _as_it_is(problem: DualProblem, start: Start, tolerance: float) -> DualSolut
     if not residuals.within(tolerance):
         return None
     closed, stick, slip = count_status(problem, iterate.multiplier)
-    products, note = start.operator.products, "the answer already"
+    products = start.operator.products
+    note = "released: no load, and no friction that grips" if start.released else "the answer already"
     line = SolverStep("start", 0, products, residuals, closed, stick, slip, note)
     return answer.solution([line], products, start.memory)
 

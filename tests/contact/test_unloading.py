@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, FixedPoint, LoadSequence
+from fenics_contact.contact import ContactProblem, FixedPoint, LoadSequence, followed_loads
 from fenics_contact.gallery import rectangle
-from fenics_contact.qp import FaceNewton, Smalse
+from fenics_contact.qp import FaceNewton, Smalse, may_grip
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -44,6 +45,24 @@ def test_a_wedge_that_friction_cannot_hold_comes_out_without_any_force(solver: s
     assert not released.contact.normal_force.any()
     assert not released.gather_displacement("wedge").any()
     assert released.solution.products <= 1
+
+
+def test_whether_friction_can_grip_is_asked_once_and_the_solution_says_what_came_of_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = []
+
+    def counted(*given: object) -> bool:
+        asked.append(given)
+        return may_grip(*given)
+
+    for module in (sys.modules["fenics_contact.qp.solve"], followed_loads):
+        monkeypatch.setattr(module, "may_grip", counted)
+    _, released = follow(wedge(SIDE, 0.5 * np.tan(np.radians(SIDE))), (50.0, 0.0))
+
+    assert len(asked) == 1
+    assert released.solution.released
+    assert "released: no load, and no friction that grips" in str(released.solution.history[-1])
 
 
 def test_a_step_without_another_start_begins_at_the_step_before() -> None:
