@@ -2,23 +2,54 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from fenics_contact.mesh import vector_areas
 from fenics_contact.scene import ContactPair, Scene, Surface
+from fenics_contact.surfaces import outside
+
+if TYPE_CHECKING:
+    from fenics_contact.contact.state import State
 
 #: Facets lie in one plane if the cosine of the angle between them differs from one by no more than this.
 FLAT = 1e-9
 
 
-def advice(scene: Scene, *, moves: bool) -> str:
+def advice(scene: Scene, last: State | None = None, *, moves: bool) -> str:
     """Return words to append to the message of a load step that ends, empty where there is nothing to say.
 
     Args:
         scene: The scene.
+        last: The last state that was reached, or None.
         moves: Whether contact is that of bodies that move far.
     """
-    return (_on_contact(scene) if moves else "") + _on_symmetry(scene)
+    moving = _on_contact(scene) + ("" if last is None else _on_ends(last)) if moves else ""
+    return moving + _on_symmetry(scene)
+
+
+def _on_ends(last: State) -> str:
+    """Return words on nodes that press on masters from beyond their ends, empty if there are none.
+
+    Where such a node is lost, its force ends at once, and it may come back: no equilibrium is near.
+    """
+    contact, points, found = last.contact, last.contact.points, []
+    total = contact.normal_force.sum()
+    for index, pair in enumerate(last.scene.contacts):
+        mine = np.flatnonzero((points.pair == index) & (points.facet >= 0) & (contact.normal_force > 0.0))
+        if isinstance(pair.master, Surface) and len(mine):
+            nodes = last.scene.facets(pair.master).shape[1]
+            corners = 2 if last.scene.dim == 2 else 3 if nodes in (3, 6) else 4
+            beyond = mine[outside(points.local[mine], corners) > 0.0]
+            share = contact.normal_force[beyond].sum() / total
+            if share > 0.0:
+                found.append(
+                    f"; {len(beyond)} nodes of surface {pair.slave.name!r} press on {pair.master.name!r} "
+                    f"from beyond its end and lose {share:.1%} of the normal force where they leave it: let "
+                    "the master reach further there"
+                )
+    return "".join(found)
 
 
 def _on_contact(scene: Scene) -> str:

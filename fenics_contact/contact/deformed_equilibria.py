@@ -148,7 +148,8 @@ class DeformedEquilibria:
         except PathEndsError as failure:
             last = None if failure.path is None else _state_after(failure.path, origin, timer)
             where = "" if step is None else f"load step {step.name!r}: "
-            words = f"{where}{failure}{advice(scene, moves=isinstance(self._contact, MovingContact))}"
+            hints = advice(scene, last or origin, moves=isinstance(self._contact, MovingContact))
+            words = f"{where}{failure}{hints}"
             raise LoadStepError(words, failure.history, last) from failure
         state = _state_after(path, origin, timer)
         self._turned.tell(state)

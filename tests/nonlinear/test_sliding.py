@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,8 +10,9 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, DeformedState, solve_scene, solve_steps
+from fenics_contact.errors import LoadStepError
 from fenics_contact.gallery import half_disc, rectangle
-from fenics_contact.nonlinear import AutomaticSteps
+from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
 from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
@@ -133,3 +135,18 @@ def test_friction_does_not_act_across_a_plane_of_symmetry(discretisation: str, s
     assert contact.slip[cut] == 0.0
     assert np.linalg.norm(contact.force[cut]) == pytest.approx(contact.normal_force[cut], rel=1e-12)
     assert state.balance().imbalance < 1e-8
+
+
+@pytest.mark.parametrize(("end", "told"), [(2.02, True), (1.9, False)])
+def test_a_path_that_ends_where_nodes_leave_the_end_of_a_master_says_so(end: float, told: bool) -> None:
+    """A node beyond the end by a few percent of a facet presses still; where it is lost, its force ends."""
+    bodies = {"bed": Body(rectangle((0, 0), (2, 1), (2, 1)), RUBBER)}
+    bodies["slider"] = Body(rectangle((1.2, 1), (end, 1.5), (1, 1)), RUBBER)
+    pair = ContactPair(Surface("slider", "y0"), Surface("bed", "y1"), discretisation="node")
+    held = [[Support("bed", "y0"), Support("slider", "y1", (0.0, -depth))] for depth in (0.02, 1.4)]
+    steps = AutomaticSteps(TangentNewton(max_steps=8), smallest=1.0)
+    problem = ContactProblem(Scene(bodies, held[0], contacts=[pair]), MPI.COMM_SELF, steps=steps)
+    with pytest.raises(LoadStepError) as ended:
+        solve_steps(problem, [LoadStep(str(n), supports=each) for n, each in enumerate(held)])
+    words = r"; 1 nodes of surface 'y0' press on 'y1' from beyond its end and lose \d\d\.\d% of the normal"
+    assert bool(re.search(words, str(ended.value))) == told, ended.value
