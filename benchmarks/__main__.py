@@ -25,6 +25,7 @@ STUDIES = {
     "large_deformations": "benchmarks.large_deformations.report",
     "optimisation_tolerance": "benchmarks.optimisation_tolerance.report",
     "optimisers": "benchmarks.optimisers.report",
+    "refinement": "benchmarks.refinement",
     "true_surfaces": "benchmarks.true_surfaces.report",
 }
 

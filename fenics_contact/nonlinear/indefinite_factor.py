@@ -53,6 +53,8 @@ class IndefiniteFactor(RefillableFactor):
     """LDLᵀ factors of a sparse symmetric matrix on one rank, by MUMPS, with the number of negative pivots."""
 
     positive = False
+    #: Further memory of each analysis, in percent; MUMPS's own first.
+    _memory: tuple[int | None, ...] = (None, *ROOM)
 
     @property
     def negative(self) -> int:
@@ -61,17 +63,21 @@ class IndefiniteFactor(RefillableFactor):
 
     def _set_up(self, pc: PETSc.PC, given: PETSc.Mat) -> None:
         given.setOption(PETSc.Mat.Option.SPD, False)
-        pc.setFactorSolverType("mumps")
-        pc.setFactorSetUpSolverType()
-        factor = pc.getFactorMatrix()
-        # Without these MUMPS does not count the pivots of its last front, or PETSc does not ask for them.
-        factor.setMumpsIcntl(13, 1)
-        factor.setMumpsIcntl(24, 1)
-        pc.setUp()
-        for percent in ROOM:
-            if factor.getMumpsInfog(1) in (-8, -9):  # its words for too little memory
+        for percent in self._memory:
+            pc.setFactorSolverType("mumps")
+            pc.setFactorSetUpSolverType()
+            factor = pc.getFactorMatrix()
+            # Without these MUMPS does not count the pivots of its last front, or PETSc does not ask for them.
+            factor.setMumpsIcntl(13, 1)
+            factor.setMumpsIcntl(24, 1)
+            if percent is not None:
                 factor.setMumpsIcntl(14, percent)
-                petsc_call("MatCholeskyFactorNumeric", factor.handle, given.handle, None)
+            pc.setUp()
+            if factor.getMumpsInfog(1) not in (-8, -9):  # its words for too little memory
+                break
+            # PETSc takes no further matrix into factors that failed: they are analysed anew.
+            pc.reset()
+            pc.setOperators(given)
         require_factored(factor)
 
     def _complete(self) -> bool:

@@ -13,16 +13,18 @@ from typing import Any
 import pytest
 from mpi4py import MPI
 
-from benchmarks import effects, speed
+from benchmarks import effects, refinement, speed
 from benchmarks.__main__ import STUDIES, main, set_environment
 from benchmarks.cases.chain import cold_state
 from benchmarks.cases.linear_face import solve_face
 from benchmarks.cases.monolithic.elasticity import assemble_block
 from benchmarks.cases.monolithic.linear import solve_linear
+from benchmarks.cases.refinement import MESHES, hertz
 from benchmarks.held import HELD
 from benchmarks.optimisation_tolerance import report as tolerance
 from benchmarks.plan import run, runs
 from benchmarks.study import chosen, filled
+from fenics_contact.contact import solve_scene
 from fenics_contact.study import runner
 from fenics_contact.study.runner import Job, measure
 from tests.benchmarks.small_records import all_summaries
@@ -194,6 +196,21 @@ def test_the_page_of_the_effects_is_its_record() -> None:
     folder = ROOT / "benchmarks"
     records = json.loads((folder / "effects.json").read_text())
     assert effects.page(records) == (folder / "effects.md").read_text()
+
+
+def test_the_page_of_refinement_is_its_record_and_products_hardly_grow() -> None:
+    folder = ROOT / "benchmarks"
+    records = json.loads((folder / "refinement.json").read_text())
+    assert refinement.page(records) == (folder / "refinement.md").read_text()
+    products = {name: found[0]["counts"]["f_products"] for name, found in records.items()}
+    for scene in ("shear", "press", "hertz"):  # subdomains grow by a factor of four
+        assert 0 < products[f"{scene}-3"] <= 2.5 * products[f"{scene}-2"]
+
+
+def test_a_cold_state_takes_the_products_of_its_record() -> None:
+    record = json.loads((ROOT / "benchmarks" / "refinement.json").read_text())["hertz-2"][0]
+    scene = hertz(*MESHES["hertz"][1])
+    assert solve_scene(scene, MPI.COMM_SELF).counts["f_products"] <= 1.05 * record["counts"]["f_products"]
 
 
 def test_effects_are_replaced_when_all_are_measured(tmp_path: Path) -> None:

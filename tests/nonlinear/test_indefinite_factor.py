@@ -66,6 +66,21 @@ def test_a_matrix_that_is_not_positive_definite_is_told_by_an_error_alone(capfd)
     assert capfd.readouterr() == ("", "")
 
 
+def test_factors_for_which_mumps_takes_too_little_memory_are_made_with_more(monkeypatch):
+    line = sp.diags([-np.ones(29), np.full(30, 2.0), -np.ones(29)], [-1, 0, 1])
+    one = sp.identity(30)
+    orders = ((line, one, one), (one, line, one), (one, one, line))
+    matrix = sum(sp.kron(sp.kron(a, b), c) for a, b, c in orders).tocsr() - sp.identity(30**3, format="csr")
+    monkeypatch.setattr(IndefiniteFactor, "_memory", (-90,))
+    with pytest.raises(ConvergenceError, match=r"MUMPS ends with INFOG\(1\) = -9"):
+        with_inertia(matrix, None)
+    monkeypatch.setattr(IndefiniteFactor, "_memory", (-90, 100))
+    factor, right = with_inertia(matrix, None), np.linspace(1.0, 2.0, 30**3)
+    factor.solve(right, solution := np.empty(30**3))
+    np.testing.assert_allclose(matrix @ solution, right, rtol=1e-9)
+    assert factor.negative > 10
+
+
 def test_factors_that_mumps_cannot_complete_are_refused():
     matrix = stiffness(0.0)
     matrix.data[:] = np.nan

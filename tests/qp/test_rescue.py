@@ -13,6 +13,7 @@ from fenics_contact.qp import FaceNewton, Smalse, TrescaLaw, contact_step, measu
 from fenics_contact.qp.face_newton import slides
 from fenics_contact.qp.forcing import Forcing
 from fenics_contact.qp.iterate import Start, iterate_at
+from fenics_contact.qp.newton_steps import NewtonSteps
 from fenics_contact.qp.problem import CountedOperator
 from fenics_contact.qp.rescue import ProximalPoint, Rescue
 from fenics_contact.qp.slip_law import CoulombLaw
@@ -46,6 +47,28 @@ def test_a_rescue_comes_nearer_from_anywhere(preconditioned: bool) -> None:
     assert rescued.line.residuals == after
     assert rescued.line.products == operator.products < 400
     assert (rescued.memory is None) == preconditioned
+
+
+def test_a_rescue_whose_steps_are_cut_to_nothing_ends_with_its_best_iterate(monkeypatch) -> None:
+    dual, _ = torn_problem(Bricks(crown=0.1, tilt=0.5))
+    dual = dual.with_law(CoulombLaw(dual.layout, np.full(dual.layout.n_friction, 0.3)))
+    far, operator = dual.coarse.particular(), CountedOperator(dual.operator)
+    begin = iterate_at(dual, far, dual.operator(far), np.zeros(dual.coarse.m))
+    free, taken = NewtonSteps.step, []
+
+    def stuck(self, state, number, care=1.0):
+        newton, line = free(self, state, number, care)
+        taken.append(newton if not taken else state)
+        return taken[-1], line
+
+    monkeypatch.setattr(NewtonSteps, "step", stuck)
+    monkeypatch.setattr("fenics_contact.qp.rescue.REDUCTION", 0.0)
+    rescued = Rescue(dual, Forcing(0.25, 0.1, 1e-6), 20_000, Smalse())(
+        Start(begin, operator, None, cold=False), 4000
+    )
+    assert len(taken) <= 4
+    assert not rescued.reached
+    assert rescued.iterate.residuals.worst <= begin.residuals.worst
 
 
 def test_the_history_says_why_a_rescue_was_called_and_what_it_reached() -> None:
