@@ -61,7 +61,7 @@ class Recipe:
         build: Returns scene and load steps in a frame.
         open: Whether supports leave components open, so that a frame may be turned by quarters only.
         held: Whether something holds every body.
-        remembers: Whether forces depend on the way: metal, friction, loads that follow.
+        remembers: Whether forces depend on more than the last displacement: metal, friction, loads.
     """
 
     dim: int
@@ -313,9 +313,9 @@ def pressed_by_force(dice: Dice, dim: int) -> Recipe:
     """One body on another under dead forces, with a guide or without: some are not held."""
     bed = pad_mesh(dice, dim, (0.0,) * dim, vector(dim, 3.0, 1.0, 1.0), dice.one_of((7, 9)))
     upper = pad_mesh(dice, dim, vector(dim, 0.9, 1.0, 0.1), vector(dim, 1.9, 1.8, 0.8), dice.one_of((3, 5)))
-    below, plastic = any_material(dice, dim, bed)
-    above, more = any_material(dice, dim, upper, soft=True)
-    law, rubs = friction_law(dice)
+    below, _ = any_material(dice, dim, bed)
+    above, _ = any_material(dice, dim, upper, soft=True)
+    law, _ = friction_law(dice)
     guided = dice.chance(0.6) or law is None
     unheld = dice.chance(0.12)
     size, shear = dice.between(0.01, 0.05), dice.between(-0.05, 0.05)
@@ -344,7 +344,7 @@ def pressed_by_force(dice: Dice, dim: int) -> Recipe:
         scene = Scene(bodies, held, loads(levels[0]), [pair])
         return scene, [LoadStep(str(level), loads=loads(level)) for level in levels]
 
-    return Recipe(dim, build, open=guided, held=not unheld, remembers=plastic or more or rubs)
+    return Recipe(dim, build, open=guided, held=not unheld, remembers=True)
 
 
 def tie_beside_contact(dice: Dice, dim: int) -> Recipe:

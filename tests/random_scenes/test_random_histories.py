@@ -61,6 +61,13 @@ def test_seeds_meet_everything() -> None:
         assert part in words, part
 
 
+def test_histories_with_loads_are_not_judged_by_internal_forces_alone() -> None:
+    for recipe in (history(seed).recipe for seed in (87, 96, 98)):
+        scene, _ = recipe.build(Frame.plain(recipe.dim))
+        assert scene.loads
+        assert recipe.remembers
+
+
 def test_a_frame_gives_back_what_it_was_given() -> None:
     turn = np.array([[0.0, -1.0], [1.0, 0.0]])
     frame = Frame(turn, np.array([3.0, 4.0]), 10.0, 2.0)
