@@ -2,7 +2,6 @@
 
 from fenics_contact.feti.condensation import Condensations
 from fenics_contact.feti.contact_rows import on_copies
-from fenics_contact.feti.continuous import ContinuousCorrection
 from fenics_contact.feti.decomposition import Decomposition, decompose
 from fenics_contact.feti.direct import DirectSolution, DirectSystem
 from fenics_contact.feti.dirichlet import DirichletPreconditioner
@@ -35,7 +34,6 @@ __all__ = [
     "FIXING_NODES",
     "CachedMatrix",
     "Condensations",
-    "ContinuousCorrection",
     "Decomposition",
     "DirectSolution",
     "DirectSystem",

@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.feti.continuous import ContinuousCorrection
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.inverse import TornInverse
 from fenics_contact.feti.numbering import DualNumbering
@@ -22,15 +21,11 @@ REGULARISATION = 1e-4
 
 
 class DirichletPreconditioner:
-    """M = Lᵀ Cᵀ S C L, L = D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹, S the Schur complement of each K_s on its interface.
+    """M = (B D⁻¹ Bᵀ)⁻¹ B D⁻¹ S D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹, S the Schur complement of each K_s on its interface.
 
     D is the typical stiffness at each copy of a node, so that of two neighbours the softer one deforms.
     Gluing and Dirichlet rows are orthogonal in D⁻¹: B D⁻¹ Bᵀ is diagonal except for the rows of contacts and
-    ties, where it is factored. L moves copies by weights that change from node to node; C, the continuous
-    correction, moves them together such that the jumps stay and S feels less of it.
-
-    Attributes:
-        correction: C; None for the identity.
+    ties, where it is factored.
 
     References:
         Farhat, Roux: An unconventional domain decomposition method for an efficient parallel solution of
@@ -46,7 +41,6 @@ class DirichletPreconditioner:
         compliance: np.ndarray,
         numbering: DualNumbering,
         n_gluing: int,
-        correction: ContinuousCorrection | None = None,
     ) -> None:
         """Factor the contact block of B D⁻¹ Bᵀ. Collective.
 
@@ -56,9 +50,7 @@ class DirichletPreconditioner:
             compliance: Diagonal of D⁻¹, shape (n_interface,), the same for all components of a node.
             numbering: Owners and exchange of multipliers.
             n_gluing: Number of gluing and Dirichlet rows; rows of ties and contacts have the higher numbers.
-            correction: Makes lifted jumps smooth; None: they stay as they are.
         """
-        self.correction = correction
         self._inverse, self._numbering = inverse, numbering
         self._B = scaled_columns(B, compliance)
         self._Bt = self._B.T.tocsr()
@@ -90,10 +82,7 @@ class DirichletPreconditioner:
         return Lifting(self, self._contact.on_face(restriction))
 
     def _apply(self, residual: np.ndarray, contact: _ContactBlock) -> np.ndarray:
-        lifted, correction = self._jump(residual, contact), self.correction
-        if correction is None:
-            return self._force(self._inverse.stiffen(lifted), contact)
-        return self._force(correction.transposed(self._inverse.stiffen(correction(lifted))), contact)
+        return self._force(self._inverse.stiffen(self._jump(residual, contact)), contact)
 
     def _jump(self, residual: np.ndarray, contact: _ContactBlock) -> np.ndarray:
         """Return D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹ r on the interface. Collective."""
@@ -106,7 +95,7 @@ class DirichletPreconditioner:
 
 @dataclass(frozen=True, eq=False)
 class Lifting:
-    """The lifting by the weights of copies on a face, L = D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹, without correction.
+    """The two factors of the preconditioner on a face, M = Lᵀ S L with L = D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹.
 
     B L r = r on the rows of the face, up to the regularisation of the contact block.
     """

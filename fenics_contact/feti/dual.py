@@ -12,7 +12,6 @@ import scipy.sparse as sp
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import InfeasibleError, together
 from fenics_contact.feti.condensation import Condensations
-from fenics_contact.feti.continuous import ContinuousCorrection
 from fenics_contact.feti.dirichlet import DirichletPreconditioner
 from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
 from fenics_contact.feti.kernel_basis import whole_motions
@@ -122,9 +121,8 @@ class DualSystem:
             self.kernel = self._kernel(comm)
             coarse = self._without_unheld(CoarseSpace(comm, self._coarse_columns(), self._resultants(comm)))
         with timer.phase("preconditioner"):
-            rows, numbering = self._B_interface, torn.numbering
             preconditioner = DirichletPreconditioner(
-                self.inverse, rows, self._compliance(), numbering, torn.n_gluing, self._correction()
+                self.inverse, self._B_interface, self._compliance(), torn.numbering, torn.n_gluing
             )
             diagonal, supported = self._diagonal()
             scaling = self._scaling(coarse)
@@ -292,13 +290,6 @@ class DualSystem:
         columns.data[np.abs(columns.data) <= ROUNDING * np.abs(columns.data).max(initial=0.0)] = 0.0
         columns.eliminate_zeros()
         return columns
-
-    def _correction(self) -> ContinuousCorrection | None:
-        """Return what makes lifted jumps smooth. Collective."""
-        rows, decomposition = self._B_interface, self.torn.decomposition
-        return ContinuousCorrection.build(
-            self.inverse, rows, self.torn.numbering, decomposition.gluing, decomposition.tearing
-        )
 
     def _compliance(self) -> np.ndarray:
         """Return 1 / the typical stiffness at each interface dof."""

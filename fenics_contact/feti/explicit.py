@@ -48,11 +48,6 @@ class ExplicitOperator:
         self._K_ib, self._K_bb = rows[:, interface].tocsr(), stiffness[interface][:, interface].tocsr()
         self._inner = Factor(rows[:, self._inside].tocsr()) if len(self._inside) else None
 
-    @property
-    def held_inside(self) -> sp.csr_matrix:
-        """K_bb, the stiffness of the interface with the inside held, shape (n_b, n_b)."""
-        return self._K_bb
-
     def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb times an interface force into ``displacement``."""
         blas.dspmv(self._size, 1.0, self._flexible, force, y=displacement, overwrite_y=1, lower=1)

@@ -46,11 +46,6 @@ class FactoredOperator:
         self._right, self._left = np.zeros(stiffness.shape[0]), np.zeros(stiffness.shape[0])
         self._inner = np.zeros(len(self._rest))
 
-    @property
-    def held_inside(self) -> sp.csr_matrix:
-        """K_bb, the stiffness of the interface with the inside held, shape (n_b, n_b)."""
-        return self._K_bb
-
     def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write the inverse on the interface times a force there into ``displacement``."""
         self._right[self._interface] = force

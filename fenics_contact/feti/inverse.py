@@ -86,11 +86,6 @@ class TornInverse:
                 solution[start:stop] = operator.invert(right[start:stop])
         return solution
 
-    @property
-    def held_inside(self) -> sp.csr_matrix:
-        """K_bb of all subdomains: the inside is held, shape (n_interface, n_interface)."""
-        return sp.block_diag([operator.held_inside for operator in self.operators], format="csr")
-
     def flex(self, force: np.ndarray) -> np.ndarray:
         """Return (K⁺)_bb times an interface force, shape (n_interface,)."""
         return self._each(lambda operator: operator.flex, force)

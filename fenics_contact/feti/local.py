@@ -20,10 +20,6 @@ class LocalOperator(Protocol):
     interface b.
     """
 
-    @property
-    def held_inside(self) -> sp.csr_matrix:
-        """K_bb, the stiffness of the interface with the inside held, shape (n_b, n_b)."""
-
     def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb times an interface force, shape (n_b,), into ``displacement``."""
 

@@ -14,7 +14,6 @@ from fenics_contact._libraries import MPI
 from fenics_contact.feti import (
     CachedMatrix,
     Condensations,
-    ContinuousCorrection,
     DirichletPreconditioner,
     DualSystem,
     LocalKind,
@@ -119,10 +118,6 @@ class TangentSystem(DualSystem):
         self.unheld = sp.csr_matrix((self.kernel.shape[0], 0))
         self._unheld_points = self.points[:, :0]
         return coarse
-
-    def _correction(self) -> ContinuousCorrection | None:
-        """Return none: under stress the blocks may not be positive definite."""
-        return None
 
     def on_rows_of(
         self, torn: TornSystem, law: SlipLaw, diagonal: np.ndarray, open_: np.ndarray

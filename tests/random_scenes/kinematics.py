@@ -21,8 +21,9 @@ from tests.random_scenes.whole import Whole, surface_area
 
 #: What rounding may do beside the coordinates, and beside the size of what lies about a point.
 ROUNDING, EXACT = 64 * np.finfo(float).eps, 1e-8
-#: How far beyond the outer edge of a master a node may lie that still meets it: weights of its facet.
-BEYOND = -0.12
+#: How far beyond the outer edge of a master a node may lie that still meets it: weights of its facet. Those
+#: of quadratic facets are as low as -1/8 inside, and -0.3 as far outside.
+BEYOND = {1: -0.12, 2: -0.3}
 #: What of the sagitta of facets the true surface over them may miss.
 NEARLY = 0.01
 #: A node this far inside of a master's facet must meet it.
@@ -39,12 +40,16 @@ class Side:
         mean: Of the nodes: the facets' area vectors around each added up, unit length, (n_nodes, dim); NaN
             away from the surface.
         flat: Whether all facets lie in one plane.
+        entire: The facets of its cells, each of which consecutive linear ones make up, (n_entire, nodes).
+        order: That of its cells.
     """
 
     facets: np.ndarray
     normals: np.ndarray
     mean: np.ndarray
     flat: bool
+    entire: np.ndarray
+    order: int
 
     @classmethod
     def of(cls, whole: Whole, surface: Surface) -> Side:
@@ -62,7 +67,9 @@ class Side:
         mean[np.unique(facets)] = 0.0
         np.add.at(mean, facets, vector[:, None])
         mean /= np.linalg.norm(mean, axis=1)[:, None]
-        return cls(facets, normals, mean, bool(np.abs(normals - normals[0]).max() < EXACT) and mesh.order > 0)
+        flat = bool(np.abs(normals - normals[0]).max() < EXACT)
+        entire = mesh.surfaces[surface.name] + whole.offset[surface.body]
+        return cls(facets, normals, mean, flat, entire, mesh.order)
 
 
 def own_distance(obstacle: RigidObstacle, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -162,9 +169,9 @@ def _weights(
         off = off_the_master(local, master, true, weight @ local)
         if off > length:
             yield f"slave and master are not a gap apart along the normal, by {off:.1e}"
-        if weight.data.min(initial=0.0) < BEYOND:
+        if weight.data.min(initial=0.0) < BEYOND[master.order]:
             yield f"a node lies beside the master, weight {weight.data.min():.2f}"
-        facet = master.facets[points.facet[own]]
+        facet = master.entire[points.facet[own] // (len(master.facets) // len(master.entire))]
         rows = np.repeat(np.arange(len(own)), np.diff(weight.indptr))
         if not (weight.indices[:, None] == facet[rows]).any(axis=1)[weight.data != 0.0].all():
             yield "weights lie on several facets"

@@ -114,7 +114,7 @@ def test_gaps_to_the_facets_of_a_round_master_are_noticed() -> None:
     scene = Scene(
         {"floor": Body(floor, STEEL), "ball": Body(hemisphere(2.0, 3), STEEL)},
         [Support("floor", "z0"), Support("ball", "top", (0.0, 0.0, -0.001))],
-        contacts=[ContactPair(Surface("floor", "z1"), Surface("ball", "contact"))],
+        contacts=[ContactPair(Surface("floor", "z1"), Surface("ball", "contact"), discretisation="node")],
     )
     for geometry, noticed in (("best", False), ("reconstructed", True), ("faceted", True)):
         pair = replace(scene.contacts[0], geometry=geometry)
@@ -125,7 +125,7 @@ def test_gaps_to_the_facets_of_a_round_master_are_noticed() -> None:
 
 def test_a_point_that_is_lost_is_noticed(state: State) -> None:
     points, kept = state.contact.points, np.arange(1, state.contact.points.count)
-    fewer = replace(points, **{name: getattr(points, name)[kept] for name in points.__dataclass_fields__})
+    fewer = points.part(kept)
     found = complaints(replace(state, contact=replace(state.contact, points=fewer)), stacked())
     assert any("above the master are no contact points" in words for words in found), found
 
