@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
@@ -296,9 +296,13 @@ class _ProximalPath:
 
 
 def _stands(before: Iterate, after: Iterate) -> bool:
-    """Return whether a step was cut to nothing: all steps behind it would be the same."""
-    worst = after.residuals.worst
-    return abs(worst - before.residuals.worst) <= ROUNDING * worst
+    """Return whether a step was cut to nothing: all steps behind it would be the same.
+
+    Then all residuals stand with their scales. The worst alone may be one before and after: without forces
+    all that is to be balanced, at the first forces all of these.
+    """
+    pairs = zip(astuple(before.residuals), astuple(after.residuals), strict=True)
+    return all(abs(new - old) <= ROUNDING * abs(new) for old, new in pairs)
 
 
 def _improved(after: Residuals, before: Residuals, further: bool) -> bool:

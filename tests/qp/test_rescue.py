@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from fenics_contact.qp.forcing import Forcing
 from fenics_contact.qp.iterate import Start, iterate_at
 from fenics_contact.qp.newton_steps import NewtonSteps
 from fenics_contact.qp.problem import CountedOperator
-from fenics_contact.qp.rescue import ProximalPoint, Rescue
+from fenics_contact.qp.rescue import ProximalPoint, Rescue, _stands
 from fenics_contact.qp.slip_law import CoulombLaw
 from fenics_contact.qp.solution import Residuals, SolverStep
 from tests.qp.torn_bricks import Bricks, torn_problem
@@ -138,3 +139,13 @@ def test_one_step_in_which_all_slips_does_not_mean_that_friction_is_too_small() 
     assert not slides(6 * [slipping] + [sticking, slipping])
     assert not slides(6 * [step(0, 0)])
     assert not slides([])
+
+
+def test_first_forces_that_are_all_out_of_place_are_no_step_cut_to_nothing() -> None:
+    """The worst residual is one without forces, where all loads are to be balanced, and one at the first."""
+    none, first = (
+        SimpleNamespace(residuals=Residuals(*values))
+        for values in ((0.0, 0.8, 1.0, 0.0, 5e-13, 4e-3), (1.0, 1e-3, 1e-15, 0.0, 2.0, 5e-2))
+    )
+    assert not _stands(none, first)  # type: ignore[arg-type]
+    assert _stands(first, first)  # type: ignore[arg-type]
