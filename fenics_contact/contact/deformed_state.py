@@ -116,7 +116,8 @@ class DeformedState(State):
     def contact_nominal_pressure(self) -> dict[str, dolfinx.fem.Function]:
         """Contact force by area of the undeformed slave as a Function, [force / length²].
 
-        Laid out as `contact_pressure`, the force by area of the deformed slave. Collective on first use.
+        Laid out as `State.contact_pressure`, the force by area of the deformed slave. Collective on first
+        use.
         """
         return self._contact_functions("contact_nominal_pressure")
 
