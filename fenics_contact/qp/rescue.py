@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact.linalg import ROUNDING
 from fenics_contact.qp.forcing import Forcing
 from fenics_contact.qp.iterate import Iterate, Start, certify, iterate_at, iterate_between
 from fenics_contact.qp.newton_steps import Damped, NewtonState, NewtonSteps, Safeguards
@@ -218,14 +217,13 @@ class Rescue:
 
     def _by_proximal_points(self, start: Start, limit: int, further: bool) -> tuple[Iterate, SolverStep]:
         """Take Newton steps with springs, and move their centre whenever they converge. Collective."""
-        path, best = self._first_centre(start), start.iterate
+        path = self._first_centre(start)
         for number in range(PROXIMAL_STEPS):
             newton, line = path.steps.step(path.newton, number)
             iterate = path.point.leave(newton.iterate)
-            if not iterate.residuals.worst < DIVERGED or _stands(path.newton.iterate, newton.iterate):
-                iterate = best
+            if not iterate.residuals.worst < DIVERGED:
+                iterate = start.iterate
                 break
-            best = iterate if iterate.residuals.worst < best.residuals.worst else best
             improved = _improved(iterate.residuals, start.iterate.residuals, further)
             solved = iterate.residuals.within(self.forcing.tolerance)
             if improved or solved or start.operator.products >= limit:
@@ -293,16 +291,6 @@ class _ProximalPath:
     steps: NewtonSteps
     newton: NewtonState
     since: int = 0
-
-
-def _stands(before: Iterate, after: Iterate) -> bool:
-    """Return whether a step was cut to nothing: all steps behind it would be the same.
-
-    Then all residuals stand with their scales. The worst alone may be one before and after: without forces
-    all that is to be balanced, at the first forces all of these.
-    """
-    pairs = zip(astuple(before.residuals), astuple(after.residuals), strict=True)
-    return all(abs(new - old) <= ROUNDING * abs(new) for old, new in pairs)
 
 
 def _improved(after: Residuals, before: Residuals, further: bool) -> bool:

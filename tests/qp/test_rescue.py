@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,9 +13,8 @@ from fenics_contact.qp import FaceNewton, Smalse, TrescaLaw, contact_step, measu
 from fenics_contact.qp.face_newton import slides
 from fenics_contact.qp.forcing import Forcing
 from fenics_contact.qp.iterate import Start, iterate_at
-from fenics_contact.qp.newton_steps import NewtonSteps
 from fenics_contact.qp.problem import CountedOperator
-from fenics_contact.qp.rescue import ProximalPoint, Rescue, _stands
+from fenics_contact.qp.rescue import ProximalPoint, Rescue
 from fenics_contact.qp.slip_law import CoulombLaw
 from fenics_contact.qp.solution import Residuals, SolverStep
 from tests.qp.torn_bricks import Bricks, torn_problem
@@ -48,28 +46,6 @@ def test_a_rescue_comes_nearer_from_anywhere(preconditioned: bool) -> None:
     assert rescued.line.residuals == after
     assert rescued.line.products == operator.products < 400
     assert (rescued.memory is None) == preconditioned
-
-
-def test_a_rescue_whose_steps_are_cut_to_nothing_ends_with_its_best_iterate(monkeypatch) -> None:
-    dual, _ = torn_problem(Bricks(crown=0.1, tilt=0.5))
-    dual = dual.with_law(CoulombLaw(dual.layout, np.full(dual.layout.n_friction, 0.3)))
-    far, operator = dual.coarse.particular(), CountedOperator(dual.operator)
-    begin = iterate_at(dual, far, dual.operator(far), np.zeros(dual.coarse.m))
-    free, taken = NewtonSteps.step, []
-
-    def stuck(self, state, number, care=1.0):
-        newton, line = free(self, state, number, care)
-        taken.append(newton if not taken else state)
-        return taken[-1], line
-
-    monkeypatch.setattr(NewtonSteps, "step", stuck)
-    monkeypatch.setattr("fenics_contact.qp.rescue.REDUCTION", 0.0)
-    rescued = Rescue(dual, Forcing(0.25, 0.1, 1e-6), 20_000, Smalse())(
-        Start(begin, operator, None, cold=False), 4000
-    )
-    assert len(taken) <= 4
-    assert not rescued.reached
-    assert rescued.iterate.residuals.worst <= begin.residuals.worst
 
 
 def test_the_history_says_why_a_rescue_was_called_and_what_it_reached() -> None:
@@ -139,13 +115,3 @@ def test_one_step_in_which_all_slips_does_not_mean_that_friction_is_too_small() 
     assert not slides(6 * [slipping] + [sticking, slipping])
     assert not slides(6 * [step(0, 0)])
     assert not slides([])
-
-
-def test_first_forces_that_are_all_out_of_place_are_no_step_cut_to_nothing() -> None:
-    """The worst residual is one without forces, where all loads are to be balanced, and one at the first."""
-    none, first = (
-        SimpleNamespace(residuals=Residuals(*values))
-        for values in ((0.0, 0.8, 1.0, 0.0, 5e-13, 4e-3), (1.0, 1e-3, 1e-15, 0.0, 2.0, 5e-2))
-    )
-    assert not _stands(none, first)  # type: ignore[arg-type]
-    assert _stands(first, first)  # type: ignore[arg-type]
