@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import fields, is_dataclass
 from enum import Enum
@@ -10,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-__all__ = ["displayed", "in_lines", "in_short"]
+__all__ = ["displayed", "force_units", "in_lines", "in_short", "name_in_words"]
 
 Class = TypeVar("Class", bound=type)
 
@@ -152,3 +153,8 @@ def force_units(force: str, length: str, dim: int) -> tuple[str, str]:
     """Return the units of forces, and of moments and energies; those of plane bodies are per thickness."""
     per = f"/{length}" if dim == 2 else ""
     return f"{force}{per}", f"{force} {length}{per}"
+
+
+def name_in_words(name: str) -> str:
+    """Return the name of a class in words: "rigid plane" for RigidPlane."""
+    return re.sub(r"(?<!^)(?=[A-Z])", " ", name).lower()

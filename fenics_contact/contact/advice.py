@@ -39,8 +39,7 @@ def _on_ends(last: State) -> str:
     for index, pair in enumerate(last.scene.contacts):
         mine = np.flatnonzero((points.pair == index) & (points.facet >= 0) & (contact.normal_force > 0.0))
         if isinstance(pair.master, Surface) and len(mine):
-            nodes = last.scene.facets(pair.master).shape[1]
-            corners = 2 if last.scene.dim == 2 else 3 if nodes in (3, 6) else 4
+            corners = last.scene.facets(pair.master).shape[1]
             beyond = mine[outside(points.local[mine], corners) > 0.0]
             share = contact.normal_force[beyond].sum() / total
             if share > 0.0:

@@ -17,7 +17,7 @@ from fenics_contact.pairing import (
     tied_once,
     without_tied,
 )
-from fenics_contact.scene import ContactPair, Scene, Surface
+from fenics_contact.scene import Scene
 
 #: Supports hold a point along its normal if the free fraction is no larger than this: normals of facets are
 #: slightly tilted, and sliding along that tilt does not open a gap.
@@ -34,7 +34,7 @@ def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
     Raises:
         InvalidInputError: Names the pair, the number of nodes and the depth.
     """
-    by_mortar = np.array([_has_means(pair) for pair in scene.contacts])
+    by_mortar = np.array([pair.by_mortar for pair in scene.contacts])
     # Where a facet of length h misses an arc of curvature κ by κh²/8, the dual basis, which is negative in
     # part, has a mean gap of -κh²/12 in addition.
     allowed = -_explained(points) * np.where(by_mortar[points.pair], 5.0 / 3.0, 1.0)
@@ -49,10 +49,6 @@ def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
             "ContactPair(interference='measured'), or give its amount, interference=0.05; adjust= puts "
             "points in touch without strain"
         )
-
-
-def _has_means(pair: ContactPair) -> bool:
-    return isinstance(pair.master, Surface) and pair.discretisation == "mortar"
 
 
 def meeting_points(

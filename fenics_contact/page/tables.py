@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from fenics_contact.display import force_units
+from fenics_contact.display import force_units, name_in_words
 from fenics_contact.io import listed_forces, scales_of
 from fenics_contact.viz import Units
 
@@ -152,7 +151,7 @@ def _side(side: Any) -> str:
         return "?"
     if "surface" in side:
         return f"{side['body']} {side['surface']}"
-    return re.sub(r"(?<!^)(?=[A-Z])", " ", str(side.get("type", "obstacle"))).lower()
+    return name_in_words(str(side.get("type", "obstacle")))
 
 
 def _plane(record: Record) -> bool:

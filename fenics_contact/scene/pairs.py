@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from fenics_contact.checks import checked
+from fenics_contact.display import name_in_words
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene.obstacles import RigidObstacle
 from fenics_contact.scene.values import OfPosition, evaluate
@@ -150,6 +150,11 @@ class ContactPair:
     def within_body(self) -> bool:
         """Whether a body meets itself, which needs large deformations."""
         return isinstance(self.master, Surface) and self.master.body == self.slave.body
+
+    @property
+    def by_mortar(self) -> bool:
+        """Whether weighted means are compared: contact with a rigid obstacle is always nodal."""
+        return isinstance(self.master, Surface) and self.discretisation == "mortar"
 
     @property
     def place(self) -> str:
@@ -294,5 +299,4 @@ def _in_words(value: float | OfPosition | str) -> str:
 def _place(slave: Surface, master: Surface | RigidObstacle) -> str:
     if isinstance(master, Surface):
         return f"{slave.body} {slave.name} on {master.body} {master.name}"
-    words = re.sub(r"(?<!^)(?=[A-Z])", " ", type(master).__name__).lower()
-    return f"{slave.body} {slave.name} on {words}"
+    return f"{slave.body} {slave.name} on {name_in_words(type(master).__name__)}"

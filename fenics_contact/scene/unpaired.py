@@ -65,7 +65,7 @@ class Unpaired:
 
 
 def outline_of(mesh: BodyMesh) -> Outline:
-    """Return the boundary and the inside of a body; meshes of the same cells share them."""
+    """Return the boundary and the inside of a body, which depend on its cells alone."""
     cells = mesh.linear.cells
     facets, _ = boundary_faces(cells, mesh.dim)
     return facets, cells[:, cell_type_of(cells, mesh.dim).simplices].reshape(-1, mesh.dim + 1)

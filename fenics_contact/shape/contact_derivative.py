@@ -66,7 +66,7 @@ def contact_by_shape(
         np.add.at(result, points.slave, bounds_by_place(torn, rows.normal[0], by_bound))
     for index, pair in enumerate(torn.scene.contacts):
         mine = np.flatnonzero(points.pair == index)
-        if isinstance(pair.master, Surface) and pair.discretisation == "mortar":
+        if pair.by_mortar:
             result += _by_mortar(torn, index, rows, by_area)
             continue
         add_areas(result, torn, index, by_area)

@@ -37,7 +37,7 @@ def _meet_alike(pair: ContactPair, other: ContactPair) -> bool:
     one, two = pair.master, other.master
     same = one is two or (isinstance(one, (Surface, RigidPlane)) and one == two)
     given = (pair.gap, pair.interference, pair.adjust) == (other.gap, other.interference, other.adjust)
-    by_mortar = isinstance(one, Surface) and "mortar" in (pair.discretisation, other.discretisation)
+    by_mortar = pair.by_mortar or other.by_mortar
     return same and given and not by_mortar and not pair.within_body and pair.geometry == other.geometry
 
 
