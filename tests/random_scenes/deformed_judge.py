@@ -32,8 +32,12 @@ def judge_history(seed: int, comm: MPI.Comm = MPI.COMM_WORLD) -> Verdict:
     made = history(seed)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
+        told = logging.root.manager.disable
         logging.disable(logging.WARNING)
-        outcome, detail, products = _ended(made, comm)
+        try:
+            outcome, detail, products = _ended(made, comm)
+        finally:
+            logging.disable(told)
     each = comm.allgather(outcome)
     if len(set(each)) > 1:
         outcome, detail = Outcome.WRONG, f"on ranks {[one.value for one in each]}: {detail}"

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -48,6 +49,7 @@ def test_verdicts_of_ranks_that_differ_are_wrong(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(deformed_judge, "_ended", lambda made, comm: (Outcome.SOLVED, "", 1))
     verdict = judge_history(0, comm)  # type: ignore[arg-type]
     assert (verdict.outcome, verdict.detail) == (Outcome.WRONG, "on ranks ['solved', 'refused']: ")
+    assert logging.getLogger().isEnabledFor(logging.WARNING)  # who judges is silent only meanwhile
 
 
 def test_seeds_meet_everything() -> None:
