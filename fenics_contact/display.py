@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-__all__ = ["displayed", "force_units", "in_lines", "in_short", "name_in_words"]
+__all__ = ["counted", "displayed", "force_units", "in_lines", "in_short", "name_in_words"]
 
 Class = TypeVar("Class", bound=type)
 
@@ -147,6 +147,16 @@ def _sequence(values: Sequence[Any] | Set[Any], inside: bool) -> str:
 
 def _more(count: int) -> list[str]:
     return [f"… {count - ENTRIES} more"] if count > ENTRIES else []
+
+
+def counted(number: int, one: str, many: str = "") -> str:
+    """Return a count with what is counted, ``many`` being "s" behind ``one`` by default.
+
+    Example:
+        >>> counted(1, "node lies", "nodes lie"), counted(3, "rank")
+        ('1 node lies', '3 ranks')
+    """
+    return f"{number} {one if number == 1 else many or one + 's'}"
 
 
 def force_units(force: str, length: str, dim: int) -> tuple[str, str]:

@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fenics_contact.cli.streams import say
+from fenics_contact.display import counted
 from fenics_contact.progress import at_terminal, visible
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ class Desk:
     @property
     def ranks(self) -> str:
         """The number of ranks in words."""
-        return "1 rank" if self.comm.size == 1 else f"{self.comm.size} ranks"
+        return counted(self.comm.size, "rank")
 
     def say(self, text: str = "") -> None:
         """Write a line verbatim."""

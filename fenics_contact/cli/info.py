@@ -11,6 +11,7 @@ from fenics_contact import _dolfinx, _requirements
 from fenics_contact._libraries import MPI
 from fenics_contact.cli.blas import SLOW, loaded_blas, numpy_speed
 from fenics_contact.cli.desk import Desk, desk_of, facts
+from fenics_contact.display import counted
 from fenics_contact.errors import MissingRequirementError
 from fenics_contact.io import json_text, versions
 
@@ -55,7 +56,7 @@ def gathered(comm: MPI.Comm) -> dict[str, Any]:
     libraries, speed = loaded_blas(), numpy_speed()
     rates = [library.speed for library in libraries if library.speed is not None]
     machine = {
-        "ranks": f"{comm.size} on {nodes} node{'s' if nodes > 1 else ''}, {os.cpu_count()} cores on this one",
+        "ranks": f"{comm.size} on {counted(nodes, 'node')}, {os.cpu_count()} cores on this one",
         "threads": ", ".join(f"{name}={os.environ.get(name, 'not set')}" for name in THREADS),
         "BLAS": [str(library) for library in libraries] or "not found",
         "NumPy's BLAS": f"{speed:.1f} GFLOP/s",

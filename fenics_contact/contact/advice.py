@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fenics_contact.display import counted
 from fenics_contact.mesh import vector_areas
 from fenics_contact.scene import ContactPair, Scene, Surface
 from fenics_contact.surfaces import outside
@@ -43,10 +44,11 @@ def _on_ends(last: State) -> str:
             beyond = mine[outside(points.local[mine], corners) > 0.0]
             share = contact.normal_force[beyond].sum() / total
             if share > 0.0:
+                surface = f"of surface {pair.slave.name!r}"
+                nodes = counted(len(beyond), f"node {surface} presses", f"nodes {surface} press")
                 found.append(
-                    f"; {len(beyond)} nodes of surface {pair.slave.name!r} press on {pair.master.name!r} "
-                    f"from beyond its end and lose {share:.1%} of the normal force where they leave it: let "
-                    "the master reach further there"
+                    f"; {nodes} on {pair.master.name!r} from beyond its end with {share:.1%} of the normal "
+                    "force, which ends where the master is left: let that reach further there"
                 )
     return "".join(found)
 

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.contact.state import State
+from fenics_contact.display import counted
 from fenics_contact.pairing import NodeNumbers
 from fenics_contact.scene import ContactPair, surface_of
 from fenics_contact.surfaces import FacetedSurface
@@ -67,8 +68,8 @@ def _beside(surface: FacetedSurface) -> tuple[sp.csr_matrix, np.ndarray]:
 
 
 def _in_words(pair: ContactPair, count: int, steps: int) -> str:
-    points = f"{count} points press" if count > 1 else "one point presses"
-    cells = "one cell" if steps == 1 else "two cells"
+    points = counted(count, "point presses", "points press")
+    cells = counted(steps, "cell")
     return (
         f"the contact of {pair.place} is too small for its cells: {points}, and it ends within "
         f"{cells} of the largest pressure, which may be off {OFF[steps]}; four cells on the half width of a "

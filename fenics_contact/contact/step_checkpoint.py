@@ -11,6 +11,7 @@ from fenics_contact.checkpoint import Checkpoint, CheckpointError, without_check
 from fenics_contact.contact.problem import ContactProblem
 from fenics_contact.contact.state import State
 from fenics_contact.contact.stored import stored_state
+from fenics_contact.display import counted
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.fingerprint import described, differences
 from fenics_contact.scene import LoadStep, Scene
@@ -117,7 +118,7 @@ class StepCheckpoint:
             count: Number of all steps, None if unknown.
         """
         if self._checkpoint is None:
-            return without_checkpoint(f"{done} load step{'' if done == 1 else 's'}")
+            return without_checkpoint(counted(done, "load step"))
         number = self._written
         words = f"{number} of {count}" if count is not None else f"{number}"
         steps = "load step" if (count or number) == 1 else "load steps"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.display import displayed
+from fenics_contact.display import counted, displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.contact_rows import Relations
 from fenics_contact.feti.copies import Tearing
@@ -121,10 +121,11 @@ def _require_flexible_slaves(scene: Scene, tearing: Tearing, moving: np.ndarray)
     for pair in pairs:
         nodes = tearing.global_nodes(pair.slave.body, np.unique(scene.facets(pair.slave)))
         if moving[nodes].any():
+            surface = f"of surface {pair.slave.name!r} of body {pair.slave.body!r}"
+            lie = counted(np.count_nonzero(moving[nodes]), f"node {surface} lies", f"nodes {surface} lie")
             raise InvalidInputError(
-                f"slaves must be flexible, but {np.count_nonzero(moving[nodes])} nodes of surface "
-                f"{pair.slave.name!r} of body {pair.slave.body!r} lie on a rigid surface with free "
-                "components: exchange slave and master, or let the rigid surface end before the slave begins"
+                f"slaves must be flexible, but {lie} on a rigid surface with free components: exchange slave "
+                "and master, or let the rigid surface end before the slave begins"
             )
 
 
@@ -135,7 +136,7 @@ def _require_room(surface: AnySupport, modes: np.ndarray, held: np.ndarray, poin
     if np.any(against > LAST_PLACES * size):
         raise InvalidInputError(
             f"the rigid surface {surface.surface!r} of body {surface.body!r} meets another support at "
-            f"{int(held.any(axis=1).sum())} nodes, which holds what the surface is free to move: prescribe "
-            "displacement and rotation as the support does; at a plane of symmetry the displacement across "
-            "it and the rotations about both axes within it are zero"
+            f"{counted(int(held.any(axis=1).sum()), 'node')}, which holds what the surface is free to move: "
+            "prescribe displacement and rotation as the support does; at a plane of symmetry displacements "
+            "across it and rotations about both axes within it are zero"
         )

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact.display import counted
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.copies import Tearing
 from fenics_contact.feti.rows import Rows
@@ -38,7 +39,7 @@ def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
             node, component = np.argwhere(clash)[0]
             raise InvalidInputError(
                 f"supports must agree where they meet: component {component} of "
-                f"{int(clash[:, component].sum())} nodes of surface {support.surface!r} of body "
+                f"{counted(int(clash[:, component].sum()), 'node')} of surface {support.surface!r} of body "
                 f"{support.body!r} already has another value than {given[node, component]:g}: leave the "
                 "component free (None) in one of them"
             )

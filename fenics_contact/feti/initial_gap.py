@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fenics_contact.display import counted
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.contact_rows import Relations
 from fenics_contact.feti.decomposition import Decomposition
@@ -42,8 +43,10 @@ def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
     if deep.any():
         worst = int(np.argmin(np.where(deep, points.gap, np.inf)))
         pair = scene.contacts[int(points.pair[worst])]
+        body = f"of {pair.slave.body!r}"
+        nodes = counted(int(deep.sum()), f"node {body} lies", f"nodes {body} lie up to")
         raise InvalidInputError(
-            f"bodies must not overlap at the start: {int(deep.sum())} nodes of {pair.slave.body!r} lie up to "
+            f"bodies must not overlap at the start: {nodes} "
             f"{-points.gap[worst]:.3g} inside the master, more than the faceting of the surfaces explains "
             f"({-allowed[worst]:.3g}): move the bodies apart; for a press fit declare the overlap by "
             "ContactPair(interference='measured'), or give its amount, interference=0.05; adjust= puts "

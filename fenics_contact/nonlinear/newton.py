@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact.checks import check_count, checked
-from fenics_contact.display import displayed
+from fenics_contact.display import counted, displayed
 from fenics_contact.errors import ConvergenceError, FoldedFacetsError, InfeasibleError, InvalidInputError
 from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation
 from fenics_contact.nonlinear.loading import Loading
@@ -238,8 +238,8 @@ class _Run:
             return self._contact.at(self._load, at.displacement, self._start, at.meeting)
         except FoldedFacetsError as folded:
             raise ConvergenceError(
-                f"a Newton step must not fold facets that meet, but after {len(self.history)} steps "
-                f"{folded}; or take smaller load steps",
+                "a Newton step must not fold facets that meet, but after "
+                f"{counted(len(self.history), 'step')} {folded}; or take smaller load steps",
                 self.history,
             ) from folded
 
@@ -256,7 +256,8 @@ class _Run:
             last = self.history[-1] if self.history else "no step"
             raise ConvergenceError(
                 f"Newton's method needs residuals below {method.tolerance:.1e}, got after "
-                f"{len(self.history)} steps: {last}: {HOLD if self._loose else 'take smaller load steps'}",
+                f"{counted(len(self.history), 'step')}: {last}: "
+                f"{HOLD if self._loose else 'take smaller load steps'}",
                 self.history,
             )
         if not previous or previous >= 1.0:
@@ -336,7 +337,7 @@ class _Run:
                 raise
             raise NotHeldError(
                 f"Newton's method needs tangents that the rows of supports and contacts hold, got after "
-                f"{len(self.history)} steps: {reason}: {HOLD}",
+                f"{counted(len(self.history), 'step')}: {reason}: {HOLD}",
                 self.history,
             ) from reason
         except ConvergenceError as reason:

@@ -16,6 +16,7 @@ from fenics_contact.checkpoint import (
     safe_point,
     without_checkpoint,
 )
+from fenics_contact.display import counted
 from fenics_contact.errors import collective
 from fenics_contact.fingerprint import described
 from fenics_contact.optimize.problem import PosedProblem
@@ -188,17 +189,15 @@ class Progress:
     def _summary(self) -> str:
         """Describe what a run that ends now leaves, and how to continue it."""
         if self._checkpoint is None:
-            return without_checkpoint(_evaluations(0 if self._state is None else self._state.evaluations))
+            evaluations = 0 if self._state is None else self._state.evaluations
+            return without_checkpoint(counted(evaluations, "evaluation"))
         written = max(self._written, 0)
-        return self._checkpoint.resume_hint(written, _evaluations(written))
+        return self._checkpoint.resume_hint(written, counted(written, "evaluation"))
 
 
 def _asking(comm: MPI.Comm) -> AbstractContextManager[None]:
     return collective(comm, "the callback of a minimisation", closed=True, users=True)
 
-
-def _evaluations(number: int) -> str:
-    return f"{number} evaluation{'' if number == 1 else 's'}"
 
 
 def _fingerprint(method: Method, problem: PosedProblem) -> dict[str, str]:

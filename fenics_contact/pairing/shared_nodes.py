@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact.display import counted
 from fenics_contact.errors import tell
 from fenics_contact.pairing.contact_points import HELD, ContactPoints
 from fenics_contact.scene import ContactPair, Scene, Surface, Tie
@@ -38,7 +39,7 @@ def without_tied(
     """
     point, tied = _tied(points, ties, scene, fixed)
     if not told:
-        words = "%d nodes of the contact of %s are no contact points: %s ties them, and has their force"
+        words = "the contact of %s leaves out %s, where the force is that of %s, which ties the same places"
         _tell(words, (scene.contacts, points, point), (scene.ties, ties, tied))
     return points.part(np.setdiff1d(np.arange(points.count), point))
 
@@ -78,7 +79,7 @@ def shared_once(points: ContactPoints, scene: Scene, *, told: bool) -> ContactPo
     """
     kept, lost = _shared(points, scene)
     if not told:
-        words = "%d nodes of the contact of %s are those of %s, too, which alone has their force and friction"
+        words = "the contact of %s leaves out %s, where force and friction are those of %s at the same places"
         _tell(words, (scene.contacts, points, lost), (scene.contacts, points, kept))
     area, taken = areas_taken(points, (kept, lost), scene)
     points = replace(points, area=points.area + area, taken=taken)
@@ -188,8 +189,8 @@ def _tell(words: str, lost: _Side, kept: _Side) -> None:
     """Log how many points of which pair are left out for which other pair."""
     (pairs, points, one), (others, those, other) = lost, kept
     for here, there, which in _by_pairs(points.pair[one], those.pair[other]):
-        count = len(np.unique(one[which]))
-        tell(_LOG.info, words, count, pairs[here].place, others[there].place)
+        left_out = counted(len(np.unique(one[which])), "node")
+        tell(_LOG.info, words, pairs[here].place, left_out, others[there].place)
 
 
 def _by_pairs(left: np.ndarray, right: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from scipy.spatial import cKDTree
 
+from fenics_contact.display import counted
 from fenics_contact.mesh import BodyMesh, boundary_faces, cell_type_of, corners_of, vector_areas
 from fenics_contact.scene.kernels import rigid_body_modes
 from fenics_contact.scene.pairs import ContactPair, Surface, Tie
@@ -60,8 +61,7 @@ class Unpaired:
             else ("without a pair or tie between them", "add a ContactPair or a Tie, or take Automatic()")
         )
         one, other = self.bodies
-        facets = "1 facet" if count == 1 else f"{count} facets"
-        return f"bodies {one!r} and {other!r} {what} at {facets}, {where}: {mend}"
+        return f"bodies {one!r} and {other!r} {what} at {counted(count, 'facet')}, {where}: {mend}"
 
 
 def outline_of(mesh: BodyMesh) -> Outline:

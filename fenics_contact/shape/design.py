@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact._libraries import MPI
-from fenics_contact.display import displayed
+from fenics_contact.display import counted, displayed
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.gallery import DesignSurface, side_of
@@ -110,7 +110,7 @@ class SurfaceDesign:
         leaving = np.count_nonzero(length <= LAST_PLACES)
         if leaving:
             raise InvalidInputError(
-                f"a design surface may end at a plane of symmetry, but {leaving} nodes of that on "
+                f"a design surface may end at a plane of symmetry, but {counted(leaving, 'node')} of that on "
                 f"{self.body!r} would leave it: choose another surface"
             )
         directions = surface.directions.copy()

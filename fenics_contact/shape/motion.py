@@ -11,7 +11,7 @@ import ufl
 from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI, PETSc, check_not_forked
 from fenics_contact.contact import body_mesh
-from fenics_contact.display import displayed
+from fenics_contact.display import counted, displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.fem import Template, volume_measure
 from fenics_contact.feti import Decomposition
@@ -140,10 +140,10 @@ class MeshMotion:
         """
         both = int(np.count_nonzero(held[moving].all(axis=1)))
         if both:
+            nodes = counted(both, f"node of body {name!r} lies", f"nodes of body {name!r} lie")
             raise InvalidInputError(
-                f"the design surface must keep away from supports, but {both} nodes of "
-                f"body {name!r} "
-                "lie on both: choose another surface"
+                f"the design surface must keep away from supports, but {nodes} on both: "
+                "choose another surface"
             )
         self.moving, self.held = moving, held
         mesh = body_mesh(decomposition, name, body)

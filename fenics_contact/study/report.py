@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fenics_contact.display import counted
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.io import write_text
 from fenics_contact.study.certificates import CertificateCheck, check_certificates
@@ -121,8 +122,8 @@ def _measured(results: Results) -> str:
     load = max((run.load_average for run in results.good), default=0.0)
     between = f"{repeats[0]} to {repeats[-1]}" if len(repeats) > 1 else f"{repeats[0]}"
     return (
-        f"{len(results.good)} runs of {len(results.runs)} have an answer, each on {results.ranks} "
-        f"rank{'s' if results.ranks > 1 else ''} in a process of its own. Times are from the mesh to the "
+        f"{len(results.good)} runs of {len(results.runs)} have an answer, each on "
+        f"{counted(results.ranks, 'rank')} in a process of its own. Times are from the mesh to the "
         f"state, the median of {between} repeats; the machine's load over the minute before a run was "
         f"{load:.1f} at most.\n"
     )
@@ -131,7 +132,7 @@ def _measured(results: Results) -> str:
 def _answers(errors: Errors) -> str:
     """Return the costs of accuracies and of settings."""
     scene, ranks = errors.results.scene, errors.results.ranks
-    of = f"size: {scene.size_name}; on {ranks} rank{'s' if ranks > 1 else ''}"
+    of = f"size: {scene.size_name}; on {counted(ranks, 'rank')}"
     return (
         f"**What an accuracy takes** ({of})\n\n{accuracy_table(errors)}\n\n"
         f"**What a setting costs**\n\n{cost_table(errors)}\n"

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 
 from fenics_contact.contact import body_grid, in_space
+from fenics_contact.display import counted
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import Scene
@@ -84,7 +85,7 @@ def _draw(
 ) -> None:
     count = sum(np.unique(partitions[name]).size for name in scene.bodies)
     cells = sum(body.mesh.n_cells for body in scene.bodies.values())
-    title = f"{_number(count, 'subdomain')} of {_number(len(scene.bodies), 'body', 'bodies')}, "
+    title = f"{counted(count, 'subdomain')} of {counted(len(scene.bodies), 'body', 'bodies')}, "
     title += f"{written(cells)} cells"
     parts = [_linear(body.mesh, partitions[name]) for name, body in scene.bodies.items()]
     points = np.concatenate([mesh.points for mesh, _ in parts])
@@ -105,9 +106,6 @@ def _linear(mesh: BodyMesh, partition: np.ndarray) -> tuple[BodyMesh, np.ndarray
     """Return the linear cells to draw and the subdomain of each."""
     return mesh.linear, np.repeat(np.asarray(partition), mesh.linear.n_cells // mesh.n_cells)
 
-
-def _number(count: int, one: str, many: str = "") -> str:
-    return f"{count} {one if count == 1 else many or one + 's'}"
 
 
 def _draw_in_plane(

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
+from fenics_contact.display import counted
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.qp import SolverStep
 from fenics_contact.viz.colours import BLUE, GREEN, GREY, INK, ORANGE, PALE
@@ -92,7 +93,7 @@ def _draw(
 ) -> None:
     products = np.array([step.products for step in steps])
     methods = {step.method for step in steps}
-    count = f"{len(steps)} step{'s' if len(steps) > 1 else ''}"
+    count = counted(len(steps), "step")
     count += f" of {methods.pop()}" if len(methods) == 1 else ""
     facts = f"natural residual {written(steps[-1].residuals.natural, 2)} after {written(int(products[-1]))} "
     facts += f"products with F in {count}"

@@ -50,7 +50,7 @@ def test_what_is_told_is_the_error_of_the_peak(
         off = 0.61 if "by a half or more" in said[-1] else 0.1 if "by a tenth" in said[-1] else 0.03
         assert abs(largest / peak - 1.0) < off
     assert "by a half or more" in said[0]
-    assert f": {'2 points press' if axis else 'one point presses'}, and it ends within one cell" in said[0]
+    assert f": {'2 points press' if axis else '1 point presses'}, and it ends within 1 cell" in said[0]
     assert said[1]
     assert said[2] == ""
 
@@ -59,7 +59,7 @@ def test_balls_are_told_likewise(caplog: pytest.LogCaptureFixture) -> None:
     (words,), _ = told(caplog, pressed(3, 1.5)[0])
     assert words == (
         "the contact of upper z0 on rigid plane is too small for its cells: 4 points press, and it ends "
-        "within two cells of the largest pressure, which may be off by a tenth; four cells on the half width "
+        "within 2 cells of the largest pressure, which may be off by a tenth; four cells on the half width "
         "of a contact have it to about a percent: refine the meshes there"
     )
 

@@ -148,5 +148,5 @@ def test_a_path_that_ends_where_nodes_leave_the_end_of_a_master_says_so(end: flo
     problem = ContactProblem(Scene(bodies, held[0], contacts=[pair]), MPI.COMM_SELF, steps=steps)
     with pytest.raises(LoadStepError) as ended:
         solve_steps(problem, [LoadStep(str(n), supports=each) for n, each in enumerate(held)])
-    words = r"; 1 nodes of surface 'y0' press on 'y1' from beyond its end and lose \d\d\.\d% of the normal"
+    words = r"; 1 node of surface 'y0' presses on 'y1' from beyond its end with \d\d\.\d% of the normal force"
     assert bool(re.search(words, str(ended.value))) == told, ended.value

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from fenics_contact.display import counted
 from fenics_contact.study.errors import Errors
 from fenics_contact.study.figures.series import (
     WIDTH,
@@ -50,7 +51,7 @@ def pareto_front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
 def _draw_all(errors: Errors, paper: BinaryIO) -> None:
     scene, ranks, runs = errors.results.scene, errors.results.ranks, errors.results.good
     quantities = [each for each in scene.quantities if any(errors.of(run, each.name) for run in runs)]
-    title = f"{scene.title}: error against time on {ranks} rank{'s' if ranks > 1 else ''}"
+    title = f"{scene.title}: error against time on {counted(ranks, 'rank')}"
     with sheet(paper, (WIDTH, height(len(quantities))), title) as figure:
         handles: dict[str, Any] = {}
         for axes, quantity in zip(panels(figure, len(quantities)), quantities, strict=True):

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from fenics_contact.display import counted
 from fenics_contact.study.errors import Errors
 from fenics_contact.study.figures.series import WIDTH, by_mesh_and_tolerance, picture, style
 from fenics_contact.study.results import Run
@@ -36,7 +37,7 @@ def plot_phases(errors: Errors, path: Path | None = None) -> Picture:
 def _draw_all(errors: Errors, paper: BinaryIO) -> None:
     results = errors.results
     meshes, varied = by_mesh_and_tolerance(errors)
-    title = f"{results.scene.title}: time by phase on {results.ranks} rank{'s' if results.ranks > 1 else ''}"
+    title = f"{results.scene.title}: time by phase on {counted(results.ranks, 'rank')}"
     with sheet(paper, (WIDTH, 760), title) as figure:
         left, right = figure.subplots(1, 2)
         tolerances = [run.parameters.tolerance_words for run in varied]
