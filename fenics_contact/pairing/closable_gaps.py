@@ -3,7 +3,7 @@
 Where the gap g closes, the slave moves by (1 − s) g and the master by s g, s its share of the compliance, up
 to rigid motions. The constraint contains linear interpolants of that, I g on the slave and J g on the master:
 it can close (1 − s) g(x_i) + s ∫ ψ_i J g. The mean of g itself includes its curvature between nodes. Nodes
-that are partly beside the other surface keep that mean.
+that are partly beside the other surface keep that mean, and so do points with several nodes of the slave.
 """
 
 from __future__ import annotations
@@ -43,7 +43,12 @@ class ClosableGaps:
 
 
 def closable_gaps(
-    slave: FacetedSurface, master: FacetedSurface, coupling: MortarCoupling, share: float, comm: MPI.Comm
+    slave: FacetedSurface,
+    master: FacetedSurface,
+    coupling: MortarCoupling,
+    share: float,
+    comm: MPI.Comm,
+    alone: np.ndarray,
 ) -> ClosableGaps:
     """Return the gaps that linear displacements can close. Collective.
 
@@ -53,6 +58,7 @@ def closable_gaps(
         coupling: Coupling of both, or some of its nodes.
         share: s, the master's share of the motion that closes the gap.
         comm: Communicator of the ranks that share the work.
+        alone: Whether a point has no node of the slave but its own, shape (n,); others keep their mean.
     """
     weight = coupling.weight
     nodes = np.flatnonzero(np.bincount(weight.indices, minlength=weight.shape[1]))
@@ -65,6 +71,6 @@ def closable_gaps(
     opposite = np.nan_to_num(opposite)
     across = np.where(lost, own, weight @ opposite)
     closable = (1.0 - share) * own + share * across
-    kept = np.isnan(closable)
+    kept = np.isnan(closable) | ~alone
     value = np.where(kept, coupling.gap, closable)
     return ClosableGaps(value, kept, np.where(lost | kept, 0.0, share), here, there, opposite)

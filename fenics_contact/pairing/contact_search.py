@@ -190,14 +190,14 @@ def _measured(
 def _symmetric(points: ContactPoints, slave: _Side, master: _Side) -> np.ndarray:
     """Return the components normal to symmetry planes that cut both surfaces at a point, (n_points, dim)."""
     place = np.zeros((slave.n_nodes, points.normal.shape[1]))
-    cut = np.zeros(place.shape, dtype=bool)
-    for side in (slave, master):
-        place[side.nodes], cut[side.nodes] = side.surface.points, side.surface.mirrored
+    cut = np.zeros((2, *place.shape), dtype=bool)
+    for here, side in zip(cut, (slave, master), strict=True):
+        place[side.nodes], here[side.nodes] = side.surface.points, side.surface.mirrored
     met = points.master.tocoo()
     node, other = points.slave[met.row], met.col
     same = np.abs(place[node] - place[other]) <= coordinate_rounding(place)
     symmetric = np.zeros(points.normal.shape, dtype=bool)
-    np.logical_or.at(symmetric, met.row, cut[node] & cut[other] & same)
+    np.logical_or.at(symmetric, met.row, cut[0][node] & cut[1][other] & same)
     return symmetric
 
 
@@ -234,10 +234,10 @@ def _by_mortar(
         share: The master's share of the motion that closes the gap.
     """
     met = MortarPoints.of(slave.surface, master.surface, movable, share, comm)
-    coupling, count = met.coupling, len(master.nodes)
-    spread = sp.csr_matrix((np.ones(count), (np.arange(count), master.nodes)), shape=(count, master.n_nodes))
-    weight = (coupling.weight @ spread).tocsr()
-    points = _points(slave, coupling.node, coupling.normal, met.gap, weight)
+    coupling, nodes = met.coupling, np.concatenate([slave.nodes, master.nodes])
+    count = len(nodes)
+    spread = sp.csr_matrix((np.ones(count), (np.arange(count), nodes)), shape=(count, master.n_nodes))
+    points = _points(slave, coupling.node, coupling.normal, met.gap, (met.weight @ spread).tocsr())
     return replace(points, area=coupling.area)
 
 

@@ -22,6 +22,9 @@ class CouplingDerivatives:
         right: Factors at each node of the master, shape (len(master.nodes), r).
         normal: By the normals, shape (n, dim).
         gap: By the gaps, shape (n,).
+        own: Factors at each node of the slave, shape (len(slave.nodes), r): the derivative by its weight in
+            the slave's mean at point i is −left_i · own_j. Needed where such means have several nodes.
+        relief: By the reliefs beside what the gaps have of them, shape (n, dim).
     """
 
     area: np.ndarray
@@ -29,3 +32,5 @@ class CouplingDerivatives:
     right: np.ndarray
     normal: np.ndarray
     gap: np.ndarray
+    own: np.ndarray | None = None
+    relief: np.ndarray | None = None

@@ -60,7 +60,9 @@ def mortar_by_shape(
     bearing, comm = np.isin(nodes, points), torn.decomposition.comm
     met = MortarPoints.of(slave, master, bearing, master_share(scene, pair), comm)
     left, right = (np.hstack(list(each)) for each in (by.pulled, motions.at(opposite)))
-    coupled = CouplingDerivatives(by.area, left, right, by.normal, by.gap)
+    own, known = np.zeros((len(nodes), left.shape[1])), np.isin(nodes, motions.nodes)
+    own[known] = np.hstack(list(motions.at(nodes[known])))
+    coupled = CouplingDerivatives(by.area, left, right, by.normal, by.gap, own)
     by_slave, by_master = mortar_points_pulled_back(met, coupled, comm)
     result = np.zeros((tearing.n_nodes, torn.dim))
     result[nodes] += by_slave
@@ -93,8 +95,10 @@ def mortar_points_pulled_back(
         at_master, at_slave = _gaps_pulled_back(slave, there, (coupling.weight.T @ across)[there.point])
         by_master[there.point] += at_master
         by_slave += at_slave
+        own = None if by.own is None else np.pad(by.own, ((0, 0), (0, 1)))
         by = replace(
             by,
+            own=own,
             gap=np.where(gaps.kept, by.gap, 0.0),
             left=np.column_stack([by.left, across]),
             right=np.column_stack([by.right, gaps.opposite]),

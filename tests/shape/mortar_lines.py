@@ -17,6 +17,7 @@ from fenics_contact.scene import (
     Body,
     Coulomb,
     Scene,
+    Surface,
     Tresca,
 )
 from fenics_contact.shape import Objective, TotalPotential
@@ -49,6 +50,17 @@ def matching() -> Scene:
     return replace(block_on_block(Coulomb(0.38), load=DRAG), bodies=bodies)
 
 
+def beyond_the_rim() -> Scene:
+    """The slave is the larger block below; some of its nodes hardly face the upper one."""
+    scene = block_on_block(Coulomb(0.38), load=DRAG)
+    lower = block((-0.6, -0.3, -1.0), (2.13, 1.5, 0.0), (7, 6, 2))
+    bodies = {"lower": Body(lower, PLASTIC), "upper": scene.bodies["upper"]}
+    (pair,) = scene.contacts
+    assert isinstance(pair.master, Surface)
+    turned = replace(pair, slave=pair.master, master=pair.slave, geometry="faceted")
+    return by_mortar(replace(scene, bodies=bodies, contacts=[turned]))
+
+
 BLOCKS: dict[str, Callable[[], Scene]] = {
     "hexahedra": lambda: by_mortar(block_on_block(Coulomb(0.38), load=DRAG)),
     "tetrahedra": lambda: by_mortar(block_on_block(Coulomb(0.38), "tetrahedron", load=DRAG)),
@@ -56,6 +68,7 @@ BLOCKS: dict[str, Callable[[], Scene]] = {
     "Tresca": lambda: by_mortar(block_on_block(Tresca(0.8), load=DRAG)),
     "matching": lambda: by_mortar(matching(), geometry="faceted"),
     "adjusted": lambda: by_mortar(block_on_block(Coulomb(0.38), load=DRAG), adjust=0.01),
+    "rim": beyond_the_rim,
     "given gap": lambda: by_mortar(block_on_block(Coulomb(0.38), load=DRAG), gap=bowl),
 }
 PLANE: dict[str, Callable[[], Scene]] = {

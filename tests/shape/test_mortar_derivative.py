@@ -55,7 +55,7 @@ class Setting:
         met, by = couple(slave, master), self.by
         found = met.coupling
         assert np.array_equal(found.node, self.chosen)
-        weights = np.einsum("nr,nr->", by.left, found.weight @ by.right)
+        weights = np.einsum("nr,nr->", by.left, met.weight @ np.concatenate([by.own, by.right]))
         return float(by.area @ found.area + weights + np.sum(by.normal * found.normal) + by.gap @ met.gap)
 
 
@@ -66,7 +66,7 @@ def setting(kinds: tuple[str, str]) -> Setting:
     by = CouplingDerivatives(
         rng.standard_normal(len(chosen)), rng.standard_normal((len(chosen), 2)),
         rng.standard_normal((len(master.nodes), 2)), rng.standard_normal((len(chosen), 3)),
-        rng.standard_normal(len(chosen)),
+        rng.standard_normal(len(chosen)), rng.standard_normal((len(slave.nodes), 2)),
     )  # fmt: skip
     return Setting(slave, master, chosen, by)
 
@@ -82,6 +82,9 @@ def test_gaps_are_closable_from_both_sides_and_at_the_rim_means(kinds: tuple[str
     assert alone.any(), "what faces them has nodes that face nothing"
     own = dict(zip(gaps.here.point, gaps.here.gap, strict=True))
     assert gaps.value[alone] == pytest.approx([own[node] for node in np.flatnonzero(alone)], abs=1e-15)
+    met = couple(here.slave, here.master)
+    assert met.gathering is not None
+    assert gaps.kept[met.gathering.gathers].all()
     assert here.slave.mirrored.any()
     assert here.master.mirrored.any()
 

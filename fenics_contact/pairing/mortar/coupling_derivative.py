@@ -124,14 +124,15 @@ def _sums_pulled_back(
     mean = np.einsum("nr,nr->n", left, coupling.weight @ right)
     left = np.concatenate([left, -mean[:, None]], axis=1) / coupling.area[:, None]
     right = np.concatenate([right, np.ones((len(right), 1))], axis=1)
-    by_area = by.area - np.einsum("nd,nd->n", along, coupling.relief) / coupling.area
+    by_relief = along if by.relief is None else along + by.relief
+    by_area = by.area - np.einsum("nd,nd->n", by_relief, coupling.relief) / coupling.area
 
     def spread(values: np.ndarray) -> np.ndarray:
         everywhere = np.zeros((len(slave.nodes), *values.shape[1:]))
         everywhere[coupling.node] = values
         return everywhere
 
-    return _BySums(spread(by_area), spread(left), right, spread(along / coupling.area[:, None]))
+    return _BySums(spread(by_area), spread(left), right, spread(by_relief / coupling.area[:, None]))
 
 
 def _add_integrals(
