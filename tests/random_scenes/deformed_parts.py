@@ -143,7 +143,10 @@ def stages(dice: Dice, depth: float, way: float) -> list[tuple[float, float]]:
 
 
 def slotted(whole: BodyMesh, keep: np.ndarray) -> BodyMesh:
-    """Return some cells of a plane mesh; new rims are "slot", and above and below "roof" and "ground"."""
+    """Return some cells of a plane mesh; new rims are "slot", and above and below "roof" and "ground".
+
+    The ends of the arms belong to "slot", too: nodes that left the end of a facing arm would lose force.
+    """
     cells = whole.cells[keep]
     used, flat = np.unique(cells, return_inverse=True)
     points, cells = whole.points[used], flat.reshape(cells.shape)
@@ -164,4 +167,5 @@ def slotted(whole: BodyMesh, keep: np.ndarray) -> BodyMesh:
     top = old["y1"]
     tip = top[points[top].mean(axis=1)[:, 0] > 2.0]
     roof, ground = (slot[level & (sign * (middle[:, 1] - half) > 0.0)] for sign in (1.0, -1.0))
+    slot = np.concatenate([slot, old["x1"]])
     return BodyMesh(points, cells, {**old, "slot": slot, "roof": roof, "ground": ground, "tip": tip})
