@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.inverse import TornInverse
 from fenics_contact.feti.numbering import DualNumbering
-from fenics_contact.linalg import scaled_columns
+from fenics_contact.linalg import ROUNDING, scaled_columns
 from fenics_contact.qp import global_sum
 
 #: Fraction of its diagonal added to the contact block of B D⁻¹ Bᵀ. A node in two contact pairs has more rows
@@ -62,7 +62,7 @@ class DirichletPreconditioner:
         """Return M r for an owned vector. Collective."""
         return self._apply(residual, self._contact)
 
-    def on_face(self, restriction: sp.csr_matrix) -> Callable[[np.ndarray], np.ndarray]:
+    def on_face(self, restriction: sp.csr_matrix) -> PreconditionerOfFace:
         """Return the preconditioner of a face; only its rows enter B D⁻¹ Bᵀ. Collective.
 
         Rows that are not on the face would stiffen their neighbours, the more the stiffer the slave.
@@ -70,8 +70,7 @@ class DirichletPreconditioner:
         Args:
             restriction: Z with orthonormal columns, shape (n_owned, n_face), owned.
         """
-        contact = self._contact.on_face(restriction)
-        return lambda residual: self._apply(residual, contact)
+        return PreconditionerOfFace(self, self._contact.on_face(restriction))
 
     def lifting(self, restriction: sp.csr_matrix) -> Lifting:
         """Return the displacements of the interface that close rows of a face. Collective.
@@ -91,6 +90,22 @@ class DirichletPreconditioner:
     def _force(self, stiffened: np.ndarray, contact: _ContactBlock) -> np.ndarray:
         """Return the transpose of `_jump` times an interface force, owned. Collective."""
         return self._equality * contact.solve(self._numbering.to_owned(self._B @ stiffened))
+
+
+@dataclass(frozen=True, eq=False)
+class PreconditionerOfFace:
+    """The preconditioner where only rows of a face enter B D⁻¹ Bᵀ, and where these depend on each other."""
+
+    _preconditioner: DirichletPreconditioner
+    _contact: _ContactBlock
+
+    def __call__(self, residual: np.ndarray) -> np.ndarray:
+        """Return M r for an owned vector. Collective."""
+        return self._preconditioner._apply(residual, self._contact)
+
+    def contradiction(self, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int] | None:
+        """Return what no force on the face's rows changes, see `qp.RowsOfFace`. Collective."""
+        return self._contact.contradiction(residual)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,10 +152,7 @@ class _ContactBlock:
     @cached_property
     def _factor(self) -> Factor:
         """Factors, on first use."""
-        diagonal = self._matrix.diagonal()
-        # Rows that supports alone determine are empty.
-        share = np.where(diagonal > 0.0, REGULARISATION * diagonal, 1.0)
-        return Factor((self._matrix + sp.diags(share)).tocsr())
+        return _regularised(self._matrix)
 
     @classmethod
     def of_rows(
@@ -173,14 +185,89 @@ class _ContactBlock:
         """Return the solution on these rows, zero on those that are not on the face. Collective."""
         if self._gram.shape[0] == 0:
             return x
+        right, solution = self._gathered(x), np.empty(self._size)
+        if self._size:
+            self._factor.solve(right, solution)
+        result = x.copy()
+        result[self._owned] = self._scattered(solution)
+        return result
+
+    def contradiction(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int] | None:
+        """Return what no force on the columns of the face changes in x, see `qp.RowsOfFace`. Collective."""
+        if self._size == 0:
+            return None
+        right = self._gathered(x)
+        part = _dependent_part(self._matrix, self._factor, right)
+        # Beside their rows, slipping discs feel the stiffness of their circle, and depend on nothing.
+        alone = np.ones(self._size, dtype=bool)
+        if part is not None and self._basis is not None:
+            alone = np.diff(self._basis.tocsc().indptr) == 1
+        if part is not None and not alone.all():
+            matrix = self._matrix[alone][:, alone].tocsr()
+            part = _dependent_part(matrix, _regularised(matrix), right[alone]) if alone.any() else None
+        if part is None:
+            return None
+        excess, force, number = (np.full(self._size, empty) for empty in (0.0, 0.0, -1))
+        excess[alone], force[alone], number[alone] = part
+        count = int(number.max()) + 1
+        group = self._scattered(number + 1.0).astype(np.int64) - 1
+        parts = [np.zeros(len(x)), np.zeros(len(x)), np.full(len(x), -1)]
+        for whole, own in zip(parts, (self._scattered(excess), self._scattered(-force), group), strict=True):
+            whole[self._owned] = own
+        return parts[0], parts[1], parts[2], count
+
+    def _gathered(self, x: np.ndarray) -> np.ndarray:
+        """Return an owned vector on all columns of the face, replicated. Collective."""
         right = np.zeros(self._gram.shape[0])
         right[self._place] = x[self._owned]
         right = global_sum(self._numbering.comm, right)
-        right = right if self._transposed is None else self._transposed @ right
-        solution = np.empty(self._size)
-        if self._size:
-            self._factor.solve(right, solution)
-        solution = solution if self._basis is None else self._basis @ solution
-        result = x.copy()
-        result[self._owned] = solution[self._place]
-        return result
+        return right if self._transposed is None else np.asarray(self._transposed @ right)
+
+    def _scattered(self, columns: np.ndarray) -> np.ndarray:
+        """Return this rank's rows of a vector on the columns of the face."""
+        rows = columns if self._basis is None else self._basis @ columns
+        return np.asarray(rows[self._place])
+
+
+def _regularised(matrix: sp.csr_matrix) -> Factor:
+    """Factor A + ε diag A; rows that supports alone determine are empty and become those of the identity."""
+    diagonal = matrix.diagonal()
+    share = np.where(diagonal > 0.0, REGULARISATION * diagonal, 1.0)
+    return Factor((matrix + sp.diags(share)).tocsr())
+
+
+def _dependent_part(
+    matrix: sp.csr_matrix, regularised: Factor, right: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Return z = D N (Nᵀ D N)⁻¹ Nᵀ x with A N = 0 and D = diag A, D⁻¹ z, and coupled rows; None for zero.
+
+    T = ε D (A + ε D)⁻¹ keeps D N and multiplies the rest by ε / (ε + its eigenvalues).
+
+    Args:
+        matrix: A, positive semidefinite, shape (n, n).
+        regularised: Factors of A + ε D.
+        right: x, shape (n,).
+
+    Returns:
+        Both vectors, shape (n,), and the number of the block of A that a row belongs to, −1 where z is zero.
+    """
+    diagonal = matrix.diagonal()
+    left = np.where(diagonal > 0.0, right, 0.0)
+    least, force = ROUNDING * np.abs(left).max(), np.zeros(len(left))
+    for _ in range(30):
+        before = left
+        regularised.solve(before, force)
+        left = REGULARISATION * diagonal * force
+        if np.abs(left).max() <= least:
+            return None
+        if np.abs(before - left).max() <= ROUNDING / REGULARISATION * np.abs(left).max():
+            break
+    count, number = connected_components(matrix, directed=False)
+    size, moved = np.zeros(count), np.zeros(count)
+    np.maximum.at(size, number, np.abs(left))
+    np.maximum.at(moved, number, np.abs(before - left))
+    dependent = (size > least) & (moved <= ROUNDING / REGULARISATION * size)
+    if not dependent.any():
+        return None
+    kept = dependent[number]
+    return np.where(kept, left, 0.0), np.where(kept, REGULARISATION * force, 0.0), np.where(kept, number, -1)

@@ -18,7 +18,14 @@ from fenics_contact.qp.krylov import FaceStep, Kept, Stop, gmres, projected_cg, 
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.mpgp import Mpgp
 from fenics_contact.qp.not_held import SlidingError
-from fenics_contact.qp.problem import EVEN, CountedOperator, DualProblem, FacePreconditioner, Scaling
+from fenics_contact.qp.problem import (
+    EVEN,
+    CountedOperator,
+    DualProblem,
+    FacePreconditioner,
+    RowsOfFace,
+    Scaling,
+)
 from fenics_contact.qp.reductions import Vector, global_max, global_min, global_sum
 from fenics_contact.qp.slip_law import CoulombLaw, SlipLaw, TrescaLaw
 from fenics_contact.qp.smalse import Smalse
@@ -57,6 +64,7 @@ __all__ = [
     "ObliqueProjector",
     "ProjectedCG",
     "Residuals",
+    "RowsOfFace",
     "Scaling",
     "SlidingError",
     "SlipLaw",

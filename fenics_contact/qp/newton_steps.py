@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenics_contact._libraries import MPI
+from fenics_contact.qp.contradiction import Contradiction, contradiction
 from fenics_contact.qp.face import Face, classify
 from fenics_contact.qp.face_system import CoupledFace, FaceSystem, FaceSystems, couple
 from fenics_contact.qp.forcing import Forcing, residual_weights
@@ -120,6 +121,7 @@ class _SolvedFace:
         multiplier: λ, owned.
         product: F λ, owned.
         inner: The step of the Krylov method.
+        contradiction: What rows of the face demand of each other beyond its tolerance; None where they agree.
     """
 
     system: FaceSystem
@@ -127,6 +129,7 @@ class _SolvedFace:
     multiplier: Vector
     product: Vector
     inner: FaceStep
+    contradiction: Contradiction | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +210,7 @@ class NewtonSteps:
         solved = self._solve(face, before, self.forcing.tolerance_of_face(before.residuals, expected, care))
         # 3. Rigid motions, then the damped step.
         alpha = self._motions(solved, before, step)
-        after = iterate_at(self.problem, solved.multiplier, solved.product, alpha)
+        after = iterate_at(self.problem, self._relieved(solved, alpha, step), solved.product, alpha)
         mismatch = abs(after.residuals.size - solved.inner.measure) / (before.residuals.size or 1.0)
         taken = self.safeguards.shorten(self.problem, before, after, state.before)
         faces = (face, *state.faces[:LONGEST_CYCLE])
@@ -236,14 +239,32 @@ class NewtonSteps:
         product = before.product + apply_unless_zero(problem, self.operator, entered - before.multiplier)
         gradient = system.gradient(entered, product - problem.rhs)
         weights = residual_weights(face, before.residuals, self.natural_step)
+        contrary = self._contradiction(system, gradient)
+        if contrary is not None:
+            gradient = gradient - contrary.excess
+            if system.weighted_norm(contrary.excess, weights) <= tolerance:
+                contrary = None
         limit = max(self.max_products - self.operator.products, 1)
         if isinstance(linear, CoupledFace):
             inner = projected_gmres(linear.coupled, gradient, weights, tolerance, limit)
         else:
             inner = projected_cg(linear, gradient, weights, tolerance, limit)
-        return _SolvedFace(
-            system, linear, entered + linear.advance(inner.step), product + inner.product, inner
-        )
+        multiplier, product = entered + linear.advance(inner.step), product + inner.product
+        return _SolvedFace(system, linear, multiplier, product, inner, contrary)
+
+    def _contradiction(self, system: FaceSystem, gradient: Vector) -> Contradiction | None:
+        """Return what rows demand of each other; springs let all of them have their way. Collective."""
+        if isinstance(self.operator, ShiftedOperator):
+            return None
+        return contradiction(self.problem, system, gradient)
+
+    def _relieved(self, solved: _SolvedFace, alpha: Vector, step: Vector) -> Vector:
+        """Return the multiplier of a face, at which one of contradicting rows gives way. Collective."""
+        if solved.contradiction is None:
+            return solved.multiplier
+        residual = solved.product - self.problem.rhs - self.problem.coarse.transpose(alpha)
+        trial, face = solved.multiplier - step * residual, solved.system.face
+        return solved.contradiction.relieved(self.problem, face, solved.multiplier, trial)
 
     def _motions(self, solved: _SolvedFace, before: Iterate, step: Vector) -> Vector:
         """Return α after a step: from the rows of the face, then in equilibrium. Collective."""
@@ -265,6 +286,8 @@ class NewtonSteps:
         )
         closed, stick, slip = (round(float(count)) for count in counts)
         note = f"{inner.iterations} CG steps, {changed} status changes"
+        if solved.contradiction is not None:
+            note += ", rows that contradict each other"
         if taken.fraction < 1.0:
             note += f", cut to {taken.fraction:g} of the step"
         if inner.stop is not Stop.CONVERGED:

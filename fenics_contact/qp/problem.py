@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol, runtime_checkable
+from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
+import numpy.typing as npt
 import scipy.sparse as sp
 
 from fenics_contact._libraries import MPI
@@ -35,6 +36,26 @@ class FacePreconditioner(Protocol):
 
     def on_face(self, restriction: sp.csr_matrix) -> Operator:
         """Return the preconditioner of the face with basis Z, shape (n_owned, n_face). Collective."""
+
+
+#: What `RowsOfFace.contradiction` returns.
+Dependence: TypeAlias = tuple[Vector, Vector, npt.NDArray[np.int64], int]
+
+
+@runtime_checkable
+class RowsOfFace(Protocol):
+    """A preconditioner of a face that knows which of its rows depend on each other."""
+
+    def __call__(self, residual: Vector) -> Vector:
+        """Approximate F⁻¹ r on the face, owned. Collective."""
+
+    def contradiction(self, residual: Vector) -> Dependence | None:
+        """Return what no force on the face's rows changes in r; None where that is nothing. Collective.
+
+        Returns:
+            The part D N (Nᵀ D N)⁻¹ Nᵀ r, where B_Fᵀ N = 0 and D is a diagonal; −D⁻¹ times it, a force that
+            deforms nothing; numbers of coupled rows, −1 elsewhere, all owned; and how many numbers there are.
+        """
 
 
 @dataclass(frozen=True)
@@ -202,6 +223,8 @@ def _scaled(precondition: Operator, s: Vector) -> Operator:
     """Return x -> M(x / s) / s."""
     if isinstance(precondition, FacePreconditioner):
         return _ScaledPreconditioner(precondition, s)
+    if isinstance(precondition, RowsOfFace):
+        return _ScaledRows(precondition, s)
     return lambda x: precondition(x / s) / s
 
 
@@ -216,8 +239,22 @@ class _ScaledPreconditioner:
         return self.inner(residual / self.factor) / self.factor
 
     def on_face(self, restriction: sp.csr_matrix) -> Operator:
-        precondition, s = self.inner.on_face(restriction), self.factor
-        return lambda x: precondition(x / s) / s
+        return _scaled(self.inner.on_face(restriction), self.factor)
+
+
+@dataclass(frozen=True, eq=False)
+class _ScaledRows:
+    """x -> M(x / s) / s on a face, with what its rows demand of each other, for scaled multipliers."""
+
+    inner: RowsOfFace
+    factor: Vector
+
+    def __call__(self, residual: Vector) -> Vector:
+        return self.inner(residual / self.factor) / self.factor
+
+    def contradiction(self, residual: Vector) -> Dependence | None:
+        found = self.inner.contradiction(residual / self.factor)
+        return found and (self.factor * found[0], found[1] / self.factor, *found[2:])
 
 
 class CountedOperator:

@@ -37,3 +37,10 @@ def global_max(comm: MPI.Comm, value: float) -> float:
 def global_min(comm: MPI.Comm, value: float) -> float:
     """Return the smallest of the ranks' values. Collective on ``comm``."""
     return float(comm.allreduce(value, op=MPI.MIN))
+
+
+def global_least(comm: MPI.Comm, values: Vector) -> Vector:
+    """Return the smallest of the ranks' values in each entry, shape (n,). Collective."""
+    least = np.empty_like(values)
+    comm.Allreduce(values, least, op=MPI.MIN)
+    return least
