@@ -73,11 +73,21 @@ def _check_balance(torn: TornSystem, bodies: list[RigidBody], loads: np.ndarray)
         return
     without_margin = balance.left(1.0)
     part, left = (1.0 - MARGIN, left) if without_margin is None else (1.0, without_margin)
-    motion, rubs = balance.motion(part, left)
-    words = _describe(
-        motion.reshape(len(bodies), -1), bodies, loads, only_just=without_margin is None, rubs=rubs
+    found = _Motion.of(balance, part, left, bodies)
+    # The certificate points against the right side, which is minus the load. The pushed body may take others
+    # along: it is the one on which the load does most work.
+    pushed = int(np.argmax(np.einsum("bm,bm->b", found.bodies, loads)))
+    if without_margin is None:
+        raise InfeasibleError(
+            f"every body must be held by supports, contact or friction, but body {bodies[pushed].name!r} is "
+            f"held only just: the load uses up all friction against {found.words(pushed)}, and how far it "
+            "slides is not determined. Support it, or raise the friction coefficient"
+        )
+    raise InfeasibleError(
+        f"every body must be held by supports, contact or friction, but body {bodies[pushed].name!r} can "
+        f"move away under the load: {found.words(pushed)} meets "
+        f"{'too little friction' if found.rubs else 'no resistance'}. {found.advice(pushed, torn, bodies)}"
     )
-    raise InfeasibleError(words)
 
 
 class RigidBody:
@@ -88,7 +98,8 @@ class RigidBody:
         self.name = tearing.body_names[index]
         self._nodes = slice(int(tearing.node_offset[index]), int(tearing.node_offset[index + 1]))
         body = torn.scene.bodies[self.name]
-        self._modes = rigid_body_modes(body.mesh.points)
+        self._points = body.mesh.points
+        self._modes = rigid_body_modes(self._points)
         supports = resisted_motions(held_components(torn.scene, self.name, self._modes))
         #: Wrenches that supports and material can exert in both directions, shape (n_modes, n).
         self.support = _both(supports, _resisted_by_material(body, self._modes))
@@ -100,7 +111,7 @@ class RigidBody:
 
     def contact_wrenches(self, torn: TornSystem) -> sp.csr_matrix:
         """Wrenches of unit normal and tangential multipliers, (n_modes, n_contact + (dim - 1) n_friction)."""
-        points, arms = torn.points, self._arms(torn.points)
+        points, arms = torn.points, self.arms(torn.points)
         # The contact force on the slave is n λ_N − t τ; the master feels the opposite (negative weights).
         normal = np.einsum("nd,ndm->mn", points.normal, arms)
         slip = -np.einsum("nad,ndm->mna", points.tangents[torn.frictional], arms[torn.frictional])
@@ -108,7 +119,7 @@ class RigidBody:
 
     def tie_wrenches(self, torn: TornSystem) -> sp.csr_matrix:
         """Wrenches of unit forces at tied points, shape (n_modes, n)."""
-        arms = self._arms(torn.ties)
+        arms = self.arms(torn.ties)
         sliding = np.array([tie.sliding for tie in torn.scene.ties], dtype=bool)[torn.ties.pair]
         bonded = arms[~sliding].reshape(-1, arms.shape[2]).T
         gliding = np.einsum("nd,ndm->mn", torn.ties.normal[sliding], arms[sliding])
@@ -125,11 +136,22 @@ class RigidBody:
             wrench += point_loads(torn.scene, self.name, self._modes)
         return wrench
 
-    def _arms(self, points: ContactPoints) -> np.ndarray:
+    def arms(self, points: ContactPoints) -> np.ndarray:
         """Return the jump at each point when the body alone moves, shape (n, dim, n_modes)."""
         jump = points.jump[:, self._nodes]
         moved = jump @ self._modes.reshape(self._modes.shape[0], -1)
         return np.asarray(moved).reshape(points.count, *self._modes.shape[1:])
+
+    def axis(self, motion: np.ndarray) -> str:
+        """Return in words what a motion with a rotation, shape (n_modes,), turns the body about."""
+        dim = self._points.shape[1]
+        centre = self._points.mean(axis=0)
+        size = np.abs(self._points - centre).max()
+        turning = np.zeros(3)
+        turning[3 - len(motion[dim:]) :] = motion[dim:]
+        across = np.cross(turning, np.pad(motion[:dim], (0, 3 - dim)))[:dim]
+        at = _in_words(centre + size * across / (turning @ turning), size)
+        return at if dim == 2 else f"the axis through {at} along {_in_words(_digits(turning), 1.0)}"
 
 
 def _resisted_by_material(body: Body, modes: np.ndarray) -> np.ndarray:
@@ -223,8 +245,8 @@ class _Balance:
             return None
         return _Left(np.array(solution.z[: len(left)]), np.array(solution.x[:size]))
 
-    def motion(self, part: float, left: _Left) -> tuple[np.ndarray, bool]:
-        """Return the motion on which bodies set off, and whether friction acts against it.
+    def motion(self, part: float, left: _Left) -> _Left:
+        """Return the motion on which bodies set off, and the forces against it.
 
         The direction v of what is left obeys the associated law, v_N ≥ μ (|v_T| − s), by which what slides
         lifts off where s = 0. Where s = |v_T|, v_N ≥ 0 ⊥ λ_N and what slides stays on: a fixed point in v.
@@ -239,9 +261,57 @@ class _Balance:
                 break
             velocity = (slip.T @ left.motion).reshape(len(torn.frictional), torn.dim - 1)
             before, left = digits, self.left(part, np.linalg.norm(velocity, axis=1)) or left
-        tangential = left.forces[self.support.shape[1] + torn.points.count :]
-        lost = float(tangential @ (slip.T @ left.motion))
-        return left.motion, abs(lost) > MARGIN * abs(float(self.right @ left.motion))
+        return left
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """How bodies set off.
+
+    Attributes:
+        bodies: Coefficients of the modes of each body, shape (n_bodies, n_modes).
+        pressed: Normal forces meanwhile, relative to the load, shape (n_contact,).
+        rubs: Whether friction acts against it.
+        slides: Whether more friction would: something slides that is pressed.
+    """
+
+    bodies: np.ndarray
+    pressed: np.ndarray
+    rubs: bool
+    slides: bool
+
+    @classmethod
+    def of(cls, balance: _Balance, part: float, left: _Left, bodies: list[RigidBody]) -> _Motion:
+        """Return the motion of what is left of a balance with a part of the friction."""
+        left, points = balance.motion(part, left), balance.torn.points
+        motion = left.motion.reshape(len(bodies), -1)
+        normal, tangential = np.split(left.forces[balance.support.shape[1] :], [points.count])
+        lost = tangential @ (balance.contact[:, points.count :].T @ left.motion)
+        jump = sum(body.arms(points) @ own for body, own in zip(bodies, motion, strict=True))
+        slip = jump - np.einsum("nd,nd->n", jump, points.normal)[:, None] * points.normal
+        least = MARGIN * abs(float(balance.right @ left.motion))
+        rubs = bool(abs(lost) > least)
+        return cls(motion, normal, rubs, rubs or float(normal @ np.linalg.norm(slip, axis=1)) > least)
+
+    def words(self, body: int) -> str:
+        """Return the motion of a body in words."""
+        return motion_in_words(_digits(self.bodies[body]))
+
+    def advice(self, body: int, torn: TornSystem, bodies: list[RigidBody]) -> str:
+        """Return what would stop the motion of a body."""
+        touch = "let it touch something in the direction of the load"
+        if self.slides:
+            more = "raise the friction coefficient" if len(torn.frictional) else "give its contact friction"
+            return f"Support it, {touch}, or {more}"
+        own = np.abs(bodies[body].arms(torn.points)).any(axis=(1, 2)) & (self.pressed > MARGIN)
+        if not _digits(self.bodies[body])[torn.dim :].any() or not own.any():
+            return f"Support it, or {touch}"
+        places = " and ".join(torn.scene.contacts[pair].place for pair in np.unique(torn.points.pair[own]))
+        axis = bodies[body].axis(self.bodies[body])
+        return (
+            f"It turns about {axis}, pressed by {places}, and no friction would stop that: support it, let "
+            f"that contact reach further, or {touch}"
+        )
 
 
 def _admissible(
@@ -279,23 +349,7 @@ def _digits(motion: np.ndarray) -> np.ndarray:
     return np.round(motion / np.abs(motion).max(), 3) + 0.0  # no -0
 
 
-def _describe(
-    motion: np.ndarray, bodies: list[RigidBody], loads: np.ndarray, *, only_just: bool, rubs: bool
-) -> str:
-    # The certificate points against the right side, which is minus the load. The pushed body may take others
-    # along: it is the one on which the load does most work.
-    pushed = int(np.argmax(np.einsum("bm,bm->b", motion, loads)))
-    words = motion_in_words(_digits(motion[pushed]))
-    against = "too little friction" if rubs else "no resistance"
-    name = repr(bodies[pushed].name)
-    if only_just:
-        return (
-            f"every body must be held by supports, contact or friction, but body {name} is held only just: "
-            f"the load uses up all friction against {words}, and how far it slides is not determined. "
-            "Support it, or raise the friction coefficient"
-        )
-    return (
-        f"every body must be held by supports, contact or friction, but body {name} can move "
-        f"away under the load: {words} meets {against}. Support it, let it touch something in the "
-        "direction of the load, or raise the friction coefficient"
-    )
+def _in_words(place: np.ndarray, size: float) -> str:
+    """Return coordinates to a thousandth of a size."""
+    rounded = np.round(place / size, 3) * size + 0.0
+    return f"({', '.join(f'{x:.3g}' for x in rounded)})"

@@ -101,7 +101,7 @@ class FrictionAlone:
                 "friction needs surfaces that are pressed together, but without it they are pressed so "
                 f"little that even {WEDGED:g} times the forces that it may then bear leave "
                 f"{100 * equilibrium.error:.2g} % of the load unbalanced: support bodies that only friction "
-                "holds, press them, or raise the friction"
+                "holds, or press them"
             )
 
     def require_enough_sliding(self, start: Vector | None, settled: float = 1e-2, times: int = 20) -> None:

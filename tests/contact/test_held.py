@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from fenics_contact.contact import ContactProblem, Status, check_held, solve_scene
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.feti import build_torn_system, decompose
-from fenics_contact.gallery import block
+from fenics_contact.gallery import block, rectangle
 from fenics_contact.partition import graph_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
@@ -22,6 +22,7 @@ from fenics_contact.scene import (
     ContactPair,
     Coulomb,
     IsotropicElasticity,
+    PlaneStrain,
     RigidPlane,
     Scene,
     Support,
@@ -109,15 +110,33 @@ def test_a_block_between_floor_and_wall_leaves_neither_where_it_slides_along_bot
 
 def test_words_tell_friction_that_is_too_weak_from_a_motion_without_any() -> None:
     for friction in (Coulomb(0.3), Tresca(0.15)):
-        with pytest.raises(InfeasibleError, match=r"translation \(1, 0, 0\) meets too little friction\."):
+        words = r"translation \(1, 0, 0\) meets too little friction\. Support .* or raise the friction coeff"
+        with pytest.raises(InfeasibleError, match=words):
             check(pulled(block_on_plane(friction), "block", (0.31, 0.0, -1.0)))
-    for scene, force in (
-        (block_on_plane(None), (0.3, 0.0, -1.0)),
-        (block_on_plane(Coulomb(5.0)), (1.1, 0.0, -1.0)),  # tips
-        (block_on_plane(Coulomb(0.3)), (0.31, 0.0, 1.0)),  # leaves the floor
+    for scene, force, advice in (
+        (block_on_plane(None), (0.3, 0.0, -1.0), "Support it, .*, or give its contact friction"),
+        (block_on_plane(Coulomb(0.3)), (0.31, 0.0, 1.0), "Support it, or let it .*"),
     ):
-        with pytest.raises(InfeasibleError, match=r"translation .* meets no resistance\."):
+        with pytest.raises(InfeasibleError, match=rf"translation .* meets no resistance\. {advice}$"):
             check(pulled(scene, "block", force))
+
+
+def test_what_tips_is_told_about_which_edge_and_not_to_raise_its_friction() -> None:
+    place = r"the axis through \(2, 0\.5, 0\.02\) along \(0, 1, 0\), pressed by block z0 on rigid plane"
+    words = rf"resistance\. It turns about {place}, and no friction would stop that: [^;]* of the load$"
+    for friction in (Coulomb(5.0), Coulomb(1.2)):
+        with pytest.raises(InfeasibleError, match=words):
+            check(pulled(block_on_plane(friction), "block", (1.1, 0.0, -1.0)))
+    slab = rectangle((2.0, 0.0), (6.0, 1.0), (4, 1))  # a metre of it lies on the bed
+    bodies = {"bed": rectangle((0.0, -1.0), (3.0, 0.0), (3, 1)), "slab": slab}
+    scene = Scene(
+        {name: Body(mesh, PlaneStrain(100.0, 0.3)) for name, mesh in bodies.items()},
+        [Support("bed", "y0")],
+        [BodyForce("slab", (0.0, -1.0))],
+        [ContactPair(Surface("slab", "y0"), Surface("bed", "y1"), Coulomb(0.5))],
+    )
+    with pytest.raises(InfeasibleError, match=r"'slab' .* about \(3, 0\), pressed by slab y0 on bed y1, and"):
+        check(scene)
 
 
 @pytest.mark.parametrize("friction", [Coulomb(0.3), Tresca(0.15)])

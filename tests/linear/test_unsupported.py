@@ -29,7 +29,7 @@ def bars(*loads: Load, supports: tuple[Support, ...] = ()) -> State:
 def test_a_loaded_body_without_support_is_refused_by_name() -> None:
     message = (
         r"every body must be held by supports, contact or friction, but body 'right' can move away under the "
-        r"load: translation \(.*, 1\) .*meets no resistance. Support it, let it touch something"
+        r"load: translation \(.*, 1\) .*meets no resistance. Support it, or let it touch something"
     )
     with pytest.raises(InfeasibleError, match=message):
         bars(Traction("left", "z1", (1.0, 0.0, 0.0)), Traction("right", "z1", (0.0, 0.0, 1.0)))
