@@ -60,7 +60,8 @@ class Sizes:
         unbalanced, internal, bound, load, moved, open_, given, natural = np.sqrt(sums)
         moved = max(moved, given, self.largest)
         floor = FORCE_FLOOR * stiff * moved / np.sqrt(count)
-        force = max(min(internal, bound) if internal > 0 else bound, load, floor)
+        # Before anything acts, what is to act is all there is: a tool in a body at rest is no equilibrium.
+        force = max(min(internal, bound) if internal > 0 else bound, load, floor) or max(natural, unbalanced)
         violation = global_max(comm, violation)
         ratio = 1.0 / force if force > 0.0 else 0.0
         return Residuals(

@@ -10,7 +10,17 @@ from benchmarks.large_deformations.ironing import ironing
 from fenics_contact.contact import ContactProblem, LoadSequence, State, solve_steps
 from fenics_contact.gallery import rectangle
 from fenics_contact.nonlinear.rigid_start import RigidStart
-from fenics_contact.scene import Body, ContactPair, LoadStep, NeoHooke, Scene, Support, Surface
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    LoadStep,
+    MovingObstacle,
+    NeoHooke,
+    RigidSphere,
+    Scene,
+    Support,
+    Surface,
+)
 from tests.nonlinear.ironing import die
 
 #: Of the die: down, then along.
@@ -78,3 +88,22 @@ def test_ironing_by_five_millimetres_takes_the_newton_steps_of_the_study() -> No
         taken.append(len(state.solution.history))
     assert sum(taken) == pytest.approx(130, abs=6)
     assert max(taken[8:]) <= 6
+
+
+@pytest.mark.parametrize("parts", [1, 2])
+def test_a_tool_that_meets_nothing_at_first_presses_later(parts: int) -> None:
+    """By then no force acts anywhere, with which what is to act could be compared."""
+
+    def pressed(*times: float) -> State:
+        tool = MovingObstacle(RigidSphere((1.0, 2.25), 1.0), lambda time: (None, (0.0, -0.2 * time)))
+        pad = Body(rectangle((0.0, 0.0), (2.0, 1.0), (7, 3)), NeoHooke(1.0, 0.3))
+        pair = ContactPair(Surface("pad", "y1"), tool)
+        scene = Scene({"pad": pad}, [Support("pad", "y0")], contacts=[pair])
+        problem = ContactProblem(scene, MPI.COMM_SELF, partitions={"pad": np.arange(21) * parts // 21})
+        return list(solve_steps(problem, [LoadStep(str(time), time=time) for time in times]))[-1]
+
+    assert pressed(1.0).contact.normal_force.sum() == 0.0
+    at_once, later = pressed(2.0), pressed(0.5, 1.0, 2.0)
+    assert at_once.contact.normal_force.sum() > 0.1
+    require_the_same([later], [at_once])
+    assert later.contact.gap.min() > -1e-8
