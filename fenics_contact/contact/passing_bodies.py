@@ -10,7 +10,7 @@ import numpy as np
 from fenics_contact.contact.state import State
 from fenics_contact.errors import tell, together
 from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import Scene, bodies_near, outline_of, unpaired
+from fenics_contact.scene import Outline, Scene, bodies_near, outline_of, unpaired
 
 _LOG = logging.getLogger(__name__)
 
@@ -20,7 +20,7 @@ class PassingBodies:
 
     def __init__(self) -> None:
         """Start without any."""
-        self._outlines: dict[str, tuple[BodyMesh, tuple[np.ndarray, np.ndarray]]] = {}
+        self._outlines: dict[str, tuple[BodyMesh, Outline]] = {}
         self._told: set[tuple[str, str]] = set()
 
     def warn(self, state: State) -> None:
@@ -48,7 +48,7 @@ class PassingBodies:
                 if comm.rank == 0:
                     tell(_LOG.warning, "%s", words)
 
-    def _outline(self, scene: Scene, name: str) -> tuple[np.ndarray, np.ndarray]:
+    def _outline(self, scene: Scene, name: str) -> Outline:
         """Return the boundary of a body, which meshes of the same cells share."""
         mesh = scene.bodies[name].mesh
         known = self._outlines.get(name)

@@ -70,7 +70,7 @@ from fenics_contact.scene.scene import Scene
 from fenics_contact.scene.steps import LoadStep
 from fenics_contact.scene.supports import Support
 from fenics_contact.scene.true_surfaces import surface_of
-from fenics_contact.scene.unpaired import bodies_near, outline_of, unpaired
+from fenics_contact.scene.unpaired import Outline, bodies_near, outline_of, unpaired
 from fenics_contact.scene.values import OfPosition, ScalarValue, Ufl, VectorValue, evaluate, gradients_of
 
 __all__ = [
@@ -106,6 +106,7 @@ __all__ = [
     "Ogden",
     "OrthotropicElasticity",
     "OrthotropicPlaneStress",
+    "Outline",
     "PairGeometry",
     "Plan",
     "PlaneStrain",

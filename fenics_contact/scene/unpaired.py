@@ -25,8 +25,8 @@ DEEP = 1e-3
 #: Barycentric coordinates down to this are inside.
 ROUNDING = -1e-12
 
-#: The boundary of a body, in linear facets, and its inside, in simplices.
-Outline: TypeAlias = tuple[np.ndarray, np.ndarray]
+#: The boundary of a body, in linear facets, with the cell behind each, and its inside, in simplices.
+Outline: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ class Unpaired:
 def outline_of(mesh: BodyMesh) -> Outline:
     """Return the boundary and the inside of a body, which depend on its cells alone."""
     cells = mesh.linear.cells
-    facets, _ = boundary_faces(cells, mesh.dim)
-    return facets, cells[:, cell_type_of(cells, mesh.dim).simplices].reshape(-1, mesh.dim + 1)
+    facets, behind = boundary_faces(cells, mesh.dim)
+    return facets, cells[behind], cells[:, cell_type_of(cells, mesh.dim).simplices].reshape(-1, mesh.dim + 1)
 
 
 def unpaired_bodies(scene: SceneParts) -> tuple[str, ...]:
@@ -112,7 +112,7 @@ def unpaired(
     """Count the facets of two bodies that nothing keeps out of each other.
 
     Only facets outside of the surfaces that pairs and ties of the two name are looked for in the cells of the
-    other.
+    other. Those that go there behind a named surface are left out: how far that passes is the pair's matter.
 
     Args:
         scene: The scene.
@@ -126,13 +126,18 @@ def unpaired(
     counts, deep = np.zeros(3, dtype=int), DEEP * reach
     for body, into in (both, both[::-1]):
         before, wall = scene.bodies[body].mesh.points, scene.bodies[into].mesh.points
-        facets, inside = outlines[body][0], outlines[into][1]
-        facets = facets[~np.isin(facets, named[body]).all(axis=1)][share]
+        facets, behind, _ = outlines[body]
+        mine = np.isin(facets, named[body]).all(axis=1)
+        own, mine = facets[mine], np.flatnonzero(~mine)[share]
+        facets, behind, inside = facets[mine], behind[mine], outlines[into][2]
         size = np.ptp(before[facets], axis=1).max(axis=1)
-        touching = _within(before, facets, TOUCHING * size, wall, inside)
-        overlapping = _within(before, facets, -OVERLAPPING * size, wall, inside)
-        after = _within(before + moved[body], facets, -deep, wall + moved[into], inside)
-        entered = after & ~_within(before, facets, -deep, wall, inside)
+        here, there = _Facets.of(before, facets, behind), _Facets.of(before + moved[body], facets, behind)
+        passed = wall + moved[into]
+        touching = here.within(TOUCHING * size, wall, inside)
+        overlapping = here.within(-OVERLAPPING * size, wall, inside)
+        overlapping &= ~here.follow(_Facets.of(before, own), overlapping, wall, inside)
+        entered = there.within(-deep, passed, inside) & ~here.within(-deep, wall, inside)
+        entered &= ~there.follow(_Facets.of(before + moved[body], own), entered, passed, inside)
         counts += [np.count_nonzero(each) for each in (touching, overlapping, entered)]
     return Unpaired(both, any(len(nodes) for nodes in named.values()), tuple(counts.tolist()))
 
@@ -164,20 +169,53 @@ def _named(scene: SceneParts, both: tuple[str, str]) -> dict[str, np.ndarray]:
     return {name: np.concatenate([*found, np.zeros(0, dtype=np.int64)]) for name, found in nodes.items()}
 
 
-def _within(
-    points: np.ndarray, facets: np.ndarray, out: np.ndarray | float, wall: np.ndarray, simplices: np.ndarray
-) -> np.ndarray:
-    """Return which facets' middles, moved outwards by a distance, are inside the simplices of a body."""
-    found = np.zeros(len(facets), dtype=bool)
-    if not len(facets):
+@dataclass(frozen=True, eq=False)
+class _Facets:
+    """Facets of a body.
+
+    Attributes:
+        middle: Shape (n, dim), [length].
+        normal: Outwards, of unit length, shape (n, dim).
+        depth: How far they are from the middles of their cells, shape (n,), [length].
+    """
+
+    middle: np.ndarray
+    normal: np.ndarray
+    depth: np.ndarray
+
+    @classmethod
+    def of(cls, points: np.ndarray, facets: np.ndarray, cells: np.ndarray | None = None) -> _Facets:
+        """Return facets, with the cells behind them, given by their nodes."""
+        area = vector_areas(points, facets)
+        normal = area / np.linalg.norm(area, axis=1)[:, None]
+        middle = points[corners_of(facets, points.shape[1])].mean(axis=1)
+        inner = middle if cells is None else points[cells].mean(axis=1)
+        return cls(middle, normal, np.einsum("nd,nd->n", middle - inner, normal))
+
+    def within(self, out: np.ndarray | float, wall: np.ndarray, simplices: np.ndarray) -> np.ndarray:
+        """Return which middles, moved outwards, are inside a body; inwards only as far as their cells go."""
+        places = self.middle + np.maximum(out, -self.depth)[:, None] * self.normal
+        found: np.ndarray = ((places >= wall.min(axis=0)) & (places <= wall.max(axis=0))).all(axis=1)
+        if found.any():
+            found[found] = _in_simplices(places[found], wall, simplices)
         return found
-    area = vector_areas(points, facets)
-    places = points[corners_of(facets, points.shape[1])].mean(axis=1)
-    places += np.reshape(out, (-1, 1)) * area / np.linalg.norm(area, axis=1)[:, None]
-    here = np.flatnonzero(((places >= wall.min(axis=0)) & (places <= wall.max(axis=0))).all(axis=1))
-    if len(here):
-        found[here] = _in_simplices(places[here], wall, simplices)
-    return found
+
+    def follow(
+        self, leading: _Facets, chosen: np.ndarray, wall: np.ndarray, simplices: np.ndarray
+    ) -> np.ndarray:
+        """Return which of the chosen facets are behind leading ones that go as deep into a body as they do.
+
+        Those beside them, in one surface with them, lead themselves.
+        """
+        found = np.zeros(len(chosen), dtype=bool)
+        at = np.flatnonzero(chosen)
+        if len(at) and len(leading.middle):
+            near = cKDTree(leading.middle).query(self.middle[at])[1]
+            middle, normal = leading.middle[near], leading.normal[near]
+            behind = np.maximum(np.einsum("nd,nd->n", middle - self.middle[at], normal), 0.0)
+            found[at] = np.einsum("nd,nd->n", self.normal[at], normal) < 0.5
+            found[at] &= _in_simplices(middle - behind[:, None] * normal, wall, simplices)
+        return found
 
 
 def _in_simplices(places: np.ndarray, points: np.ndarray, simplices: np.ndarray) -> np.ndarray:

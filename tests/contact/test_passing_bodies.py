@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
-from fenics_contact.scene import Scene
+from fenics_contact.gallery import rectangle
+from fenics_contact.scene import Body, ContactPair, PlaneStrain, Scene, Surface, outline_of, unpaired
 from tests.contact.passing import pressed
 
 TOUCHING = (
@@ -64,6 +67,35 @@ def test_bodies_that_keep_apart_are_not_told_of(scene: Scene, caplog: pytest.Log
     assert told(scene, caplog) == []
     assert scene.plan().unpaired == ()
     assert "no pair" not in str(scene.plan())
+
+
+def plates(into: float, *, cells: tuple[int, int] = (4, 5), along: float = 0.0) -> Scene:
+    """A flat plate that reaches into a block, or begins ``along`` behind its start, with a pair between."""
+    flat = rectangle((0.0, into - 0.05), (2.0, into), cells)
+    bodies = {"flat": flat, "high": rectangle((along, 0.0), (along + 2.0, 1.0), (1, 1))}
+    pair = ContactPair(Surface("high", "y0"), Surface("flat", "y1"), discretisation="node")
+    return Scene({name: Body(mesh, PlaneStrain(1.0, 0.3)) for name, mesh in bodies.items()}, contacts=[pair])
+
+
+def entered(scene: Scene, way: tuple[float, float]) -> int:
+    """Return how many facets outside of the pair pass into the other body as the plate moves."""
+    moved = {name: np.zeros_like(body.mesh.points) for name, body in scene.bodies.items()}
+    moved["flat"] += way
+    outlines = {name: outline_of(body.mesh) for name, body in scene.bodies.items()}
+    return unpaired(scene, ("flat", "high"), outlines, moved, float(np.abs(way).max())).counts[2]
+
+
+def test_sides_that_follow_a_surface_of_a_pair_as_deep_as_it_passes_are_not_told_of() -> None:
+    """By nodes a master passes between nodes of a coarse slave, here by more than its flat cells are high."""
+    assert entered(plates(0.0), (0.0, 0.03)) == 0
+    assert entered(replace(plates(0.0), contacts=[]), (0.0, 0.03)) == 4 + 6 + 1
+    beside = plates(0.02, along=2.1)
+    assert entered(beside, (0.2, 0.0)) == 2  # of its five cells are as high as the block: a true passing
+    assert plates(0.03).plan().unpaired == ()  # as a press fit, before any load
+
+
+def test_bodies_flatter_than_their_facets_are_long_do_not_overlap_where_they_touch() -> None:
+    assert plates(0.0, cells=(1, 1)).plan().unpaired == ()
 
 
 ON_RANKS = """
