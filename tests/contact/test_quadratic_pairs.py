@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import BodyMesh, quadratic
 from fenics_contact.qp import FaceNewton
@@ -145,3 +148,16 @@ def test_surfaces_that_slide_and_small_strains_agree_where_hardly_anything_moves
     np.testing.assert_allclose(slid, facets, rtol=1e-4)
     assert np.abs(smooth / smooth.mean() - 1.0).max() < 1.2 * np.abs(facets / facets.mean() - 1.0).max()
     assert np.abs(smooth - facets).max() > 1e-3 * facets.mean(), "smooth surfaces have edges"
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_master_of_quadratic_cells_that_nothing_faces_is_named(cell: str) -> None:
+    meshes = stacked(cell, 1, 2)
+    upper, lower = faces(meshes["lower"].dim)
+    aside = replace(meshes["upper"], points=meshes["upper"].points + 5.0 * np.eye(meshes["lower"].dim)[0])
+    scene = Scene(
+        bodies({**meshes, "upper": aside}, 0.3), [Support("lower", lower.name.replace("1", "0"))],
+        contacts=[ContactPair(upper, lower)],
+    )  # fmt: skip
+    with pytest.raises(InvalidInputError, match="needs slave nodes that face the master"):
+        solve_scene(scene, MPI.COMM_SELF)

@@ -61,6 +61,8 @@ def test_shape_functions_are_one_on_their_node_and_reproduce_polynomials(cell: s
     np.testing.assert_allclose(shape_values(kind, positions) @ at_nodes, polynomial(positions), atol=1e-14)
     slopes = np.einsum("mkd,k->md", shape_gradients(kind, positions), at_nodes)
     np.testing.assert_allclose(slopes, positions @ matrix + vector, atol=1e-13)
+    assert shape_values(kind, positions[:0]).shape == (0, len(kind.nodes))
+    assert shape_gradients(kind, positions[:0]).shape == (0, len(kind.nodes), kind.dim)
 
 
 @pytest.mark.parametrize("cell", QUADRATIC)
