@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.display import displayed
-from fenics_contact.linalg import ROUNDING
+from fenics_contact.linalg import ROUNDING, scaled_columns
 from fenics_contact.qp import (
     CountedOperator,
     DualProblem,
@@ -208,6 +208,7 @@ class _StiffFace:
         tested: W: those, and the rows that are felt, shape (n_owned, n).
         moving: Z: those with growing friction, and the rows that act, shape (n_owned, n).
         compliance: κ, of slipping discs, of rows with a compliance, and one of acting rows, shape (n,).
+        further: Marks of the columns with a compliance of their own, shape (n,).
         oblique: Projector to equilibrium.
         operator: F, counted.
     """
@@ -218,6 +219,7 @@ class _StiffFace:
     tested: sp.csr_matrix
     moving: sp.csr_matrix
     compliance: Vector
+    further: np.ndarray
     oblique: ObliqueProjector
     operator: CountedOperator
 
@@ -233,17 +235,20 @@ class _StiffFace:
         moving = basis if coupling is None else (basis + coupling).tocsr()
         tested = at.complete(basis[:, np.concatenate([shared, felt])])
         moving = moving[:, np.concatenate([shared, acting])]
+        own = face.restrict(at.compliance)
+        compliance = np.concatenate([(face.curvature + own)[shared], at.share])
+        further = np.concatenate([own[shared] != 0.0, np.ones(len(at.share), dtype=bool)])
+        scale = _scale(at, compliance, further)
+        tested, moving = scaled_columns(tested, scale), scaled_columns(moving, scale)
         oblique = ObliqueProjector.build(sp.csr_matrix(coarse.matrix @ tested), coarse.restricted(moving))
         if oblique is None:
             return None
-        own = face.restrict(at.compliance)
         preconditioner = problem.preconditioner
         if isinstance(preconditioner, FacePreconditioner):
             # The other rows are nearly combinations of contact rows: the preconditioner is that of these.
             preconditioner = preconditioner.on_face(basis[:, shared[own[shared] == 0.0]])
         system = FaceSystem(problem.comm, face, operator, coarse.restricted(basis), preconditioner)
-        compliance = np.concatenate([(face.curvature + own)[shared], at.share])
-        return cls(at, system, shared, tested, moving, compliance, oblique, operator)
+        return cls(at, system, shared, tested, moving, compliance * scale**2, further, oblique, operator)
 
     def transposed(self) -> _StiffFace | None:
         """Return the face with its bases swapped; None where that does not hold every body. Collective."""
@@ -276,14 +281,13 @@ class _StiffFace:
         change = fixed + self.moving @ y - self.at.multiplier
         product = apply_unless_zero(problem, self.operator, change)
         gradient = self._testing @ (product - problem.rhs) + self.compliance * y
-        weights = self._weights
 
         def expand(vector: Vector) -> tuple[Vector, Kept]:
-            step, motions = self._direction(vector / weights)
+            step, motions = self._direction(vector)
             image = self._testing @ self.operator(self.moving @ step) + self.compliance * step
-            return weights * (image - oblique.transposed @ motions), (step, motions)
+            return image - oblique.transposed @ motions, (step, motions)
 
-        across, gradient = weights * oblique(gradient), weights * gradient
+        across = oblique(gradient)
         # Rigid motions that close the jumps of the last step must not make the tolerance larger, nor may an
         # oblique projection; what rounding leaves of them is small enough.
         size, seen = np.sqrt(global_sum(comm, gradient @ gradient, across @ across))
@@ -298,17 +302,6 @@ class _StiffFace:
         return self.tested.T.tocsr()
 
     @property
-    def _weights(self) -> Vector:
-        """Weights of the rows: an error in a soft row causes little force, shape (n,). Collective."""
-        problem, contact = self.at.problem, self.at.problem.layout.contact
-        total, count = global_sum(problem.comm, problem.diagonal[contact].sum(), len(contact))
-        weights = np.ones(len(self.compliance))
-        further = self._further
-        usual = total / count if count > 0.0 else self.at.flexibility
-        weights[further] = np.minimum(usual / np.abs(self.compliance[further]), 1.0)
-        return weights
-
-    @property
     def _nothing(self) -> Vector:
         """No multipliers of acting rows."""
         return np.zeros(self.tested.shape[1] - len(self.shared))
@@ -320,12 +313,25 @@ class _StiffFace:
         residual = np.zeros(self.system.face.n_face)
         residual[self.shared] = across[: len(self.shared)]
         step = np.concatenate([self.system.precondition(residual)[self.shared], self._nothing])
-        step[self._further] = across[self._further] / self.compliance[self._further]
+        step[self.further] = across[self.further] / self.compliance[self.further]
         borne = oblique.transposed @ oblique.solve(self.at.stiffness @ motions)
         return np.asarray(oblique.moving.project(step) - borne, dtype=np.float64), motions
 
-    @cached_property
-    def _further(self) -> np.ndarray:
-        """Marks of the columns with a compliance of their own, shape (n,)."""
-        soft = self.system.face.restrict(self.at.compliance)[self.shared] != 0.0
-        return np.concatenate([soft, np.ones(len(self._nothing), dtype=bool)])
+
+def _scale(at: TangentProblem, compliance: Vector, further: np.ndarray) -> Vector:
+    """Return factors of columns that give soft rows the usual flexibility, shape (n,). Collective.
+
+    An error in a soft row causes little force: unscaled, its residual would swamp all others, first where
+    rigid motions take their part of it.
+
+    Args:
+        at: The linearised problem.
+        compliance: Of each column, shape (n,).
+        further: Marks of the columns with a compliance of their own, shape (n,).
+    """
+    problem, contact = at.problem, at.problem.layout.contact
+    total, count = global_sum(problem.comm, problem.diagonal[contact].sum(), len(contact))
+    usual = total / count if count > 0.0 else at.flexibility
+    scale = np.ones(len(compliance))
+    scale[further] = np.sqrt(np.minimum(usual / np.abs(compliance[further]), 1.0))
+    return scale

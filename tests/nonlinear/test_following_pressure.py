@@ -16,7 +16,7 @@ from fenics_contact.feti.subdomain import assemble, cut_out
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
-from fenics_contact.partition import box_partition
+from fenics_contact.partition import bisection_partition, box_partition
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -204,6 +204,23 @@ def test_a_pressed_cube_with_a_free_rim_and_neighbours() -> None:
     assert max(len(state.solution.history) for state in answers) <= 9
     top = np.unique(mesh.surfaces["z1"])
     assert a[top, 2].mean() < -0.1
+
+
+def test_soft_rows_of_rims_between_many_parts_neither_cost_products_nor_accuracy() -> None:
+    """Their stiffness has entries of any size: unscaled, steps took 30 to 50 products and stalled at 1e-8."""
+    mesh = block((0, 0, 0), (2, 1, 1), (5, 2, 2))
+    rollers = [Support("pad", "x0", (0.0, None, None)), Support("pad", "y0", (None, 0.0, None))]
+    floor = ContactPair(Surface("pad", "z0"), RigidPlane((0, 0, 0), (0, 0, 1)), Coulomb(0.5))
+    scene = Scene({"pad": Body(mesh, RUBBER)}, rollers, [Pressure("pad", "z1", 0.0108)], [floor])
+    state = solve_scene(scene, MPI.COMM_SELF, partitions={"pad": bisection_partition(mesh, 4)})
+    assert isinstance(state, DeformedState)
+    assert state.fractions == (1.0,)
+    _, *steps = itertools.pairwise(state.solution.history)
+    assert len(steps) >= 5
+    assert max(after.products - before.products for before, after in steps) <= 15
+    residuals = [line.residuals.worst for line in state.solution.history]
+    far = max(number for number, size in enumerate(residuals) if size > 1e-7)
+    assert residuals[far + 1] < 10 * residuals[far] ** 1.5, "superlinear to the end"
 
 
 def test_small_strains_know_no_following_pressure() -> None:

@@ -56,7 +56,8 @@ def test_ironing_is_the_same_however_bodies_are_cut() -> None:
     last = torn[-1].contact
     assert last.count(2) > 3, "it slides"
     worst = [line.residuals.worst for line in torn[1].solution.history]
-    assert worst[-1] < 10 * worst[-2] ** 1.5, "superlinear, with friction between two bodies"
+    far = max(number for number, size in enumerate(worst) if size > 1e-8)  # nearer, forcing is loose
+    assert worst[far + 1] < 10 * worst[far] ** 1.5, "superlinear, with friction between two bodies"
 
 
 def test_ironing_turned_in_the_plane_gives_the_turned_answer() -> None:
