@@ -109,7 +109,7 @@ class TangentNewton:
     Attributes:
         tolerance: All relative residuals end below it: forces out of balance, openings of glued rows and
             supports, contact.
-        max_steps: Largest number of Newton steps of a load step.
+        max_steps: Largest number of Newton steps of a load step; half of them may bring no progress.
         max_products: Largest number of F-products of one Newton step.
         forcing: Largest residual of a linear system, relative to its start.
 
@@ -247,12 +247,16 @@ class _Run:
         """Adapt the forcing term and ρ. Collective.
 
         Raises:
-            ConvergenceError: Steps are used up, or residuals grow without bound.
+            ConvergenceError: Steps are used up, or residuals stand still or grow without bound.
         """
         worst, method = evaluation.residuals.worst, self._method
         previous = self._residuals[-1] if self._residuals else None
         self._residuals.append(worst)
-        if len(self.history) >= method.max_steps or not worst < 1e6:
+        late = self._residuals[-PATIENCE - 1 :]
+        stalled = len(late) > PATIENCE and min(late[1:]) > 0.5 * late[0]
+        # Near a loss of stability the active set alternates for ever: a shorter load step costs less.
+        stands = self._stalls + stalled >= max(3, method.max_steps // (2 * PATIENCE))
+        if stands or len(self.history) >= method.max_steps or not worst < 1e6:
             last = self.history[-1] if self.history else "no step"
             raise ConvergenceError(
                 f"Newton's method needs residuals below {method.tolerance:.1e}, got after "
@@ -270,8 +274,7 @@ class _Run:
             self._care = 1.0 if worst < 0.5 * previous else max(CARE * self._care, LEAST_CARE)
         least = 0.3 * method.tolerance / max(worst, method.tolerance)
         self._forcing = self._care * max(self._forcing, least)
-        late = self._residuals[-PATIENCE - 1 :]
-        if len(late) > PATIENCE and min(late[1:]) > 0.5 * late[0]:
+        if stalled:
             self._stalls += 1
             self._caution *= CAUTION if self._stalls > 1 else 1.0
             self._residuals = [worst]
@@ -354,15 +357,13 @@ class _Run:
         load = problem.coarse.load + problem.coarse.apply(multiplier)
         scaling = None if problem.scaling is None else problem.scaling.with_load(load)
         flexed = apply_unless_zero(problem, system.apply, multiplier)
-        problem = replace(
-            problem,
-            rhs=problem.rhs + flexed,
-            coarse=problem.coarse.with_load(load),
-            scaling=scaling,
-            reach=None,
-        )
+        coarse = problem.coarse.with_load(load)
+        problem = replace(problem, rhs=problem.rhs + flexed, coarse=coarse, scaling=scaling, reach=None)
         tresca, coefficient = torn.friction
-        solution = solve(problem, tresca, FaceNewton(NESTED), multiplier, friction_coefficient=coefficient)
+        solver = FaceNewton(NESTED)
+        if self._forces_known(evaluation):  # then a failure cuts the load step, whatever its reason
+            solver = replace(solver, max_products=self._method.max_products, doubts=False)
+        solution = solve(problem, tresca, solver, multiplier, friction_coefficient=coefficient)
         bound = torn.law.bound(solution.multiplier)
         face = classify(problem.layout, bound, solution.multiplier, solution.residual, step)
         return TangentStep(

@@ -63,6 +63,8 @@ class FaceNewton:
         patience: Steps in which the residual must halve before a rescue is called.
         rescue: Parameters of the fallback of problems without a preconditioner.
         rescue_products: Products that a rescue may use; doubled each time Newton fails again.
+        doubts: Whether to ask, without progress, if friction can suffice at all: more solves, of no use
+            where another load is tried after any failure.
 
     References:
         S. Hüeber, G. Stadler, B. Wohlmuth, A primal-dual active set algorithm for three-dimensional
@@ -78,6 +80,7 @@ class FaceNewton:
     patience: int = 6
     rescue: Smalse = field(default_factory=Smalse)
     rescue_products: int = 300
+    doubts: bool = True
 
     def with_tolerance(self, tolerance: float) -> FaceNewton:
         """Return the solver with another tolerance."""
@@ -226,9 +229,9 @@ class _Run:
         Raises:
             InfeasibleError: Friction is far from sufficient, or everything slides and goes on to do so.
         """
-        if state.rescues + 1 == DOUBT:
+        if self.parameters.doubts and state.rescues + 1 == DOUBT:
             self.friction_alone.require_enough()
-        if state.rescues == 1 and slides(state.history):
+        if self.parameters.doubts and state.rescues == 1 and slides(state.history):
             self._require_enough_sliding()
         operator, last = self.start.operator, state.last_rescue
         origin = self._rescue_start(state.best)
@@ -259,7 +262,7 @@ class _Run:
     def fail(self, state: _State) -> NoReturn:
         """Raise the error of a solve that is exhausted. Collective."""
         failure = ConvergenceError(self._failed(state), state.history)
-        if state.rescues >= DOUBT:
+        if self.parameters.doubts and state.rescues >= DOUBT:
             try:
                 self._require_enough_sliding()
             except InfeasibleError as reason:

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
 from fenics_contact.contact import ContactProblem, Status, check_held, solve_scene
-from fenics_contact.errors import InfeasibleError
+from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.partition import graph_partition
@@ -373,6 +373,9 @@ def test_friction_that_is_pressed_too_little_is_refused_with_what_it_bears() -> 
     )
     with pytest.raises(InfeasibleError, match=words):
         solve_scene(replace(pushed, loads=[loads[10.0]]), MPI.COMM_SELF)
+    without = FaceNewton(doubts=False, max_products=300)
+    with pytest.raises(ConvergenceError, match="needs residuals below"):
+        solve_scene(replace(pushed, loads=[loads[10.0]]), MPI.COMM_SELF, solver=without)
     later = ContactProblem(pushed, MPI.COMM_SELF)
     later.solve(replace(pushed, loads=[loads[0.3]]))
     with pytest.raises(InfeasibleError, match=words):
