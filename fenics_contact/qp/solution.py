@@ -117,12 +117,13 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
         _square(problem.rhs),
         _square(product[layout.normal]),
         *(_square(x[rows]) for x in (error, needed) for rows in (free, ~free)),
+        _square(step[free]),
         problem.coarse.local(multiplier),
     )
     normal, normal_mapped, force, force_mapped = np.sqrt(sums[:4])
     jump, cancelled, load, everything, rhs, pressed = np.sqrt(sums[4:10])
-    distance, distance_held, closing, closing_held = np.sqrt(sums[10:14])
-    unbalanced = problem.coarse.norm(sums[14:] - problem.coarse.load)
+    distance, distance_held, closing, closing_held, stiff = np.sqrt(sums[10:15])
+    unbalanced = problem.coarse.norm(sums[15:] - problem.coarse.load)
     loads = problem.coarse.norm(problem.coarse.load)
     force_scale = max(normal, normal_mapped)
     if force_scale <= FORCE_FLOOR * max(force, force_mapped):
@@ -132,8 +133,9 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
     force_scale = max(force_scale, least.force)
     gluing_scale = max(cancelled, load, least.gluing) or rhs
     # Errors below the last places of all forces, and jumps of what the loads alone would open, or of what
-    # contact forces displace, are none: an interference alone may displace nothing at supports.
-    rounding = LAST_PLACES * max(everything, closing)
+    # contact forces displace, are none: an interference alone may displace nothing at supports. Of bodies
+    # that supports move without forces, neither are jumps that are rounding of these motions.
+    rounding = LAST_PLACES * max(everything, closing, stiff * load)
     distance = np.hypot(
         distance if distance > rounding else 0.0,
         distance_held if distance_held > max(rounding, LAST_PLACES * closing_held) else 0.0,

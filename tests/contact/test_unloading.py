@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, FixedPoint, LoadSequence, followed_loads
+from fenics_contact.contact import ContactProblem, FixedPoint, LoadSequence, followed_loads, solve_scene
 from fenics_contact.gallery import rectangle
+from fenics_contact.partition import bisection_partition
 from fenics_contact.qp import FaceNewton, Smalse, may_grip
 from fenics_contact.scene import (
     Body,
@@ -92,3 +93,29 @@ def test_a_block_that_was_released_has_no_force_and_can_be_pushed_again(solver: 
     assert released.solution.products <= 1
     sums = [state.contact.normal_force.sum() for state in (pressed, again)]
     np.testing.assert_allclose(sums, [50.0, 10.0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("parts", [1, 2, 3, 5])
+def test_a_body_that_a_support_lifts_off_leaves_the_one_below_at_rest(parts: int) -> None:
+    """Nothing acts; jumps of bodies that touch are rounding of how far the support moves."""
+    made = (
+        ("lower", 0.0, 1.14, 2.72, (5, 7)),
+        ("middle", 2.72, 2.2, 1.83, (3, 5)),
+        ("upper", 4.55, 2.3, 2.4, (7, 3)),
+    )
+    bodies = {
+        name: Body(rectangle((0.0, low), (width, low + height), cells), MATERIAL)
+        for name, low, width, height, cells in made
+    }
+    supports = [
+        Support("lower", "y0"), Support("middle", "x0", (None, 0.0)), Support("upper", "y1", (0.0, 0.0747)),
+    ]  # fmt: skip
+    contacts = [
+        ContactPair(Surface("middle", "y0"), Surface("lower", "y1"), discretisation="node"),
+        ContactPair(Surface("middle", "y1"), Surface("upper", "y0"), discretisation="node"),
+    ]
+    scene = Scene(bodies, supports, contacts=contacts)
+    partitions = {name: bisection_partition(body.mesh, parts) for name, body in bodies.items()}
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=partitions)
+    assert state.solution.products <= 1
+    assert np.abs(state.contact.normal_force).max() == 0.0
