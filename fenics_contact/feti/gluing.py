@@ -11,7 +11,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.copies import Tearing
 from fenics_contact.feti.rows import Rows
 from fenics_contact.linalg import LAST_PLACES
-from fenics_contact.scene import RigidSurface, Scene, Surface
+from fenics_contact.scene import Scene
 
 
 def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
@@ -25,14 +25,9 @@ def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
     """
     prescribed = np.full((tearing.n_nodes, scene.dim), np.nan)
     for support in scene.supports:
-        own = np.unique(scene.facets(Surface(support.body, support.surface)))
+        own, given = scene.given(support)
         nodes = tearing.global_nodes(support.body, own)
-        body = scene.bodies[support.body]
-        points, known = body.mesh.points[own], prescribed[nodes]
-        if isinstance(support, RigidSurface) and body.deforms_much:
-            given = support.turned(points, support.prescribed)
-        else:
-            given = support.values(points)
+        known = prescribed[nodes]
         near = LAST_PLACES * np.nanmax(np.abs(given))
         clash = ~np.isnan(known) & ~np.isnan(given) & (np.abs(known - given) > near)
         if clash.any():

@@ -159,8 +159,7 @@ def _largest_motion(scene: SceneParts) -> float:
     """Return the largest displacement that supports prescribe, [length]."""
     sizes = [0.0]
     for support in scene.supports:
-        mesh = scene.bodies[support.body].mesh
-        values = np.nan_to_num(support.values(mesh.points[np.unique(mesh.surfaces[support.surface])]))
+        values = np.nan_to_num(scene.given(support)[1])
         sizes.append(float(np.linalg.norm(values, axis=1).max(initial=0.0)))
     return max(sizes)
 

@@ -194,13 +194,30 @@ class SceneParts:
             body: Name of the body.
             supports: Those that count, all by default.
         """
-        mesh = self.bodies[body].mesh
-        marks = np.zeros(mesh.points.shape, dtype=bool)
+        return ~np.isnan(self.prescribed(body, supports))
+
+    def prescribed(self, body: str, supports: Sequence[AnySupport] | None = None) -> np.ndarray:
+        """Return what supports prescribe at the nodes of a body, NaN where free, (n_nodes, dim), [length].
+
+        Args:
+            body: Name of the body.
+            supports: Those that count, all by default; where they disagree the last one.
+        """
+        values = np.full(self.bodies[body].mesh.points.shape, np.nan)
         for support in self.supports if supports is None else supports:
             if support.body == body:
-                nodes = np.unique(mesh.surfaces[support.surface])
-                marks[nodes] |= ~np.isnan(support.values(mesh.points[nodes]))
-        return marks
+                nodes, given = self.given(support)
+                values[nodes] = np.where(np.isnan(given), values[nodes], given)
+        return values
+
+    def given(self, support: AnySupport) -> tuple[np.ndarray, np.ndarray]:
+        """Return the nodes of a support, ascending, and what it prescribes, NaN where free, (n, dim)."""
+        body = self.bodies[support.body]
+        nodes = np.unique(body.mesh.surfaces[support.surface])
+        points = body.mesh.points[nodes]
+        if isinstance(support, RigidSurface) and body.deforms_much:
+            return nodes, support.turned(points, support.prescribed)
+        return nodes, support.values(points)
 
     @property
     def body_names(self) -> tuple[str, ...]:

@@ -146,12 +146,7 @@ def _moved_by_supports(scene: SceneParts, name: str) -> np.ndarray:
     """Return the rigid motion of a body's nodes nearest to what its supports prescribe, (n_nodes, dim)."""
     points = scene.bodies[name].mesh.points
     modes = rigid_body_modes(points)
-    prescribed = np.full(points.shape, np.nan)
-    for support in scene.supports:
-        if support.body == name:
-            nodes = np.unique(scene.bodies[name].mesh.surfaces[support.surface])
-            value = support.values(points[nodes])
-            prescribed[nodes] = np.where(np.isnan(value), prescribed[nodes], value)
+    prescribed = scene.prescribed(name)
     given = ~np.isnan(prescribed)
     motion = np.linalg.lstsq(modes[given], prescribed[given], rcond=None)[0]
     return np.asarray(modes @ motion)

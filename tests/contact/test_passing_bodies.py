@@ -12,7 +12,18 @@ from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
 from fenics_contact.gallery import rectangle
-from fenics_contact.scene import Body, ContactPair, PlaneStrain, Scene, Surface, outline_of, unpaired
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    NeoHooke,
+    PlaneStrain,
+    RigidSurface,
+    Scene,
+    Support,
+    Surface,
+    outline_of,
+    unpaired,
+)
 from tests.contact.passing import pressed
 
 TOUCHING = (
@@ -112,3 +123,11 @@ ON_RANKS = """
 def test_ranks_share_the_facets_and_one_of_them_tells(mpirun: Callable[..., str]) -> None:
     (found,) = mpirun(ON_RANKS, 2).splitlines()
     assert found.startswith(TOUCHING)
+
+
+def test_a_rigid_surface_that_turns_far_moves_rubber_on_an_arc_and_not_along_its_tangent() -> None:
+    """A whole turn brings it back; linearised it would pass through all that is near."""
+    meshes = {"wheel": rectangle((-1, -1), (1, 1), (2, 2)), "near": rectangle((3, -1), (4, 1), (1, 2))}
+    turned = RigidSurface("wheel", "x1", at=(0.0, 0.0), displacement=(0.0, 0.0), rotation=2.0 * np.pi)
+    bodies = {name: Body(mesh, NeoHooke(1.0, 0.3)) for name, mesh in meshes.items()}
+    assert Scene(bodies, [turned, Support("near", "x1")]).plan().unpaired == ()
