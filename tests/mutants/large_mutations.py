@@ -21,6 +21,16 @@ LARGE_MUTATIONS = (
         ),
     ),
     Mutation(
+        "soft rows of forces that turn keep columns of length one",
+        "nonlinear/tangent_step.py",
+        "np.minimum(usual / np.abs(compliance[further]), 1.0)",
+        "np.ones(np.count_nonzero(further))",
+        (
+            "tests/nonlinear/test_following_pressure.py::test_soft_rows_of_rims_between_many_parts_neither_cost"
+            "_products_nor_accuracy",
+        ),
+    ),
+    Mutation(
         "slip of bodies that move far begins anew in every part of a load step",
         "nonlinear/newton.py",
         "None if at.meeting is None else at.meeting.start",
