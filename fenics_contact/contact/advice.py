@@ -61,7 +61,7 @@ def _on_contact(scene: Scene) -> str:
     """
 
     def by_nodes(pair: ContactPair) -> bool:
-        if pair.discretisation == "mortar" or pair.within_body or not isinstance(pair.master, Surface):
+        if pair.by_mortar or pair.within_body or not isinstance(pair.master, Surface):
             return False
         return all(scene.bodies[side.body].mesh.order == 1 for side in (pair.slave, pair.master))
 

@@ -189,7 +189,7 @@ def _is_approximate(scene: Scene, pair: ContactPair) -> bool:
     if not isinstance(pair.master, Surface):
         return False
     # Slave nodes lie on their surface; mortar contact also uses what is between them.
-    sides = (pair.master, pair.slave) if pair.discretisation == "mortar" else (pair.master,)
+    sides = (pair.master, pair.slave) if pair.by_mortar else (pair.master,)
     return any(_is_curved(scene, side, pair) for side in sides)
 
 

@@ -21,7 +21,7 @@ def passing_nodes(state: State, number: int, moved: float, share: float) -> list
         share: Share of that which is told of no more.
     """
     pair = state.scene.contacts[number]
-    if pair.discretisation == "mortar" or not isinstance(pair.master, Surface) or pair.within_body:
+    if pair.by_mortar or not isinstance(pair.master, Surface) or pair.within_body:
         return []
     deep = _depth(state, number, pair, pair.master)
     if deep <= share * moved:

@@ -118,5 +118,5 @@ def _compliance(surface: FacetedSurface) -> np.ndarray:
     """Return size over area of the linear pieces around each node, up to a constant, shape (n,)."""
     facets, corners = surface.facets, surface.corners
     around = np.bincount(facets.ravel(), np.repeat(nodal_areas(surface.points, facets).sum(axis=1), corners))
-    mean = around / np.bincount(facets.ravel())
-    return (mean * 6 / {2: 6, 3: 3, 4: 6}[corners]) ** (1.0 / (surface.dim - 1)) * corners / around
+    square = around / np.bincount(facets.ravel()) * (2.0 if corners == 3 else 1.0)  # of two triangles
+    return square ** (1.0 / (surface.dim - 1)) * corners / around

@@ -98,7 +98,7 @@ def pair_geometry(scene: SceneParts, pair: ContactPair) -> PairGeometry:
     approach = _approach(scene, pair, slave, met)
     near = met.gap <= met.gap.min(initial=np.inf) + (np.inf if approach is None else approach)
     height = _largest_height(master, np.unique(met.facet[near]))
-    if pair.discretisation == "mortar":
+    if pair.by_mortar:
         touching = np.flatnonzero(np.isin(slave.facets, met.node[near]).any(axis=1))
         height = max(height, _largest_height(slave, touching))
     if pair.gives_all_gaps:

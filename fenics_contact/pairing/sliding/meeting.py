@@ -140,11 +140,10 @@ def _meeting(scene: Scene, pair: ContactPair, fixed: np.ndarray, tied: np.ndarra
         none = np.zeros(0, dtype=np.int64), np.zeros((0, dim), dtype=bool)
         return Meeting(slave, slave_nodes, candidates, *own, None, None, *none, pair.master)
     master = surface_of(scene, pair.master, "faceted")
-    by_means = pair.discretisation == "mortar"
-    patches = None if by_means else SmoothPatches.of(master, smooth=pair.geometry != "faceted")
+    patches = None if pair.by_mortar else SmoothPatches.of(master, smooth=pair.geometry != "faceted")
     nodes = numbers.global_nodes(pair.master.body, master.nodes)
     met = Meeting(
-        slave, slave_nodes, candidates, *own, patches, master if by_means else None, nodes,
+        slave, slave_nodes, candidates, *own, patches, master if pair.by_mortar else None, nodes,
         master.mirrored, None,
     )  # fmt: skip
     return _within_body(met, master) if pair.within_body else met
