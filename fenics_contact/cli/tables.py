@@ -10,7 +10,7 @@ from rich import box
 from rich.table import Table
 
 from fenics_contact.contact import State, Status, pairs_in_words
-from fenics_contact.display import force_units
+from fenics_contact.display import counted, force_units
 from fenics_contact.linalg import ROUNDING
 from fenics_contact.scene_file import SceneFile
 
@@ -22,8 +22,9 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
     """Return a summary of a state as text, without energies that are not known. Collective."""
     counts, (force, energy) = state.counts, force_units(units.force, units.length, state.scene.dim)
     rows = {
-        "unknowns": f"{counts['torn_unknowns']} in {counts['subdomains']} subdomains",
-        "work": f"{counts['solver_steps']} steps, {counts['f_products']} products with F",
+        "unknowns": f"{counts['torn_unknowns']} in {counted(counts['subdomains'], 'subdomain')}",
+        "work": f"{counted(counts['solver_steps'], 'step')}, "
+        f"{counted(counts['f_products'], 'product')} with F",
         "residuals": f"natural {state.solution.natural_residual:.1e}, gluing "
         f"{state.solution.gluing_residual:.1e}",
         "strain energy": f"{state.energies.strain:.6g} {energy}",

@@ -8,6 +8,7 @@ import numpy as np
 
 from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.result import ContactResult, Status
+from fenics_contact.display import counted
 from fenics_contact.feti import DirectSolution
 from fenics_contact.qp import DualSolution
 from fenics_contact.scene import ContactPair, Scene
@@ -21,12 +22,13 @@ def answer_in_words(
 ) -> dict[str, str]:
     """Return the size of a problem, its answer and the work of its solver, by name."""
     return {
-        "unknowns": f"{counts['torn_unknowns']} in {counts['subdomains']} subdomains",
-        "contact": f"{contact.points.count} points, {contact.counts_in_words}",
+        "unknowns": f"{counts['torn_unknowns']} in {counted(counts['subdomains'], 'subdomain')}",
+        "contact": f"{counted(contact.points.count, 'point')}, {contact.counts_in_words}",
         "largest force": f"{np.linalg.norm(contact.force, axis=1).max(initial=0.0):.6g}",
         "strain energy": f"{energies.strain:.6g}",
         "total potential": f"{energies.total_potential:.6g}",
-        "work": f"{counts['solver_steps']} steps, {counts['f_products']} products with F",
+        "work": f"{counted(counts['solver_steps'], 'step')}, "
+        f"{counted(counts['f_products'], 'product')} with F",
         "residuals": f"natural {solution.natural_residual:.1e}, gluing {solution.gluing_residual:.1e}",
     }
 
@@ -67,7 +69,7 @@ def pairs_in_words(scene: Scene, contact: ContactResult, force: str = "", stress
             nominal = contact.nominal_pressure[mine].max(initial=0.0)
             pressure += f", nominal {nominal:.5g} {stress}".rstrip()
         rows.append(
-            f"{pair.place}: {len(mine)} points, {_kinds(pair, contact.status[mine])}; "
+            f"{pair.place}: {counted(len(mine), 'point')}, {_kinds(pair, contact.status[mine])}; "
             f"{resultant}, pressure up to {pressure}"
         )
     return rows

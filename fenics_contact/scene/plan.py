@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fenics_contact.display import displayed
+from fenics_contact.display import counted, displayed
 from fenics_contact.linalg import expected_bytes
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene.chosen_discretisation import in_words
@@ -94,7 +94,7 @@ class Plan:
         bounds = "follow the normal forces" if self.fixed_point else "given"
         return {
             "effects": "; ".join(f"{effect.name} ({effect.reason})" for effect in self.effects),
-            "unknowns": f"{self.unknowns} in {self.subdomains} subdomains",
+            "unknowns": f"{self.unknowns} in {counted(self.subdomains, 'subdomain')}",
             "multipliers": kinds or "none",
             "solver": self.solver.value,
             "cone": self.cone.value,

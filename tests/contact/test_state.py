@@ -81,6 +81,7 @@ def test_a_scene_without_contact_is_a_linear_solve() -> None:
     assert state.counts["normal_multipliers"] == state.counts["tangential_multipliers"] == 0
     assert state.counts["solver_steps"] <= 2
     assert state.counts["f_products"] < 50
+    assert ("1 step, " if state.counts["solver_steps"] == 1 else "2 steps, ") in repr(state)
     assert state.energies.friction == 0
     elongation = state.gather_displacement("bar")[:, 0].max()
     assert state.energies.load == pytest.approx(TENSION * elongation, rel=1e-8)

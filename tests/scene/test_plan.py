@@ -153,6 +153,7 @@ def test_sensitivities_need_multipliers_and_an_adjoint() -> None:
     plan = scene.plan({"lower": np.zeros(64, dtype=int)}, sensitivity=True)
     assert plan.adjoint
     assert plan.solver is SolverKind.PROJECTED_CG
+    assert "in 1 subdomain\n" in str(plan)
 
 
 def test_without_a_partition_the_plan_has_the_default_one() -> None:
