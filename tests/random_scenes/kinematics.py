@@ -115,7 +115,7 @@ def _pair_misplaced(whole: Whole, points: ContactPoints, pair: ContactPair, own:
         yield from _areas(whole, pair.slave, slave, points.area[own])
     if isinstance(pair.master, Surface):
         master = Side.of(whole, pair.master)
-        yield from _weights(whole, points, own, master, mortar, length, side.flat)
+        yield from _weights(whole, points, own, (side, master), mortar, length)
         if master.flat and side.flat and not mortar:
             must = above(whole, movable, side, master)
             missing = np.setdiff1d(must, slave)
@@ -146,16 +146,25 @@ def _weights(
     whole: Whole,
     points: ContactPoints,
     own: np.ndarray,
-    master: Side,
+    sides: tuple[Side, Side],
     mortar: bool,
     length: float,
-    flat: bool,
 ) -> Iterator[str]:
-    """The master's point that a slave node meets lies on the master, a gap away along the normal."""
-    weight = points.master[own].tocsr()
+    """The master's point that a slave node meets lies on the master, a gap away along the normal.
+
+    By mortar a mean over nodes of the slave may take the place of its node.
+    """
+    weight, (slave, master) = points.master[own].tocsr(), sides
+    flat, of_slave = slave.flat, np.isin(weight.indices, slave.facets)
+    if mortar:
+        jump = points.jump[own].tocsr()
+        means = jump.data[np.isin(jump.indices, slave.facets)]
+        if means.min(initial=0.0) < -EXACT or means.sum() > len(own) * (1.0 + EXACT):
+            yield "weights of the slave are no means"
     if np.abs(np.asarray(weight.sum(axis=1)) - 1.0).max(initial=0.0) > EXACT:
         yield "weights of the master do not sum to one"
-    if not np.isin(weight.indices[weight.data != 0.0], master.facets).all():
+    there = np.isin(weight.indices, master.facets) | (mortar & of_slave)
+    if not there[weight.data != 0.0].all():
         yield "weights lie on nodes that are not the master's"
     origin = whole.points.mean(axis=0)
     local = whole.points - origin
