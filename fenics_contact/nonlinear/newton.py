@@ -109,7 +109,7 @@ class TangentNewton:
     Attributes:
         tolerance: All relative residuals end below it: forces out of balance, openings of glued rows and
             supports, contact.
-        max_steps: Largest number of Newton steps of a load step; half of them may bring no progress.
+        max_steps: Largest number of Newton steps of a load step.
         max_products: Largest number of F-products of one Newton step.
         forcing: Largest residual of a linear system, relative to its start.
 
@@ -247,16 +247,12 @@ class _Run:
         """Adapt the forcing term and ρ. Collective.
 
         Raises:
-            ConvergenceError: Steps are used up, or residuals stand still or grow without bound.
+            ConvergenceError: Steps are used up, or residuals grow without bound.
         """
         worst, method = evaluation.residuals.worst, self._method
         previous = self._residuals[-1] if self._residuals else None
         self._residuals.append(worst)
-        late = self._residuals[-PATIENCE - 1 :]
-        stalled = len(late) > PATIENCE and min(late[1:]) > 0.5 * late[0]
-        # Near a loss of stability the active set alternates for ever: a shorter load step costs less.
-        stands = self._stalls + stalled >= max(3, method.max_steps // (2 * PATIENCE))
-        if stands or len(self.history) >= method.max_steps or not worst < 1e6:
+        if len(self.history) >= method.max_steps or not worst < 1e6:
             last = self.history[-1] if self.history else "no step"
             raise ConvergenceError(
                 f"Newton's method needs residuals below {method.tolerance:.1e}, got after "
@@ -274,7 +270,8 @@ class _Run:
             self._care = 1.0 if worst < 0.5 * previous else max(CARE * self._care, LEAST_CARE)
         least = 0.3 * method.tolerance / max(worst, method.tolerance)
         self._forcing = self._care * max(self._forcing, least)
-        if stalled:
+        late = self._residuals[-PATIENCE - 1 :]
+        if len(late) > PATIENCE and min(late[1:]) > 0.5 * late[0]:
             self._stalls += 1
             self._caution *= CAUTION if self._stalls > 1 else 1.0
             self._residuals = [worst]

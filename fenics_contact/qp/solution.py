@@ -108,6 +108,7 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
     feasible = problem.law.feasible(multiplier)
     mapped = feasible.project(multiplier - step * residual)
     free, error, needed = ~problem.between_supports, multiplier - mapped, step * problem.rhs
+    idle = free & (multiplier == 0.0) & (mapped != 0.0)
     sums = global_sum(
         problem.comm,
         *(_square(x[layout.normal]) for x in (multiplier, mapped)),
@@ -116,14 +117,15 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
         _square(multiplier),
         _square(problem.rhs),
         _square(product[layout.normal]),
-        *(_square(x[rows]) for x in (error, needed) for rows in (free, ~free)),
-        _square(step[free]),
+        *(_square(error[rows]) for rows in (free & ~idle, ~free, idle)),
+        *(_square(needed[rows]) for rows in (free, ~free)),
+        _square(step[idle]),
         problem.coarse.local(multiplier),
     )
     normal, normal_mapped, force, force_mapped = np.sqrt(sums[:4])
     jump, cancelled, load, everything, rhs, pressed = np.sqrt(sums[4:10])
-    distance, distance_held, closing, closing_held, stiff = np.sqrt(sums[10:15])
-    unbalanced = problem.coarse.norm(sums[15:] - problem.coarse.load)
+    distance, distance_held, distance_idle, closing, closing_held, stiff = np.sqrt(sums[10:16])
+    unbalanced = problem.coarse.norm(sums[16:] - problem.coarse.load)
     loads = problem.coarse.norm(problem.coarse.load)
     force_scale = max(normal, normal_mapped)
     if force_scale <= FORCE_FLOOR * max(force, force_mapped):
@@ -133,13 +135,14 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
     force_scale = max(force_scale, least.force)
     gluing_scale = max(cancelled, load, least.gluing) or rhs
     # Errors below the last places of all forces, and jumps of what the loads alone would open, or of what
-    # contact forces displace, are none: an interference alone may displace nothing at supports. Of bodies
-    # that supports move without forces, neither are jumps that are rounding of these motions.
-    rounding = LAST_PLACES * max(everything, closing, stiff * load)
-    distance = np.hypot(
+    # contact forces displace, are none: an interference alone may displace nothing at supports. Neither are
+    # jumps where nothing presses that are rounding of how far supports move bodies.
+    rounding = LAST_PLACES * max(everything, closing)
+    distance = np.linalg.norm([
         distance if distance > rounding else 0.0,
         distance_held if distance_held > max(rounding, LAST_PLACES * closing_held) else 0.0,
-    )
+        distance_idle if distance_idle > max(rounding, LAST_PLACES * stiff * load) else 0.0,
+    ])
     violation = global_max(problem.comm, feasible.violation(multiplier))
     return Residuals(
         natural=_ratio(distance, force_scale),

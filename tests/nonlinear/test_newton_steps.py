@@ -11,23 +11,13 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, LoadSequence, NewtonSteps, State, solve_scene
-from fenics_contact.errors import InvalidInputError, LoadStepError
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.fem.hyperelastic import HyperelasticMechanics
-from fenics_contact.gallery import block, half_disc
+from fenics_contact.gallery import block
 from fenics_contact.nonlinear import AutomaticSteps, TangentNewton, newton
 from fenics_contact.nonlinear.tangent_step import tangent_step
 from fenics_contact.qp import FaceNewton, solve
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    LoadStep,
-    NeoHooke,
-    RigidPlane,
-    Scene,
-    Support,
-    Surface,
-)
+from fenics_contact.scene import Body, LoadStep, NeoHooke, Scene
 from tests.models.deformed import patch_of
 from tests.nonlinear.scenes import cut, pressed, rounded
 
@@ -135,23 +125,6 @@ def test_tangents_are_assembled_only_where_they_are_factored(monkeypatch: pytest
         asked.clear()
         state = sequence.advance(LoadStep("press", supports=scene.supports))
     assert 0 < len(asked) == len(state.solution.history)
-
-
-@pytest.mark.parametrize(("given", "least", "most"), [(25, 10, 24), (60, 25, 59)])
-def test_a_load_step_whose_active_set_alternates_is_given_up_half_way(
-    given: int, least: int, most: int
-) -> None:
-    """Half a roll without its support of symmetry: contact at its rim opens and closes in turn, for ever."""
-    scene = Scene(
-        {"roll": Body(half_disc(5.0, 4), NeoHooke(3.0, 0.495, mean_dilatation=True))},
-        [Support("roll", "top", (0.0, -1.2))],
-        contacts=[ContactPair(Surface("roll", "contact"), RigidPlane((0, 0), (0, 1)), Coulomb(0.3))],
-    )
-    steps = AutomaticSteps(TangentNewton(max_steps=given), smallest=1.0)
-    words = "needs residuals below .* a flat side is a plane of symmetry .* see surface 'x0' of body 'roll'"
-    with pytest.raises(LoadStepError, match=words) as ended:
-        solve_scene(scene, MPI.COMM_SELF, steps=steps)
-    assert least <= len(ended.value.history) <= most
 
 
 def test_contact_is_solved_as_a_whole_on_the_way_without_asking_why_it_fails(
