@@ -121,7 +121,7 @@ LARGE_MUTATIONS = (
         "nonlinear/residuals.py",
         "FORCE_FLOOR = 1e-4",
         "FORCE_FLOOR = 1e-1",
-        ("tests/nonlinear/test_mortar.py::test_ironing_converges_quadratically",),
+        ("tests/nonlinear/test_starts.py::test_a_die_that_slides_starts_where_its_support_takes_it",),
     ),
     Mutation(
         "pressures of bodies that deform much are by undeformed area",
