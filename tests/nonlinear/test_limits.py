@@ -87,6 +87,19 @@ def test_rounding_alone_hides_nothing_of_a_small_load() -> None:
     assert np.abs(found.gather_displacement("block") - moved).max() < 1e-3 * np.abs(moved).max()
 
 
+def test_a_small_load_on_a_body_that_is_moved_far_is_balanced() -> None:
+    """Forces are compared with a small part alone of what would strain the body by its displacement."""
+    mesh, load = rectangle((0, 0), (1, 1), (4, 4)), [Traction("block", "x1", (3e-10, 1e-9))]
+    held = [Support("block", "x0", (3.0, -2.0))]
+    found, small = (
+        solve_scene(Scene({"block": Body(mesh, material)}, held, load), MPI.COMM_SELF)
+        for material in (NeoHooke(1.0, 0.3), PlaneStrain(1.0, 0.3))
+    )
+    strained = small.gather_displacement("block") - (3.0, -2.0)
+    off = found.gather_displacement("block") - (3.0, -2.0) - strained
+    assert np.abs(off).max() < 1e-3 * np.abs(strained).max()
+
+
 def turned(points: np.ndarray, angle: float) -> np.ndarray:
     """Displacement of points that turn about an axis through the centre of the unit cube."""
     c, s = np.cos(angle), np.sin(angle)
