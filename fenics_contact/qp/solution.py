@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import hypot
 
 import numpy as np
 
@@ -138,11 +139,11 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
     # contact forces displace, are none: an interference alone may displace nothing at supports. Neither are
     # jumps where nothing presses that are rounding of how far supports move bodies.
     rounding = LAST_PLACES * max(everything, closing)
-    distance = np.linalg.norm([
+    distance = hypot(
         distance if distance > rounding else 0.0,
         distance_held if distance_held > max(rounding, LAST_PLACES * closing_held) else 0.0,
         distance_idle if distance_idle > max(rounding, LAST_PLACES * stiff * load) else 0.0,
-    ])
+    )
     violation = global_max(problem.comm, feasible.violation(multiplier))
     return Residuals(
         natural=_ratio(distance, force_scale),
