@@ -131,7 +131,7 @@ if comm.rank == 0:
 #
 # ![Each cell's part of the estimated error](../docs/pictures/hertz_sphere_error.png)
 
-errors = states["mortar"].errors
+errors = states["mortar"].estimate_errors()
 if comm.rank == 0:
     print(f"errors of the mortar state in energy norm\n{errors}")
 

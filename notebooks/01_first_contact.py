@@ -176,7 +176,7 @@ assert np.all(contact.normal_force[closed] > 0)
 # sharp edges; the solver stops when its own error no longer matters beside it.
 
 # %%
-print(state.errors)
+print(state.estimate_errors())
 
 # %% [markdown]
 # ## To look at it elsewhere
@@ -195,7 +195,7 @@ print(write_vtu(state, "output/notebooks/first_contact", "tower"))
 # - `Coulomb(0.15)`: friction cannot carry a push of 3 kN under a load of 16 kN. The error says so, names
 #   the body and the direction in which it slides away.
 # - A push of 1500 N: the resultant stays in the middle third, and everything is in contact.
-# - A finer mesh, `(20, 20, 20)` cells: where does the contact begin, how does `state.errors` change, and
+# - A finer mesh, `(20, 20, 20)` cells: where does the contact begin, how do the errors change, and
 #   why does the largest pressure keep growing? (The edge of the tower is sharp: the pressure there has no
 #   finite limit.)
 # - Next notebook: [two chain links](02_chain_links_and_friction.ipynb), which are round, and friction with

@@ -99,9 +99,9 @@ for quantity in hertz.scene.quantities:
 # %% [markdown]
 # ## What the error consists of
 #
-# Every state carries its own errors, relative and in energy norm: `state.errors.algebraic` is a
-# certificate, an upper bound of what the solver left at the slip bounds of the state;
-# `state.errors.friction` estimates what is missing to Coulomb's law, `state.errors.discretisation` what
+# `state.estimate_errors()` has relative errors in energy norm: `algebraic` is a certificate, an upper
+# bound of what the solver left at the slip bounds of the state; `friction` estimates what is missing to
+# Coulomb's law, `discretisation` what
 # the mesh cannot represent. By default the solver stops as soon as its part is a tenth of that of the
 # mesh. A case with friction, the cylinders of Cattaneo and Mindlin:
 

@@ -75,7 +75,7 @@ def _figures(*states: State, **more: Any) -> Figures:
 
 def _balanced_figures(state: State) -> Figures:
     """Return the figures of a balanced state, which is as good as its mesh deserves, and its errors."""
-    errors, wanted = state.errors, state.tolerance
+    errors, wanted = state.estimate_errors(), state.tolerance
     solver = [errors.algebraic, errors.friction]
     found = _figures(state, estimate=[errors.discretisation, errors.geometry], certificate=solver)
     assert isinstance(wanted, Balanced)
@@ -227,7 +227,7 @@ def without_contact() -> Figures:
     cut = {name: bisection_partition(body.mesh, 3) for name, body in parts.items()}
     alone = Scene({"lower": parts["lower"]}, [held], [Traction("lower", "z1", load)])
     states = solve_scene(tied, COMM, partitions=cut, tolerance=TOLERANCE), solve_scene(alone, COMM)
-    return _figures(*states, estimate=[state.errors.discretisation for state in states])
+    return _figures(*states, estimate=[state.estimate_errors().discretisation for state in states])
 
 
 def heated_stack() -> Figures:

@@ -29,15 +29,16 @@ class StateErrors:
             `friction_error`; zero without it.
         discretisation: Estimate, not a bound, of the error of the mesh, see `discretisation_error`.
         geometry: Estimate, not a bound, of the error by the geometry of contact surfaces, see
-            `geometry_error`: the distance to the state of the true surfaces on the same mesh.
-        peak_by_geometry: Its effect on the largest contact pressure, relative to it.
+            `geometry_error`: the distance to the state of the true surfaces on the same mesh; NaN if not
+            estimated.
+        peak_by_geometry: Its effect on the largest contact pressure, relative to it, or NaN.
         norm: ‖u‖, [√(force · length)].
         by_body: Body name -> its part of `discretisation`; the sum of squares is its square.
         own_bounds: Whether slip bounds follow normal forces, so that `algebraic` refers to those of the
             state.
 
     Example:
-        >>> print(state.errors)  # doctest: +SKIP
+        >>> print(state.estimate_errors())  # doctest: +SKIP
         algebraic       0.0120 % (at most, at the slip bounds of the state)
         friction        0.0031 % (estimate)
         discretisation  4.2 % (estimate)
@@ -51,8 +52,8 @@ class StateErrors:
     by_body: Mapping[str, float]
     own_bounds: bool
     _estimate: DiscretisationError = field(repr=False)
-    geometry: float = 0.0
-    peak_by_geometry: float = 0.0
+    geometry: float = np.nan
+    peak_by_geometry: float = np.nan
 
     def with_geometry(self, energy: float, peak_pressure: float) -> StateErrors:
         """Return the errors with that of the geometry.
@@ -137,6 +138,8 @@ def state_errors(solver: SolverErrors, estimate: DiscretisationError, norm: floa
 
 
 def _in_percent(value: float, kind: str) -> str:
+    if np.isnan(value):
+        return "not estimated"
     return f"{100 * value:.2g} % ({kind})" if np.isfinite(value) else "unknown"
 
 

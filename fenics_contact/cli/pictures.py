@@ -127,7 +127,8 @@ def _decomposition(file: SceneFile, states: Mapping[str, State], state: State, p
 def _error(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
     from fenics_contact.viz import plot_error
 
-    parts = {body: state.errors.by_cell(body) for body in state.scene.bodies}
+    errors = state.estimate_errors(geometry=False)
+    parts = {body: errors.by_cell(body) for body in state.scene.bodies}
     plot_error(state, path, parts, title=file.title, units=units_of(file))
 
 

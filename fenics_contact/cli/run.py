@@ -112,7 +112,7 @@ def _write(file: SceneFile, state: State) -> None:
         write_xdmf(state, file.folder / "state.xdmf")
     if "vtx" in kinds:
         write_vtx(state, file.folder)
-    write_result(state, file.folder, more=_origin(file))
+    write_result(state, file.folder, more=_origin(file), errors=state.known_errors is not None)
 
 
 @contextmanager
@@ -164,7 +164,8 @@ def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str
         sequence.finish()
     desk.show(step_table(rows, file))
     _show(desk, file, state, f"{file.title}: after the last step")
-    write_result(state, file.folder, more={**_origin(file), "steps": _steps(rows, file)})
+    more = {**_origin(file), "steps": _steps(rows, file)}
+    write_result(state, file.folder, more=more, errors=state.known_errors is not None)
     _done(desk, checkpoint)
     return drawn
 

@@ -121,8 +121,7 @@ class DeformedState(State):
         """
         return self._contact_functions("contact_nominal_pressure")
 
-    @cached_property
-    def errors(self) -> StateErrors:  # type: ignore[override]
+    def estimate_errors(self, *, geometry: bool = True) -> StateErrors:
         """Refused: the bounds and estimates of `accuracy` are those of linear elasticity.
 
         Raises:

@@ -59,7 +59,7 @@ class State:
         contact: Result on the contact surfaces, replicated.
         energies: Energies of all bodies.
         seconds: Wall time of this rank by phase, of all work up to this state that shares its timer.
-        known_errors: Errors that were computed on the way, None if they were not needed; use `errors`.
+        known_errors: Errors estimated so far, by a balanced solve or by `estimate_errors`; None before.
         tolerance: Tolerance of the solution, a relative residual or `Balanced`; None where no solver
             iterated.
 
@@ -67,7 +67,7 @@ class State:
         >>> state = solve_scene(scene, comm)  # doctest: +SKIP
         >>> state.displacement["block"]  # a dolfinx Function on the block's own mesh  # doctest: +SKIP
         >>> state.contact.count(Status.SLIP)  # doctest: +SKIP
-        >>> print(state.errors)  # doctest: +SKIP
+        >>> print(state.estimate_errors())  # doctest: +SKIP
     """
 
     system: DualSystem | DirectSystem
@@ -84,11 +84,10 @@ class State:
         return in_lines(self, 25, 200)
 
     def _facts(self) -> dict[str, str]:
-        errors = self.__dict__.get("errors", self.known_errors)
         return {
             **answer_in_words(self.contact, self.solution, self.energies, self.counts),
             "seconds": ", ".join(f"{name} {spent:.2f}" for name, spent in self.seconds.items()),
-            **errors_in_words(errors and errors.in_words),
+            **errors_in_words(self.known_errors),
             **first_pairs(self.scene, self.contact),
         }
 
@@ -130,13 +129,19 @@ class State:
         """The time at which obstacles that move are where they are: with small displacements zero."""
         return 0.0
 
-    @cached_property
-    @collectively("State.errors", _comm)
-    def errors(self) -> StateErrors:
-        """Errors of the state by solver, friction law, mesh and geometry, in energy norm.
+    @collectively("State.estimate_errors", _comm)
+    def estimate_errors(self, *, geometry: bool = True) -> StateErrors:
+        """Bound or estimate the errors by solver, friction law, mesh and geometry, in energy norm.
 
-        Collective on first use. Where surfaces are known better than contact used them, or reconstructed, the
-        contact problem is solved once more to estimate the effect.
+        Collective. Costs at most one product and recovery of the stress, which a balanced solve has done
+        already; the error by the geometry up to two solutions of the contact problem with the same factors,
+        unless surfaces are flat or their shapes known and used. Estimates are kept in `known_errors`.
+
+        Args:
+            geometry: Whether to estimate that, too; else it is NaN unless it is known.
+
+        Raises:
+            ConvergenceError: If the solver fails on the better geometry.
         """
         from fenics_contact.accuracy import discretisation_error, solver_errors, state_errors
         from fenics_contact.contact.geometry_error import geometry_error
@@ -147,8 +152,11 @@ class State:
                 solver = solver_errors(self.system, self.solution)
                 estimate = discretisation_error(self.torn, self.conforming_displacement)
                 errors = state_errors(solver, estimate, self.energies.norm)
-            geometry = geometry_error(self.system, self.solution)
-        return errors.with_geometry(geometry.energy, geometry.peak_pressure)
+            if geometry and np.isnan(errors.geometry):
+                better = geometry_error(self.system, self.solution)
+                errors = errors.with_geometry(better.energy, better.peak_pressure)
+        object.__setattr__(self, "known_errors", errors)
+        return errors
 
     @cached_property
     def unheld(self) -> tuple[UnheldMotion, ...]:
@@ -165,9 +173,8 @@ class State:
     def conforming_displacement(self) -> np.ndarray:
         """Displacement, continuous across subdomains, used by all fields, shape (torn_size,), [length].
 
-        A solver satisfies gluing and supports up to its tolerance. Here copies of a node agree, being their
-        mean weighted by stiffness, and prescribed values are met exactly; distances and slips of the contact
-        points are those of `torn_displacement`. Collective on first use.
+        Copies of a node agree, being their mean weighted by stiffness, and prescribed values are met exactly;
+        distances and slips of contact points are those of `torn_displacement`. Collective on first use.
         """
         return self.system.conforming(self.torn_displacement)
 
@@ -265,8 +272,7 @@ class State:
     def gather_nodal_stress(self, body: str) -> np.ndarray:
         """Return the stress of a body at its nodes, averaged within one material, on every rank. Collective.
 
-        It is made of the displacements around each node and more accurate than the means of the cells, above
-        all on surfaces, where the largest stresses are.
+        Recovered from displacements around each node: on surfaces more accurate than means of cells.
 
         Returns:
             Shape (n_materials, n_nodes, 3, 3), materials in the order of `Body.materials`; NaN where a node
@@ -303,10 +309,8 @@ class State:
     def reactions(self, about: GivenVector | np.ndarray | None = None) -> Resultants:
         """Return force and moment that every support exerts on its body, in the scene's order. Collective.
 
-        They are the multipliers of the prescribed displacements less what contacts and ties exert on
-        prescribed components: exact in the sense that they balance the other forces (see `balance`), and as
-        accurate as the tolerance of the solver. A component that several supports prescribe at a node is
-        shared by the areas that belong to the node on their surfaces.
+        They balance the other forces (see `balance`), and are as accurate as the tolerance of the solver. A
+        component that several supports prescribe at a node is shared by its areas on their surfaces.
 
         Args:
             about: Point for all moments, shape (dim,), [length]; by default the centroid of the surface of
@@ -331,8 +335,6 @@ class State:
     def resultants(self, about: GivenVector | np.ndarray | None = None) -> PairResultants:
         """Return force and moment on the slave of every contact pair and tie. Collective.
 
-        The torque about an axis is `Resultant.torque`.
-
         Args:
             about: Point for all moments, shape (dim,), [length]; by default the centroid of each slave
                 surface.
@@ -344,8 +346,7 @@ class State:
         """Return loads, reactions and forces of rigid obstacles and what is missing between them. Collective.
 
         Args:
-            about: Point for all moments, shape (dim,), [length]; by default the middle of the box around all
-                bodies.
+            about: Point for all moments, shape (dim,), [length]; by default the middle of all bodies' box.
         """
         return force_balance(self.torn, self._nodal_forces, about, self._least_force)
 

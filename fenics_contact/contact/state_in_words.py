@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from fenics_contact.display import counted
 from fenics_contact.feti import DirectSolution
 from fenics_contact.qp import DualSolution
 from fenics_contact.scene import ContactPair, Scene
+
+if TYPE_CHECKING:
+    from fenics_contact.accuracy import StateErrors
 
 
 def answer_in_words(
@@ -33,11 +37,11 @@ def answer_in_words(
     }
 
 
-def errors_in_words(errors: Mapping[str, str] | None) -> dict[str, str]:
+def errors_in_words(errors: StateErrors | None) -> dict[str, str]:
     """Return the errors of a state by name, or where to get them."""
     if errors is None:
-        return {"errors": "not estimated yet: ask for state.errors"}
-    return {f"error, {name}": words for name, words in errors.items()}
+        return {"errors": "not estimated yet: call state.estimate_errors()"}
+    return {f"error, {name}": words for name, words in errors.in_words.items()}
 
 
 def first_pairs(scene: Scene, contact: ContactResult, most: int = 8) -> dict[str, str]:

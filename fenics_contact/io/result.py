@@ -25,6 +25,7 @@ from fenics_contact.scene import SolverKind
 if TYPE_CHECKING:
     from mpi4py import MPI
 
+    from fenics_contact.accuracy import StateErrors
     from fenics_contact.optimize import Result
     from fenics_contact.shape import LoadPath, ShapeProblem
 
@@ -63,7 +64,8 @@ that was read from a checkpoint says so and has no tolerance |
 lists, one entry per step of the solver; empty for a state that was read from a checkpoint |
     | ``energies`` | ``strain``, ``load``, ``friction``, ``dual``, ``total_potential``, ``primal``; \
 None where materials dissipate or are nonlinear |
-    | ``errors`` | ``algebraic``, ``friction``, ``discretisation``, ``by_body``; None if unknown |
+    | ``errors`` | ``algebraic``, ``friction``, ``discretisation``, ``geometry``, \
+``peak_pressure_by_geometry``, ``by_body``; None if unknown |
     | ``contact`` | one entry per pair: ``points``, ``open``, ``stick``, ``slip``, ``force`` on the slave, \
 ``normal_force``, ``peak_pressure``, where bodies deform much ``peak_nominal_pressure``, ``area``, \
 ``smallest_gap``, ``largest_slip`` in the last load step; without friction closed points count as ``slip`` |
@@ -82,8 +84,9 @@ point ``about`` |
         folder: Output folder; created.
         name: Name of the file without ".json". A file of that name is replaced when the new one is complete.
         more: Further results: numbers, text, arrays, by name.
-        errors: Whether to compute the state's errors if they are not known yet, at the cost of a few
-            products; a state that was solved without a fixed tolerance knows them.
+        errors: Whether to estimate the state's errors first, see `State.estimate_errors` for the cost; else
+            those known already are written, as a state that was solved without a fixed tolerance has but for
+            that of the geometry.
 
     Returns:
         The file; `read_result` reads it.
@@ -108,7 +111,8 @@ def result_record(
     comm, unheld, read_off = state.torn.decomposition.comm, state.unheld, _read_off(state)
     with together(comm):
         record = {**_head("state", comm), **_state_record(state, unheld), **read_off}
-    record["errors"] = _errors(state) if errors or _knows_errors(state) else None
+    found = state.estimate_errors() if errors else state.known_errors
+    record["errors"] = None if found is None else _errors(found)
     return {**record, "more": dict(more or {})}
 
 
@@ -181,7 +185,8 @@ an evaluation; None where a trial point was rejected as invalid |
             "constraints": readable(result.constraints),
             "history": _history(result),
         }
-    record["errors"] = _errors(best.state) if _knows_errors(best.state) else None
+    known = best.state.known_errors
+    record["errors"] = None if known is None else _errors(known)
     return write_json(target, {**record, "more": dict(more or {})}, comm=comm)
 
 
@@ -269,14 +274,7 @@ def _pair(state: State, number: int) -> dict[str, Any]:
     }
 
 
-def _knows_errors(state: State) -> bool:
-    """Return whether the errors are known: computing them takes products with F."""
-    return state.known_errors is not None or "errors" in vars(state)
-
-
-def _errors(state: State) -> dict[str, Any]:
-    """Return the errors of a state. Collective if they are not known."""
-    errors = state.errors
+def _errors(errors: StateErrors) -> dict[str, Any]:
     return {
         "algebraic": readable(errors.algebraic),
         "friction": readable(errors.friction),

@@ -100,7 +100,7 @@ def _accuracy(record: Record) -> dict[str, Any]:
     errors = record.get("errors") or {}
     facts = {f"residual, {name}": value for name, value in (record.get("residuals") or {}).items()}
     facts |= {
-        f"error, {name.replace('_', ' ')}": value
+        f"error, {name.replace('_', ' ')}": "not estimated" if value is None else value
         for name, value in errors.items()
         if not isinstance(value, Mapping)
     }

@@ -61,7 +61,7 @@ def measured(
 
 def error_parts(state: State) -> dict[str, float | None]:
     """Return the three parts of a state's error, relative to its energy norm. Collective."""
-    errors = state.errors
+    errors = state.estimate_errors(geometry=False)
     parts = {name: float(getattr(errors, name)) for name in ("algebraic", "friction", "discretisation")}
     # Without an admissible pair the bound is infinite, which JSON cannot represent.
     return {name: value if np.isfinite(value) else None for name, value in parts.items()}

@@ -18,7 +18,7 @@ def main(comm: MPI.Comm) -> None:
     for name in NAMES:
         scene = CASES[name].make()
         state = solve_scene(scene, comm, partitions=CASES[name].cut(scene), solver=solver_of(scene, 1e-3))
-        real, errors = measured(state), state.errors
+        real, errors = measured(state), state.estimate_errors()
         found[name] = {
             "bound": real.bound,
             "error": real.error,

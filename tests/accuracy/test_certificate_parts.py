@@ -146,7 +146,7 @@ def test_the_estimate_by_the_law_of_friction_is_needed(scene: Scene, solver: Fac
     found = measured(state)
     assert found.error <= found.bound
     assert found.bound < found.whole <= found.bound + found.friction
-    errors = state.errors
+    errors = state.estimate_errors()
     assert "(at most, at the slip bounds of the state)" in str(errors)
     assert errors.algebraic + errors.friction == pytest.approx(found.bound + found.friction, rel=0.02)
 
@@ -216,7 +216,7 @@ def test_given_slip_bounds_are_never_raised() -> None:
     estimate = discretisation_error(state.torn, state.conforming_displacement)
     told = str(state_errors(solver_errors(state.dual, weak), estimate, state.energies.norm))
     assert "algebraic       unknown" in told
-    assert "(at most)" in str(state.errors)
+    assert "(at most)" in str(state.estimate_errors())
 
 
 def test_slip_bounds_that_follow_normal_forces_are_raised_where_these_are_too_weak() -> None:

@@ -245,7 +245,7 @@ def test_the_bound_of_the_error_holds() -> None:
         return float(0.5 * u @ (whole.K @ u) - work)
 
     error = np.sqrt(2 * (potential(state) - potential(exact)))
-    bound = state.errors.algebraic * state.energies.norm
+    bound = state.estimate_errors().algebraic * state.energies.norm
     assert 1e-9 < error <= bound < 20 * error
     assert exact.energies.total_potential == pytest.approx(potential(exact), rel=1e-10)
     assert exact.energies.dual == pytest.approx(exact.energies.primal, rel=1e-9)

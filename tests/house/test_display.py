@@ -130,8 +130,8 @@ def objects() -> dict[str, Any]:
     weights = [BodyForce("block", (0, 0, float(k))) for k in range(50)]
     roots = [
         shape.function(TotalPotential()),
-        shape, point, state, scene, scene.plan(), state.errors, state.gather_fields("block"), partials,
-        state.balance(), state.resultants(), find_sites(state.torn),
+        shape, point, state, scene, scene.plan(), state.estimate_errors(), partials,
+        state.gather_fields("block"), state.balance(), state.resultants(), find_sites(state.torn),
         solve_adjoint(state, partials, linearise_face(state, WeakChoice.RELEASED)),
         certify(state.dual, state.dual_solution), solver_errors(state.system, state.solution),
         Balanced(), FixedPoint(FaceNewton()), LoadSequence(shape.contact), AdaptiveTolerance(),
@@ -239,7 +239,7 @@ def test_a_printed_state_says_what_was_found_and_what_it_cost() -> None:
 def test_printing_a_state_estimates_no_errors() -> None:
     state = solve_scene(objects()["Scene"], MPI.COMM_SELF, tolerance=1e-4)
     assert "errors" in str(state)
-    assert "ask for state.errors" in str(state)
+    assert "call state.estimate_errors()" in str(state)
     assert "errors" not in state.__dict__
 
 

@@ -116,7 +116,7 @@ def test_errors_are_told_where_they_are_known_or_asked_for(tmp_path: Path) -> No
     state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-8)
     assert read_result(write_result(state, tmp_path))["errors"] is None
     asked = read_result(write_result(state, tmp_path, errors=True))["errors"]
-    assert asked["discretisation"] == state.errors.discretisation > 0.0
+    assert asked["discretisation"] == state.estimate_errors().discretisation > 0.0
     assert read_result(write_result(state, tmp_path))["errors"] == asked, "now they are known"
     direct = read_result(tmp_path)
     assert direct["solver"]["kind"] == "sparse factorisation of one body"

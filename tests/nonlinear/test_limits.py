@@ -166,7 +166,7 @@ def test_a_deformed_state_says_what_it_has() -> None:
     words = str(solve_scene(pressed(rounded(2), 0.05), MPI.COMM_SELF))
     assert "out of balance" in words
     assert "compare two meshes" in words
-    assert "ask for state.errors" not in words
+    assert "call state.estimate_errors()" not in words
 
 
 @pytest.mark.parametrize("friction", [None, Coulomb(0.3)])

@@ -67,7 +67,7 @@ def allowed(state: State, tolerance: float | None) -> float:
     """
     if tolerance is None:
         return MOST
-    told = state.errors.algebraic + state.errors.friction
+    told = state.estimate_errors().algebraic + state.estimate_errors().friction
     return min(MOST, 1e3 * max(tolerance, told if np.isfinite(told) else 0.0))
 
 
