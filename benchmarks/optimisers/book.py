@@ -132,7 +132,7 @@ class Book:
         self.bounds, self.constraints, self.start = posed.bounds, posed.constraints, posed.start
         self.budget, self.rows, self.designs, self.notes = budget, [], [], []
         self._held, self._width = posed.held, float(np.max(posed.bounds[1] - posed.bounds[0]))
-        self._state_products, self._began = 0, perf_counter()
+        self._began = perf_counter()
 
     rows: list[tuple[float, float, int, float]]
     designs: list[np.ndarray]
@@ -159,7 +159,6 @@ class Book:
     def value(self, alpha: np.ndarray) -> float:
         """Return J alone, without an adjoint."""
         state = self._told(alpha, self.problem.state_of)
-        self._state_products += state.solution.products
         value = self._judge(state)
         self._write(alpha, value)
         return value
@@ -188,6 +187,5 @@ class Book:
             (row,) = np.asarray(self.constraints.matrix)
             outside = max(outside, float(row @ alpha) / float(np.linalg.norm(row)))
         violation = max(outside, 0.0) / self._width
-        products = self.problem.products + self._state_products
-        self.rows.append((float(value), violation, products, perf_counter() - self._began))
+        self.rows.append((float(value), violation, self.problem.products, perf_counter() - self._began))
         self.designs.append(np.array(alpha))

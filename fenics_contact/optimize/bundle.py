@@ -103,9 +103,6 @@ class Bundle:
 
         Args:
             gradient: The centre's subgradient, shape (n,), scaled variables.
-            change: Change of the centre's value.
-            noise: Its new error.
-            doubtful: Whether its slope may not be a subgradient.
             pushes: Multiples of gradients of equalities that it contains, shape (r,).
         """
         gradients, errors, noises = self.gradients.copy(), self.errors + change, self.noise.copy()
@@ -118,8 +115,6 @@ class Bundle:
 
         Args:
             step: Move of the centre, shape (n,), scaled variables.
-            change: Change of J.
-            locality: c at the new centre.
             own: Number of planes at the end that were found at the new centre.
 
         Returns:
@@ -143,7 +138,6 @@ class Bundle:
 
         Args:
             weights: Multipliers of the planes, shape (m,), not negative, sum one.
-            room: Largest number of planes, at least two.
 
         Returns:
             The reduced bundle; row 0 stays where it is.

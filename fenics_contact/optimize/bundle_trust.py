@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.errors import InvalidDesignError, InvalidInputError, tell
 from fenics_contact.optimize.bundle import Bundle
-from fenics_contact.optimize.care import surely, without_doubt
+from fenics_contact.optimize.care import verified, with_verified_centre
 from fenics_contact.optimize.conclusion import conclude
 from fenics_contact.optimize.evaluation import Known, evaluate_problem
 from fenics_contact.optimize.first_centre import first_centre
@@ -46,13 +46,9 @@ _RADIUS_LEAST = 1e-8  # least one, in lengths of the problem
 _T_LEAST, _T_MOST = 1e-10, 1e4  # range of t, in units of the first t
 _FIRST_SUBGRADIENT = 0.01  # relative error that the first subgradient of an inexact function may have
 _SLOPE_SHARE = 0.1  # error of an inexact subgradient along a step, relative to the predicted decrease
-_OF_THE_MODEL = (
-    Reason.CONVERGED,
-    Reason.STATIONARY,
-    Reason.NO_DESCENT,
-    Reason.INFEASIBLE,
-)  # based on subgradients alone
-_BESIDE = "a gradient from beside, as the centre lies on a kink"
+# Based on subgradients alone.
+_OF_THE_MODEL = (Reason.CONVERGED, Reason.STATIONARY, Reason.NO_DESCENT, Reason.INFEASIBLE)
+_GRADIENT_NEAR = "a gradient nearby, as the centre lies on a kink"
 
 
 @dataclass(frozen=True)
@@ -249,7 +245,7 @@ def _evaluated(
     number = state.evaluations + 1
     penalties = {k: one.penalty for k, one in zip(problem.inequalities, state.soft, strict=True)}
     evaluation = evaluate_problem(problem, x, number, accuracy, penalties, known)
-    return surely(problem, evaluation, number) if state.careful else evaluation
+    return verified(problem, evaluation, number) if state.careful else evaluation
 
 
 def _guarded_step(method: BundleTrust, problem: PosedProblem, state: MethodState) -> tuple[Step, MethodState]:
@@ -314,11 +310,12 @@ def _reconsidered(
 ) -> tuple[MethodState, Reason | None]:
     """Drop the doubtful subgradients on which the method would stop, and test again."""
     if not state.centre.doubtful:
-        return _iterated(method, problem, without_doubt(problem, state))
+        return _iterated(method, problem, with_verified_centre(problem, state))
     if state.evaluations >= method.max_evaluations:
         return state, Reason.EVALUATION_LIMIT
-    sure = without_doubt(problem, state)
-    return replace(sure, history=recorded(problem, state, step, StepKind.REFINED, sure.centre, _BESIDE)), None
+    sure = with_verified_centre(problem, state)
+    history = recorded(problem, state, step, StepKind.REFINED, sure.centre, _GRADIENT_NEAR)
+    return replace(sure, history=history), None
 
 
 def _reason_to_stop(

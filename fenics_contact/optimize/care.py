@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fenics_contact.optimize.evaluation import beside_problem
+from fenics_contact.optimize.evaluation import with_gradients_near
 from fenics_contact.optimize.merit import merit_planes
 from fenics_contact.optimize.objective import Evaluation
 from fenics_contact.optimize.problem import PosedProblem
@@ -19,35 +19,33 @@ _NEAR = 1e-2  # distance to a neighbour, in lengths of the problem
 _ATTEMPTS = 8  # directions that are tried until one yields half the distance
 
 
-def surely(problem: PosedProblem, given: Evaluation, number: int) -> Evaluation:
+def verified(problem: PosedProblem, given: Evaluation, number: int) -> Evaluation:
     """Return an evaluation whose subgradient is valid, as far as the function knows.
 
     At almost every point a locally Lipschitz function has a gradient, and limits of such gradients at points
     that tend to x are Clarke subgradients at x: the gradient near x in a generic direction approximates one
     of them.
 
-    Args:
-        problem: The problem.
-        given: Value and subgradient, doubtful or not.
-        number: Count of the evaluation, for messages.
-
     References:
         J. V. Burke, A. S. Lewis, M. L. Overton, A robust gradient sampling algorithm for nonsmooth, nonconvex
         optimization, SIAM J. Optim. 15 (2005) 751-779.
     """
-    return beside_problem(problem, given, neighbour(problem, given.x), number) if given.doubtful else given
+    return (
+        with_gradients_near(problem, given, neighbour(problem, given.x), number) if given.doubtful else given
+    )
 
 
-def without_doubt(problem: PosedProblem, state: MethodState) -> MethodState:
+def with_verified_centre(problem: PosedProblem, state: MethodState) -> MethodState:
     """Return the state with a verified centre, without doubtful planes, careful from now on.
 
     A proximal parameter that wrong predictions have reduced is reset.
     """
-    centre = surely(problem, state.centre, state.evaluations + 1)
+    centre = verified(problem, state.centre, state.evaluations + 1)
     planes = merit_planes(problem, centre)
     bundle = state.bundle.refined(planes[0].gradient, 0.0, centre.error, pushes=planes[0].pushes)
     soft = [
-        one.refined(plane, False).without_doubt() for one, plane in zip(state.soft, planes[1:], strict=True)
+        one.refined(plane, False).without_doubtful_planes()
+        for one, plane in zip(state.soft, planes[1:], strict=True)
     ]
     trust = replace(state.trust, t=state.first_t) if state.trust.exhausted else state.trust
     remaining = bundle.chosen(np.flatnonzero(~bundle.doubtful))

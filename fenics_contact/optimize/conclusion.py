@@ -17,12 +17,6 @@ _LOG = logging.getLogger(__name__)
 def conclude(problem: PosedProblem, state: MethodState, reason: Reason, *, raises: bool) -> Result:
     """Return the result at the centre.
 
-    Args:
-        problem: The problem.
-        state: The last state.
-        reason: Why the method stops.
-        raises: Whether a stop that is no success raises.
-
     Raises:
         NotConvergedError: Then, with the history and the result.
     """

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.optimize.contradiction import contradicting
-from fenics_contact.optimize.from_scipy import rows_of
-from fenics_contact.optimize.nonlinear import NonlinearConstraint
+from fenics_contact.optimize.nonlinear import NonlinearConstraint, is_nonlinear
 from fenics_contact.optimize.quadratic_program import shortest, unit_rows
 
 if TYPE_CHECKING:
@@ -56,17 +56,6 @@ class Bounds:
     lower: ArrayLike
     upper: ArrayLike
 
-    def to_scipy(self, *, keep_feasible: bool = False) -> scipy.optimize.Bounds:
-        """Return the box as SciPy's Bounds.
-
-        Args:
-            keep_feasible: Whether SciPy methods that support this never leave the box.
-        """
-        from scipy.optimize import Bounds as ScipyBounds
-
-        lower, upper = np.array(self.lower, dtype=float), np.array(self.upper, dtype=float)
-        return ScipyBounds(lower, upper, keep_feasible)
-
 
 @displayed
 @dataclass(frozen=True)
@@ -91,17 +80,6 @@ class LinearConstraints:
     limit: ArrayLike
     equality_matrix: ArrayLike | None = None
     equality_value: ArrayLike | None = None
-
-    def to_scipy(self) -> list[scipy.optimize.LinearConstraint]:
-        """Return SciPy's constraints −∞ ≤ A x ≤ b and e ≤ E x ≤ e, omitting those without rows.
-
-        Raises:
-            InvalidInputError: If a shape does not fit.
-        """
-        from scipy.optimize import LinearConstraint
-
-        n = np.shape(self.matrix)[-1] if np.ndim(self.matrix) else 0
-        return [LinearConstraint(*rows) for rows in ranges(feasible_set(n, None, self))]
 
 
 @dataclass(frozen=True)
@@ -232,26 +210,12 @@ def _residual(matrix: Array, limit: Array, x: Array) -> tuple[Array, Array]:
     return matrix @ x - limit, _FEASIBILITY * np.where(size > 0.0, size, 1.0) + 10.0 * rounding
 
 
-def ranges(allowed: FeasibleSet) -> list[tuple[Array, Array, Array]]:
-    """Return the rows as low ≤ matrix x ≤ high, inequalities and equalities apart, without empty ones."""
-    sides = [
-        (allowed.matrix, np.full(len(allowed.limit), -np.inf), allowed.limit),
-        (allowed.equality_matrix, allowed.equality_value, allowed.equality_value),
-    ]
-    return [side for side in sides if len(side[0])]
-
-
 def feasible_set(
     n: int,
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
     constraints: Constraints | None = None,
 ) -> FeasibleSet:
     """Check the caller's constraints and fill in the defaults.
-
-    Args:
-        n: Number of variables.
-        bounds: Box, or None for none.
-        constraints: Rows, or those of SciPy, or None for none.
 
     Returns:
         The feasible set; the caller's arrays are copied.
@@ -269,13 +233,54 @@ def feasible_set(
 
 def _checked_rows(n: int, given: Any) -> tuple[Array, Array, Array, Array]:
     """Return A, b, E, e of linear constraints in either form."""
-    rows = given if isinstance(given, LinearConstraints) else LinearConstraints(*rows_of(given, n))
+    rows = given if isinstance(given, LinearConstraints) else _of_scipy(given, n)
     matrix, limit = _rows(n, rows.matrix, rows.limit, "A", "b")
     if (rows.equality_matrix is None) != (rows.equality_value is None):
         raise InvalidInputError("an equality needs both equality_matrix and equality_value, got only one")
     if rows.equality_matrix is None or rows.equality_value is None:
         return matrix, limit, np.zeros((0, n)), np.zeros(0)
     return matrix, limit, *_rows(n, rows.equality_matrix, rows.equality_value, "E", "e")
+
+
+def _of_scipy(given: Any, n: int) -> LinearConstraints:
+    """Return a `scipy.optimize.LinearConstraint`: a row for each finite limit, one where both are equal."""
+    from scipy.optimize import LinearConstraint
+
+    if not isinstance(given, LinearConstraint):
+        raise InvalidInputError(_what_to_give(given))
+    dense = given.A.toarray() if sp.issparse(given.A) else given.A
+    matrix = np.atleast_2d(np.asarray(dense, dtype=float))
+    low, high = (np.broadcast_to(np.asarray(side, dtype=float), len(matrix)) for side in (given.lb, given.ub))
+    if matrix.shape[1] != n:
+        raise InvalidInputError(
+            f"a LinearConstraint must have a matrix of {n} columns, one for each variable, got shape "
+            f"{matrix.shape}"
+        )
+    if np.isnan(low).any() or np.isnan(high).any() or (low > high).any():
+        raise InvalidInputError(
+            f"a LinearConstraint must have lb <= ub in every row, got lb {low} and ub {high}: exchange them"
+        )
+    equal = low == high
+    above, below = np.isfinite(high) & ~equal, np.isfinite(low) & ~equal
+    rows, limits = np.vstack([matrix[above], -matrix[below]]), np.concatenate([high[above], -low[below]])
+    return LinearConstraints(rows, limits, matrix[equal], high[equal])
+
+
+def _what_to_give(given: Any) -> str:
+    if is_nonlinear(given):
+        return (
+            "points are projected onto linear constraints only, got a NonlinearConstraint: leave it out, and "
+            "let minimize restore it with restore=True"
+        )
+    if isinstance(given, dict):
+        return (
+            "constraints must be objects, got a dict: write NonlinearConstraint(fun, lower=0.0) for fun(x) "
+            ">= 0, where fun returns value and gradient, or let a method of SciPy keep it (optimize.ForScipy)"
+        )
+    return (
+        "constraints must be LinearConstraints or NonlinearConstraint, or SciPy's, or a list of them, got "
+        f"a {type(given).__name__}: write LinearConstraints(A, b) for A x <= b"
+    )
 
 
 def _box(n: int, bounds: Bounds | tuple[ArrayLike, ArrayLike] | None) -> tuple[Array, Array]:

@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenics_contact.optimize.nonlinear import NonlinearConstraint
-from fenics_contact.optimize.objective import Accuracy, Evaluation, beside, can_be_inexact, evaluate
+from fenics_contact.optimize.objective import (
+    Accuracy,
+    Evaluation,
+    can_be_inexact,
+    evaluate,
+    with_gradient_near,
+)
 from fenics_contact.optimize.problem import PosedProblem
 
 Array = NDArray[np.float64]
@@ -38,12 +44,8 @@ def evaluate_problem(
     again.
 
     Args:
-        problem: The problem.
         x: Point, shape (n,).
-        number: Count of this evaluation, for messages.
-        accuracy: Accuracy requested from inexact functions.
         penalties: Weights of inequalities in the merit function by their numbers, units of J.
-        known: What is known of constraints at x already.
 
     Raises:
         InvalidDesignError: If one of them does not exist at x.
@@ -71,17 +73,16 @@ def with_constraints(found: Evaluation, own: list[Evaluation]) -> Evaluation:
     )
 
 
-def beside_problem(problem: PosedProblem, given: Evaluation, end: Array, number: int) -> Evaluation:
+def with_gradients_near(problem: PosedProblem, given: Evaluation, end: Array, number: int) -> Evaluation:
     """Return an evaluation with nearby gradients in place of those that may not be subgradients.
 
     Args:
-        problem: The problem.
-        given: The evaluation, doubtful or not.
         end: A feasible point near it, in a generic direction, shape (n,).
-        number: Count of the evaluation, for messages.
     """
-    found, slopes = beside(problem.fun, given, end, number), given.slopes.copy()
+    found, slopes = with_gradient_near(problem.fun, given, end, number), given.slopes.copy()
     for k, constraint in enumerate(problem.nonlinear):
         own = replace(given, value=float(given.constraints[k]), subgradient=slopes[k])
-        slopes[k] = beside(constraint.fun, own, end, number, f"fun of {constraint.name}").subgradient
+        slopes[k] = with_gradient_near(
+            constraint.fun, own, end, number, f"fun of {constraint.name}"
+        ).subgradient
     return replace(found, slopes=slopes, doubtful=False)

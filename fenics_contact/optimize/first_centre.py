@@ -15,11 +15,6 @@ from fenics_contact.optimize.restoration import restored
 def first_centre(problem: PosedProblem, subgradient: float, feasibility: float) -> Evaluation:
     """Evaluate the starting point, corrected to meet the equalities where it need not be feasible.
 
-    Args:
-        problem: The problem.
-        subgradient: Largest relative error of the first subgradient.
-        feasibility: Largest violation of nonlinear constraints, relative to their sizes.
-
     Raises:
         InvalidDesignError: If a function does not exist there, or no point near it meets the equalities.
         InvalidInputError: If it violates nonlinear constraints although it must not.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
-from fenics_contact.optimize.constraints import Bounds, Constraints, ranges
+from fenics_contact.optimize.constraints import Bounds, Constraints
 from fenics_contact.optimize.evaluation import evaluate_constraint
 from fenics_contact.optimize.nonlinear import NonlinearConstraint, scaled_constraints
 from fenics_contact.optimize.objective import Evaluation, Fun, evaluate, require_finite
@@ -238,13 +238,18 @@ class ForScipy:
         return ScipyBounds(allowed.lower / scale, allowed.upper / scale, keep_feasible)
 
     def _rows(self, with_box: bool) -> list[Any]:
-        """All rows in scaled variables, optionally with those of the box, then without equalities."""
+        """All rows in scaled variables, of length one; with those of the box no equalities."""
+        from scipy.optimize import LinearConstraint
+
         allowed, scale = self._problem.allowed, self._problem.scale
-        rows = ranges(allowed)
+        free = np.full(len(allowed.limit), -np.inf)
+        rows = [(allowed.matrix, free, allowed.limit)]
+        rows.append((allowed.equality_matrix, allowed.equality_value, allowed.equality_value))
         if with_box:
             rows.append((np.eye(scale.size), allowed.lower, allowed.upper))
             rows = [half for row in rows for half in _from_both_sides(*row)]
-        return [_linear_constraint(matrix * scale, below, above) for matrix, below, above in rows]
+        scaled = (unit_rows(matrix * scale, below, above) for matrix, below, above in rows if len(matrix))
+        return [LinearConstraint(*row) for row in scaled]
 
 
 class _Remembered:
@@ -281,17 +286,7 @@ class _Remembered:
 
 
 def _from_both_sides(matrix: Array, below: Array, above: Array) -> list[tuple[Array, Array, Array]]:
-    """Return rows of which none is an equality, which COBYLA does not take: these are bounded twice."""
+    """Return rows without equalities, which COBYLA does not take: these are bounded twice."""
     equal = below == above
     upper = np.full(int(equal.sum()), -np.inf), above[equal]
-    return [
-        (matrix, below, np.where(equal, np.inf, above)),
-        *([(matrix[equal], *upper)] if equal.any() else []),
-    ]
-
-
-def _linear_constraint(matrix: Array, below: Array, above: Array) -> scipy.optimize.LinearConstraint:
-    """Return below ≤ matrix z ≤ above with rows of length one."""
-    from scipy.optimize import LinearConstraint
-
-    return LinearConstraint(*unit_rows(matrix, below, above))
+    return [(matrix, below, np.where(equal, np.inf, above)), (matrix[equal], *upper)]

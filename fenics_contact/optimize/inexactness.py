@@ -60,9 +60,6 @@ def demand(worth: float, reach: float, norm: float, shares: tuple[float, float])
     """Return the accuracy that a decision needs.
 
     Args:
-        worth: Decrease of J that the decision is about.
-        reach: Length of the step that it is about, scaled variables.
-        norm: Length of the centre's subgradient, scaled variables.
         shares: Fractions of the decrease by which the value and the step's slope may be wrong.
     """
     slope = norm * reach

@@ -72,10 +72,6 @@ def with_pieces(
     """Return the bundle with the planes of other functions of which J is the largest, see `Pieced`.
 
     Args:
-        bundle: The bundle.
-        problem: The problem.
-        evaluation: Evaluation of a trial point.
-        centre: J at the centre.
         move: The step from there to the trial point, shape (n,), scaled variables.
     """
     for value, slope in zip(map(float, evaluation.pieces), evaluation.piece_slopes, strict=True):
@@ -99,10 +95,7 @@ def first_soft(
     """Return the inequalities at the start, their penalty a multiple of the ratio of the gradients.
 
     Args:
-        planes: Planes of J and of the inequalities.
         locality: Locality of a plane in units of the length of its gradient.
-        doubtful: Whether the planes may not belong to subgradients.
-        factor: The multiple.
     """
     size = factor * (planes[0].steepness or 1.0)
     return tuple(

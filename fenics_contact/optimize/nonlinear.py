@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from fenics_contact.display import displayed
@@ -89,6 +92,48 @@ class NonlinearConstraint:
         return (above, 1.0 / self.size) if self.equality or above >= below else (below, -1.0 / self.size)
 
 
+def is_nonlinear(given: Any) -> bool:
+    """Return whether a constraint is nonlinear, this package's or SciPy's; without importing SciPy's."""
+    return isinstance(given, NonlinearConstraint) or (
+        type(given).__name__ == "NonlinearConstraint" and hasattr(given, "jac")
+    )
+
+
+def named_constraints(given: Sequence[Any], start: Array) -> tuple[NonlinearConstraint, ...]:
+    """Return nonlinear constraints, SciPy's component by component, with a name for each."""
+    groups = ([one] if isinstance(one, NonlinearConstraint) else _components(one, start) for one in given)
+    found = [one for group in groups for one in group]
+    return tuple(replace(one, name=one.name or f"constraint {k}") for k, one in enumerate(found))
+
+
+def _components(given: Any, start: Array) -> list[NonlinearConstraint]:
+    """Return the components of a `scipy.optimize.NonlinearConstraint`, whose function exists at ``start``."""
+    if not callable(given.jac):
+        raise InvalidInputError(
+            f"a NonlinearConstraint must have its derivative as the function jac, got {given.jac!r}: give "
+            "it, or fenics_contact.optimize.NonlinearConstraint with a function x -> (value, subgradient)"
+        )
+    values = np.atleast_1d(np.asarray(given.fun(start.copy()), dtype=float))
+    if np.size(given.lb) not in (1, values.size) or np.size(given.ub) not in (1, values.size):
+        raise InvalidInputError(
+            f"a NonlinearConstraint with {values.size} components must have as many limits, or one for all, "
+            f"got lb {given.lb} and ub {given.ub}"
+        )
+    low, high = (
+        np.broadcast_to(np.asarray(side, dtype=float), values.shape) for side in (given.lb, given.ub)
+    )
+    return [
+        NonlinearConstraint(partial(_component, given, k), float(high[k]), float(low[k]))
+        for k in range(values.size)
+    ]
+
+
+def _component(given: Any, k: int, x: Array) -> tuple[float, Array]:
+    derivative = given.jac(x)
+    rows = np.atleast_2d(derivative.toarray() if sp.issparse(derivative) else np.asarray(derivative))
+    return float(np.atleast_1d(given.fun(x))[k]), rows[k]
+
+
 @displayed
 @dataclass(frozen=True)
 class ConstraintValue:
@@ -161,7 +206,6 @@ def scaled_constraints(constraints: Sequence[NonlinearConstraint], values: Array
     """Return constraints in units of their sizes.
 
     Args:
-        constraints: The constraints.
         values: Their values c, shape (k,).
     """
     pairs = [constraint.excess(float(value)) for constraint, value in zip(constraints, values, strict=True)]

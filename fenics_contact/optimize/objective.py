@@ -18,12 +18,16 @@ Fun = Callable[[Array], tuple[float, ArrayLike]]
 _LOG = logging.getLogger(__name__)
 
 
-@runtime_checkable
-class Inexact(Protocol):
-    """A function that is cheaper to evaluate less accurately, such as one of an iteratively solved state."""
+class Function(Protocol):
+    """A function of x, shape (n,), that says more of itself than values."""
 
     def __call__(self, x: Array) -> tuple[float, ArrayLike]:
-        """Return value and subgradient as accurately as it can."""
+        """Return value and one subgradient, as accurately as it can."""
+
+
+@runtime_checkable
+class Inexact(Function, Protocol):
+    """A function that is cheaper to evaluate less accurately, such as one of an iteratively solved state."""
 
     @property
     def inexact(self) -> bool:
@@ -40,7 +44,7 @@ class Inexact(Protocol):
 
 
 @runtime_checkable
-class Kinked(Protocol):
+class Kinked(Function, Protocol):
     """A piecewise smooth function that knows where it cannot decide on which piece a point lies.
 
     There it returns the gradient of some combination of pieces, which need not occur at any nearby point: it
@@ -48,13 +52,10 @@ class Kinked(Protocol):
     the point.
     """
 
-    def __call__(self, x: Array) -> tuple[float, ArrayLike]:
-        """Return value and subgradient, possibly a doubtful one."""
-
-    def doubtful(self, x: Array) -> bool:
+    def may_be_invalid(self, x: Array) -> bool:
         """Return whether the last result, at x, may not be a subgradient."""
 
-    def beside(self, x: Array, end: Array) -> ArrayLike:
+    def gradient_near(self, x: Array, end: Array) -> ArrayLike:
         """Return a gradient at a point on the way from x to end, as near to x as a piece can be identified.
 
         Raises `InvalidDesignError` where the function does not exist there.
@@ -66,11 +67,8 @@ class Kinked(Protocol):
 
 
 @runtime_checkable
-class Remarked(Protocol):
-    """A function that has words about a point beside its value; those about the end are logged, once."""
-
-    def __call__(self, x: Array) -> tuple[float, ArrayLike]:
-        """Return value and subgradient."""
+class Remarked(Function, Protocol):
+    """A function with remarks on a point; those on the last one are logged, once."""
 
     def remarks(self, x: Array) -> Sequence[str]:
         """Return what to know about a point, in whole sentences; nothing if there is nothing.
@@ -81,14 +79,11 @@ class Remarked(Protocol):
 
 
 @runtime_checkable
-class Pieced(Protocol):
+class Pieced(Function, Protocol):
     """A maximum J = max J_k of functions, several of which an evaluation knows, such as of load cases.
 
     The planes of all of them enter the model: fewer evaluations are needed to find where they are equal.
     """
-
-    def __call__(self, x: Array) -> tuple[float, ArrayLike]:
-        """Return J(x) and a subgradient, those of the largest."""
 
     def pieces(self, x: Array) -> tuple[ArrayLike, ArrayLike]:
         """Return what the evaluation at x, the last one, knows of the other functions.
@@ -161,11 +156,8 @@ def evaluate(
     """Call the function with a copy of x and check what it returns.
 
     Args:
-        fun: Returns the value and one subgradient.
         x: Point, shape (n,).
-        number: Count of this evaluation, for the message.
         accuracy: Accuracy requested from an inexact function; None for the best possible.
-        name: Name of the function, for the message.
 
     Returns:
         Copies of all three.
@@ -185,7 +177,7 @@ def evaluate(
             asked_subgradient=accuracy.subgradient,
             turned=float(np.inf),
         )
-    evaluation = replace(evaluation, doubtful=isinstance(fun, Kinked) and bool(fun.doubtful(x.copy())))
+    evaluation = replace(evaluation, doubtful=isinstance(fun, Kinked) and bool(fun.may_be_invalid(x.copy())))
     return _with_pieces(fun, evaluation, f"at evaluation {number}") if isinstance(fun, Pieced) else evaluation
 
 
@@ -203,7 +195,9 @@ def _with_pieces(fun: Pieced, evaluation: Evaluation, where: str) -> Evaluation:
     return replace(evaluation, pieces=np.minimum(values, evaluation.value), piece_slopes=slopes)
 
 
-def beside(fun: Fun, evaluation: Evaluation, end: Array, number: int, name: str = "fun") -> Evaluation:
+def with_gradient_near(
+    fun: Fun, evaluation: Evaluation, end: Array, number: int, name: str = "fun"
+) -> Evaluation:
     """Return a doubtful evaluation with a nearby gradient as its subgradient; any other unchanged.
 
     Where the function does not exist near the point, its result at the point is used.
@@ -214,11 +208,11 @@ def beside(fun: Fun, evaluation: Evaluation, end: Array, number: int, name: str 
     if not (evaluation.doubtful and isinstance(fun, Kinked)):
         return evaluation
     try:
-        gradient = fun.beside(evaluation.x.copy(), end.copy())
+        gradient = fun.gradient_near(evaluation.x.copy(), end.copy())
     except InvalidDesignError as error:
-        tell(_LOG.warning, "the subgradient of evaluation %d may be none: %s", number, error)
+        tell(_LOG.warning, "the subgradient of evaluation %d may be invalid: %s", number, error)
         return replace(evaluation, doubtful=False)
-    checked = _checked((evaluation.value, gradient), evaluation.x, f"beside evaluation {number}", name)
+    checked = _checked((evaluation.value, gradient), evaluation.x, f"near evaluation {number}", name)
     return replace(evaluation, subgradient=checked.subgradient, doubtful=False)
 
 
@@ -242,9 +236,7 @@ def require_finite(needed: str, numbers: Array, where: str) -> None:
     """Refuse numbers that are not finite.
 
     Args:
-        needed: What is needed, for the message.
         numbers: The numbers, of any shape.
-        where: Place for the message.
 
     Raises:
         InvalidInputError: If an entry is nan or infinite.

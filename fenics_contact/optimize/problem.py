@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,8 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.optimize.constraints import Bounds, Constraints, FeasibleSet, feasible_set
-from fenics_contact.optimize.from_scipy import components_of, is_nonlinear
-from fenics_contact.optimize.nonlinear import NonlinearConstraint, Scaled, scaled_constraints
+from fenics_contact.optimize.nonlinear import (
+    NonlinearConstraint,
+    Scaled,
+    is_nonlinear,
+    named_constraints,
+    scaled_constraints,
+)
 from fenics_contact.optimize.objective import Evaluation, Fun
 
 Array = NDArray[np.float64]
@@ -90,7 +94,7 @@ def pose(
         raise InvalidInputError(f"x0 must be finite, got x0[{k}] = {start[k]}")
     given = () if constraints is None else constraints
     parts = list(given) if isinstance(given, Sequence) else [given]
-    curved = [one for one in parts if isinstance(one, NonlinearConstraint) or is_nonlinear(one)]
+    curved = [one for one in parts if is_nonlinear(one)]
     linear = [one for one in parts if all(one is not other for other in curved)]
     allowed = feasible_set(start.size, bounds, linear)
     violations = allowed.violations(start)
@@ -103,14 +107,7 @@ def pose(
     start = allowed.clip(start)
     size = _scale(start.size, allowed, scale)
     length = _length(start, allowed, size)
-    return PosedProblem(fun, start, allowed, size, length, _named(curved, start), restore)
-
-
-def _named(given: Sequence[Any], start: Array) -> tuple[NonlinearConstraint, ...]:
-    """Return nonlinear constraints, SciPy's one by one, with a name for each."""
-    groups = ([one] if isinstance(one, NonlinearConstraint) else components_of(one, start) for one in given)
-    found = [one for group in groups for one in group]
-    return tuple(replace(one, name=one.name or f"constraint {k}") for k, one in enumerate(found))
+    return PosedProblem(fun, start, allowed, size, length, named_constraints(curved, start), restore)
 
 
 def _scale(n: int, allowed: FeasibleSet, scale: ArrayLike | None) -> Array:

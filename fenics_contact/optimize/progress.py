@@ -8,7 +8,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fenics_contact.checkpoint import (
     Checkpoint,
@@ -19,6 +19,7 @@ from fenics_contact.checkpoint import (
 from fenics_contact.display import counted
 from fenics_contact.errors import collective
 from fenics_contact.fingerprint import described
+from fenics_contact.optimize.objective import Function
 from fenics_contact.optimize.problem import PosedProblem
 from fenics_contact.optimize.result import Record
 from fenics_contact.optimize.state import MethodState
@@ -38,11 +39,8 @@ _OF_FUN = "fun."
 
 
 @runtime_checkable
-class Resumable(Protocol):
+class Resumable(Function, Protocol):
     """A function whose values depend on earlier ones, for example by a warm start."""
-
-    def __call__(self, x: Array) -> tuple[float, ArrayLike]:
-        """Return value and subgradient."""
 
     @property
     def comm(self) -> MPI.Comm:
@@ -85,14 +83,7 @@ class Progress:
     def __init__(
         self, checkpoint: Checkpoint | None, method: Method, problem: PosedProblem, callback: Callback | None
     ) -> None:
-        """Describe the problem; nothing is read or written yet.
-
-        Args:
-            checkpoint: The file, or None.
-            method: Parameters of the method, a dataclass.
-            problem: The checked problem.
-            callback: Called after every evaluation.
-        """
+        """Describe the problem; nothing is read or written yet."""
         self._checkpoint, self._written = checkpoint, -1
         self._method, self._callback = method, callback
         self._state: MethodState | None = None
@@ -167,10 +158,6 @@ class Progress:
     def keep(self, state: MethodState, *, last: bool = False) -> None:
         """Write the state if that is due. Collective.
 
-        Args:
-            state: The state of the method.
-            last: Write it unless the file holds it already.
-
         Raises:
             CheckpointError: If it cannot be written; the file is then unchanged.
         """
@@ -197,7 +184,6 @@ class Progress:
 
 def _asking(comm: MPI.Comm) -> AbstractContextManager[None]:
     return collective(comm, "the callback of a minimisation", closed=True, users=True)
-
 
 
 def _fingerprint(method: Method, problem: PosedProblem) -> dict[str, str]:

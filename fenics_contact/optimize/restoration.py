@@ -22,11 +22,7 @@ def restored(
     Every correction is the shortest one, in scaled variables, to the linearised equalities.
 
     Args:
-        problem: The problem.
         x: Point that satisfies bounds and linear constraints, shape (n,).
-        number: Count of the evaluation, for messages.
-        feasibility: Largest violation, relative to the sizes of the equalities.
-        steps: Largest number of corrections.
 
     Returns:
         The point and the equalities there.

@@ -103,9 +103,7 @@ class SoftConstraint:
         """Return the constraint with the plane of a trial point at the end, and what the point says.
 
         Args:
-            plane: Its plane.
             move: The step to it, shape (n,), scaled variables.
-            doubtful: Whether the subgradient may be none.
         """
         value, slope = plane.value, float(plane.gradient @ move)
         error, length = slope - (value - self.value), float(np.linalg.norm(move))
@@ -134,6 +132,6 @@ class SoftConstraint:
         bundle = self.bundle.moved(move, plane.value - self.value, locality * plane.length)
         return replace(self, bundle=bundle, value=plane.value)
 
-    def without_doubt(self) -> SoftConstraint:
+    def without_doubtful_planes(self) -> SoftConstraint:
         """Return the constraint without doubtful planes."""
         return replace(self, bundle=self.bundle.chosen(np.flatnonzero(~self.bundle.doubtful)))

@@ -34,12 +34,7 @@ class StoppingTest:
     first_t: float
 
     def reason(self, step: Step, solve: Callable[[float], Step]) -> Reason | None:
-        """Return CONVERGED or STATIONARY where the centre is a solution within the tolerance, else None.
-
-        Args:
-            step: The step from the centre.
-            solve: Returns the step from the same centre with another t.
-        """
+        """Return CONVERGED or STATIONARY where the centre is a solution within the tolerance, else None."""
         certificate = step.aggregate_error + max(self.reach, step.length) * step.aggregate_norm
         if certificate <= self.limit:
             return Reason.STATIONARY

@@ -98,12 +98,6 @@ def solve_step(bundle: Bundle, near: Surroundings, t: float, soft: Sequence[Soft
     solved again with γ = ‖z‖, without the planes that lie too deep to affect the solution, and the sharper
     result is used if the solver reports success.
 
-    Args:
-        bundle: Cutting planes at the centre.
-        near: Constraints around the centre, which satisfies them.
-        t: Proximal parameter, positive: units of (scaled length)²/J.
-        soft: Nonlinear inequalities, which the centre may violate.
-
     Returns:
         The step.
 

@@ -94,7 +94,7 @@ class MortarPoints:
     def pulled_back(
         self, by: CouplingDerivatives, comm: MPI.Comm | None = None
     ) -> tuple[SurfaceDerivatives, SurfaceDerivatives]:
-        """Return the derivatives by slave and master from those by the coupling. Collective on ``comm``."""
+        """Vector-Jacobian product of the coupling by slave and master. Collective on ``comm``."""
         from fenics_contact.pairing.mortar import mortar_pulled_back
 
         slave, master, coupling, gathering = self.slave, self.master, self.coupling, self.gathering

@@ -132,7 +132,7 @@ class LargestPart(ObjectivePart):
 
     def made(self, **other: Any) -> Objective:
         """Build the objective."""
-        return shape.Largest(tuple(part.objective for part in self.objectives))
+        return shape.Maximum(tuple(part.objective for part in self.objectives))
 
 
 _ANY: Any = Annotated[Any, one_of("kind", *_ALONE, LargestStressPart, MovementPart, LargestPart)]

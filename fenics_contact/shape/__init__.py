@@ -10,16 +10,15 @@ from fenics_contact.shape.largest_stress import LargestStress
 from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints, linearise_face
 from fenics_contact.shape.load_cases import LoadCases
 from fenics_contact.shape.load_path import LoadPath
-from fenics_contact.shape.memory import DesignPoint
+from fenics_contact.shape.memory import DesignPoint, JointPoint
 from fenics_contact.shape.motion import MeshMotion
 from fenics_contact.shape.moved_surface import MovedSurface
 from fenics_contact.shape.movement import Movement
 from fenics_contact.shape.objective import Objective, Partials
-from fenics_contact.shape.path_points import PathPoint
 from fenics_contact.shape.pressures import ContactArea, LargestPressure, PressureNorm, PressureUnevenness
 from fenics_contact.shape.problem import ShapeProblem
 from fenics_contact.shape.remeshed import Remeshed, Remeshing
-from fenics_contact.shape.sums import Largest, Weighable, WeightedSum
+from fenics_contact.shape.sums import Maximum, Weighable, WeightedSum
 from fenics_contact.shape.tolerance import AdaptiveTolerance
 from fenics_contact.shape.volume_integral import VolumeIntegral
 
@@ -31,17 +30,17 @@ __all__ = [
     "DesignFunction",
     "DesignPoint",
     "FrictionWork",
-    "Largest",
+    "JointPoint",
     "LargestPressure",
     "LargestStress",
     "LoadCases",
     "LoadPath",
+    "Maximum",
     "MeshMotion",
     "MovedSurface",
     "Movement",
     "Objective",
     "Partials",
-    "PathPoint",
     "PressureNorm",
     "PressureUnevenness",
     "Remeshed",

@@ -16,7 +16,6 @@ def by_true_areas(state: State, by_area: np.ndarray) -> dict[str, np.ndarray]:
     x = X + u of its nodes, by mortar also with the master's: with the displacement and the shape alike.
 
     Args:
-        state: The state.
         by_area: Derivative by `ContactResult.area`, replicated, shape (n_points,).
     """
     moved = state.equilibrium.evaluation.meeting if isinstance(state, DeformedState) else None

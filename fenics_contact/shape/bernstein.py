@@ -11,7 +11,6 @@ def bernstein(parameters: np.ndarray, count: int) -> np.ndarray:
 
     Args:
         parameters: t in [0, 1], shape (m,).
-        count: Number of polynomials, at least 1.
 
     Returns:
         Values, shape (m, count); each row is a partition of unity.
@@ -26,7 +25,6 @@ def tensor_bernstein(parameters: np.ndarray, counts: tuple[int, ...]) -> np.ndar
 
     Args:
         parameters: (s, t) in the unit square, shape (m, 2), or s in the unit interval, (m, 1).
-        counts: Number of polynomials along each.
 
     Returns:
         Values, shape (m, product of the counts); l runs fastest.

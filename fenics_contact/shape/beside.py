@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from fenics_contact.errors import InvalidDesignError
-from fenics_contact.shape.linearised_face import WeakPoints
+from fenics_contact.shape.memory import DesignPoint, JointPoint
 
 #: Fractions of the way to a neighbour at which designs are evaluated, nearest first.
 PARTS = (1e-2, 1.0)
 
 
-class Evaluated(Protocol):
-    """A design with its gradient, of one state or of several."""
-
-    @property
-    def weak(self) -> WeakPoints:
-        """Its weak points."""
-
-
-Point = TypeVar("Point", bound=Evaluated)
+Point = TypeVar("Point", DesignPoint, JointPoint)
 
 
 def with_fewest_weak_points(
@@ -37,7 +29,6 @@ def with_fewest_weak_points(
     Args:
         alpha: Design variables, shape (size,), [length].
         end: A design nearby, shape (size,), [length].
-        evaluate: Returns a design with its gradient.
 
     Raises:
         InvalidDesignError: If none of them has an equilibrium.

@@ -47,12 +47,6 @@ def contact_by_shape(
 
     It is ∂/∂X of −λᵀ B w + (ζ − j)ᵀ(c − B u), with the objective's derivative j by B u − c, and the shares of
     slip bounds and areas. Collective.
-
-    Args:
-        state: The state.
-        adjoint: Its adjoint.
-        partials: Partial derivatives of the objective.
-        linearised: Branch of the contact law.
     """
     torn = state.torn
     tearing, points = torn.decomposition.tearing, torn.points
@@ -84,8 +78,6 @@ def add_areas(
 
     Args:
         result: By the nodes of all bodies, shape (n_nodes, dim).
-        torn: The torn system.
-        index: Number of the pair.
         by_area: By the areas of all points, shape (n_points,).
         places: Where all nodes lie, shape (n_nodes, dim), [length]; undeformed by default.
     """
@@ -168,8 +160,6 @@ def _by_point(
     """Differentiate −λᵀ B w − ζᵀ B u + ζ_N g; rows −n·rel(v) and t·rel(v), rel(v) = v_s − Σ w_j v_j.
 
     Args:
-        points: All points.
-        rows: Their multipliers and displacements.
         mine: The points to differentiate, shape (m,).
         corners: Displacements of the corners of their master facets, shape (2, m, corners, dim).
     """

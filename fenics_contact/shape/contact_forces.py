@@ -73,7 +73,6 @@ def on_rows(state: State, normal: np.ndarray | None, tangential: np.ndarray | No
     """Return values at the contact points in the owned rows of B, zero in all others, shape (n_owned,).
 
     Args:
-        state: The state.
         normal: Values for the normal rows, shape (n_points,), or None for zero.
         tangential: Values for the tangential rows, in the points' tangents, shape (n_points, dim − 1), or
             None; those of points without friction, which have no such rows, are left out.

@@ -36,13 +36,6 @@ def solve_deformed_adjoint(
     Its tangents are factored once more at the state itself, with the stiffness of forces that turn with
     their surfaces; the columns of the face's two bases are swapped.
 
-    Args:
-        state: A converged state.
-        partials: Partial derivatives of the objective.
-        linearised: Branch of the contact law.
-        tolerance: Residual relative to that of the start.
-        max_iterations: Largest number of F-products.
-
     Raises:
         ConvergenceError: If the face does not hold every body, or the tolerance was not reached.
         InvalidInputError: If friction depends on more than the derivative knows: a load step of
@@ -96,12 +89,6 @@ def deformed_contact_by_shape(
     Everything depends on places x = X + u alone, so that moving a node of the undeformed body acts as its
     displacement does: through −wᵀ ∂(Bᵀλ)/∂x and ζᵀ ∂(c − B u)/∂x. Only slip depends on its start, too, and
     areas and friction coefficients are those of the undeformed body.
-
-    Args:
-        state: The state.
-        adjoint: Its adjoint.
-        partials: Partial derivatives of the objective.
-        linearised: Branch of the contact law.
     """
     torn, meeting = state.torn, state.equilibrium.evaluation.meeting
     points = meeting.points

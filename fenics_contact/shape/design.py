@@ -91,15 +91,15 @@ class SurfaceDesign:
         return placed
 
     def _check_resolved(self) -> None:
-        """Reject a net of which the nodes do not feel every variable."""
+        """Raise unless the nodes distinguish all control points of the net."""
         _, sizes, ways = np.linalg.svd(self.basis, full_matrices=False)
         lost = ways[sizes <= LAST_PLACES * sizes[0]]
         if lost.size:
             names = ", ".join(map(str, np.flatnonzero(np.abs(lost).max(axis=0) > 0.1)))
             raise InvalidInputError(
-                f"nodes must tell all control points of a net apart, but those of {self.body!r} feel only "
-                f"{self.size - len(lost)} of {self.size} movements of the net {self.net}, not those of the "
-                f"variables {names} against one another: use fewer control points or a finer mesh"
+                f"the surface mesh of {self.body!r} is too coarse for a net {self.net}: its {self.size} "
+                f"control points move the nodes in only {self.size - len(lost)} independent ways (variables "
+                f"{names} depend on one another): use fewer control points or a finer mesh"
             )
 
     def _within(self, surface: DesignSurface, cut: np.ndarray) -> DesignSurface:
@@ -155,7 +155,7 @@ class SurfaceDesign:
         return (self.basis @ alpha)[:, None] * self.lattice.directions
 
     def pull_back(self, gradient: np.ndarray) -> np.ndarray:
-        """Return the gradient by the design variables from that by the surface's nodes.
+        """Vector-Jacobian product of `displacement` with respect to the design variables.
 
         Args:
             gradient: Derivative by the nodes' displacements, shape (n_nodes, dim).
@@ -205,11 +205,6 @@ class SurfaceDesign:
 
 def checked_variables(alpha: np.ndarray, size: int, comm: MPI.Comm) -> np.ndarray:
     """Return design variables as a checked array. Collective on ``comm``.
-
-    Args:
-        alpha: Design variables.
-        size: Required number of variables.
-        comm: Communicator of the ranks, on which they must be equal.
 
     Raises:
         InvalidInputError: If the shape is wrong, or they are not finite or differ from rank to rank.

@@ -29,10 +29,8 @@ def design_state(
     """Compute the equilibrium of a design, whose surfaces may overlap before they are loaded. Collective.
 
     Args:
-        contact: The problem that computes it.
         scene: The scene in the shape of the design.
         start: State of a neighbouring design, or None for the first one.
-        tolerance: Relative residual.
         slip_from: State of the same design after the last load step, or None.
 
     Raises:

@@ -178,8 +178,6 @@ def sum_over_subdomains(
     """Add up vectors of nodal derivatives over this rank's subdomains, shape (n_nodes, dim) for all bodies.
 
     Args:
-        torn: The torn system.
-        fields: Torn fields handed to ``evaluate`` as Functions.
         evaluate: Takes the subdomain and the Functions; returns a vector by dof.
         moving: Marks of nodes of all bodies; subdomains without one of them are skipped.
     """
@@ -198,8 +196,6 @@ def subdomain_fields(
     """Yield each of this rank's subdomains with the fields as Functions on it.
 
     Args:
-        torn: The torn system.
-        fields: Torn fields to yield as Functions.
         moving: Marks of nodes of all bodies; subdomains without one of them are skipped.
     """
     tearing = torn.decomposition.tearing

@@ -25,12 +25,11 @@ def bound_sensitivity(
 
 
 def bounds_by_area(torn: TornSystem, by_bound: np.ndarray) -> np.ndarray:
-    """Return the derivative by the areas of the points, shape (n_points,).
+    """Vector-Jacobian product of the slip bounds with respect to the areas of the points, (n_points,).
 
     Tresca's bound is a traction times a nodal area, which moves with the nodes.
 
     Args:
-        torn: The torn system.
         by_bound: Derivative by each frictional point's slip bound, shape (n_friction,).
     """
     by_area = np.zeros(torn.points.count)
@@ -40,13 +39,12 @@ def bounds_by_area(torn: TornSystem, by_bound: np.ndarray) -> np.ndarray:
 
 
 def bounds_by_place(torn: TornSystem, normal_force: np.ndarray, by_bound: np.ndarray) -> np.ndarray:
-    """Return the derivative by the places of the points' slave nodes, shape (n_points, dim).
+    """Vector-Jacobian product of the slip bounds with respect to the slave nodes, (n_points, dim).
 
     Friction given as a function of position changes with the place of the node: a bound μ(x) λ_N by λ_N ∇μ,
     Tresca's bound by the area times the gradient of the traction. Gradients are central differences.
 
     Args:
-        torn: The torn system.
         normal_force: λ_N of the points, shape (n_points,), [force].
         by_bound: Derivative by each frictional point's slip bound, shape (n_friction,).
 

@@ -32,8 +32,6 @@ class DesignGeometry:
 
         Args:
             scene: The scene in its reference shape.
-            decomposition: Its subdomains.
-            designs: The moving surfaces.
         """
         self.designs = tuple(design.on(scene) for design in designs)
         self.size = sum(design.size for design in self.designs)
@@ -94,7 +92,7 @@ class DesignGeometry:
         return total, self.pull_back(by_points)
 
     def pull_back(self, by_points: np.ndarray) -> np.ndarray:
-        """Return the derivative by α from that by the nodes of all bodies, replicated. Collective."""
+        """Vector-Jacobian product of the nodes of all bodies with respect to α, replicated. Collective."""
         parts = []
         for design, motion in zip(self.designs, self.motions, strict=True):
             own = np.arange(self._bodies[design.body].mesh.n_nodes)

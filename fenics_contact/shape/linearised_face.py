@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -54,14 +55,21 @@ class WeakPoints:
     edges: int
     choice: WeakChoice
 
+    @classmethod
+    def joined(cls, several: Sequence[WeakPoints]) -> WeakPoints:
+        """Return the weak points of several states together."""
+        counts = ((each.contacts, each.discs, each.edges) for each in several)
+        contacts, discs, edges = (sum(column) for column in zip(*counts, strict=True))
+        return cls(contacts, discs, edges, several[0].choice)
+
     @property
     def count(self) -> int:
         """Number of all weak points."""
         return self.contacts + self.discs + self.edges
 
     @property
-    def doubtful(self) -> bool:
-        """Whether the combination of branches may be one that no nearby design has.
+    def may_be_invalid(self) -> bool:
+        """Whether the derivative may not be a subgradient: no nearby design may have all these branches.
 
         Where one weak contact closes, its friction may slip: only that single point must not be held.
         """

@@ -2,21 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from fenics_contact._libraries import MPI
 from fenics_contact.contact import State
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.shape.memory import joined_fingerprint, joined_memory, recall_joined
+from fenics_contact.scene import Scene
+from fenics_contact.shape.design_function import DesignProblem
+from fenics_contact.shape.linearised_face import WeakPoints
+from fenics_contact.shape.memory import DesignPoint, JointPoint, record_of_values
 from fenics_contact.shape.problem import ShapeProblem
 
 
+class JointProblem(DesignProblem[JointPoint]):
+    """A design problem with several states a design.
+
+    Attributes:
+        problems: Name of each case or step -> its problem; all are made of the first by `ShapeProblem.case`.
+    """
+
+    problems: dict[str, ShapeProblem]
+
+    @property
+    def _parts(self) -> Sequence[ShapeProblem]:
+        return list(self.problems.values())
+
+    def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the coordinates of the designed bodies, see `DesignGeometry.points_of`. Collective."""
+        return self._parts[0].points_of(alpha)
+
+    def fingerprint(self) -> dict[str, str]:
+        """Identify the problem, for a checkpoint."""
+        known = {name: problem.fingerprint() for name, problem in self.problems.items()}
+        return {f"{name}.{key}": text for name, each in known.items() for key, text in each.items()}
+
+
 @displayed
-class LoadCases:
+class LoadCases(JointProblem):
     """J(α) = max J_k(α) over load cases of one design, or Σ w_k J_k(α), with a subgradient.
 
     Each case is a `ShapeProblem`; the others are made of the first by `ShapeProblem.case`. One design costs a
@@ -53,7 +78,8 @@ class LoadCases:
         self.problems, self.weights = dict(problems), None if weights is None else dict(weights)
         if not self.problems:
             raise InvalidInputError("LoadCases needs a problem, got none: give {'name': problem}")
-        first = self._first
+        self._memory = record_of_values(self._at)
+        first = self._parts[0]
         with together(first.comm):
             for name, problem in self.problems.items():
                 if not isinstance(problem, ShapeProblem) or not problem.shares_with(first):
@@ -78,40 +104,12 @@ class LoadCases:
 
     def _facts(self) -> dict[str, Any]:
         how = "largest" if self.weights is None else f"weighted sum, {self.weights}"
-        return {"cases": list(self.problems), "objective": how, "first": self._first}
-
-    @property
-    def _first(self) -> ShapeProblem:
-        return next(iter(self.problems.values()))
-
-    @property
-    def size(self) -> int:
-        """Number of design variables."""
-        return self._first.size
-
-    @property
-    def comm(self) -> MPI.Comm:
-        """Communicator over which the subdomains are spread."""
-        return self._first.comm
-
-    @property
-    def products(self) -> int:
-        """F-products of states and adjoints of all cases so far."""
-        return sum(problem.products for problem in self.problems.values())
-
-    @property
-    def evaluations(self) -> int:
-        """Number of designs evaluated."""
-        return self._first.evaluations
+        return {"cases": list(self.problems), "objective": how, "first": self._parts[0]}
 
     @property
     def inexact(self) -> bool:
         """Whether an optimiser may ask for less accuracy, see `ShapeProblem.within`."""
         return all(problem.inexact for problem in self.problems.values())
-
-    def __call__(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return J(α) and a subgradient. Collective; raises as `ShapeProblem` does."""
-        return self._joined({name: problem(alpha) for name, problem in self.problems.items()})
 
     def pieces(self, alpha: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return J_k and gradients of the cases beside the largest, for `optimize`. Collective.
@@ -122,18 +120,25 @@ class LoadCases:
         Returns:
             Values, shape (k,), and gradients, shape (k, size); none of a weighted sum.
         """
-        known = [] if self.weights is not None else [each.known(alpha) for each in self.problems.values()]
-        points = sorted((each for each in known if each is not None), key=lambda each: -each.value)[1:]
+        known = None if self.weights is not None else self.known(alpha)
+        points = sorted(known.parts.values(), key=lambda each: -each.value)[1:] if known else []
         gradients = np.array([each.gradient for each in points]).reshape(len(points), self.size)
         return np.array([each.value for each in points]), gradients
+
+    def evaluate(self, alpha: np.ndarray) -> JointPoint:
+        """Evaluate all cases. Collective; raises as `ShapeProblem.evaluate` does."""
+        point = self._joined({name: problem.evaluate(alpha) for name, problem in self.problems.items()})
+        self._memory.record(point)
+        return point
 
     def within(self, alpha: np.ndarray, value: float, subgradient: float) -> tuple[float, np.ndarray, float]:
         """Return J(α), a subgradient and the estimated error of J, see `ShapeProblem.within`. Collective."""
         share = 1.0 if self.weights is None else sum(map(abs, self.weights.values())) or 1.0
-        found = {name: each.within(alpha, value / share, subgradient) for name, each in self.problems.items()}
-        errors = {name: error for name, (_, _, error) in found.items()}
-        total = max(errors.values()) if self.weights is None else self._sum(errors, absolute=True)
-        return *self._joined({name: answer[:2] for name, answer in found.items()}), total
+        for problem in self.problems.values():
+            problem.within(alpha, value / share, subgradient)
+        point = self._at(alpha)
+        self._memory.record(point)
+        return point.value, point.gradient, point.error
 
     def values_of(self, alpha: np.ndarray) -> dict[str, float]:
         """Return J_k(α) of every case. Collective."""
@@ -147,36 +152,42 @@ class LoadCases:
         """Return what to know of a design beside its value, see `ShapeProblem.remarks`. Collective."""
         return tuple(words for problem in self.problems.values() for words in problem.remarks(alpha))
 
-    def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return the volume of the designed bodies, in the plane the area, and its gradient. Collective."""
-        return self._first.volume(alpha)
+    def scene_of(self, alpha: np.ndarray) -> Scene:
+        """Return the scene of the first case in the shape of a design. Collective; raises as `evaluate`."""
+        return self._parts[0].scene_of(alpha)
 
-    def doubtful(self, alpha: np.ndarray) -> bool:
+    def may_be_invalid(self, alpha: np.ndarray) -> bool:
         """Return whether the last result, at α, may not be a subgradient. Collective."""
-        return any(problem.doubtful(alpha) for problem in self._counting(alpha).values())
+        known = self.known(alpha)
+        return known is not None and any(
+            known.parts[name].weak.may_be_invalid for name in self._active(_values(known))
+        )
 
-    def beside(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """Return a gradient near α, see `ShapeProblem.beside`. Collective."""
-        gradients = {name: each.beside(alpha, end) for name, each in self._counting(alpha).items()}
-        return next(iter(gradients.values())) if self.weights is None else self._sum(gradients)
+    def gradient_near(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Return a gradient near α, see `ShapeProblem.gradient_near`. Collective."""
+        known = self.known(alpha)
+        names = self._active(self.values_of(alpha) if known is None else _values(known))
+        gradients = {name: self.problems[name].gradient_near(alpha, end) for name in names}
+        return gradients[names[0]] if self.weights is None else self._sum(gradients)
 
     def fingerprint(self) -> dict[str, str]:
         """Identify the problem, for a checkpoint."""
-        return {**joined_fingerprint(self.problems), "weights": str(self.weights)}
+        return {**super().fingerprint(), "weights": str(self.weights)}
 
-    def memory(self) -> dict[str, np.ndarray]:
-        """Return what the next states depend on. Collective."""
-        return joined_memory(self.problems.values())
+    def _at(self, alpha: np.ndarray) -> JointPoint:
+        """Return a design of the parts as they are known, or evaluated again. Collective."""
+        return self._joined({name: problem.at(alpha) for name, problem in self.problems.items()})
 
-    def recall(self, memory: Mapping[str, np.ndarray]) -> None:
-        """Continue from what `memory` returned, also on another number of ranks. Collective."""
-        recall_joined(self.problems.values(), memory)
-
-    def _joined(self, answers: Mapping[str, tuple[float, np.ndarray]]) -> tuple[float, np.ndarray]:
+    def _joined(self, parts: Mapping[str, DesignPoint]) -> JointPoint:
+        values = {name: part.value for name, part in parts.items()}
+        errors = {name: part.error for name, part in parts.items()}
+        names = self._active(values)
+        first, weak = parts[names[0]], WeakPoints.joined([parts[name].weak for name in names])
         if self.weights is None:
-            return max(answers.values(), key=lambda answer: answer[0])
-        values = {name: value for name, (value, _) in answers.items()}
-        return self._sum(values), self._sum({name: gradient for name, (_, gradient) in answers.items()})
+            return JointPoint(first.alpha, first.value, first.gradient, weak, parts, max(errors.values()))
+        gradient = self._sum({name: part.gradient for name, part in parts.items()})
+        error = self._sum(errors, absolute=True)
+        return JointPoint(first.alpha, self._sum(values), gradient, weak, parts, error)
 
     def _sum(self, parts: Mapping[str, Any], *, absolute: bool = False) -> Any:
         assert self.weights is not None
@@ -184,14 +195,10 @@ class LoadCases:
             (abs(self.weights[name]) if absolute else self.weights[name]) * parts[name] for name in parts
         )
 
-    def _counting(self, alpha: np.ndarray) -> dict[str, ShapeProblem]:
-        """Return the cases of which the subgradient at α is made. Collective."""
-        if self.weights is not None:
-            return self.problems
+    def _active(self, values: Mapping[str, float]) -> list[str]:
+        """Return the load cases that contribute to the subgradient, from their values."""
+        return list(self.problems) if self.weights is not None else [max(values, key=values.__getitem__)]
 
-        def value(name: str) -> float:
-            known = self.problems[name].known(alpha)
-            return self.problems[name].value_of(alpha) if known is None else known.value
 
-        name = max(self.problems, key=value)
-        return {name: self.problems[name]}
+def _values(point: JointPoint) -> dict[str, float]:
+    return {name: part.value for name, part in point.parts.items()}

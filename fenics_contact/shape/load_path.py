@@ -16,22 +16,18 @@ from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.fingerprint import described
 from fenics_contact.scene import LoadStep, Scene
 from fenics_contact.shape.beside import with_fewest_weak_points
-from fenics_contact.shape.design import SurfaceDesign
+from fenics_contact.shape.design_function import comm_of
 from fenics_contact.shape.forms import ShapeForms
 from fenics_contact.shape.linearised_face import WeakPoints
-from fenics_contact.shape.memory import DesignPoint, joined_fingerprint, joined_memory, recall_joined
+from fenics_contact.shape.load_cases import JointProblem
+from fenics_contact.shape.memory import DesignPoint, JointPoint, record_of_values
 from fenics_contact.shape.objective import Objective, Partials, asking, finite_value
-from fenics_contact.shape.path_points import PathPoint, PathPoints
 from fenics_contact.shape.problem import ShapeProblem
 from fenics_contact.shape.slip_history import by_slip_origin, with_later_steps
 
 
-def _comm(path: LoadPath, *_: Any, **__: Any) -> MPI.Comm:
-    return path.comm
-
-
 @displayed
-class LoadPath:
+class LoadPath(JointProblem):
     """J(α) = Σ J_n(α) over quasi-static load steps of one design, with a subgradient.
 
     Slip of a step is measured from the step before, as by `LoadSequence`, so that its state depends on the
@@ -91,63 +87,24 @@ class LoadPath:
         for step in steps:
             scene = step.applied_to(scene)
             self.problems[step.name] = last = last.case(scene)
-        self.evaluations, self._states = 0, _States(self.problems)
-        self._points = PathPoints(self._point_at)
+        self._states, self._memory = _States(self.problems), record_of_values(self._point_at)
 
     def _facts(self) -> dict[str, Any]:
         work = f"{self.evaluations} designs, {self.products} products with F"
         return {"steps": list(self.problems), "objectives": self.objectives, "work": work}
 
     @property
-    def _first(self) -> ShapeProblem:
-        return next(iter(self.problems.values()))
-
-    @property
-    def _final(self) -> ShapeProblem:
-        return next(reversed(self.problems.values()))
-
-    @property
-    def size(self) -> int:
-        """Number of design variables."""
-        return self._first.size
-
-    @property
-    def designs(self) -> tuple[SurfaceDesign, ...]:
-        """The moving surfaces; α is the concatenation of their variables."""
-        return self._first.designs
-
-    @property
     def scene(self) -> Scene:
         """The scene after the last step, in its reference shape."""
-        return self._final.scene
-
-    @property
-    def seconds(self) -> dict[str, float]:
-        """Wall time of this rank by phase, over all evaluations."""
-        return self._first.seconds
+        return self._parts[-1].scene
 
     @property
     def forms(self) -> ShapeForms:
         """Compiled derivatives, which objectives take beside a state."""
-        return self._first.geometry.forms
+        return self._parts[0].geometry.forms
 
-    @property
-    def comm(self) -> MPI.Comm:
-        """Communicator over which the subdomains are spread."""
-        return self._first.comm
-
-    @property
-    def products(self) -> int:
-        """F-products of states and adjoints so far."""
-        return self._states.products
-
-    def __call__(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return J(α) and a subgradient. Collective; raises as `evaluate` does."""
-        point = self.evaluate(alpha)
-        return point.value, point.gradient
-
-    @collectively("LoadPath.evaluate", _comm)
-    def evaluate(self, alpha: np.ndarray) -> PathPoint:
+    @collectively("LoadPath.evaluate", comm_of)
+    def evaluate(self, alpha: np.ndarray) -> JointPoint:
         """Solve the states of all steps and their adjoints. Collective.
 
         States of the design solved last are not solved again.
@@ -156,43 +113,19 @@ class LoadPath:
             InvalidDesignError: If the design inverts a cell or has no equilibrium.
         """
         point = self._point_at(alpha)
-        self.evaluations += 1
-        self._points.record(point)
+        self._memory.record(point)
         return point
-
-    def at(self, alpha: np.ndarray) -> PathPoint:
-        """Return a design as evaluated, again unless it is known, such as the x of a result. Collective."""
-        return self._points.of_design(alpha) or self.evaluate(alpha)
-
-    @property
-    def first(self) -> PathPoint | None:
-        """The design evaluated first. Collective after a run was resumed, as it is evaluated anew then."""
-        return self._points.point("first")
-
-    @property
-    def best(self) -> PathPoint | None:
-        """The design with the smallest J so far, feasible or not. Collective after a run was resumed."""
-        return self._points.point("best")
-
-    @property
-    def last(self) -> PathPoint | None:
-        """The design evaluated last. Collective after a run was resumed."""
-        return self._points.point("last")
-
-    def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the coordinates of the designed bodies, see `DesignGeometry.points_of`. Collective."""
-        return self._first.points_of(alpha)
 
     def scene_of(self, alpha: np.ndarray) -> Scene:
         """Return the scene after the last step in the shape of a design. Collective; raises as `evaluate`."""
-        return self._final.scene_of(alpha)
+        return self._parts[-1].scene_of(alpha)
 
-    @collectively("LoadPath.states_of", _comm)
+    @collectively("LoadPath.states_of", comm_of)
     def states_of(self, alpha: np.ndarray) -> dict[str, State]:
         """Return the equilibrium after every step. Collective."""
         return dict(self._states.of(alpha))
 
-    @collectively("LoadPath.values_of", _comm)
+    @collectively("LoadPath.values_of", comm_of)
     def values_of(self, alpha: np.ndarray) -> dict[str, float]:
         """Return J_n(α) of every step that has an objective. Collective."""
         states, forms = self._states.of(alpha), self.forms
@@ -214,46 +147,23 @@ class LoadPath:
         """
         other = copy(self)
         other.objectives = _checked(self.comm, list(self.problems), objectives, last=False)
-        other.evaluations, other._points = 0, PathPoints(other._point_at)
+        other._memory = record_of_values(other._point_at)
         return other
 
     def remarks(self, alpha: np.ndarray) -> tuple[str, ...]:
         """Return what to know of a design after the last step, see `ShapeProblem.remarks`. Collective."""
-        return self._final.contact.overlaps(self.states_of(alpha)[list(self.problems)[-1]])
+        return self._parts[-1].contact.overlaps(self.states_of(alpha)[list(self.problems)[-1]])
 
-    def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return the volume of the designed bodies, in the plane the area, and its gradient. Collective."""
-        return self._first.volume(alpha)
-
-    def doubtful(self, alpha: np.ndarray) -> bool:
-        """Return whether the last result, at α, may not be a subgradient."""
-        known = self._points.of_design(alpha)
-        return known is not None and known.weak.doubtful
-
-    @collectively("LoadPath.beside", _comm)
-    def beside(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """Return a gradient near α, see `ShapeProblem.beside`. Collective."""
+    @collectively("LoadPath.gradient_near", comm_of)
+    def gradient_near(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Return a gradient near α, see `ShapeProblem.gradient_near`. Collective."""
         return with_fewest_weak_points(alpha, end, self._point_at).gradient
 
     def fingerprint(self) -> dict[str, str]:
         """Identify the problem, for a checkpoint."""
-        return joined_fingerprint(self.problems) | described(self.objectives, "objectives")
+        return super().fingerprint() | described(self.objectives, "objectives")
 
-    def memory(self) -> dict[str, np.ndarray]:
-        """Return what the next states depend on. Collective."""
-        counts = np.array([self.evaluations, self.products])
-        kept = {f"design.{name}": known for name, known in self._points.stored().items()}
-        return {"counts": counts, **kept, **joined_memory(self.problems.values())}
-
-    def recall(self, memory: Mapping[str, np.ndarray]) -> None:
-        """Continue from what `memory` returned, also on another number of ranks. Collective."""
-        stored = dict(memory)
-        self.evaluations, self._states.products = (int(count) for count in stored.pop("counts"))
-        names = [name for name in stored if name.startswith("design.")]
-        self._points.recall({name.removeprefix("design."): stored.pop(name) for name in names})
-        recall_joined(self.problems.values(), stored)
-
-    def _point_at(self, alpha: np.ndarray) -> PathPoint:
+    def _point_at(self, alpha: np.ndarray) -> JointPoint:
         """Solve the adjoints from the last step to the first. Collective."""
         states = self._states.of(alpha)
         found: dict[str, DesignPoint] = {}
@@ -269,30 +179,22 @@ class LoadPath:
                 state, with_later_steps(state, own, by_position) if found else own
             )
             by_position = by_slip_origin(state, own, found[name].adjoint_multiplier)
-            self._states.products += found[name].adjoint_iterations
         alpha = np.array(alpha, dtype=float)
-        points = {name: replace(found[name], alpha=alpha) for name in self.problems if name in found}
-        return PathPoint(
-            alpha,
-            sum(point.value for point in points.values()),
-            np.asarray(sum(point.gradient for point in points.values())),
-            _together([point.weak for point in points.values()]),
-            points,
+        parts = {name: replace(found[name], alpha=alpha) for name in self.problems if name in found}
+        value = sum(part.value for part in parts.values())
+        gradient = np.sum([part.gradient for part in parts.values()], axis=0)
+        return JointPoint(
+            alpha, value, gradient, WeakPoints.joined([part.weak for part in parts.values()]), parts
         )
 
 
 class _States:
-    """States of all steps of one design after another; those of the last one are kept.
-
-    Attributes:
-        products: F-products of states, and of the adjoints that paths add, so far.
-    """
+    """States of all steps of one design after another; those of the last one are kept."""
 
     def __init__(self, problems: Mapping[str, ShapeProblem]) -> None:
         self._problems = problems
         self._alpha: np.ndarray | None = None
         self._known: dict[str, State] = {}
-        self.products = 0
 
     def of(self, alpha: np.ndarray) -> Mapping[str, State]:
         """Return the states of a design. Collective."""
@@ -302,15 +204,8 @@ class _States:
         last = None
         for name, problem in self._problems.items():
             states[name] = last = problem.state_of(alpha, last)
-            self.products += last.dual.products
         self._alpha, self._known = np.array(alpha, dtype=float), states
         return states
-
-
-def _together(weak: Sequence[WeakPoints]) -> WeakPoints:
-    """Return the weak points of all steps."""
-    counts = np.sum([(each.contacts, each.discs, each.edges) for each in weak], axis=0)
-    return WeakPoints(int(counts[0]), int(counts[1]), int(counts[2]), weak[0].choice)
 
 
 def _check_names(names: Sequence[str]) -> None:

@@ -1,10 +1,10 @@
-"""Designs that a problem stores: the state from which the next one starts, and the first, best and last."""
+"""Evaluated designs, and those that a problem stores: the first, the best and the last."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -51,67 +51,151 @@ class DesignPoint:
     adjoint_multiplier: np.ndarray = field(repr=False)
 
 
-class DesignMemory:
-    """The last state and the first, best and last design; those of an earlier run as arrays.
+@displayed
+@dataclass(frozen=True, eq=False)
+class JointPoint:
+    """An evaluated design of several problems: of all load cases, or of all steps of a load path.
 
     Attributes:
-        state: State from which the next one starts, None before the first.
-        error_by_tolerance: Error of the last value divided by the tolerance of its state, 0 before the first.
+        alpha: Design variables, shape (size,), [length].
+        value: J, the largest or the sum of the parts.
+        gradient: Its gradient or subgradient, see `DesignPoint`, shape (size,).
+        weak: Weakly active points of all parts that the gradient is made of.
+        parts: Name of the case or step -> its state, its own objective and its share of the gradient; of a
+            path up to the last step with an objective.
+        error: Safe estimate of the error of the value, where the tolerance is adaptive.
     """
 
-    def __init__(self, restore: Callable[[np.ndarray, Stored], State]) -> None:
-        """Start empty.
+    alpha: np.ndarray
+    value: float
+    gradient: np.ndarray
+    weak: WeakPoints
+    parts: Mapping[str, DesignPoint]
+    error: float = 0.0
 
-        Args:
-            restore: Builds the state of a design from what `stored_state` returned. Collective.
-        """
-        self._restore = restore
-        self._points: dict[str, DesignPoint | Stored] = {}
-        self._alpha: np.ndarray = np.zeros(0)
-        self.state: State | None = None
-        self.error_by_tolerance = 0.0
+    @property
+    def state(self) -> State:
+        """Equilibrium of the last part."""
+        return list(self.parts.values())[-1].state
 
-    def record_state(self, alpha: np.ndarray, state: State) -> None:
-        """Store the last state."""
-        self._alpha, self.state = np.array(alpha, dtype=float), state
 
-    def record_point(self, point: DesignPoint) -> None:
+class Recorded(Protocol):
+    """A design with its objective."""
+
+    @property
+    def alpha(self) -> np.ndarray:
+        """Its variables."""
+
+    @property
+    def value(self) -> float:
+        """Its objective."""
+
+
+Point = TypeVar("Point", bound=Recorded)
+
+
+class DesignRecord(Generic[Point]):
+    """The first, best and last evaluated design; those of an earlier run as arrays until they are asked for.
+
+    Attributes:
+        evaluations: Number of designs evaluated.
+    """
+
+    def __init__(self, build: Callable[[Stored], Point], arrays_of: Callable[[Point], Stored]) -> None:
+        """Start empty; ``arrays_of`` stores a design, ``build`` rebuilds it (collective)."""
+        self._build, self._arrays_of = build, arrays_of
+        self._points: dict[str, Point | Stored] = {}
+        self.evaluations = 0
+
+    def record(self, point: Point) -> None:
         """Store an evaluated design."""
+        self.evaluations += 1
         first, best = self._points.get("first"), self._points.get("best")
         if first is None or np.array_equal(point.alpha, _alpha(first)):
             self._points["first"] = point
         if best is None or point.value < _value(best) or np.array_equal(point.alpha, _alpha(best)):
             self._points["best"] = point
         self._points["last"] = point
-        self.error_by_tolerance = point.error / point.tolerance
 
-    def of_design(self, alpha: np.ndarray) -> DesignPoint | None:
+    def of_design(self, alpha: np.ndarray) -> Point | None:
         """Return the stored evaluation of exactly this design, if any. Collective after a run was resumed."""
         for name in ("last", "best", "first"):
             if name in self._points and np.array_equal(_alpha(self._points[name]), alpha):
                 return self.point(name)
         return None
 
-    def point(self, name: str) -> DesignPoint | None:
+    def point(self, name: str) -> Point | None:
         """Return a design by its name; one of an earlier run is rebuilt first. Collective then."""
         stored = self._points.get(name)
-        if stored is None or isinstance(stored, DesignPoint):
+        if not isinstance(stored, dict):
             return stored
-        built = self._built(stored)
+        built = self._build(stored)
         self._points = {key: built if point is stored else point for key, point in self._points.items()}
         return built
 
     def stored(self) -> Stored:
         """Return everything as arrays. Collective."""
-        arrays: Stored = {}
+        arrays: Stored = {"evaluations": np.array(self.evaluations)}
         names: dict[int, str] = {}
         for name, point in self._points.items():
             if id(point) in names:
                 arrays[f"{name}.{_SAME}"] = np.array(names[id(point)])
                 continue
             names[id(point)] = name
-            parts = _stored_point(point) if isinstance(point, DesignPoint) else point
+            parts = point if isinstance(point, dict) else self._arrays_of(point)
             arrays.update({f"{name}.{part}": values for part, values in parts.items()})
+        return arrays
+
+    def recall(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Continue from what `stored` returned."""
+        parts: dict[str, Stored] = {}
+        for key, values in arrays.items():
+            name, _, part = key.partition(".")
+            parts.setdefault(name, {})[part] = values
+        self.evaluations = int(parts.pop("evaluations")[""])
+        points = {name: stored for name, stored in parts.items() if _SAME not in stored}
+        points |= {name: points[str(stored[_SAME])] for name, stored in parts.items() if _SAME in stored}
+        self._points = dict(points)
+
+
+def record_of_values(again: Callable[[np.ndarray], Point]) -> DesignRecord[Point]:
+    """Return a record that stores variables and values alone; ``again`` finds or evaluates a design anew."""
+
+    def arrays_of(point: Point) -> Stored:
+        return {"alpha": point.alpha, "value": np.array(point.value)}
+
+    return DesignRecord(lambda stored: again(stored["alpha"]), arrays_of)
+
+
+class DesignMemory(DesignRecord[DesignPoint]):
+    """The evaluated designs of a problem, the state from which the next one starts, and the cost so far.
+
+    Attributes:
+        state: State from which the next one starts, None before the first.
+        error_by_tolerance: Error of the last value divided by the tolerance of its state, 0 before the first.
+        products: F-products of states and adjoints so far.
+    """
+
+    def __init__(self, restore: Callable[[np.ndarray, Stored], State]) -> None:
+        """Start empty; ``restore`` builds the state of a design from `stored_state` (collective)."""
+        super().__init__(self._built, _stored_point)
+        self._restore = restore
+        self._alpha: np.ndarray = np.zeros(0)
+        self.state: State | None = None
+        self.error_by_tolerance, self.products = 0.0, 0
+
+    def record_state(self, alpha: np.ndarray, state: State) -> None:
+        """Store the last state."""
+        self._alpha, self.state = np.array(alpha, dtype=float), state
+
+    def record(self, point: DesignPoint) -> None:
+        """Store an evaluated design."""
+        super().record(point)
+        self.error_by_tolerance = point.error / point.tolerance
+
+    def stored(self) -> Stored:
+        """Return everything as arrays. Collective."""
+        arrays = {**super().stored(), "products": np.array(self.products)}
         if self.state is not None:
             arrays[f"{_START}.alpha"] = self._alpha
             arrays[f"{_START}.error"] = np.array(self.error_by_tolerance)
@@ -120,15 +204,12 @@ class DesignMemory:
 
     def recall(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Load what `stored` returned; only the state to start from is built immediately. Collective."""
-        parts: dict[str, Stored] = {}
-        for key, values in arrays.items():
-            name, _, part = key.partition(".")
-            parts.setdefault(name, {})[part] = values
-        start = parts.pop(_START, None)
-        points = {name: stored for name, stored in parts.items() if _SAME not in stored}
-        points |= {name: points[str(stored[_SAME])] for name, stored in parts.items() if _SAME in stored}
-        self._points = dict(points)
-        if start is not None:
+        rest = dict(arrays)
+        self.products = int(rest.pop("products"))
+        names = [key for key in rest if key.startswith(f"{_START}.")]
+        start = {key.removeprefix(f"{_START}."): rest.pop(key) for key in names}
+        super().recall(rest)
+        if start:
             alpha, self.error_by_tolerance = start.pop("alpha"), float(start.pop("error"))
             self.record_state(alpha, self._restore(alpha, start))
 
@@ -151,47 +232,6 @@ class DesignMemory:
         )
 
 
-class Remembers(Protocol):
-    """What a checkpoint stores, such as a `ShapeProblem`."""
-
-    def fingerprint(self) -> dict[str, str]:
-        """Identify it."""
-
-    def memory(self) -> Stored:
-        """Return what its next state depends on. Collective."""
-
-    def recall(self, memory: Mapping[str, np.ndarray]) -> None:
-        """Continue from what `memory` returned. Collective."""
-
-
-def joined_fingerprint(problems: Mapping[str, Remembers]) -> dict[str, str]:
-    """Identify several problems, under keys that begin with their names."""
-    return {
-        f"{name}.{key}": text
-        for name, problem in problems.items()
-        for key, text in problem.fingerprint().items()
-    }
-
-
-def joined_memory(problems: Iterable[Remembers]) -> Stored:
-    """Return what several problems remember under keys that begin with their numbers. Collective."""
-    return {
-        f"{number}/{key}": values
-        for number, problem in enumerate(problems)
-        for key, values in problem.memory().items()
-    }
-
-
-def recall_joined(problems: Collection[Remembers], memory: Mapping[str, np.ndarray]) -> None:
-    """Let several problems continue from what `joined_memory` returned. Collective."""
-    parts: list[Stored] = [{} for _ in problems]
-    for key, values in memory.items():
-        number, _, name = key.partition("/")
-        parts[int(number)][name] = values
-    for problem, part in zip(problems, parts, strict=True):
-        problem.recall(part)
-
-
 def _stored_point(point: DesignPoint) -> Stored:
     weak, numbering = point.weak, point.state.torn.numbering
     return {
@@ -209,9 +249,9 @@ def _stored_point(point: DesignPoint) -> Stored:
     }
 
 
-def _value(point: DesignPoint | Stored) -> float:
-    return point.value if isinstance(point, DesignPoint) else float(point["value"])
+def _value(point: Recorded | Stored) -> float:
+    return float(point["value"] if isinstance(point, dict) else point.value)
 
 
-def _alpha(point: DesignPoint | Stored) -> np.ndarray:
-    return point.alpha if isinstance(point, DesignPoint) else point["alpha"]
+def _alpha(point: Recorded | Stored) -> np.ndarray:
+    return point["alpha"] if isinstance(point, dict) else point.alpha

@@ -44,11 +44,8 @@ def mortar_by_shape(
     """Return the derivative by the nodes of all bodies, replicated, shape (n_nodes, dim). Collective.
 
     Args:
-        torn: The torn system.
-        pair: The pair, of contact or tied.
         points: Slave nodes among those of all bodies, ascending, shape (n,).
         motions: Displacements of state and adjoint at the nodes of the master.
-        by: Derivatives by the points.
     """
     tearing, scene = torn.decomposition.tearing, torn.scene
     assert isinstance(pair.master, Surface)
@@ -79,8 +76,6 @@ def mortar_points_pulled_back(
     nodes of both, each of which is a projection.
 
     Args:
-        points: The contact points.
-        by: Derivatives by the results of their coupling.
         comm: Communicator of the ranks that share the work, all with the same arguments.
     """
     slave, master, coupling, gaps = points.slave, points.master, points.coupling, points.closable
@@ -115,7 +110,7 @@ def mortar_points_pulled_back(
 def _gaps_pulled_back(
     surface: FacetedSurface, hit: Projection, by_gap: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives by projected points and by the surface's nodes from that by the gaps."""
+    """Vector-Jacobian product of the gaps with respect to projected points and the surface's nodes."""
     count, dim, corners = len(hit.point), surface.dim, surface.corners
     by = PointDerivatives(
         by_gap, np.zeros((count, dim)), np.zeros((count, dim - 1, dim)), np.zeros((count, corners))

@@ -52,10 +52,7 @@ class _Component:
         """Factor the matrix of the free nodes. Collective.
 
         Args:
-            space: The space of scalars on the mesh.
-            matrix: Its matrix.
             given: Marks of the nodes where it is given, shape (n_nodes,).
-            free: Marks of those where it is free.
         """
         self._given, self._free = _Nodes.chosen(space, given), _Nodes.chosen(space, free)
         inner = matrix.createSubMatrix(self._free.rows, self._free.rows)

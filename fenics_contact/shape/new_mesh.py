@@ -29,9 +29,6 @@ def meshed(
 
     Args:
         scene: The scene in the shape of a design.
-        designs: The designs.
-        mesher: Makes the meshes.
-        comm: Communicator of the ranks.
 
     Raises:
         InvalidInputError: If a mesh lacks nodes of a design surface, or does not tell where points of a pair

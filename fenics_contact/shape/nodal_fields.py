@@ -23,11 +23,6 @@ def field_by_places(
     """Return Σ_c g_c ∇f_c at the nodes that move, by dof of the displacement, shape (size,).
 
     Args:
-        torn: The torn system.
-        subdomain: The subdomain.
-        load: A load whose value is a function of position.
-        space: Space of its interpolant on the subdomain.
-        by_values: g, derivative by the dofs of the interpolant.
         moving: Marks of the nodes of all bodies that move, or None for all.
 
     Raises:

@@ -38,8 +38,6 @@ def point_motions(
     """Return the motions of points. Collective.
 
     Args:
-        torn: The torn system.
-        points: Its contact points, or those of its ties.
         masters: The masters of the pairs that the points number; all nodes of surfaces are included, as some
             have no weight at any point but a derivative of it.
         fields: Adjoint and state, torn displacements of this rank, shape (torn_size,) each.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from fenics_contact.fingerprint import described
 from fenics_contact.scene import Scene
 from fenics_contact.shape.beside import with_fewest_weak_points
 from fenics_contact.shape.design import SurfaceDesign
-from fenics_contact.shape.design_function import DesignFunction, aimed
+from fenics_contact.shape.design_function import SingleProblem, comm_of, with_objective
 from fenics_contact.shape.design_state import design_state
 from fenics_contact.shape.geometry import DesignGeometry
 from fenics_contact.shape.linearised_face import WeakChoice, linearise_face
@@ -33,25 +33,20 @@ ADJOINT_SHARE, ADJOINT_FLOOR = 1e-1, 1e-11
 logger = logging.getLogger(__name__)
 
 
-def _comm(problem: ShapeProblem, *_: Any, **__: Any) -> MPI.Comm:
-    return problem.comm
-
-
 @displayed
-class ShapeProblem:
+class ShapeProblem(SingleProblem):
     """J(α) with a subgradient, for one or more moving surfaces of a scene.
 
     Call it with α to get (J, subgradient): one state, one adjoint, whatever the number of variables. Where no
     contact point is weakly active it is the gradient, where one is, a Clarke subgradient. Where several are
-    it may not be a subgradient (`WeakChoice`): such designs are `doubtful`, and `beside` returns a gradient
-    nearby. Topology, partition and compiled forms are reused; each state starts from the one before.
+    it may not be a subgradient (`WeakChoice`): such designs `may_be_invalid`, and
+    `gradient_near` returns the gradient of a design nearby. Topology, partition and compiled forms are
+    reused; each state starts from the one before.
 
     Attributes:
         contact: The problem that computes the states, to the tolerance given (`tolerance`).
         scene: The scene in its reference shape.
         geometry: How it moves with a design.
-        products: F-products of states and adjoints so far.
-        evaluations: Number of designs evaluated, without those for `beside`.
 
     Example:
         >>> designs = SurfaceDesign("link1", links.first.crown, net=(7, 4))  # doctest: +SKIP
@@ -84,9 +79,8 @@ class ShapeProblem:
         self.scene, self.tolerance = contact.scene, tolerance
         self._tightest = tightest_of(contact, tolerance)
         self._timer = contact.timer
-        self.evaluations, self.products = 0, 0
-        self._memory = DesignMemory(self._restored)
-        self._beside: ShapeProblem | None = None
+        self._memory: DesignMemory = DesignMemory(self._restored)
+        self._neighbour: ShapeProblem | None = None
         self._apart = False
         with self._timer.phase("mesh motion"):
             given = (designs,) if isinstance(designs, SurfaceDesign) else designs
@@ -103,29 +97,28 @@ class ShapeProblem:
         return self.geometry.designs
 
     @property
-    def size(self) -> int:
-        """Number of design variables."""
-        return self.geometry.size
-
-    @property
     def comm(self) -> MPI.Comm:
         """Communicator over which the subdomains are spread."""
         return self.contact.comm
 
     @property
-    def first(self) -> DesignPoint | None:
-        """The design evaluated first. Collective after a run was resumed, as it is rebuilt then."""
-        return self._memory.point("first")
+    def _parts(self) -> Sequence[ShapeProblem]:
+        return (self,)
 
     @property
-    def best(self) -> DesignPoint | None:
-        """The design with the smallest objective so far, feasible or not. Collective after a run resumed."""
-        return self._memory.point("best")
+    def products(self) -> int:
+        """F-products of states and adjoints so far."""
+        return self._memory.products
 
     @property
-    def last(self) -> DesignPoint | None:
-        """The design evaluated last. Collective after a run was resumed."""
-        return self._memory.point("last")
+    def seconds(self) -> dict[str, float]:
+        """Wall time of this rank by phase, over all evaluations."""
+        return self._timer.seconds
+
+    @property
+    def inexact(self) -> bool:
+        """Whether an optimiser may ask for less accuracy, see `within`."""
+        return isinstance(self.tolerance, AdaptiveTolerance)
 
     def fingerprint(self) -> dict[str, str]:
         """Identify the problem, for a checkpoint."""
@@ -150,23 +143,11 @@ class ShapeProblem:
             raise InvalidInputError(
                 "checkpoints of designs need linear materials, got others: leave the checkpoint out"
             )
-        return {"counts": np.array([self.evaluations, self.products]), **self._memory.stored()}
+        return self._memory.stored()
 
     def recall(self, memory: Mapping[str, np.ndarray]) -> None:
         """Continue from what `memory` returned, also on another number of ranks. Collective."""
-        stored = dict(memory)
-        self.evaluations, self.products = (int(count) for count in stored.pop("counts"))
-        self._memory.recall(stored)
-
-    @property
-    def seconds(self) -> dict[str, float]:
-        """Wall time of this rank by phase, over all evaluations."""
-        return self._timer.seconds
-
-    def __call__(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return J(α) and a subgradient, see the class; raises as `evaluate` does. Collective."""
-        point = self.evaluate(alpha)
-        return point.value, point.gradient
+        self._memory.recall(memory)
 
     def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
         """Return the coordinates of the designed bodies, see `DesignGeometry.points_of`. Collective."""
@@ -176,7 +157,7 @@ class ShapeProblem:
         """Return the scene in the shape of a design; raises as `evaluate` does. Collective."""
         return self.geometry.scene_of(self.scene, alpha)
 
-    @collectively("ShapeProblem.state_of", _comm)
+    @collectively("ShapeProblem.state_of", comm_of)
     def state_of(self, alpha: np.ndarray, after: State | None = None) -> State:
         """Return the equilibrium of a design, started from the one before. Collective.
 
@@ -189,14 +170,14 @@ class ShapeProblem:
         """
         return self._solved(alpha, self._tightest, after=after)
 
-    @collectively("ShapeProblem.value_of", _comm)
+    @collectively("ShapeProblem.value_of", comm_of)
     def value_of(self, alpha: np.ndarray) -> float:
         """Return J(α) alone, without adjoint. Collective."""
         state = self.state_of(alpha)
         with asking(self.comm):
             return finite_value(self.objective.value(state, self.geometry.forms))
 
-    @collectively("ShapeProblem.evaluate", _comm)
+    @collectively("ShapeProblem.evaluate", comm_of)
     def evaluate(self, alpha: np.ndarray) -> DesignPoint:
         """Solve the state and its adjoint and return value and subgradient. Collective.
 
@@ -209,7 +190,7 @@ class ShapeProblem:
         state = self._solved(alpha, self._tightest, known) if self.inexact else self.state_of(alpha)
         return self._recorded(self._point_at(alpha, state, self._tightest, known))
 
-    @collectively("ShapeProblem.differentiate", _comm)
+    @collectively("ShapeProblem.differentiate", comm_of)
     def differentiate(self, state: State, partials: Partials | None = None) -> DesignPoint:
         """Return value and subgradient at a known state of the reference shape, for one adjoint. Collective.
 
@@ -229,32 +210,12 @@ class ShapeProblem:
         with self._timer.phase("objective"), asking(self.comm):
             return finite_partials(objective.partials(state, self.geometry.forms))
 
-    def function(self, objective: Objective, name: str | None = None) -> DesignFunction:
-        """Return another objective as a function α -> (value, subgradient), for a constraint.
-
-        At a design evaluated before it uses the state and costs one adjoint.
-        """
-        return DesignFunction(self, objective, name)
-
-    def known(self, alpha: np.ndarray) -> DesignPoint | None:
-        """Return the first, best or last design if it is exactly this one. Collective."""
-        return self._memory.of_design(alpha)
-
-    def at(self, alpha: np.ndarray) -> DesignPoint:
-        """Return a design as evaluated, again unless it is `known`, such as the x of a result. Collective."""
-        return self.known(alpha) or self.evaluate(alpha)
-
     def remarks(self, alpha: np.ndarray) -> tuple[str, ...]:
         """Return what to know of a design beside its value: overlaps before it is loaded. Collective."""
         known = self.known(alpha)
         return self.contact.overlaps(self.state_of(alpha) if known is None else known.state)
 
-    @property
-    def inexact(self) -> bool:
-        """Whether an optimiser may ask for less accuracy, see `within`."""
-        return isinstance(self.tolerance, AdaptiveTolerance)
-
-    @collectively("ShapeProblem.within", _comm)
+    @collectively("ShapeProblem.within", comm_of)
     def within(self, alpha: np.ndarray, value: float, subgradient: float) -> tuple[float, np.ndarray, float]:
         """Return J(α), a subgradient and the estimated error of J, to the requested accuracy. Collective.
 
@@ -281,18 +242,12 @@ class ShapeProblem:
 
     def _recorded(self, point: DesignPoint) -> DesignPoint:
         if not self.evaluations and not point.weak.count:  # at a kink a branch may be flat
-            require_influence(self.objective, self.scene, point, self._beside_at(self._tightest))
-        self.evaluations += 1
-        self._memory.record_point(point)
+            require_influence(self.objective, self.scene, point, self._unrecorded(self._tightest))
+        self._memory.record(point)
         return point
 
-    @collectively("ShapeProblem.doubtful", _comm)
-    def doubtful(self, alpha: np.ndarray) -> bool:
-        """Return whether the last result, at α, may not be a subgradient. Collective."""
-        return (known := self._memory.of_design(alpha)) is not None and known.weak.doubtful
-
-    @collectively("ShapeProblem.beside", _comm)
-    def beside(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
+    @collectively("ShapeProblem.gradient_near", comm_of)
+    def gradient_near(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
         """Return the gradient of the design between two, near α, with the fewest weak points. Collective.
 
         Args:
@@ -303,10 +258,10 @@ class ShapeProblem:
             InvalidDesignError: If no design between them has an equilibrium.
         """
         known = self._memory.of_design(alpha)
-        evaluate = self._beside_at(known.tolerance if known else self._tightest)
+        evaluate = self._unrecorded(known.tolerance if known else self._tightest)
         return with_fewest_weak_points(alpha, end, evaluate).gradient
 
-    def _beside_at(self, tolerance: float) -> Callable[[np.ndarray], DesignPoint]:
+    def _unrecorded(self, tolerance: float) -> Callable[[np.ndarray], DesignPoint]:
         """Return what evaluates designs that are not recorded. Collective when called."""
         return lambda near: self._point_at(near, self._solved(near, tolerance), tolerance, None)
 
@@ -319,8 +274,8 @@ class ShapeProblem:
     ) -> State:
         """Compute an equilibrium, from a less accurate one of the same design if known. Collective."""
         previous = self._memory.state if known is None else known.state
-        if previous is None and self._beside is not None:  # the first state of a load case
-            previous = self._beside._memory.state
+        if previous is None and self._neighbour is not None:  # the first state of a load case
+            previous = self._neighbour._memory.state
         if not self._apart:  # the shape given, whichever design is the first
             self.contact.check_apart(self.scene)
             self._apart = True
@@ -328,6 +283,7 @@ class ShapeProblem:
             scene = self.scene_of(alpha) if known is None else known.state.scene
         state = design_state(self.contact, scene, previous, tolerance, slip_from=after)
         self._memory.record_state(alpha, state)
+        self._memory.products += products_of(state)
         return state
 
     def _point_at(
@@ -351,7 +307,7 @@ class ShapeProblem:
             by_points = by_nodes(state, adjoint, partials, linearised, self.geometry.forms)
             gradient = self.geometry.pull_back(by_points)
         spent = max(products_of(state) - before, adjoint.iterations)
-        self.products += before + spent
+        self._memory.products += spent
         value = partials.value + (error.correction if self.inexact else 0.0)
         # Ranks must take the same decisions, whatever the rounding in sums over ranks.
         value, gradient, error = self.comm.bcast((value, gradient, error))
@@ -363,7 +319,7 @@ class ShapeProblem:
             correction=error.correction, error=error.size, adjoint_multiplier=adjoint.multiplier,
         )  # fmt: skip
 
-    @collectively("ShapeProblem.case", _comm)
+    @collectively("ShapeProblem.case", comm_of)
     def case(self, scene: Scene, objective: Objective | None = None) -> ShapeProblem:
         """Return the problem of another load case of the same designs, see `LoadCases`. Collective.
 
@@ -378,9 +334,8 @@ class ShapeProblem:
                 loads have no derivative by the designs.
         """
         check_case(self.scene, scene)
-        other = aimed(self, objective or self.objective)
-        other.scene, other._beside, other._apart = scene, self, False
-        other.evaluations, other.products = 0, 0
+        other = with_objective(self, objective or self.objective)
+        other.scene, other._neighbour, other._apart = scene, self, False
         other._memory = DesignMemory(other._restored)
         return other
 
@@ -388,12 +343,12 @@ class ShapeProblem:
         """Return whether another problem is a `case` of the same designs."""
         return self.geometry is other.geometry
 
-    @collectively("ShapeProblem.volume", _comm)
+    @collectively("ShapeProblem.volume", comm_of)
     def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the volume of the designed bodies, in the plane the area, and its gradient. Collective."""
         return self.geometry.volume(self.scene_of(alpha))
 
     def _restored(self, alpha: np.ndarray, stored: Stored) -> State:
         state = self.contact.restore(stored, self.scene_of(alpha))
-        self.products += state.system.products
+        self._memory.products += state.system.products
         return state

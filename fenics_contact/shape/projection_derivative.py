@@ -44,7 +44,7 @@ class PointDerivatives:
 def frames_pulled_back(
     normal: np.ndarray, by_tangents: np.ndarray, axes: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return the derivative by the unit normals from that by the tangents built on them, shape (n, dim).
+    """Vector-Jacobian product of `tangent_frames` with respect to the unit normals, shape (n, dim).
 
     Reverse of `fenics_contact.pairing.contact_points.tangent_frames`.
 
@@ -71,18 +71,16 @@ def frames_pulled_back(
 def projection_pulled_back(
     master: FacetedSurface, facet: np.ndarray, local: np.ndarray, gap: np.ndarray, by: PointDerivatives
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives by the slave points and by the master's nodes.
+    """Vector-Jacobian product of the projection with respect to the slave points and the master's nodes.
 
     The projection solves Σ N_j(ξ) x_j + r n(ξ) − x_s = 0 with n = m/‖m‖, m = Σ N_j(ξ) a_j, a_j the nodal
     normals; the implicit function theorem gives ξ and r. The gap is r − h, h(ξ) the height of the true
     surface.
 
     Args:
-        master: The master surface.
         facet: Facet of each point, shape (n,).
         local: ξ, shape (n, dim − 1).
         gap: r − h, shape (n,), [length].
-        by: Derivatives by gap, normal, tangents and weights.
 
     Returns:
         Derivative by each slave point, shape (n, dim), and by each node of the master, (n_nodes, dim).
@@ -115,7 +113,6 @@ def carriers(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> t
     """Return the nodes that carry a master's motion at points and the gradients of their weights.
 
     Args:
-        surface: The master.
         facet: Facet of each point, shape (n,).
         local: Local coordinates on it, shape (n, dim − 1).
 

@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from fenics_contact._libraries import MPI
 from fenics_contact.contact import State
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidDesignError, InvalidInputError, tell
 from fenics_contact.mesh import BodyMesh, jacobians
 from fenics_contact.scene import Scene
-from fenics_contact.shape.design import SurfaceDesign, checked_variables
-from fenics_contact.shape.design_function import DesignFunction, aimed
-from fenics_contact.shape.memory import DesignPoint, joined_memory, recall_joined
+from fenics_contact.shape.design import checked_variables
+from fenics_contact.shape.design_function import SingleProblem, with_objective
+from fenics_contact.shape.memory import DesignPoint, record_of_values
 from fenics_contact.shape.new_mesh import Mesher, meshed
-from fenics_contact.shape.objective import Objective
 from fenics_contact.shape.problem import ShapeProblem
-
-_OWN = "remeshed."
 
 logger = logging.getLogger(__name__)
 
@@ -49,7 +45,7 @@ class Remeshing:
 
 
 @displayed
-class Remeshed:
+class Remeshed(SingleProblem):
     """J(α) of a `ShapeProblem`, on a new mesh wherever a design would spoil the cells of the one before.
 
     The mesh of a design moves until a cell has lost all but a share of its Jacobian. There the body, in the
@@ -92,39 +88,14 @@ class Remeshed:
         self.origins: list[np.ndarray] = [np.zeros(problem.size)]
         self.remeshings: list[Remeshing] = []
         self.objective = problem.objective
-        self._parents, self._last = [0], 0
+        self._parents, self._memory = [0], record_of_values(self._again)
 
     def _facts(self) -> dict[str, Any]:
         return {"problem": self.problems[0], "remeshings": len(self.remeshings)}
 
     @property
-    def comm(self) -> MPI.Comm:
-        """Communicator over which the subdomains are spread."""
-        return self.problems[0].comm
-
-    @property
-    def size(self) -> int:
-        """Number of design variables."""
-        return self.problems[0].size
-
-    @property
-    def designs(self) -> tuple[SurfaceDesign, ...]:
-        """The moving surfaces on the first mesh."""
-        return self.problems[0].designs
-
-    @property
-    def evaluations(self) -> int:
-        """Number of designs evaluated."""
-        return sum(problem.evaluations for problem in self.problems)
-
-    @property
-    def products(self) -> int:
-        """F-products of states and adjoints so far."""
-        return sum(problem.products for problem in self.problems)
-
-    @products.setter
-    def products(self, value: int) -> None:
-        self.problems[self._last].products += value - self.products
+    def _parts(self) -> Sequence[ShapeProblem]:
+        return self.problems
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -135,39 +106,6 @@ class Remeshed:
             for phase in sorted(phases)
         }
 
-    @property
-    def inexact(self) -> bool:
-        """Whether an optimiser may ask for less accuracy: never."""
-        return False
-
-    @property
-    def first(self) -> DesignPoint | None:
-        """The design evaluated first on the first mesh that has one. Collective after a run was resumed."""
-        return next((point for point in self._points("first") if point is not None), None)
-
-    @property
-    def best(self) -> DesignPoint | None:
-        """The design with the smallest objective so far, feasible or not. Collective after a run resumed."""
-        known = [point for point in self._points("best") if point is not None]
-        return min(known, key=lambda point: point.value, default=None)
-
-    @property
-    def last(self) -> DesignPoint | None:
-        """The design evaluated last. Collective after a run was resumed."""
-        return self._points("last")[self._last]
-
-    def _points(self, which: str) -> list[DesignPoint | None]:
-        points = (getattr(problem, which) for problem in self.problems)
-        return [
-            point and replace(point, alpha=point.alpha + origin)
-            for point, origin in zip(points, self.origins, strict=True)
-        ]
-
-    def __call__(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return J(α) and a subgradient; raises as `evaluate` does. Collective."""
-        point = self.evaluate(alpha)
-        return point.value, point.gradient
-
     def evaluate(self, alpha: np.ndarray) -> DesignPoint:
         """Solve the state and its adjoint and return value and subgradient. Collective.
 
@@ -175,7 +113,9 @@ class Remeshed:
             InvalidDesignError: If the design is out of reach of all meshes, or has no equilibrium.
         """
         problem, moved = self._on_mesh(alpha)
-        return replace(problem.evaluate(moved), alpha=np.array(alpha, dtype=float))
+        point = replace(problem.evaluate(moved), alpha=np.array(alpha, dtype=float))
+        self._memory.record(point)
+        return point
 
     def state_of(self, alpha: np.ndarray) -> State:
         """Return the equilibrium of a design; raises as `evaluate` does. Collective."""
@@ -197,27 +137,10 @@ class Remeshed:
         problem, moved = self._on_mesh(alpha)
         return problem.volume(moved)
 
-    def known(self, alpha: np.ndarray) -> DesignPoint | None:
-        """Return a stored design if it is exactly this one. Collective."""
-        found = (
-            problem.known(alpha - origin) for problem, origin in zip(self.problems, self.origins, strict=True)
-        )
-        point = next((point for point in found if point is not None), None)
-        return point and replace(point, alpha=np.array(alpha, dtype=float))
-
-    def at(self, alpha: np.ndarray) -> DesignPoint:
-        """Return a design as evaluated, again unless it is `known`. Collective."""
-        return self.known(alpha) or self.evaluate(alpha)
-
-    def doubtful(self, alpha: np.ndarray) -> bool:
-        """Return whether the last result, at α, may not be a subgradient. Collective."""
+    def gradient_near(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Return a gradient near α, see `ShapeProblem.gradient_near`. Collective."""
         problem, moved = self._on_mesh(alpha)
-        return problem.doubtful(moved)
-
-    def beside(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """Return a gradient near α, see `ShapeProblem.beside`. Collective."""
-        problem, moved = self._on_mesh(alpha)
-        return self._aimed(problem).beside(moved, moved + (end - alpha))
+        return self._aimed(problem).gradient_near(moved, moved + (end - alpha))
 
     def differentiate(self, state: State) -> DesignPoint:
         """Return value and subgradient at a state of one of the meshes. Collective."""
@@ -225,47 +148,41 @@ class Remeshed:
         problem = next(one for one in self.problems if one.contact.decomposition is decomposition)
         return self._aimed(problem).differentiate(state)
 
-    def function(self, objective: Objective, name: str | None = None) -> DesignFunction:
-        """Return another objective as a function of the same designs, see `ShapeProblem.function`."""
-        return DesignFunction(self, objective, name)
-
     def fingerprint(self) -> dict[str, str]:
         """Identify the problem, for a checkpoint."""
         mesher = getattr(self._mesher, "__name__", str(type(self._mesher)))
         return {**self.problems[0].fingerprint(), "remeshing": f"{mesher}, {self.share}, {self.most}"}
 
     def memory(self) -> dict[str, np.ndarray]:
-        """Return what the next state depends on. Collective."""
+        """Return what the next state depends on, and the stored designs. Collective."""
         jumps = np.array([(one.before, one.after) for one in self.remeshings]).reshape(-1, 2)
-        own = {"origins": np.array(self.origins), "parents": np.array(self._parents), "jumps": jumps}
-        own["last"] = np.array(self._last)
-        return {**{_OWN + key: values for key, values in own.items()}, **joined_memory(self.problems)}
+        meshes = {"origins": np.array(self.origins), "parents": np.array(self._parents), "jumps": jumps}
+        return {**{f"meshes.{key}": values for key, values in meshes.items()}, **super().memory()}
 
     def recall(self, memory: Mapping[str, np.ndarray]) -> None:
         """Continue from what `memory` returned: the meshes are made again. Collective."""
-        own = {key.removeprefix(_OWN): memory[key] for key in memory if key.startswith(_OWN)}
-        for origin, parent, jump in zip(own["origins"][1:], own["parents"][1:], own["jumps"], strict=True):
+        origins, parents, jumps = (memory[f"meshes.{key}"] for key in ("origins", "parents", "jumps"))
+        for origin, parent, jump in zip(origins[1:], parents[1:], jumps, strict=True):
             self._add(int(parent), origin)
             self.remeshings.append(Remeshing(origin, *(float(value) for value in jump)))
-        self._last = int(own["last"])
-        rest = {key: values for key, values in memory.items() if not key.startswith(_OWN)}
-        recall_joined(self.problems, rest)
+        super().recall(memory)
+
+    def _again(self, alpha: np.ndarray) -> DesignPoint:
+        """Return a design of an earlier run. Collective."""
+        problem, moved = self._on_mesh(alpha)
+        return replace(problem.at(moved), alpha=alpha)
 
     def _aimed(self, problem: ShapeProblem) -> ShapeProblem:
-        """Return a problem with the objective of this one; itself, which counts products, if it has it."""
-        return problem if problem.objective is self.objective else aimed(problem, self.objective)
+        """Return a problem with the objective of this one."""
+        return problem if problem.objective is self.objective else with_objective(problem, self.objective)
 
     def _on_mesh(self, alpha: np.ndarray) -> tuple[ShapeProblem, np.ndarray]:
         """Return the problem on the nearest mesh that allows a design, and the design from there."""
         alpha = checked_variables(alpha, self.size, self.comm)
         order = np.argsort([np.linalg.norm(alpha - origin) for origin in self.origins], kind="stable")
-        for k in map(int, order):
-            if self._reach(k, alpha) == 1.0:
-                self._last = k
-                break
-        else:
-            self._last = self._approach(int(order[0]), alpha)
-        return self.problems[self._last], alpha - self.origins[self._last]
+        near = next((k for k in map(int, order) if self._reach(k, alpha) == 1.0), None)
+        k = self._approach(int(order[0]), alpha) if near is None else near
+        return self.problems[k], alpha - self.origins[k]
 
     def _approach(self, k: int, alpha: np.ndarray) -> int:
         """Make new meshes on the way from the k-th until one allows the design; return its number."""

@@ -54,13 +54,7 @@ class _Spread:
 
 
 def resultant_by_shape(torn: TornSystem, load: TotalForce, w: np.ndarray) -> np.ndarray:
-    """Return ∂/∂X of the work of a resultant along w, on the first rank, zero elsewhere. Collective.
-
-    Args:
-        torn: The torn system.
-        load: The resultant.
-        w: Torn field of this rank.
-    """
+    """Return ∂/∂X of the work of a resultant along w, on the first rank, zero elsewhere. Collective."""
     mesh, tearing = torn.scene.bodies[load.body].mesh, torn.decomposition.tearing
     result = np.zeros((tearing.n_nodes, torn.dim))
     nodes, facets = np.unique(mesh.surfaces[load.surface], return_inverse=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidDesignError, InvalidInputError, tell
 from fenics_contact.linalg import LAST_PLACES
 from fenics_contact.scene import HistoryMaterial, Scene, has_mean_dilatation
+from fenics_contact.shape.memory import DesignPoint
 from fenics_contact.shape.objective import Objective
 
 #: How far beside the first design an objective without a gradient is evaluated, by the size of the scene.
@@ -20,27 +20,11 @@ BESIDE = 1e-6
 _LOG = logging.getLogger(__name__)
 
 
-class Evaluated(Protocol):
-    """A design with objective and gradient."""
-
-    @property
-    def alpha(self) -> np.ndarray:
-        """Its variables."""
-
-    @property
-    def value(self) -> float:
-        """Its objective."""
-
-    @property
-    def gradient(self) -> np.ndarray:
-        """The gradient."""
-
-
 def checked_contact(contact: ContactProblem) -> ContactProblem:
     """Return the contact problem of a shape problem.
 
     Raises:
-        InvalidInputError: If it is none.
+        InvalidInputError: If it is of another type.
     """
     if not isinstance(contact, ContactProblem):
         raise InvalidInputError(
@@ -73,29 +57,23 @@ def _check_differentiable(scene: Scene) -> None:
 
 
 def require_influence(
-    objective: Objective, scene: Scene, point: Evaluated, beside: Callable[[np.ndarray], Evaluated]
+    objective: Objective, scene: Scene, point: DesignPoint, evaluate: Callable[[np.ndarray], DesignPoint]
 ) -> None:
-    """Reject an objective that no design variable changes, here or at a design beside. Collective.
+    """Reject an objective that no design variable changes, here or at a design nearby. Collective.
 
     Where the gradient is rounding the objective may be stationary, as a norm of the pressure is where that is
-    even: then it has a gradient beside.
-
-    Args:
-        objective: The objective.
-        scene: The scene.
-        point: The first design.
-        beside: Evaluates another one.
+    even: then it has a gradient nearby.
 
     Raises:
         InvalidInputError: If both gradients are zero, or rounding over the size of the scene.
     """
     size = float(np.ptp(scene.points))
-    if _is_felt(point, size):
+    if _has_influence(point, size):
         return
     number = len(point.gradient)
     way = np.random.default_rng(0).standard_normal(number)
     try:
-        if _is_felt(beside(point.alpha + BESIDE * size * way), size):
+        if _has_influence(evaluate(point.alpha + BESIDE * size * way), size):
             tell(_LOG.info, "the objective is stationary at the first design, to rounding")
             return
     except InvalidDesignError:
@@ -107,7 +85,7 @@ def require_influence(
     )
 
 
-def _is_felt(point: Evaluated, size: float) -> bool:
+def _has_influence(point: DesignPoint, size: float) -> bool:
     """Return whether a variable changes the objective over the size of the scene."""
     change = float(np.abs(point.gradient).max(initial=0.0) * size)
     return change > LAST_PLACES * abs(point.value)
@@ -115,10 +93,6 @@ def _is_felt(point: Evaluated, size: float) -> bool:
 
 def check_case(first: Scene, scene: Scene) -> None:
     """Check that a scene is a load case of the same designs.
-
-    Args:
-        first: The scene of which designs move the bodies.
-        scene: The load case.
 
     Raises:
         InvalidInputError: Says what differs.

@@ -30,10 +30,6 @@ def adjoint_of(
     """Solve the adjoint of a state and weigh its residuals with it. Collective.
 
     Args:
-        state: A converged state.
-        partials: Partial derivatives of the objective.
-        linearised: Branch of the contact law.
-        tolerance: Relative residual of the adjoint.
         start: Multiplier of a neighbouring adjoint, owned, or None; not used for deformed states.
     """
     if isinstance(state, DeformedState):

@@ -28,8 +28,6 @@ def with_later_steps(state: State, own: Partials, by_position: np.ndarray) -> Pa
     """Return the derivatives of a step's objective with what all later steps add. Collective.
 
     Args:
-        state: The state after the step.
-        own: Derivatives of the step's own objective.
         by_position: Derivative of the objectives of all later steps by the relative tangential displacement
             after this step, owned, zero in all other rows, shape (n_owned,).
     """
@@ -50,9 +48,7 @@ def by_slip_origin(state: State, own: Partials, adjoint_multiplier: np.ndarray) 
     origin is c: the derivative is ζ − ∂J/∂(B u − c) in tangential rows.
 
     Args:
-        state: The state after the step.
         own: Derivatives of the step's own objective, without those of later steps.
-        adjoint_multiplier: ζ, owned, with those of later steps.
     """
     torn = state.torn
     tangential = torn.numbering.owned >= torn.n_equality + torn.points.count

@@ -55,10 +55,6 @@ def state_error(
     right one.
 
     Args:
-        state: An inexact state.
-        partials: Partial derivatives of the objective there.
-        linearised: Branch of the contact law.
-        adjoint: The adjoint there.
         unbalanced: Shares βᵀ(G λ − e) of forces out of balance; None for those of a linear state.
 
     References:

@@ -103,7 +103,7 @@ def _terms(objective: Any) -> tuple[tuple[float, Objective], ...]:
 
 
 @dataclass(frozen=True)
-class Largest(Weighable):
+class Maximum(Weighable):
     """J = max J_k, such as the largest stress of several bodies; scale objectives of different units.
 
     The subgradient is that of the largest, of the first one where several are equal. A bundle method joins
@@ -117,7 +117,7 @@ class Largest(Weighable):
 
     Example:
         >>> from fenics_contact.shape import LargestPressure
-        >>> len(Largest((LargestPressure(0), LargestPressure(1))).objectives)
+        >>> len(Maximum((LargestPressure(0), LargestPressure(1))).objectives)
         2
     """
 
@@ -128,12 +128,12 @@ class Largest(Weighable):
         given = self.objectives
         if not isinstance(given, list | tuple) or not given:
             raise InvalidInputError(
-                f"Largest needs a tuple of objectives, got {given!r}: write Largest((first, second))"
+                f"Maximum needs a tuple of objectives, got {given!r}: write Maximum((first, second))"
             )
         for objective in given:
             if not callable(getattr(objective, "partials", None)):
                 raise InvalidInputError(
-                    f"Largest needs objectives, got {type(objective).__name__}: give objects with value and "
+                    f"Maximum needs objectives, got {type(objective).__name__}: give objects with value and "
                     "partials, such as LargestPressure()"
                 )
         object.__setattr__(self, "objectives", tuple(given))

@@ -21,10 +21,9 @@ from fenics_contact.surfaces import (
 def normals_pulled_back(
     surface: FacetedSurface, by_normals: np.ndarray, by_averaged: np.ndarray | float = 0.0
 ) -> np.ndarray:
-    """Return the derivative by the surface's nodes from that by its unit normals, shape (n, dim).
+    """Vector-Jacobian product of the unit normals with respect to the surface's nodes, shape (n, dim).
 
     Args:
-        surface: The surface.
         by_normals: Derivative by each nodal normal, shape (n, dim).
         by_averaged: Direct derivative by each averaged normal, shape (n, dim).
     """
@@ -50,7 +49,6 @@ def slopes_pulled_back(
     """Return derivatives from those by the slopes of true surfaces, see `surfaces.relief.slopes`.
 
     Args:
-        surface: The surface.
         facet: Facets, shape (n,).
         by_slopes: Derivative by the slopes at their corners, shape (n, corners, 2).
 
@@ -80,10 +78,9 @@ def slopes_pulled_back(
 
 
 def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarray:
-    """Return the derivative by the surface's nodes from that by its nodal areas, shape (n, dim).
+    """Vector-Jacobian product of the nodal areas with respect to the surface's nodes, shape (n, dim).
 
     Args:
-        surface: The surface.
         by_areas: Derivative by each nodal area, shape (n,).
     """
     if surface.whole is not None:
@@ -110,8 +107,6 @@ def integral_pulled_back(points: np.ndarray, facets: np.ndarray, density: Surfac
 
     Args:
         points: Coordinates, shape (n_nodes, dim), [length].
-        facets: Node numbers of linear or quadratic facets.
-        density: The integrand.
     """
     result = np.zeros_like(points)
     for at in gauss_points(points, facets):

@@ -20,11 +20,6 @@ def ties_by_shape(state: State, adjoint: Adjoint, partials: Partials) -> np.ndar
     It is ∂/∂X of −λᵀ B w − (ζ − j)ᵀ B u over the rows of ties, with the objective's derivative j by B u − c.
     Rows of bonded surfaces lie along the axes and change by the weights of the master alone, those of sliding
     ones by its normals, too.
-
-    Args:
-        state: The state.
-        adjoint: Its adjoint.
-        partials: Partial derivatives of the objective.
     """
     torn = state.torn
     result = np.zeros((torn.decomposition.tearing.n_nodes, torn.dim))

@@ -13,13 +13,7 @@ from fenics_contact.surfaces import gauss_points
 
 
 def volume_of(scene: Scene, names: Sequence[str], numbers: NodeNumbers) -> tuple[float, np.ndarray]:
-    """Return the volume of some bodies and its derivative by the nodes of all, (n_nodes, dim).
-
-    Args:
-        scene: The scene.
-        names: Names of the bodies.
-        numbers: Numbers of the nodes of all bodies.
-    """
+    """Return the volume of some bodies and its derivative by the nodes of all, (n_nodes, dim)."""
     total, by_points = 0.0, np.zeros((numbers.n_nodes, scene.dim))
     for name in names:
         mesh = scene.bodies[name].mesh

@@ -27,10 +27,7 @@ def strain_work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: 
     """Return ∂/∂X of a(u, w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim).
 
     Args:
-        forms: Compiled derivatives.
-        torn: The torn system.
         u: Torn displacement of this rank, [length].
-        w: Torn field used as the test function.
     """
     for body in torn.scene.bodies.values():  # all ranks compile, also for bodies without a part on them
         for materials in material_sets(body):
@@ -47,11 +44,6 @@ def strain_work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: 
 
 def load_work_by_shape(forms: ShapeForms, torn: TornSystem, w: np.ndarray) -> np.ndarray:
     """Return ∂/∂X of L(w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim). Collective.
-
-    Args:
-        forms: Compiled derivatives.
-        torn: The torn system.
-        w: Torn field used as the test function.
 
     Raises:
         InvalidInputError: If a load that is a function of position is not known close to the nodes.
@@ -112,12 +104,7 @@ def _of_position(load: Load) -> bool:
 
 
 def moving_loads(torn: TornSystem, moving: np.ndarray | None) -> list[Load]:
-    """Return the loads that act on moving volumes and surfaces.
-
-    Args:
-        torn: The torn system.
-        moving: Marks of nodes of all bodies, or None for all.
-    """
+    """Return the loads that act on moving volumes and surfaces."""
     tearing, bodies = torn.decomposition.tearing, torn.scene.bodies
 
     def moves(load: Load) -> bool:

@@ -39,7 +39,7 @@ def bearing_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
 
 
 def bearing_pulled_back(by_areas: np.ndarray) -> np.ndarray:
-    """Return the derivative by `nodal_areas` from that by `bearing_areas`, the shape of facets each."""
+    """Vector-Jacobian product of `bearing_areas` with respect to `nodal_areas`, the shape of facets."""
     if not bears_on_midpoints(by_areas):
         return by_areas
     result = by_areas.copy()

@@ -126,20 +126,18 @@ def test_a_problem_that_was_not_evaluated_has_no_best_design() -> None:
 
 
 def test_bounds_and_constraints_are_scipys_own() -> None:
-    box, (rows, plane) = BOX.to_scipy(keep_feasible=True), PLANE.to_scipy()
-    np.testing.assert_array_equal(box.ub, BOX.upper)
+    given = ForScipy(bowl, np.zeros(3), bounds=BOX, constraints=PLANE, scale=SIZE).arguments("trust-constr")
+    box, (rows, plane) = given["bounds"], given["constraints"]
+    np.testing.assert_allclose(box.ub * SIZE, BOX.upper)
     assert np.all(box.keep_feasible)
-    assert len(ROWS.to_scipy()) == 1
+    assert len(ForScipy(bowl, np.zeros(3), constraints=ROWS).arguments("SLSQP")["constraints"]) == 1
     for y, below, level in (
         (ANSWER, True, True),
         ([0.0, 0.3, -0.3], False, True),
         ([0.1, 0.1, 0.1], True, False),
     ):
-        x = np.array(y) * SIZE
-        assert bool(np.all(rows.A @ x <= rows.ub + 1e-12)) is below
-        assert bool(np.all(np.abs(plane.A @ x - plane.lb) <= 1e-12)) is level
-    number = Bounds(-1.0, 1.0).to_scipy()
-    assert scipy.optimize.minimize(lambda x: float(x[0]), [0.0], bounds=number).x[0] == pytest.approx(-1.0)
+        assert bool(np.all(rows.A @ np.array(y) <= rows.ub + 1e-12)) is below
+        assert bool(np.all(np.abs(plane.A @ np.array(y) - plane.lb) <= 1e-12)) is level
 
 
 @pytest.mark.slow

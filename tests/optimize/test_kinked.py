@@ -56,10 +56,10 @@ class Folded:
     def __call__(self, x: Array) -> tuple[float, Array]:
         return self.value(x), self.gradient(x)
 
-    def doubtful(self, x: Array) -> bool:
+    def may_be_invalid(self, x: Array) -> bool:
         return bool(np.any(x == 0.0))
 
-    def beside(self, x: Array, end: Array) -> Array:
+    def gradient_near(self, x: Array, end: Array) -> Array:
         self.asked.append(end)
         return self.gradient(x + 1e-6 * (end - x))
 
@@ -81,7 +81,7 @@ def test_an_optimum_that_is_none_is_left(size: int) -> None:
     assert result.x == pytest.approx(fun.minimiser, abs=0.02)
     second = result.history[1]
     assert (second.kind, second.value) == (StepKind.REFINED, fun.value(np.zeros(size)))
-    assert "beside" in second.note
+    assert "nearby" in second.note
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -156,18 +156,18 @@ def test_an_inexact_function_is_looked_into_as_well() -> None:
 
 
 class Alone(Folded):
-    """It does not exist beside the origin."""
+    """It does not exist near the origin."""
 
-    def beside(self, x: Array, end: Array) -> Array:
+    def gradient_near(self, x: Array, end: Array) -> Array:
         raise InvalidDesignError("nothing is here")
 
 
-def test_where_nothing_is_beside_the_point_that_is_told(caplog: pytest.LogCaptureFixture) -> None:
+def test_where_no_point_nearby_can_be_evaluated_a_warning_is_logged(caplog: pytest.LogCaptureFixture) -> None:
     fun = Alone(np.ones(2), np.zeros(2))
     with caplog.at_level(logging.WARNING):
         result = minimize(fun, np.zeros(2), bounds=(-5.0, 5.0))
     assert result.reason.success
-    assert "the subgradient of evaluation 2 may be none: nothing is here" in caplog.text
+    assert "the subgradient of evaluation 2 may be invalid: nothing is here" in caplog.text
 
 
 def test_functions_that_know_nothing_of_kinks_are_none() -> None:

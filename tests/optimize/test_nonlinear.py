@@ -303,10 +303,10 @@ class Doubting:
     def __call__(self, x: Array) -> tuple[float, Array]:
         return abs(float(x[0])) + float(x[1] ** 2), np.array([np.sign(x[0]), 2 * x[1]])
 
-    def doubtful(self, x: Array) -> bool:
+    def may_be_invalid(self, x: Array) -> bool:
         return bool(x[0] == 0.0)
 
-    def beside(self, x: Array, end: Array) -> Array:
+    def gradient_near(self, x: Array, end: Array) -> Array:
         self.beside_calls += 1
         return np.array([np.sign(end[0]), 2 * x[1]])
 

@@ -14,9 +14,9 @@ from fenics_contact.scene_file import SceneFile, SceneFileError, read_scene_file
 from fenics_contact.shape import (
     ContactArea,
     FrictionWork,
-    Largest,
     LargestPressure,
     LargestStress,
+    Maximum,
     Movement,
     Objective,
     PressureNorm,
@@ -58,7 +58,7 @@ IN_FILES: list[tuple[Any, Objective, str]] = [
                 {"kind": "largest_pressure", "weight": 2},
             ],
         },
-        Largest((STRESS, 2 * LargestPressure())),
+        Maximum((STRESS, 2 * LargestPressure())),
         "largest",
     ),
 ]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from fenics_contact.shape import (
     ContactArea,
     FrictionWork,
-    Largest,
     LargestPressure,
     LargestStress,
+    Maximum,
     Movement,
     Objective,
     PressureNorm,
@@ -29,5 +29,5 @@ def aims(body: str, surface: str, dim: int = 3) -> dict[str, Objective]:
         "largest stress": LargestStress(body),
         "movement": Movement(body, surface, along),
         "movement of a node": Movement(body, 30, across),
-        "largest of two": Largest((0.01 * LargestStress(body), 2.0 * LargestPressure(0))),
+        "largest of two": Maximum((0.01 * LargestStress(body), 2.0 * LargestPressure(0))),
     }

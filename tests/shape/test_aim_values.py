@@ -26,9 +26,9 @@ from fenics_contact.scene import (
 from fenics_contact.shape import (
     ContactArea,
     FrictionWork,
-    Largest,
     LargestPressure,
     LargestStress,
+    Maximum,
     Movement,
     Objective,
     PressureNorm,
@@ -199,11 +199,11 @@ def test_the_largest_is_the_largest_and_the_first_of_equals() -> None:
     state, forms = mixed(), ShapeForms(mixed().torn.decomposition.comm)
     low, high = LargestPressure(), 2.0 * StrainEnergy()
     scale = 3.0 * low.value(state, forms) / high.value(state, forms)
-    both = Largest([low, scale * high])  # type: ignore[arg-type]
+    both = Maximum([low, scale * high])  # type: ignore[arg-type]
     assert both.value(state, forms) == pytest.approx(3.0 * low.value(state, forms))
     found, expected = both.partials(state, forms), (scale * high).partials(state, forms)
     np.testing.assert_array_equal(found.by_displacement, expected.by_displacement)
-    equal = Largest((low, PressureNorm(), low + 0.0 * high)).partials(state, forms)
+    equal = Maximum((low, PressureNorm(), low + 0.0 * high)).partials(state, forms)
     assert not equal.by_displacement.any()
     assert np.count_nonzero(equal.by_multiplier) == 1
 
@@ -288,5 +288,5 @@ def test_strain_energy_of_a_heated_body_is_refused_and_its_stress_is_not() -> No
 
 @pytest.mark.parametrize("given", [(), None, (StrainEnergy(), 2.0), "energy"])
 def test_the_largest_of_what_are_no_objectives_is_refused(given: object) -> None:
-    with pytest.raises(InvalidInputError, match="Largest needs "):
-        Largest(given)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match="Maximum needs "):
+        Maximum(given)  # type: ignore[arg-type]

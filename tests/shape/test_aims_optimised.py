@@ -13,9 +13,9 @@ from fenics_contact.scene import Body, ContactPair, Coulomb, PlaneStrain, Scene,
 from fenics_contact.shape import (
     DesignPoint,
     FrictionWork,
-    Largest,
     LargestPressure,
     LargestStress,
+    Maximum,
     Objective,
     PressureNorm,
     ShapeProblem,
@@ -59,7 +59,7 @@ def test_the_peak_falls_almost_to_the_mean_pressure(objective: Objective) -> Non
 
 def test_the_larger_of_two_stresses_falls_until_both_are_equal() -> None:
     both = (LargestStress("punch", p=12.0), 1.5 * LargestStress("layer", p=12.0))
-    first, best = designs(Largest(both))
+    first, best = designs(Maximum(both))
     assert best.value < 0.9 * first.value
     forms = ShapeForms(MPI.COMM_SELF)
     before, after = ([judge.value(point.state, forms) for judge in both] for point in (first, best))

@@ -86,7 +86,7 @@ def test_a_gradient_near_an_earlier_design_is_that_of_the_case_which_is_largest_
         largest.append(max(values, key=values.__getitem__))
     assert largest == ["dragged", "pressed", "dragged", "dragged"]
     alpha = design(0, 0.004)
-    found = either.beside(alpha, alpha + 1e-9 * design(10, 1.0))
+    found = either.gradient_near(alpha, alpha + 1e-9 * design(10, 1.0))
     np.testing.assert_allclose(found, known["pressed"](alpha)[1], rtol=1e-4, atol=1e-6)
 
 

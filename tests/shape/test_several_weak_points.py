@@ -44,12 +44,12 @@ def test_neither_choice_is_the_slope_and_the_point_beside_has_it(friction: str) 
         assert isinstance(problem, Kinked)
         point = problem.last
         assert point is not None
-        assert (point.weak.contacts, point.weak.doubtful) == (8, True)
-        assert problem.doubtful(np.zeros(1))
-        assert not problem.doubtful(np.ones(1)), "nothing was returned there"
+        assert (point.weak.contacts, point.weak.may_be_invalid) == (8, True)
+        assert problem.may_be_invalid(np.zeros(1))
+        assert not problem.may_be_invalid(np.ones(1)), "nothing was returned there"
         assert abs(point.gradient[0] - after) > 0.5 * after
         for end in (1e-4, -1e-4):
-            assert problem.beside(np.zeros(1), np.array([end]))[0] == pytest.approx(after, rel=2e-3)
+            assert problem.gradient_near(np.zeros(1), np.array([end]))[0] == pytest.approx(after, rel=2e-3)
 
 
 @pytest.mark.parametrize("friction", FRICTION)
@@ -76,7 +76,7 @@ def test_states_that_follow_the_optimiser_end_there_as_well(choice: WeakChoice) 
 
 
 def test_without_the_question_the_first_design_is_called_stationary(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ShapeProblem, "doubtful", lambda self, alpha: False)
+    monkeypatch.setattr(ShapeProblem, "may_be_invalid", lambda self, alpha: False)
     result = minimised(posed(MPI.COMM_SELF))
     assert (result.reason, result.evaluations) == (Reason.STATIONARY, 1)
 

@@ -67,7 +67,7 @@ def test_weak_points_are_recognised_at_the_accuracy_of_the_state(switch: str, to
     weak = linearise_face(state, WeakChoice.HELD).weak
     assert (weak.contacts > 0, weak.discs > 0) == tuple(count > 0 for count in COUNTS[switch])
     assert weak.count < 6, "a state tells most points apart"
-    assert not linearise_face(state, WeakChoice.RELEASED).weak.doubtful or weak.count > 1
+    assert not linearise_face(state, WeakChoice.RELEASED).weak.may_be_invalid or weak.count > 1
     if tolerance <= 1e-6:
         assert (weak.contacts, weak.discs) == COUNTS[switch]
 

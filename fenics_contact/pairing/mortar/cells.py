@@ -160,7 +160,7 @@ class CellDerivatives:
 
 
 def cells_pulled_back(overlaps: Overlaps, cells: Cells, by: CellDerivatives) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives by the flat corners of both facets of each pair.
+    """Vector-Jacobian product of cells with respect to the flat corners of both facets of each pair.
 
     Args:
         overlaps: The overlaps.
@@ -190,7 +190,7 @@ def cells_pulled_back(overlaps: Overlaps, cells: Cells, by: CellDerivatives) -> 
 
 
 def _by_local(local: np.ndarray, by_values: np.ndarray) -> np.ndarray:
-    """Return the derivative by local coordinates, shape (n, q, dim − 1), from that by shape functions."""
+    """Vector-Jacobian product of shape functions by local coordinates, shape (n, q, dim − 1)."""
     corners = by_values.shape[2]
     _, slopes = shape_functions(local.reshape(-1, local.shape[2]), corners)
     return np.einsum("nk,nka->na", by_values.reshape(-1, corners), slopes).reshape(local.shape)

@@ -91,7 +91,7 @@ def _half(
 def clip_pulled_back(
     subject: np.ndarray, window: np.ndarray, by_vertices: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives by polygons and windows from that by the vertices that `clip` returns.
+    """Vector-Jacobian product of `clip` with respect to polygons and windows.
 
     Args:
         subject: Polygons or intervals as for `clip`.

@@ -38,7 +38,7 @@ def mortar_pulled_back(
     *,
     beside: float = 1e-9,
 ) -> tuple[SurfaceDerivatives, SurfaceDerivatives]:
-    """Return the derivatives by both surfaces from those by a coupling. Collective on ``comm``.
+    """Vector-Jacobian product of a coupling with respect to both surfaces. Collective on ``comm``.
 
     Nodes and facets are fixed: which nodes face the master, and which facets face each other. Only slave
     facets next to nodes with a derivative are integrated again.

@@ -163,7 +163,7 @@ def _inverted(values: np.ndarray) -> np.ndarray:
 
 
 def inverted_pulled_back(covariance: np.ndarray, by_inverse: np.ndarray) -> np.ndarray:
-    """Return the derivative by covariances from that by their pseudo-inverses, shape (n, m, m).
+    """Vector-Jacobian product of the pseudo-inverses of covariances, shape (n, m, m).
 
     With the eigenvectors V of X and a function f of its eigenvalues λ, δf(X) = V (Γ ∘ Vᵀ δX V) Vᵀ with the
     quotients Γ_ij = (f(λ_i) − f(λ_j)) / (λ_i − λ_j) (Daleckii and Krein): of 1/λ they are −1/(λ_i λ_j), and

@@ -12,7 +12,7 @@ from fenics_contact.pairing.mortar.sums import SumsBy
 def integrals_pulled_back(
     basis: DualBasis, field: np.ndarray, by_coverage: np.ndarray, by_integrals: np.ndarray
 ) -> tuple[CellDerivatives, np.ndarray]:
-    """Return the derivatives by the cells and by the field from those by the results of `dual_integrals`.
+    """Vector-Jacobian product of `dual_integrals` with respect to the cells and the field.
 
     Args:
         basis: The dual functions.

@@ -97,7 +97,7 @@ class Gathering:
     def pulled_back(
         self, coupling: MortarCoupling, by: CouplingDerivatives, places: tuple[np.ndarray, np.ndarray]
     ) -> CouplingDerivatives:
-        """Return the derivatives by the whole coupling from those by the points', places and normals fixed.
+        """Vector-Jacobian product of the points with respect to the whole coupling, places and normals fixed.
 
         Args:
             coupling: The coupling at the points.

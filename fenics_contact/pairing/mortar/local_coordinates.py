@@ -40,7 +40,7 @@ def local_coordinates(points: np.ndarray, flat: np.ndarray) -> np.ndarray:
 def local_coordinates_pulled_back(
     local: np.ndarray, flat: np.ndarray, by_local: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives by points and by corners from that by the local coordinates of the points.
+    """Vector-Jacobian product of the local coordinates of points with respect to the points and the corners.
 
     From x = Σ N_j(ξ) x_j follows J δξ = δx − Σ N_j δx_j with J = ∂x/∂ξ.
 

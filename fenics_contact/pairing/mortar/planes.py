@@ -48,7 +48,7 @@ def measure(flat: np.ndarray) -> np.ndarray:
 
 
 def measure_pulled_back(flat: np.ndarray, by_measure: np.ndarray) -> np.ndarray:
-    """Return the derivative by the corners from that by `measure`, in the shape of ``flat``."""
+    """Vector-Jacobian product of `measure` with respect to the corners, in the shape of ``flat``."""
     if flat.shape[2] == 1:
         return np.asarray(by_measure[:, None, None] * np.array([[-1.0], [1.0]]))
     across = np.roll(flat, -1, axis=1) - np.roll(flat, 1, axis=1)
@@ -96,7 +96,7 @@ def planes_pulled_back(
     by_normal: np.ndarray,
     opposite: tuple[np.ndarray, np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives by the facets' corners and by the points laid flat on their planes.
+    """Vector-Jacobian product of flat points with respect to the facets' corners and the points.
 
     The derived function must not depend on where in a plane its origin is and how its axes lie in it, which
     an integral does not. So origins may stay, and axes a change by −(a · δn) n only.
@@ -124,7 +124,7 @@ def planes_pulled_back(
 
 
 def _normals_pulled_back(corners: np.ndarray, normal: np.ndarray, by_normal: np.ndarray) -> np.ndarray:
-    """Return the derivative by corners from that by the mean normals, shape (n, corners, dim)."""
+    """Vector-Jacobian product of the mean normals with respect to the corners, shape (n, corners, dim)."""
     by_unit = by_normal - np.einsum("nd,nd->n", by_normal, normal)[:, None] * normal
     if corners.shape[1] == 2:
         length = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)

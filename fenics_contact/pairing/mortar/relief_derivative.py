@@ -47,7 +47,7 @@ def relief_pulled_back(
     by_relief: np.ndarray,
     into: tuple[SurfaceDerivatives, SurfaceDerivatives],
 ) -> tuple[CellDerivatives, np.ndarray]:
-    """Return the derivatives by cells and directions from those by the result of `relief_of_cells`.
+    """Vector-Jacobian product of `relief_of_cells` with respect to cells and directions.
 
     Args:
         cells: Quadrature points.

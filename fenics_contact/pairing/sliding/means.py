@@ -83,7 +83,7 @@ class MovingMeans:
         return result
 
     def areas_pulled_back(self, by_area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivatives by the nodes of slave and master from that by the coupling's areas.
+        """Vector-Jacobian product of the coupling's areas with respect to the nodes of slave and master.
 
         Collective.
 

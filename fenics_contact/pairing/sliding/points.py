@@ -131,7 +131,7 @@ class SlidingPoints:
         return PointAreas.of(scene, self.points, self.coordinates, self.means)
 
     def met_areas_pulled_back(self, by_met: np.ndarray) -> np.ndarray:
-        """Return the derivative by the coordinates from that by parts that face masters. Collective.
+        """Vector-Jacobian product of parts that face masters with respect to the coordinates. Collective.
 
         Args:
             by_met: Derivative by the areas of the slave that face the master, of mortar contact alone, (n,).
