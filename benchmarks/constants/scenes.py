@@ -10,7 +10,7 @@ import numpy as np
 import scipy.optimize
 from mpi4py import MPI
 
-from fenics_contact.accuracy import Balanced
+from fenics_contact.accuracy import BalancedTolerance
 from fenics_contact.contact import (
     ContactProblem,
     ContactResult,
@@ -78,7 +78,7 @@ def _balanced_figures(state: State) -> Figures:
     errors, wanted = state.estimate_errors(), state.tolerance
     solver = [errors.algebraic, errors.friction]
     found = _figures(state, estimate=[errors.discretisation, errors.geometry], certificate=solver)
-    assert isinstance(wanted, Balanced)
+    assert isinstance(wanted, BalancedTolerance)
     return found | {"tolerance": wanted.share * errors.discretisation}
 
 
@@ -149,7 +149,7 @@ def pressed_ball() -> Figures:
         [TotalForce("ball", "top", (0.0, 0.0, -0.1))],
         [ContactPair(Surface("block", "z1"), Surface("ball", "contact"), None, "node", "reconstructed")],
     )
-    state = solve_scene(scene, COMM, tolerance=Balanced(share=1e-5))
+    state = solve_scene(scene, COMM, tolerance=BalancedTolerance(share=1e-5))
     found = _balanced_figures(state)
     return found | {"estimate": [*found["estimate"], contact_area(state)]}
 

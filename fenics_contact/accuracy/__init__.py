@@ -1,6 +1,6 @@
 """How accurate a state is: its errors by solver, friction law and mesh, in energy norm."""
 
-from fenics_contact.accuracy.balanced import Balanced
+from fenics_contact.accuracy.balanced import BalancedTolerance
 from fenics_contact.accuracy.certificate import Certificate, certify, direct_error
 from fenics_contact.accuracy.discretisation import DiscretisationError, discretisation_error
 from fenics_contact.accuracy.fixed_point import friction_error
@@ -10,7 +10,7 @@ from fenics_contact.accuracy.sites import Sites, find_sites
 from fenics_contact.accuracy.state_errors import SolverErrors, StateErrors, solver_errors, state_errors
 
 __all__ = [
-    "Balanced",
+    "BalancedTolerance",
     "Certificate",
     "DiscretisationError",
     "Sites",

@@ -16,7 +16,7 @@ STEP = (1e-4, 0.3)
 
 
 @dataclass(frozen=True)
-class Balanced:
+class BalancedTolerance:
     """A tolerance that follows the mesh: the solver's error is at most a share of the discretisation's.
 
     The scene is solved to ``loosest``. Then the error of the discretisation is estimated, that of the solver
@@ -39,7 +39,7 @@ class Balanced:
         InvalidInputError: If the share or the tolerances are not positive or in the wrong order.
 
     Example:
-        >>> state = solve_scene(scene, comm, tolerance=Balanced(share=0.01))  # doctest: +SKIP
+        >>> state = solve_scene(scene, comm, tolerance=BalancedTolerance(share=0.01))  # doctest: +SKIP
     """
 
     share: float = 0.1
@@ -51,7 +51,7 @@ class Balanced:
         """Check the numbers."""
         if not (self.share > 0.0 and 0.0 < self.finest <= self.loosest < 1.0 and self.rounds >= 1):
             raise InvalidInputError(
-                "Balanced needs share > 0, 0 < finest <= loosest < 1 and rounds >= 1, got share "
+                "BalancedTolerance needs share > 0, 0 < finest <= loosest < 1 and rounds >= 1, got share "
                 f"{self.share:g}, finest {self.finest:g}, loosest {self.loosest:g}, rounds {self.rounds}: "
                 "keep the defaults of what you do not mean to change"
             )

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from fenics_contact.accuracy import (
-    Balanced,
+    BalancedTolerance,
     DiscretisationError,
     SolverErrors,
     StateErrors,
@@ -38,7 +38,7 @@ def solve_balanced(
     system: DualSystem,
     solve: Solve,
     solver: DualSolver,
-    balanced: Balanced,
+    balanced: BalancedTolerance,
     start: Start,
     timer: PhaseTimer,
 ) -> Rounds:
@@ -125,7 +125,7 @@ class Rounds:
                 self._estimate()
         self.remark(f"solver {self.errors.together:.1e}, mesh {self.estimate.total:.1e} in energy norm")
 
-    def satisfied(self, balanced: Balanced) -> bool:
+    def satisfied(self, balanced: BalancedTolerance) -> bool:
         """Return whether the solver's error is within its share, by an estimate that can be trusted."""
         return balanced.satisfied(self.errors, self.estimate.total)
 

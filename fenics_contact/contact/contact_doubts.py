@@ -22,7 +22,7 @@ SHARE = 0.1
 _LOG = logging.getLogger(__name__)
 
 
-class ContactDoubts:
+class ContactWarnings:
     """What is doubtful about the contact of a problem; each pair is warned of once."""
 
     def __init__(self) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from fenics_contact._libraries import MPI
 from fenics_contact.contact.advice import advice
-from fenics_contact.contact.contact_doubts import ContactDoubts
+from fenics_contact.contact.contact_doubts import ContactWarnings
 from fenics_contact.contact.deformed_state import DeformedState
 from fenics_contact.contact.dual_solve import contact_result
 from fenics_contact.contact.energies import Energies
@@ -83,7 +83,7 @@ class DeformedEquilibria:
         self._equations = Equations(scene, decomposition)
         self._assembled: TornSystem | None = None if beside is None else beside._assembled
         self._unresisted: tuple[UnheldMotion, ...] | None = None
-        self._turned, self._doubts = TurnedBodies(), ContactDoubts()
+        self._turned, self._doubts = TurnedBodies(), ContactWarnings()
         self._contact: Contact = StillContact()
         if scene.contacts and scene.deforms_much:
             self._contact = MovingContact(scene, decomposition)
@@ -130,7 +130,7 @@ class DeformedEquilibria:
         with timer.phase("assemble"):
             load = self._loading(scene, time, overlap)
             if step is not None and (callable(step.loads) or callable(step.supports)):
-                course = _Course(step, scene, self._loading, self._decomposition.comm)
+                course = _LoadHistory(step, scene, self._loading, self._decomposition.comm)
                 load = replace(load, course=course)
             if before is None:
                 check_held(load.torn)
@@ -224,8 +224,8 @@ def _require_prescribed(scene: Scene) -> None:
             )
 
 
-class _Course:
-    """The functions of time of a load step; a `Course`."""
+class _LoadHistory:
+    """The functions of time of a load step; a `LoadHistory`."""
 
     def __init__(
         self, step: LoadStep, scene: Scene, loading: Callable[[Scene, float], Loading], comm: MPI.Comm

@@ -23,7 +23,7 @@ from fenics_contact.scene import SolverKind
 from fenics_contact.timing import PhaseTimer
 
 if TYPE_CHECKING:
-    from fenics_contact.accuracy import Balanced
+    from fenics_contact.accuracy import BalancedTolerance
     from fenics_contact.contact.balancing import Solve
 
 #: Largest relative residual of a scene without contact; its solution then equals that of a direct solver.
@@ -35,7 +35,7 @@ def dual_state(
     previous: State | None,
     known: State | None,
     solver: DualSolver,
-    tolerance: float | Balanced | None,
+    tolerance: float | BalancedTolerance | None,
     timer: PhaseTimer,
 ) -> State:
     """Compute a state by its multipliers. Collective.
@@ -45,7 +45,7 @@ def dual_state(
         previous: State of a neighbouring geometry or load to start from, or None.
         known: State of which unchanged parts are reused, or None.
         solver: The dual solver.
-        tolerance: Its tolerance, or its share of the discretisation error; None: `Balanced()`.
+        tolerance: Its tolerance, or its share of the discretisation error; None: `BalancedTolerance()`.
         timer: Collects the wall time.
     """
     system, start = _dual_system(torn, previous, known, timer)
@@ -86,16 +86,16 @@ def _balanced(
     system: DualSystem,
     solve: Solve,
     solver: DualSolver,
-    balanced: Balanced | None,
+    balanced: BalancedTolerance | None,
     start: np.ndarray | None,
     timer: PhaseTimer,
 ) -> State:
     """Compute the state as accurately as the mesh deserves. Collective."""
     # A fixed tolerance needs no estimates and should not import them.
-    from fenics_contact.accuracy import Balanced
+    from fenics_contact.accuracy import BalancedTolerance
     from fenics_contact.contact.balancing import solve_balanced
 
-    wanted = balanced or Balanced()
+    wanted = balanced or BalancedTolerance()
     rounds = solve_balanced(system, solve, solver, wanted, start, timer)
     state = state_of(system, rounds.solution, rounds.displacement, timer)
     return replace(state, known_errors=rounds.state_errors(state.energies.norm), tolerance=wanted)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from fenics_contact._libraries import MPI, check_not_forked
-from fenics_contact.contact.contact_doubts import ContactDoubts
+from fenics_contact.contact.contact_doubts import ContactWarnings
 from fenics_contact.contact.equilibrium import (
     default_solver,
     direct_state,
@@ -89,7 +89,7 @@ class ContactProblem:
         self.timer = PhaseTimer()
         self.state = None
         self._partitions, self._decomposition = partitions, None
-        self._contact_doubts, self._turned = ContactDoubts(), TurnedBodies()
+        self._contact_doubts, self._turned = ContactWarnings(), TurnedBodies()
         self._passing_bodies = PassingBodies()
 
     state: State | None
@@ -157,8 +157,8 @@ class ContactProblem:
     def number(self, scene: Scene | None = None) -> float:
         """Return the tolerance as a number, for states that are differentiated or compared. Collective.
 
-        Where none is given, or `Balanced`, which leaves the status of points uncertain, it is that of the
-        solver: of the one given, of Newton's method, or of the one that the scene's plan names.
+        Where none is given, or `BalancedTolerance`, which leaves the status of points uncertain, it is that
+        of the solver: of the one given, of Newton's method, or of the one that the scene's plan names.
 
         Args:
             scene: As for `solve`.
@@ -352,10 +352,10 @@ def solve_scene(
         partitions: Body name -> subdomain of every cell, numbered from 0 within the body; None lets
             `Scene.partition` cut the bodies into subdomains of a suitable size.
         solver: Dual solver with its tolerance; None: the one that `Scene.plan` names.
-        tolerance: Largest relative residual of the solution, or `fenics_contact.accuracy.Balanced`, which
+        tolerance: Largest relative residual of the solution, or an `accuracy.BalancedTolerance`, which
             solves as accurately as the mesh deserves. By default the solver's own, and without a solver
-            `Balanced`. Give a number, 1e-6 or less, where the status of single contact points matters, or
-            small differences between states. Where materials are nonlinear a number, 1e-8 by default.
+            balanced. Give a number, 1e-6 or less, where the status of single contact points matters, or small
+            differences between states. Where materials are nonlinear a number, 1e-8 by default.
         steps: How loads on nonlinear materials are followed; None: the default
             `fenics_contact.nonlinear.AutomaticSteps`.
 

@@ -60,7 +60,7 @@ class State:
         energies: Energies of all bodies.
         seconds: Wall time of this rank by phase, of all work up to this state that shares its timer.
         known_errors: Errors estimated so far, by a balanced solve or by `estimate_errors`; None before.
-        tolerance: Tolerance of the solution, a relative residual or `Balanced`; None where no solver
+        tolerance: Tolerance of the solution, a relative residual or `BalancedTolerance`; None where no solver
             iterated.
 
     Example:

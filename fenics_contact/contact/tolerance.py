@@ -9,17 +9,17 @@ import numpy as np
 from fenics_contact.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from fenics_contact.accuracy import Balanced
+    from fenics_contact.accuracy import BalancedTolerance
 
 #: A largest relative residual, a share of the discretisation error, or None for the default.
-Tolerance: TypeAlias = "float | Balanced | None"
+Tolerance: TypeAlias = "float | BalancedTolerance | None"
 
 
-def checked_tolerance(tolerance: object) -> float | Balanced | None:
+def checked_tolerance(tolerance: object) -> float | BalancedTolerance | None:
     """Return a valid tolerance.
 
     Raises:
-        InvalidInputError: If it is neither a number between 0 and 1 nor `Balanced`.
+        InvalidInputError: If it is neither a number between 0 and 1 nor `BalancedTolerance`.
     """
     if tolerance is None:
         return None
@@ -30,11 +30,11 @@ def checked_tolerance(tolerance: object) -> float | Balanced | None:
             f"tolerance must lie between 0 and 1, got {float(tolerance):g}: it is a relative residual, "
             "1e-6 is a good one"
         )
-    from fenics_contact.accuracy import Balanced  # imported already if one was given
+    from fenics_contact.accuracy import BalancedTolerance  # imported already if one was given
 
-    if isinstance(tolerance, Balanced):
+    if isinstance(tolerance, BalancedTolerance):
         return tolerance
     raise InvalidInputError(
-        f"tolerance must be a number, Balanced(...) or None, got {type(tolerance).__name__}: give a relative "
-        "residual such as 1e-6, or leave it out"
+        f"tolerance must be a number, BalancedTolerance(...) or None, got {type(tolerance).__name__}: give a "
+        "relative residual such as 1e-6, or leave it out"
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.faces import corners_of
-from fenics_contact.surface_shapes import Joined, Plane, SurfaceShape, asked
+from fenics_contact.surface_shapes import Joined, Plane, SurfaceShape, evaluate_shape
 
 #: Largest distance of nodes from their shape, relative to the shortest edge of a facet around them.
 FARTHEST = 0.1
@@ -34,7 +34,7 @@ def distance_in_edges(points: np.ndarray, facets: np.ndarray, shape: SurfaceShap
     np.minimum.at(
         size, local.reshape(facets.shape), np.broadcast_to(edges.min(axis=1)[:, None], facets.shape)
     )
-    return np.asarray(np.abs(asked(shape, "distance", points[nodes])) / size)
+    return np.asarray(np.abs(evaluate_shape(shape, "distance", points[nodes])) / size)
 
 
 def check_shapes(
@@ -89,7 +89,7 @@ def _check_side(name: str, points: np.ndarray, facets: np.ndarray, shape: Surfac
         outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0])
     middles = corners.mean(axis=1)
     area = np.linalg.norm(outward, axis=1)
-    along = np.einsum("nd,nd->n", outward, asked(shape, "normals", middles))
+    along = np.einsum("nd,nd->n", outward, evaluate_shape(shape, "normals", middles))
     parts: Sequence[SurfaceShape] = [shape]
     part = np.zeros(len(middles), dtype=np.int64)
     if isinstance(shape, Joined):

@@ -2,7 +2,7 @@
 
 from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation
 from fenics_contact.nonlinear.load_steps import AutomaticSteps, Path, PathEndsError
-from fenics_contact.nonlinear.loading import Course, FollowingPressures, Loading, TurnedSurface
+from fenics_contact.nonlinear.loading import FollowingPressures, LoadHistory, Loading, TurnedSurface
 from fenics_contact.nonlinear.meeting import Contact, Meeting, MovingContact, StillContact
 from fenics_contact.nonlinear.newton import NonlinearEquilibrium, NotHeldError, TangentNewton
 from fenics_contact.nonlinear.snapping import Snap
@@ -12,11 +12,11 @@ __all__ = [
     "AutomaticSteps",
     "Configuration",
     "Contact",
-    "Course",
     "Equations",
     "Evaluation",
     "FollowingPressures",
     "Linearisation",
+    "LoadHistory",
     "Loading",
     "Meeting",
     "MovingContact",

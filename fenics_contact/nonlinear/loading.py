@@ -38,7 +38,7 @@ class Loading:
     time: float
     following: tuple[tuple[float, FollowingPressures], ...] = ()
     turned: tuple[TurnedSurface, ...] = ()
-    course: Course | None = None
+    course: LoadHistory | None = None
     drag: Drag | None = None
 
     def between(self, first: Loading, part: float) -> Loading:
@@ -143,7 +143,7 @@ class Drag:
         return self.viscosity * (displacement - self.origin)
 
 
-class Course(Protocol):
+class LoadHistory(Protocol):
     """Loads and supports that are functions of time.
 
     Attributes:

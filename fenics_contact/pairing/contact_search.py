@@ -28,7 +28,7 @@ from fenics_contact.pairing.surface_doubts import warn_of_surface
 from fenics_contact.pairing.tied_edges import warn_of_edge
 from fenics_contact.pairing.uneven_pressure import warn_of_uneven_pressure
 from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie, master_share, surface_of
-from fenics_contact.surface_shapes import asked
+from fenics_contact.surface_shapes import evaluate_shape
 from fenics_contact.surfaces import (
     FacetedSurface,
     Geometry,
@@ -244,10 +244,10 @@ def _by_mortar(
 def _on_obstacle(slave: _Side, movable: np.ndarray, obstacle: RigidObstacle) -> ContactPoints:
     """Pair each slave node that faces a rigid obstacle with it."""
     candidates = np.flatnonzero(movable)
-    normals = asked(obstacle, "normals", slave.surface.points[candidates])
+    normals = evaluate_shape(obstacle, "normals", slave.surface.points[candidates])
     facing = np.einsum("nd,nd->n", slave.surface.normals[candidates], normals) < 0
     chosen = candidates[facing]
-    gap = asked(obstacle, "distance", slave.surface.points[chosen])
+    gap = evaluate_shape(obstacle, "distance", slave.surface.points[chosen])
     points = _points(slave, chosen, normals[facing], gap, sp.csr_matrix((len(chosen), slave.n_nodes)))
     return replace(points, symmetric=slave.surface.mirrored[chosen])
 

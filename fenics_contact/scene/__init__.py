@@ -1,7 +1,7 @@
 """Scenes: bodies, materials, supports, loads and contact pairs."""
 
 from fenics_contact.scene.approach import master_share
-from fenics_contact.scene.automatic import Automatic
+from fenics_contact.scene.automatic import AutomaticContact
 from fenics_contact.scene.bodies import bodies_from
 from fenics_contact.scene.body import Body
 from fenics_contact.scene.chosen_discretisation import keeping_discretisation
@@ -65,7 +65,7 @@ from fenics_contact.scene.pair_geometry import PairGeometry
 from fenics_contact.scene.pairs import ContactPair, Coulomb, Discretisation, Friction, Surface, Tie, Tresca
 from fenics_contact.scene.plan import ConeKind, Plan, SolverKind, choose_solver
 from fenics_contact.scene.rigid_surfaces import AnySupport, RigidSurface
-from fenics_contact.scene.sampled import Sampled
+from fenics_contact.scene.sampled import SampledField
 from fenics_contact.scene.scene import Scene
 from fenics_contact.scene.steps import LoadStep
 from fenics_contact.scene.supports import Support
@@ -76,7 +76,7 @@ from fenics_contact.scene.values import OfPosition, ScalarValue, Ufl, VectorValu
 __all__ = [
     "RANK_TOLERANCE",
     "AnySupport",
-    "Automatic",
+    "AutomaticContact",
     "Body",
     "BodyForce",
     "ConeKind",
@@ -117,7 +117,7 @@ __all__ = [
     "RigidPlane",
     "RigidSphere",
     "RigidSurface",
-    "Sampled",
+    "SampledField",
     "ScalarValue",
     "Scene",
     "SolverKind",

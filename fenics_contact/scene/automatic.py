@@ -28,7 +28,7 @@ _LOG = logging.getLogger(__name__)
 @displayed
 @dataclass(frozen=True)
 @checked()
-class Automatic(Sequence[ContactPair]):
+class AutomaticContact(Sequence[ContactPair]):
     """Contact wherever boundaries of different bodies face each other, in place of a scene's contact pairs.
 
     The scene looks for facets that face another body within a distance, names them "near B" on A and "near
@@ -59,7 +59,7 @@ class Automatic(Sequence[ContactPair]):
         ...     "plate": Body(block((0, 0, 0), (3, 3, 1), (3, 3, 1)), steel),  # mm
         ...     "punch": Body(block((1, 1, 1), (2, 2, 2), (4, 4, 4)), steel),
         ... }
-        >>> scene = Scene(bodies, [Support("plate", "z0")], contacts=Automatic(Coulomb(0.2)))
+        >>> scene = Scene(bodies, [Support("plate", "z0")], contacts=AutomaticContact(Coulomb(0.2)))
         >>> [pair.place for pair in scene.contacts]
         ['punch near plate on plate near punch']
     """
@@ -74,8 +74,8 @@ class Automatic(Sequence[ContactPair]):
         """Reject a distance that is none."""
         if self.distance is not None and not 0.0 < self.distance < np.inf:
             raise InvalidInputError(
-                f"Automatic.distance must be positive and finite, got {self.distance!r}: give the largest "
-                "gap that may close, or None"
+                f"AutomaticContact.distance must be positive and finite, got {self.distance!r}: give the "
+                "largest gap that may close, or None"
             )
 
     def __len__(self) -> int:
@@ -116,14 +116,14 @@ class Automatic(Sequence[ContactPair]):
         """Return a body that has a surface "boundary"."""
         if name not in meshes:
             raise InvalidInputError(
-                f"Automatic.self_contact needs names of bodies of the scene, {', '.join(meshes)}, got "
+                f"AutomaticContact.self_contact needs names of bodies of the scene, {', '.join(meshes)}, got "
                 f"{name!r}: correct or remove it"
             )
         mesh = meshes[name]
         if "boundary" in mesh.surfaces:
             raise InvalidInputError(
-                f"body {name!r} must have no surface 'boundary' yet, as Automatic.self_contact names all of "
-                "its facets so: rename it"
+                f"body {name!r} must have no surface 'boundary' yet, as AutomaticContact.self_contact names "
+                "all of its facets so: rename it"
             )
         facets, _ = boundary_faces(mesh.cells, mesh.dim)
         return replace(mesh, surfaces={**mesh.surfaces, "boundary": facets})

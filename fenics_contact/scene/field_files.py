@@ -12,7 +12,7 @@ import numpy as np
 from fenics_contact.checks import require_file
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.mesh_io import read_with_meshio
-from fenics_contact.scene.sampled import Sampled
+from fenics_contact.scene.sampled import SampledField
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -27,7 +27,7 @@ def read_field(
     *,
     reach: float | None = None,
     comm: MPI.Comm | None = None,
-) -> Sampled:
+) -> SampledField:
     """Read a field as a function of position, for loads, supports, friction coefficients and gaps.
 
     Example:
@@ -42,7 +42,7 @@ def read_field(
             cells, which count at their centres.
         field: Name of the column or field; several, one for each axis, for a vector made of numbers. Needed
             if there is more than one.
-        reach: See `Sampled`.
+        reach: See `SampledField`.
         comm: If given, rank 0 reads the file and all ranks receive the field.
 
     Raises:
@@ -53,12 +53,12 @@ def read_field(
         Collective on ``comm`` if given.
     """
     if comm is None:
-        return Sampled(*_read(Path(path), field), reach)
+        return SampledField(*_read(Path(path), field), reach)
     read = None
     with together(comm):
         read = _read(Path(path), field) if comm.rank == 0 else None
     points, values = comm.bcast(read)
-    return Sampled(points, values, reach)
+    return SampledField(points, values, reach)
 
 
 def _read(path: Path, field: str | Sequence[str] | None) -> tuple[np.ndarray, np.ndarray]:

@@ -17,7 +17,7 @@ from fenics_contact.surface_shapes import (
     SignedDistance,
     Sphere,
     SurfaceShape,
-    asked,
+    evaluate_shape,
     placed,
 )
 
@@ -124,12 +124,12 @@ class MovingObstacle:
 
     def distance(self, points: np.ndarray) -> np.ndarray:
         """Return the signed distance at time zero, (n, dim) -> (n,), [length]."""
-        return asked(self.at(0.0), "distance", points)
+        return evaluate_shape(self.at(0.0), "distance", points)
 
     def normals(self, points: np.ndarray) -> np.ndarray:
         """Return the gradient of the distance at time zero, (n, dim) -> (n, dim)."""
-        return asked(self.at(0.0), "normals", points)
+        return evaluate_shape(self.at(0.0), "normals", points)
 
     def curvatures(self, points: np.ndarray) -> np.ndarray:
         """Return the second derivatives of the distance at time zero, (n, dim) -> (n, dim, dim)."""
-        return asked(self.at(0.0), "curvatures", points)
+        return evaluate_shape(self.at(0.0), "curvatures", points)

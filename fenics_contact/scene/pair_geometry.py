@@ -13,7 +13,7 @@ from fenics_contact.scene.approach import displacement_along, force_along, hertz
 from fenics_contact.scene.chosen_discretisation import in_words
 from fenics_contact.scene.pairs import ContactPair, Surface
 from fenics_contact.scene.true_surfaces import surface_of
-from fenics_contact.surface_shapes import Joined, Placed, SurfaceShape, asked
+from fenics_contact.surface_shapes import Joined, Placed, SurfaceShape, evaluate_shape
 from fenics_contact.surfaces import FacetedSurface, heights, project
 
 if TYPE_CHECKING:
@@ -132,9 +132,9 @@ def _meeting(slave: FacetedSurface, master: FacetedSurface) -> _Meeting:
 
 
 def _meeting_obstacle(slave: FacetedSurface, obstacle: SurfaceShape) -> _Meeting:
-    normal = asked(obstacle, "normals", slave.points)
+    normal = evaluate_shape(obstacle, "normals", slave.points)
     facing = np.flatnonzero(np.einsum("nd,nd->n", slave.normals, normal) < 0)
-    gap = asked(obstacle, "distance", slave.points[facing])
+    gap = evaluate_shape(obstacle, "distance", slave.points[facing])
     return _Meeting(facing, normal[facing], gap, np.zeros(len(facing), dtype=np.int64))
 
 

@@ -19,7 +19,7 @@ from fenics_contact.scene.pair_geometry import PairGeometry, pair_geometry
 from fenics_contact.scene.pairs import Surface
 from fenics_contact.scene.rigid_surfaces import RigidSurface
 from fenics_contact.scene.unpaired import unpaired_bodies
-from fenics_contact.surfaces import bears_on_midpoints
+from fenics_contact.surfaces import has_midside_pressure
 
 if TYPE_CHECKING:
     from fenics_contact.scene.parts import SceneParts
@@ -189,7 +189,7 @@ def _multipliers(scene: SceneParts, unknowns: int) -> dict[str, int]:
 
 def _bearing_nodes(scene: SceneParts, surface: Surface) -> int:
     facets = scene.bodies[surface.body].mesh.surfaces[surface.name]
-    return len(np.unique(facets[:, 3:])) if bears_on_midpoints(facets) else _slave_nodes(scene, surface)
+    return len(np.unique(facets[:, 3:])) if has_midside_pressure(facets) else _slave_nodes(scene, surface)
 
 
 def _slave_nodes(scene: SceneParts, surface: Surface) -> int:

@@ -18,7 +18,7 @@ from fenics_contact.scene.values import finite_numbers
 @displayed
 @dataclass(frozen=True, eq=False)
 @checked("points", "values")
-class Sampled:
+class SampledField:
     """A field given by its values at points; use it wherever a function of position is accepted.
 
     It has the given values at the points. Between them it is interpolated through the nearest ones, by radial
@@ -36,7 +36,7 @@ class Sampled:
         InvalidInputError: If shapes do not fit, numbers are not finite, or a point is given twice.
 
     Example:
-        >>> heights = Sampled([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [0.0, 0.5, 2.0])
+        >>> heights = SampledField([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [0.0, 0.5, 2.0])
         >>> heights(np.array([[1.0, 0.0, 0.0], [0.5, 0.0, 0.0]]))
         array([0.5 , 0.25])
     """
@@ -50,18 +50,18 @@ class Sampled:
         points, values = finite_numbers(self.points), finite_numbers(self.values)
         if points is None or points.ndim != 2 or points.shape[1] not in (2, 3) or len(points) == 0:
             raise InvalidInputError(
-                f"Sampled.points must be rows of two or three finite numbers, got "
+                f"SampledField.points must be rows of two or three finite numbers, got "
                 f"{_shape(points)}: give one row for each point"
             )
         if values is None or values.shape not in ((len(points),), points.shape):
             raise InvalidInputError(
-                f"Sampled.values must be {len(points)} finite numbers, or rows of {points.shape[1]}, one for "
-                f"each point, got {_shape(values)}: give a value for each point"
+                f"SampledField.values must be {len(points)} finite numbers, or rows of {points.shape[1]}, "
+                f"one for each point, got {_shape(values)}: give a value for each point"
             )
         if self.reach is not None and not (np.isfinite(self.reach) and self.reach > 0):
             raise InvalidInputError(
-                f"Sampled.reach must be a length above zero, got {self.reach!r}: give the largest distance "
-                "from a point at which its value still holds, or none"
+                f"SampledField.reach must be a length above zero, got {self.reach!r}: give the largest "
+                "distance from a point at which its value still holds, or none"
             )
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "values", values)
@@ -73,8 +73,8 @@ class Sampled:
         if same.size:
             one, other = sorted(order[same[0] : same[0] + 2])
             raise InvalidInputError(
-                f"Sampled.points must differ, points {one} and {other} are the same, {self.points[one]}, and "
-                f"so are {len(same) - 1} more: give each point once"
+                f"SampledField.points must differ, points {one} and {other} are the same, "
+                f"{self.points[one]}, and so are {len(same) - 1} more: give each point once"
             )
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
@@ -97,8 +97,8 @@ class Sampled:
             return self.points, self.values
         if dim == 3 or not flat:
             raise InvalidInputError(
-                f"Sampled.points must lie in the space of the bodies, they have {own} coordinates and the "
-                f"bodies {dim}: give {dim}"
+                f"SampledField.points must lie in the space of the bodies, they have {own} coordinates and "
+                f"the bodies {dim}: give {dim}"
             )
         return self.points[:, :2], self.values[:, :2] if self.values.ndim == 2 else self.values
 

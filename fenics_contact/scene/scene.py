@@ -10,7 +10,7 @@ import numpy as np
 
 from fenics_contact.display import displayed
 from fenics_contact.partition import default_partition
-from fenics_contact.scene.automatic import Automatic
+from fenics_contact.scene.automatic import AutomaticContact
 from fenics_contact.scene.chosen_discretisation import with_discretisation
 from fenics_contact.scene.effects import Effect, effects_of
 from fenics_contact.scene.materials import is_nonlinear
@@ -27,8 +27,8 @@ class Scene(SceneParts):
         bodies: Bodies by name.
         supports: Prescribed displacements.
         loads: Forces.
-        contacts: Pairs of surfaces that may touch; `Automatic` finds them, and names the surfaces. Each has
-            the discretisation that it was given or that the scene chose for it, see `plan`.
+        contacts: Pairs of surfaces that may touch; `AutomaticContact` finds them, and names the surfaces.
+            Each has the discretisation that it was given or that the scene chose for it, see `plan`.
         ties: Pairs of surfaces that stay together, likewise.
 
     Raises:
@@ -53,7 +53,7 @@ class Scene(SceneParts):
     def __post_init__(self) -> None:
         """Check the parts, and find the contact pairs if that is wanted."""
         super().__post_init__()
-        if isinstance(self.contacts, Automatic):
+        if isinstance(self.contacts, AutomaticContact):
             bodies, pairs = self.contacts.found(self)
             object.__setattr__(self, "bodies", bodies)
             object.__setattr__(self, "contacts", pairs)

@@ -58,7 +58,10 @@ class Unpaired:
         where, mend = (
             ("outside the surfaces of their pairs and ties", "name more of their facets in these")
             if self.paired
-            else ("without a pair or tie between them", "add a ContactPair or a Tie, or take Automatic()")
+            else (
+                "without a pair or tie between them",
+                "add a ContactPair or a Tie, or take AutomaticContact()",
+            )
         )
         one, other = self.bodies
         return f"bodies {one!r} and {other!r} {what} at {counted(count, 'facet')}, {where}: {mend}"

@@ -123,7 +123,7 @@ class ContactPart(Part):
     adjust: NonNegativeFloat | None
 
 
-@keys_of(scene.Automatic)
+@keys_of(scene.AutomaticContact)
 class AutomaticPart(Part):
     """Contact wherever boundaries of different bodies face each other, or those of a body that folds."""
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from pydantic import BaseModel
 
 from fenics_contact.errors import together
-from fenics_contact.scene import Sampled, read_field
+from fenics_contact.scene import SampledField, read_field
 from fenics_contact.scene_file.located import located
 from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
 from fenics_contact.scene_file.places import branches
@@ -30,7 +30,7 @@ def with_fields_read(source: Source, document: Document, comm: MPI.Comm) -> Docu
         SceneFileError: Naming every file that cannot be read.
     """
     mistakes: list[Mistake] = []
-    read: dict[tuple[Any, ...], Sampled] = {}
+    read: dict[tuple[Any, ...], SampledField] = {}
     for path, part in branches(document):
         if isinstance(part, FieldFile) and _key(part) not in read:
             with located(source, path, mistakes):
@@ -45,7 +45,7 @@ def _key(part: FieldFile) -> tuple[Any, ...]:
     return part.file, tuple(part.field) if isinstance(part.field, list) else part.field
 
 
-def _replaced(value: Any, read: Mapping[tuple[Any, ...], Sampled]) -> Any:
+def _replaced(value: Any, read: Mapping[tuple[Any, ...], SampledField]) -> Any:
     """Return a copy of a part of a document with its fields."""
     if isinstance(value, FieldFile):
         return read[_key(value)]

@@ -63,9 +63,9 @@ class SolverPart(Part):
             return None
         if isinstance(self.tolerance, float):
             return self.tolerance
-        from fenics_contact.accuracy import Balanced  # not imported for a fixed tolerance
+        from fenics_contact.accuracy import BalancedTolerance  # not imported for a fixed tolerance
 
-        return Balanced()
+        return BalancedTolerance()
 
     def chosen(self, scene: Scene, partitions: Mapping[str, np.ndarray]) -> DualSolver | None:
         """Return the dual solver given by the keys, None for the default one.

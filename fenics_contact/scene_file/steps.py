@@ -71,8 +71,8 @@ def load_steps(
     begin = 0.0
     for position, step in enumerate(steps):
         duration = step.duration or float(step.count)
-        acted = _Course(tuple(loads), dim, acting.ways(step.loads), begin, duration)
-        held_up = _Course(tuple(supports), dim, held.ways(step.supports), begin, duration)
+        acted = _LoadHistory(tuple(loads), dim, acting.ways(step.loads), begin, duration)
+        held_up = _LoadHistory(tuple(supports), dim, held.ways(step.supports), begin, duration)
         with at("steps", position):
             for number in range(1, step.count + 1):
                 time, share = begin + number / step.count * duration, number / step.count
@@ -90,7 +90,7 @@ def load_steps(
 
 
 @dataclass(frozen=True)
-class _Course:
+class _LoadHistory:
     """All loads, or all supports, within a step, as a function of time.
 
     Attributes:

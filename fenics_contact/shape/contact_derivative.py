@@ -24,7 +24,7 @@ from fenics_contact.shape.projection_derivative import (
     projection_pulled_back,
 )
 from fenics_contact.shape.surface_derivative import areas_pulled_back
-from fenics_contact.surface_shapes import asked
+from fenics_contact.surface_shapes import evaluate_shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ def _by_obstacle(torn: TornSystem, obstacle: RigidObstacle, rows: RowFields, min
     """Return the derivative by the slave nodes that face an obstacle, shape (n, dim)."""
     by, normal = _by_point(torn.points, rows, mine), torn.points.normal[mine]
     with together(torn.decomposition.comm):
-        bending = asked(obstacle, "curvatures", _points(torn, torn.points.slave[mine]))
+        bending = evaluate_shape(obstacle, "curvatures", _points(torn, torn.points.slave[mine]))
     turning = by.normal + frames_pulled_back(normal, by.tangents, by.axes)
     return np.asarray(by.gap[:, None] * normal + np.einsum("nde,ne->nd", bending, turning))
 

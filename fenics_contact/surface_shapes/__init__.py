@@ -9,7 +9,7 @@ from fenics_contact.surface_shapes.parametric import Parametric
 from fenics_contact.surface_shapes.placed import Placed, placed, simplified
 from fenics_contact.surface_shapes.plane import Plane
 from fenics_contact.surface_shapes.profile import Profile
-from fenics_contact.surface_shapes.protocol import SurfaceShape, asked
+from fenics_contact.surface_shapes.protocol import SurfaceShape, evaluate_shape
 from fenics_contact.surface_shapes.recognised import recognised
 from fenics_contact.surface_shapes.revolved import Revolved
 from fenics_contact.surface_shapes.round import Circle, Cylinder, Sphere
@@ -33,8 +33,8 @@ __all__ = [
     "SplinePatch",
     "SurfaceShape",
     "Torus",
-    "asked",
     "closest_points",
+    "evaluate_shape",
     "placed",
     "principal_curvatures",
     "recognised",

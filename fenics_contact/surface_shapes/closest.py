@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.surface_shapes.protocol import SurfaceShape, asked
+from fenics_contact.surface_shapes.protocol import SurfaceShape, evaluate_shape
 
 #: Largest number of steps onto a surface: one if the distance is exact, a few if it is nearly exact.
 STEPS = 8
@@ -32,11 +32,11 @@ def closest_points(shape: SurfaceShape, points: np.ndarray) -> np.ndarray:
     closest = np.array(points, dtype=np.float64)
     before = np.inf
     for _ in range(STEPS):
-        distance = asked(shape, "distance", closest)
+        distance = evaluate_shape(shape, "distance", closest)
         far = float(np.abs(distance).max(initial=0.0))
         if far <= ROUNDING * np.abs(closest).max(initial=0.0) or far > 0.5 * before:
             break
-        closest, before = closest - distance[:, None] * asked(shape, "normals", closest), far
+        closest, before = closest - distance[:, None] * evaluate_shape(shape, "normals", closest), far
     return closest
 
 
@@ -55,8 +55,8 @@ def principal_curvatures(shape: SurfaceShape, points: np.ndarray) -> np.ndarray:
         InvalidInputError: If the shape returns NaN or arrays of other shapes.
         UserCodeError: If it raises.
     """
-    tangents = tangent_bases(asked(shape, "normals", points))
-    bend = asked(shape, "curvatures", points)
+    tangents = tangent_bases(evaluate_shape(shape, "normals", points))
+    bend = evaluate_shape(shape, "curvatures", points)
     return np.asarray(np.linalg.eigvalsh(tangents @ bend @ np.swapaxes(tangents, 1, 2)))
 
 

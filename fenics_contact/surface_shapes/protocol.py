@@ -29,7 +29,7 @@ class SurfaceShape(Protocol):
 Quantity: TypeAlias = Literal["distance", "normals", "curvatures"]
 
 
-def asked(shape: SurfaceShape, what: Quantity, points: np.ndarray) -> np.ndarray:
+def evaluate_shape(shape: SurfaceShape, what: Quantity, points: np.ndarray) -> np.ndarray:
     """Evaluate a member of a shape, and check the result.
 
     Args:

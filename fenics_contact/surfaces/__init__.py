@@ -22,8 +22,8 @@ from fenics_contact.surfaces.facets import (
 from fenics_contact.surfaces.midpoints import (
     bearing_areas,
     bearing_pulled_back,
-    bears_on_midpoints,
     filled_at_corners,
+    has_midside_pressure,
     share_areas,
 )
 from fenics_contact.surfaces.projection import (
@@ -52,7 +52,6 @@ __all__ = [
     "SurfaceTangents",
     "bearing_areas",
     "bearing_pulled_back",
-    "bears_on_midpoints",
     "best_projections",
     "corner_normals",
     "corner_places",
@@ -64,6 +63,7 @@ __all__ = [
     "facets_in_reach",
     "filled_at_corners",
     "gauss_points",
+    "has_midside_pressure",
     "height_functions",
     "height_over",
     "heights",

@@ -17,7 +17,7 @@ from fenics_contact.surfaces.facet_areas import nodal_areas
 _CORNERS, _MIDPOINTS = slice(0, 3), slice(3, 6)
 
 
-def bears_on_midpoints(facets: np.ndarray) -> bool:
+def has_midside_pressure(facets: np.ndarray) -> bool:
     """Return whether facets are quadratic triangles, (n, 6)."""
     return facets.shape[1] == _MIDPOINTS.stop
 
@@ -32,7 +32,7 @@ def bearing_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
         Shape (n_facets, nodes of a facet), [length²] or [length].
     """
     areas = nodal_areas(points, facets)
-    if bears_on_midpoints(facets):
+    if has_midside_pressure(facets):
         areas[:, _MIDPOINTS] += areas[:, _CORNERS].mean(axis=1, keepdims=True)
         areas[:, _CORNERS] = 0.0
     return areas
@@ -40,7 +40,7 @@ def bearing_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
 
 def bearing_pulled_back(by_areas: np.ndarray) -> np.ndarray:
     """Vector-Jacobian product of `bearing_areas` with respect to `nodal_areas`, the shape of facets."""
-    if not bears_on_midpoints(by_areas):
+    if not has_midside_pressure(by_areas):
         return by_areas
     result = by_areas.copy()
     result[:, _CORNERS] = by_areas[:, _MIDPOINTS].mean(axis=1, keepdims=True)
@@ -53,7 +53,7 @@ def share_areas(mesh: BodyMesh, name: str) -> np.ndarray:
     The nodal forces of a unit pressure; on quadratic triangles those on the linear facets between the nodes.
     """
     facets = mesh.surfaces[name]
-    if bears_on_midpoints(facets):
+    if has_midside_pressure(facets):
         facets = mesh.linear.surfaces[name]
     return np.bincount(facets.ravel(), nodal_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
 
@@ -72,7 +72,7 @@ def filled_at_corners(facets: np.ndarray, values: np.ndarray) -> np.ndarray:
     Returns:
         The same with values at the corners.
     """
-    if not bears_on_midpoints(facets):
+    if not has_midside_pressure(facets):
         return values
     result, corners = values.copy(), facets[:, _CORNERS]
     after = values[facets[:, _MIDPOINTS]]

@@ -11,7 +11,7 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh, computed_rounding
-from fenics_contact.surface_shapes import Joined, SurfaceShape, asked
+from fenics_contact.surface_shapes import Joined, SurfaceShape, evaluate_shape
 from fenics_contact.surfaces.facets import FacetedSurface, Relief, facet_shape_values, faceted_surface
 from fenics_contact.surfaces.projection import interpolated_normal
 from fenics_contact.surfaces.reconstruction import reconstructed
@@ -108,7 +108,7 @@ def by_shape(surface: FacetedSurface, shape: SurfaceShape) -> FacetedSurface:
     corners = np.zeros((*surface.facets.shape, surface.dim))
     for part, mine in parts:
         nodes = surface.facets[mine]
-        shape_normals = asked(part, "normals", surface.points[nodes.ravel()]).reshape(
+        shape_normals = evaluate_shape(part, "normals", surface.points[nodes.ravel()]).reshape(
             *nodes.shape, surface.dim
         )
         corners[mine] = _unit(shape_normals)
@@ -197,8 +197,8 @@ def height_over(points: np.ndarray, directions: np.ndarray, shape: SurfaceShape)
     height = np.zeros(len(points))
     for _ in range(STEPS):
         place = points + height[:, None] * directions
-        step = asked(shape, "distance", place)
-        cosine = np.einsum("nd,nd->n", asked(shape, "normals", place), directions)
+        step = evaluate_shape(shape, "distance", place)
+        cosine = np.einsum("nd,nd->n", evaluate_shape(shape, "normals", place), directions)
         _check_across(cosine, place, shape)
         step /= cosine
         height -= step

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.accuracy import Balanced, SolverErrors
+from fenics_contact.accuracy import BalancedTolerance, SolverErrors
 from fenics_contact.contact import ContactProblem, State, solve_scene, solve_steps
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.gallery import block
@@ -24,7 +24,7 @@ PAIR = "a body that friction holds"
 MODEST = ["a linear block", "a ball on a plane", "Tresca's law", PAIR, "a mortar pair", "two dimensions"]
 
 
-def solved(name: str, tolerance: float | Balanced | None = None) -> State:
+def solved(name: str, tolerance: float | BalancedTolerance | None = None) -> State:
     scene = CASES[name].make()
     return solve_scene(scene, MPI.COMM_SELF, partitions=CASES[name].cut(scene), tolerance=tolerance)
 
@@ -60,7 +60,7 @@ def test_the_peak_pressure_is_as_good_as_the_mesh_allows(name: str) -> None:
 
 
 def test_a_smaller_share_is_reached_from_where_the_solver_is() -> None:
-    state, plain = solved(PAIR, Balanced(share=3e-4)), solved(PAIR)
+    state, plain = solved(PAIR, BalancedTolerance(share=3e-4)), solved(PAIR)
     errors = state.estimate_errors()
     assert 0.0 < errors.algebraic + errors.friction <= 3e-4 * errors.discretisation
     rounds, products = remarks(state), state.counts["f_products"]
@@ -108,7 +108,8 @@ def test_a_number_beats_the_tolerance_of_the_solver() -> None:
     cut, comm = CASES[PAIR].cut(scene), MPI.COMM_SELF
     own = solve_scene(scene, comm, partitions=cut, solver=FaceNewton(tolerance=1e-7))
     number = solve_scene(scene, comm, partitions=cut, solver=FaceNewton(tolerance=1e-3), tolerance=1e-7)
-    share = solve_scene(scene, comm, partitions=cut, solver=FaceNewton(tolerance=1e-7), tolerance=Balanced())
+    solver, tolerance = FaceNewton(tolerance=1e-7), BalancedTolerance()
+    share = solve_scene(scene, comm, partitions=cut, solver=solver, tolerance=tolerance)
     assert own.dual_solution.residuals.within(1e-7)
     assert number.counts["f_products"] == own.counts["f_products"]
     assert share.counts["f_products"] < own.counts["f_products"]
@@ -169,7 +170,7 @@ class Limited:
 
 def test_a_solver_that_fails_on_the_way_tells_all_steps() -> None:
     scene = CASES[PAIR].make()
-    solver, tolerance = Limited(1e-3), Balanced(share=1e-9)
+    solver, tolerance = Limited(1e-3), BalancedTolerance(share=1e-9)
     with pytest.raises(ConvergenceError, match="needs") as failure:
         solve_scene(
             scene, MPI.COMM_SELF, partitions=CASES[PAIR].cut(scene), solver=solver, tolerance=tolerance
@@ -181,7 +182,7 @@ def test_a_solver_that_fails_on_the_way_tells_all_steps() -> None:
 
 def test_a_good_solution_is_kept_where_the_solver_cannot_reach_a_better_one() -> None:
     scene = CASES[PAIR].make()
-    solver, tolerance = Limited(1e-7), Balanced(share=1e-12, loosest=1e-7)
+    solver, tolerance = Limited(1e-7), BalancedTolerance(share=1e-12, loosest=1e-7)
     state = solve_scene(
         scene, MPI.COMM_SELF, partitions=CASES[PAIR].cut(scene), solver=solver, tolerance=tolerance
     )
@@ -210,7 +211,7 @@ def test_errors_can_be_read_and_add_up() -> None:
 
 
 def test_the_next_tolerance_follows_the_ratio_within_limits() -> None:
-    balanced = Balanced(share=0.1, finest=1e-9)
+    balanced = BalancedTolerance(share=0.1, finest=1e-9)
     assert balanced.satisfied(SolverErrors(0.01, 0.0), 0.1)
     assert not balanced.satisfied(SolverErrors(0.01, 0.001), 0.1)
     assert balanced.tightened(1e-2, SolverErrors(0.1, 0.0), 0.1) == pytest.approx(0.5 * 0.1 * 1e-2)
@@ -228,7 +229,7 @@ def test_a_tolerance_lies_between_zero_and_one(tolerance: float) -> None:
 
 def test_a_tolerance_is_a_number_or_balanced() -> None:
     scene = gallery.block_on_plane(Coulomb(0.6))
-    with pytest.raises(InvalidInputError, match=r"a number, Balanced\(...\) or None, got str"):
+    with pytest.raises(InvalidInputError, match=r"a number, BalancedTolerance\(...\) or None, got str"):
         solve_scene(scene, MPI.COMM_SELF, tolerance="balanced")  # type: ignore[arg-type]
 
 
@@ -236,5 +237,5 @@ def test_a_tolerance_is_a_number_or_balanced() -> None:
     "wrong", [{"share": 0.0}, {"loosest": 1.0}, {"finest": 0.1}, {"finest": 0.0}, {"rounds": 0}]
 )
 def test_a_balance_needs_sensible_numbers(wrong: dict[str, float]) -> None:
-    with pytest.raises(InvalidInputError, match="Balanced needs share > 0"):
-        Balanced(**wrong)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match="BalancedTolerance needs share > 0"):
+        BalancedTolerance(**wrong)  # type: ignore[arg-type]

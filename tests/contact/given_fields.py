@@ -16,7 +16,7 @@ from fenics_contact.scene import (
     Friction,
     IsotropicElasticity,
     RigidPlane,
-    Sampled,
+    SampledField,
     Scene,
     Support,
     Surface,
@@ -41,7 +41,7 @@ def rising(x: np.ndarray) -> np.ndarray:
 
 
 def forces(comm: MPI.Comm) -> np.ndarray:
-    law = Coulomb(Sampled(NODES, rising(NODES)))
+    law = Coulomb(SampledField(NODES, rising(NODES)))
     return solve_scene(shifted(law), comm, tolerance=1e-9).contact.force
 
 

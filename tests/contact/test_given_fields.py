@@ -17,14 +17,16 @@ from fenics_contact.io import read_result, write_result
 from fenics_contact.scene import (
     Coulomb,
     Pressure,
-    Sampled,
+    SampledField,
     Support,
     Tresca,
 )
 from tests.contact.given_fields import MESH, NODES, forces, rising, shifted
 
 
-@pytest.mark.parametrize("coefficient", [rising, Sampled(NODES, rising(NODES))], ids=["function", "sampled"])
+@pytest.mark.parametrize(
+    "coefficient", [rising, SampledField(NODES, rising(NODES))], ids=["function", "sampled"]
+)
 def test_every_point_slips_with_its_own_coefficient(coefficient: object) -> None:
     state = solve_scene(shifted(Coulomb(coefficient)), MPI.COMM_SELF, tolerance=1e-9)  # type: ignore[arg-type]
     points = state.torn.points
@@ -60,17 +62,17 @@ def test_a_pressure_known_only_on_its_surface_is_enough() -> None:
     scene = replace(
         shifted(None),
         supports=[Support("block", "x0", (0.0, None, None)), Support("block", "y0", (None, 0.0, None))],
-        loads=[Pressure("block", "z1", Sampled(top, 0.01 * top[:, 0], reach=0.1))],
+        loads=[Pressure("block", "z1", SampledField(top, 0.01 * top[:, 0], reach=0.1))],
     )
     state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-9)
     assert state.balance().loads.force[2] == pytest.approx(-0.01 * 4.0**2 / 2.0)
 
 
 def test_a_result_names_a_field_shortly(tmp_path: Path) -> None:
-    state = solve_scene(shifted(Coulomb(Sampled(NODES, rising(NODES)))), MPI.COMM_SELF, tolerance=1e-6)
+    state = solve_scene(shifted(Coulomb(SampledField(NODES, rising(NODES)))), MPI.COMM_SELF, tolerance=1e-6)
     write_result(state, tmp_path)
     friction = read_result(tmp_path)["scene"]["contacts"][0]["friction"]
-    assert friction["friction_coefficient"]["type"] == "Sampled"
+    assert friction["friction_coefficient"]["type"] == "SampledField"
     assert len(str(friction)) < 300
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.accuracy import Balanced, certify, find_sites, solver_errors
+from fenics_contact.accuracy import BalancedTolerance, certify, find_sites, solver_errors
 from fenics_contact.contact import (
     ContactProblem,
     FixedPoint,
@@ -42,7 +42,7 @@ from fenics_contact.optimize import (
 )
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
-    Automatic,
+    AutomaticContact,
     BodyForce,
     Coulomb,
     DistanceObstacle,
@@ -62,7 +62,7 @@ from fenics_contact.scene import (
     RigidPlane,
     RigidSphere,
     RigidSurface,
-    Sampled,
+    SampledField,
     StVenantKirchhoff,
     Support,
     Surface,
@@ -134,7 +134,7 @@ def objects() -> dict[str, Any]:
         state.gather_fields("block"), state.balance(), state.resultants(), find_sites(state.torn),
         solve_adjoint(state, partials, linearise_face(state, WeakChoice.RELEASED)),
         certify(state.dual, state.dual_solution), solver_errors(state.system, state.solution),
-        Balanced(), FixedPoint(FaceNewton()), LoadSequence(shape.contact), AdaptiveTolerance(),
+        BalancedTolerance(), FixedPoint(FaceNewton()), LoadSequence(shape.contact), AdaptiveTolerance(),
         UnheldMotion({"block": np.eye(6)[0]}), RigidSurface("block", "z1", (0.5, 0.5, 1.0)),
         *shape.geometry.motions, LoadCases({"one": shape}), path, followed,
         Remeshed(shape), Remeshing(np.zeros(60), 1.0, 1.1),
@@ -143,7 +143,7 @@ def objects() -> dict[str, Any]:
         minimize(bowl, np.ones(60), constraints=NonlinearConstraint(bowl, 90.0, name="size")),
         NonlinearConstraint(bowl, 90.0), Checkpoint("run.npz"), search,
         pose(bowl, np.zeros(60), constraints=limits),
-        Sampled(np.eye(3), np.ones(3)),
+        SampledField(np.eye(3), np.ones(3)),
         Support("block", "z1", (None, lambda x: x[:, 0], 0.0)), LoadStep("push", loads=weights),
         *CELL_TYPES.values(), ThermalStrain("block", 20.0), TotalForce("block", "z1", (0, 0, -1)),
         Pressure("block", "z1", 1.0), Tresca(1.0), Tie(Surface("a", "z0"), Surface("b", "z1")),
@@ -152,7 +152,7 @@ def objects() -> dict[str, Any]:
         FinitePlasticity(1.0, 0.3, 1.0),
         J2Plasticity(1.0, 0.3, 1.0).answer(np.zeros((9, 3, 3)), np.zeros((9, 7)), 0.0), Ufl(lambda x: x[0]),
         DistanceObstacle(lambda x: x[:, 2]), RigidSphere((0, 0, 0), 1.0),
-        Automatic(), MovingObstacle(RigidSphere((0, 0, 0), 1.0), lambda time: (None, (time, 0, 0))),
+        AutomaticContact(), MovingObstacle(RigidSphere((0, 0, 0), 1.0), lambda time: (None, (time, 0, 0))),
         RigidCylinder((0, 0, 0), (0, 0, 1), 1.0), OrthotropicPlaneStress((2.0, 1.0), 0.1, 1.0),
         OrthotropicElasticity((3.0, 2.0, 1.0), (0.1, 0.1, 0.1), (1.0, 1.0, 1.0)),
         ContactForces(lambda contact: (0.0, np.zeros(1), np.zeros((1, 2)))),

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.accuracy import Balanced
+from fenics_contact.accuracy import BalancedTolerance
 from fenics_contact.contact import Status, solve_scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
@@ -122,7 +122,7 @@ def test_errors_are_told_where_they_are_known_or_asked_for(tmp_path: Path) -> No
     assert direct["solver"]["kind"] == "sparse factorisation of one body"
     assert direct["contact"] == []
     parts = {"block": np.arange(16) // 8}
-    balanced = solve_scene(scene, MPI.COMM_SELF, partitions=parts, tolerance=Balanced(share=0.05))
+    balanced = solve_scene(scene, MPI.COMM_SELF, partitions=parts, tolerance=BalancedTolerance(share=0.05))
     found = read_result(write_result(balanced, tmp_path))
     assert found["errors"]["by_body"]["block"] > 0.0
     assert found["solver"]["tolerance"]["share"] == 0.05

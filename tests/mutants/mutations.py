@@ -39,8 +39,8 @@ MUTATIONS = (
     Mutation(
         "gaps to rigid obstacles are forgotten",
         "pairing/contact_search.py",
-        'gap = asked(obstacle, "distance", slave.surface.points[chosen])',
-        'gap = 0.0 * asked(obstacle, "distance", slave.surface.points[chosen])',
+        'gap = evaluate_shape(obstacle, "distance", slave.surface.points[chosen])',
+        'gap = 0.0 * evaluate_shape(obstacle, "distance", slave.surface.points[chosen])',
         ("tests/contact/test_obstacles.py::test_nodes_lie_outside_of_the_round_obstacle_after_pressing",),
     ),
     Mutation(

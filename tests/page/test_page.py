@@ -231,7 +231,7 @@ def test_moments_of_plane_bodies_stand_under_z_and_energies_that_are_unknown_now
 
 
 def test_a_tolerance_that_follows_the_mesh_is_told_in_words() -> None:
-    balanced = {"type": "Balanced", "share": 0.1, "loosest": 1e-3, "finest": 1e-10, "rounds": 4}
+    balanced = {"type": "BalancedTolerance", "share": 0.1, "loosest": 1e-3, "finest": 1e-10, "rounds": 4}
     told = sections({"solver": {"tolerance": balanced}}, Units())
     assert "solver&#x27;s error at most 10 % of the discretisation&#x27;s" in told
     assert "loosest" not in told

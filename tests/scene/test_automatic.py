@@ -13,7 +13,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import near_surfaces, quadratic
 from fenics_contact.scene import (
-    Automatic,
+    AutomaticContact,
     Body,
     ContactPair,
     Coulomb,
@@ -31,13 +31,14 @@ LOW = block((0.0, 0.0, 0.0), (3.0, 3.0, 1.0), (3, 3, 1))
 
 
 def scene(high: tuple[int, int, int] = (2, 2, 2), *, gap: float = 0.0, material: IsotropicElasticity = STEEL,
-          shift: float = 0.0, push: float = 0.0, automatic: Automatic | None = None) -> Scene:  # fmt: skip
+          shift: float = 0.0, push: float = 0.0,
+          automatic: AutomaticContact = AutomaticContact(Coulomb(0.3))) -> Scene:  # fmt: skip
     """Return a block over a wider plate of three cells a side."""
     low_left = (0.5 + shift, 0.5, 1.0 + gap)
     upper = block(low_left, (2.5 + shift, 2.5, 2.0 + gap), high)
     bodies = {"plate": Body(LOW, STEEL), "punch": Body(upper, material)}
     supports = [Support("plate", "z0"), Support("punch", "z1", (push, 0.0, -0.01))]
-    return Scene(bodies, supports, contacts=Automatic(Coulomb(0.3)) if automatic is None else automatic)
+    return Scene(bodies, supports, contacts=automatic)
 
 
 def test_the_surfaces_that_face_each_other_are_found_and_solved() -> None:
@@ -71,7 +72,7 @@ def test_the_finer_side_is_the_slave_where_cells_are_quadratic() -> None:
     for high, slave in (((4, 4, 2), "punch"), ((1, 1, 1), "plate"), ((2, 2, 2), "plate")):
         meshes = {"plate": LOW, "punch": block((0.5, 0.5, 1.0), (2.5, 2.5, 2.0), high)}
         bodies = {name: Body(quadratic(mesh), STEEL) for name, mesh in meshes.items()}
-        found = Scene(bodies, [Support("plate", "z0")], contacts=Automatic())
+        found = Scene(bodies, [Support("plate", "z0")], contacts=AutomaticContact())
         assert found.contacts[0].slave.body == slave
 
 
@@ -79,14 +80,14 @@ def test_a_side_whose_nodes_are_all_held_is_the_master() -> None:
     fine = block((0.5, 0.5, 1.0), (2.5, 2.5, 2.0), (8, 8, 2))
     bodies = {"plate": Body(LOW, STEEL), "punch": Body(fine, STEEL)}
     supports = [Support("punch", "z0"), Support("plate", "z0", (None, None, 0.1))]
-    assert Scene(bodies, supports, contacts=Automatic()).contacts[0].slave.body == "plate"
+    assert Scene(bodies, supports, contacts=AutomaticContact()).contacts[0].slave.body == "plate"
 
 
 def test_bodies_that_supports_bring_together_are_near() -> None:
     with pytest.raises(InvalidInputError, match=r"finds none; the nearest nodes of two bodies are 1\.6"):
         scene(gap=1.5)
     assert scene(gap=1.5, push=2.0).contacts
-    assert scene(gap=1.5, automatic=Automatic(distance=1.6)).contacts
+    assert scene(gap=1.5, automatic=AutomaticContact(distance=1.6)).contacts
 
 
 def test_surfaces_reach_as_far_as_bodies_slide() -> None:
@@ -103,7 +104,7 @@ def test_three_plane_bodies_meet_in_two_pairs(caplog: pytest.LogCaptureFixture) 
         for name, x in (("a", 0.0), ("b", 1.0), ("c", 2.0))
     }
     with caplog.at_level(logging.INFO, logger="fenics_contact"):
-        found = Scene(bodies, contacts=Automatic(distance=0.1))
+        found = Scene(bodies, contacts=AutomaticContact(distance=0.1))
     assert {frozenset((pair.slave.body, pair.master.body)) for pair in found.contacts} == {  # type: ignore[union-attr]
         frozenset("ab"), frozenset("bc"),
     }  # fmt: skip
@@ -112,30 +113,30 @@ def test_three_plane_bodies_meet_in_two_pairs(caplog: pytest.LogCaptureFixture) 
 
 def test_bodies_that_may_fold_are_their_own_masters() -> None:
     rubber = {"seal": Body(LOW, NeoHooke(10.0, 0.3))}
-    found = Scene(rubber, contacts=Automatic(Coulomb(0.1), self_contact=("seal",)))
+    found = Scene(rubber, contacts=AutomaticContact(Coulomb(0.1), self_contact=("seal",)))
     (pair,) = found.contacts
     assert pair.slave == pair.master == Surface("seal", "boundary")
     assert pair.friction == Coulomb(0.1)
     assert len(found.facets(pair.slave)) == 2 * (9 + 3 + 3)
     above = Body(block((0.0, 0.0, 1.1), (3.0, 3.0, 2.1), (3, 3, 1)), STEEL)
-    automatic = Automatic(distance=0.2, self_contact=("seal",))
+    automatic = AutomaticContact(distance=0.2, self_contact=("seal",))
     both = Scene({**rubber, "plate": above}, contacts=automatic)
     assert [each.place for each in both.contacts] == [
         "seal near plate on plate near seal", "seal boundary on seal boundary",
     ]  # fmt: skip
     with pytest.raises(InvalidInputError, match=r"needs names of bodies of the scene, seal, got 'sael'"):
-        Scene(rubber, contacts=Automatic(self_contact=("sael",)))
+        Scene(rubber, contacts=AutomaticContact(self_contact=("sael",)))
     named = {"seal": Body(found.bodies["seal"].mesh, NeoHooke(10.0, 0.3))}
     with pytest.raises(InvalidInputError, match="must have no surface 'boundary' yet"):
-        Scene(named, contacts=Automatic(self_contact=("seal",)))
+        Scene(named, contacts=AutomaticContact(self_contact=("seal",)))
     with pytest.raises(InvalidInputError, match="with itself needs a material for large deformations"):
-        Scene({"plate": Body(LOW, STEEL)}, contacts=Automatic(self_contact=("plate",)))
+        Scene({"plate": Body(LOW, STEEL)}, contacts=AutomaticContact(self_contact=("plate",)))
 
 
 def test_one_body_and_distances_that_are_none_are_refused() -> None:
     with pytest.raises(InvalidInputError, match="needs two bodies"):
-        Scene({"plate": Body(LOW, STEEL)}, contacts=Automatic())
+        Scene({"plate": Body(LOW, STEEL)}, contacts=AutomaticContact())
     for distance in (0.0, -1.0, np.inf, np.nan):
-        with pytest.raises(InvalidInputError, match=r"Automatic\.distance must be positive and finite"):
-            Automatic(distance=distance)
-    assert list(Automatic()) == []
+        with pytest.raises(InvalidInputError, match=r"AutomaticContact\.distance must be positive"):
+            AutomaticContact(distance=distance)
+    assert list(AutomaticContact()) == []

@@ -13,7 +13,7 @@ from fenics_contact.checks import checked
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.scene import (
-    Automatic,
+    AutomaticContact,
     Body,
     BodyForce,
     ContactPair,
@@ -36,7 +36,7 @@ from fenics_contact.scene import (
     RigidPlane,
     RigidSphere,
     RigidSurface,
-    Sampled,
+    SampledField,
     Scene,
     StVenantKirchhoff,
     Support,
@@ -57,12 +57,12 @@ DOWN = (0, 0, -1)
 SAMPLES: dict[type, Any] = {
     type(sample): sample
     for sample in (
-        FLOOR, STEEL, FACE, BODY, Coulomb(0.3), Tresca(1.0), Sampled(np.eye(3), np.ones(3)),
+        FLOOR, STEEL, FACE, BODY, Coulomb(0.3), Tresca(1.0), SampledField(np.eye(3), np.ones(3)),
         ContactPair(FACE, FLOOR), Tie(FACE, OTHER), RigidSurface("a", "b", (0, 0, 0)),
         Support("a", "b"), Traction("a", "b", DOWN), TotalForce("a", "b", DOWN), Pressure("a", "b", 1),
         BodyForce("a", DOWN), ThermalStrain("a", 1.0), Ufl(lambda x: x), LoadStep("a"), Scene({"a": BODY}),
         RigidSphere((0, 0, 0), 1.0), RigidCylinder((0, 0, 0), (0, 0, 1), 1.0),
-        Automatic(Coulomb(0.3)), MovingObstacle(FLOOR, lambda time: (None, DOWN)),
+        AutomaticContact(Coulomb(0.3)), MovingObstacle(FLOOR, lambda time: (None, DOWN)),
         DistanceObstacle(lambda x: x[:, 0]), PlaneStrain(1.0, 0.3), PlaneStress(1.0, 0.3),
         OrthotropicPlaneStress((1.0, 1.0), 0.3, 1.0),
         OrthotropicElasticity((1.0,) * 3, (0.1,) * 3, (1.0,) * 3),  # type: ignore[arg-type]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import Sampled
+from fenics_contact.scene import SampledField
 
 RANDOM = np.random.default_rng(7)
 
@@ -36,9 +36,9 @@ PLACES = pytest.mark.parametrize("places", [on_a_cylinder, in_a_box, on_a_plane]
 @PLACES
 def test_the_given_values_are_kept(places: Any) -> None:
     points = places(300)
-    field = Sampled(points, smooth(points))
+    field = SampledField(points, smooth(points))
     np.testing.assert_allclose(field(points), smooth(points), atol=1e-9)
-    vector = Sampled(points, np.column_stack([smooth(points)] * 3) * (1.0, 2.0, 3.0))
+    vector = SampledField(points, np.column_stack([smooth(points)] * 3) * (1.0, 2.0, 3.0))
     np.testing.assert_allclose(vector(points)[:, 1], 2.0 * smooth(points), atol=1e-9)
 
 
@@ -47,7 +47,8 @@ def test_more_points_make_a_field_more_accurate(places: Any) -> None:
     errors, asked = [], places(300)
     for count in (400, 6400):
         points = places(count)
-        errors.append(np.sqrt(np.mean((Sampled(points, smooth(points), 10.0)(asked) - smooth(asked)) ** 2)))
+        found = SampledField(points, smooth(points), 10.0)(asked)
+        errors.append(np.sqrt(np.mean((found - smooth(asked)) ** 2)))
     # 16 times as many points: 4 times as dense on surfaces, 2.5 times in the box.
     assert errors[1] < 0.4 * errors[0]
     assert errors[1] < 0.02
@@ -55,29 +56,29 @@ def test_more_points_make_a_field_more_accurate(places: Any) -> None:
 
 def test_on_a_line_it_is_linear_between_neighbours() -> None:
     x = np.array([0.0, 1.0, 3.0, 4.0])
-    field = Sampled(np.column_stack([x, 0 * x]), x**2)
+    field = SampledField(np.column_stack([x, 0 * x]), x**2)
     np.testing.assert_allclose(field(np.array([[0.5, 0.0], [2.0, 0.0]])), [0.5, 5.0])
 
 
 def test_points_of_a_plane_suit_plane_bodies() -> None:
     points = np.array([[0.0, 0.0, 5.0], [1.0, 0.0, 5.0], [0.0, 1.0, 5.0]])
-    assert Sampled(points, np.arange(3.0))(points[:, :2]).tolist() == pytest.approx([0, 1, 2])
-    assert Sampled(points, points)(points[:, :2]).shape == (3, 2)
+    assert SampledField(points, np.arange(3.0))(points[:, :2]).tolist() == pytest.approx([0, 1, 2])
+    assert SampledField(points, points)(points[:, :2]).shape == (3, 2)
 
 
 def test_one_point_is_the_same_everywhere_within_its_reach() -> None:
-    assert Sampled([[0.0, 0.0]], [3.0])(np.array([[50.0, 1.0], [2.0, 2.0]])).tolist() == [3.0, 3.0]
+    assert SampledField([[0.0, 0.0]], [3.0])(np.array([[50.0, 1.0], [2.0, 2.0]])).tolist() == [3.0, 3.0]
     with pytest.raises(InvalidInputError, match="it reaches only 2"):
-        Sampled([[0.0, 0.0]], [3.0], 2.0)(np.array([[5.0, 0.0]]))
+        SampledField([[0.0, 0.0]], [3.0], 2.0)(np.array([[5.0, 0.0]]))
 
 
 def test_no_value_is_invented_far_from_the_points() -> None:
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.5, 0.0, 0.0]])
-    field = Sampled(points, np.zeros(3))
+    field = SampledField(points, np.zeros(3))
     assert field(np.array([[5.4, 0.0, 0.0]])) == 0.0
     with pytest.raises(InvalidInputError, match=r"is 3\.5 from \(6, 0, 0\), and it reaches only 3"):
         field(np.array([[1.0, 0.0, 0.0], [6.0, 0.0, 0.0]]))
-    assert Sampled(points, np.zeros(3), reach=4.0)(np.array([[6.0, 0.0, 0.0]])) == 0.0
+    assert SampledField(points, np.zeros(3), reach=4.0)(np.array([[6.0, 0.0, 0.0]])) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -95,11 +96,11 @@ def test_no_value_is_invented_far_from_the_points() -> None:
 )
 def test_what_is_no_field_is_refused(points: Any, values: Any, reach: Any, message: str) -> None:
     with pytest.raises(InvalidInputError, match=message):
-        Sampled(points, values, reach)
+        SampledField(points, values, reach)
 
 
 def test_points_in_space_do_not_suit_plane_bodies() -> None:
     with pytest.raises(InvalidInputError, match="they have 3 coordinates and the bodies 2"):
-        Sampled(np.eye(3), np.zeros(3))(np.zeros((1, 2)))
+        SampledField(np.eye(3), np.zeros(3))(np.zeros((1, 2)))
     with pytest.raises(InvalidInputError, match="they have 2 coordinates and the bodies 3"):
-        Sampled(np.eye(2), np.zeros(2))(np.zeros((1, 3)))
+        SampledField(np.eye(2), np.zeros(2))(np.zeros((1, 3)))

@@ -19,7 +19,7 @@ from fenics_contact.scene import (
     Load,
     PlaneStrain,
     Pressure,
-    Sampled,
+    SampledField,
     Scene,
     Surface,
     ThermalStrain,
@@ -66,11 +66,11 @@ def warm(points: np.ndarray) -> np.ndarray:
     return np.asarray(3.0 * points[:, -1] ** 2 * (1.0 + points[:, 0]))
 
 
-def measured_pressure() -> Sampled:
+def measured_pressure() -> SampledField:
     """A pressure that is known at some points around the top."""
     x, y = np.meshgrid(np.linspace(-0.21, 2.23, 9), np.linspace(0.85, 1.15, 3), indexing="ij")
     places = np.column_stack([x.ravel(), y.ravel()])
-    return Sampled(places, 2.0 + 0.4 * places[:, 0] * places[:, 1] ** 2, reach=0.5)
+    return SampledField(places, 2.0 + 0.4 * places[:, 0] * places[:, 1] ** 2, reach=0.5)
 
 
 PLANE_PUSH, PUSH = BodyForce("block", (0.3, 0.0)), BodyForce("block", (0.25, 0.05, 0.0))

@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import Coulomb, Sampled, Scene, Tresca, gradients_of
+from fenics_contact.scene import Coulomb, SampledField, Scene, Tresca, gradients_of
 from fenics_contact.shape import Objective, ShapeProblem, contact_derivative
 from tests.shape.blocks import block_on_block, block_on_floor, designs_of, problem
 from tests.shape.objectives import objectives
@@ -31,11 +31,11 @@ def dry(points: np.ndarray) -> np.ndarray:
     return np.asarray(0.6 * np.exp(6.0 * points[:, -1]) * (1.0 + 0.1 * np.sin(points[:, 0])))
 
 
-def measured() -> Sampled:
+def measured() -> SampledField:
     """The coefficient at some points around the contact."""
     x, y = np.meshgrid(np.linspace(-0.21, 2.23, 9), np.linspace(-0.105, 0.13, 3), indexing="ij")
     places = np.column_stack([x.ravel(), y.ravel()])
-    return Sampled(places, rough(places), reach=0.5)
+    return SampledField(places, rough(places), reach=0.5)
 
 
 def by_mortar(scene: Scene) -> Scene:

@@ -18,7 +18,7 @@ from fenics_contact.surface_shapes import (
     SignedDistance,
     Sphere,
     Torus,
-    asked,
+    evaluate_shape,
     placed,
 )
 
@@ -123,6 +123,6 @@ def test_an_answer_of_another_shape_is_refused_and_an_error_is_named() -> None:
         r"^the curvatures of Wrong must be finite numbers of shape \(4, 2, 2\) for points of shape \(4, 2\)"
     )
     with pytest.raises(InvalidInputError, match=message):
-        asked(Wrong(lambda x: x[:, 0]), "curvatures", np.ones((4, 2)))
+        evaluate_shape(Wrong(lambda x: x[:, 0]), "curvatures", np.ones((4, 2)))
     with pytest.raises(UserCodeError, match="the distance of SignedDistance"):
-        asked(SignedDistance(fails), "distance", np.ones((4, 2)))
+        evaluate_shape(SignedDistance(fails), "distance", np.ones((4, 2)))

@@ -22,8 +22,8 @@ from fenics_contact.surface_shapes import (
     Sphere,
     SurfaceShape,
     Torus,
-    asked,
     closest_points,
+    evaluate_shape,
     placed,
     principal_curvatures,
     simplified,
@@ -325,10 +325,10 @@ def test_where_the_closest_point_is_not_unique_one_of_them_is_taken(
     shape: SurfaceShape, where: tuple[float, ...]
 ) -> None:
     x = np.array([where])
-    normals = asked(shape, "normals", x)
+    normals = evaluate_shape(shape, "normals", x)
     np.testing.assert_allclose(np.linalg.norm(normals), 1.0)
     np.testing.assert_allclose(shape.distance(closest_points(shape, x)), 0.0, atol=1e-12)
-    assert np.isfinite(asked(shape, "curvatures", x)).all()
+    assert np.isfinite(evaluate_shape(shape, "curvatures", x)).all()
     assert np.isfinite(principal_curvatures(shape, x)).all()
 
 

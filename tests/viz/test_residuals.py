@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.accuracy import Balanced
+from fenics_contact.accuracy import BalancedTolerance
 from fenics_contact.contact import FixedPoint, solve_scene
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.qp import FaceNewton, Smalse, SolverStep
@@ -41,7 +41,7 @@ def test_the_history_of_a_fixed_point_counts_its_tresca_problems() -> None:
 
 def test_the_history_of_a_balanced_solve_counts_its_rounds() -> None:
     scene = two_blocks(Coulomb(0.4))
-    tight = Balanced(share=1e-4)
+    tight = BalancedTolerance(share=1e-4)
     steps = solve_scene(
         scene, MPI.COMM_SELF, partitions=partitions(scene), tolerance=tight
     ).dual_solution.history

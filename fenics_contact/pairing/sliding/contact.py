@@ -28,7 +28,7 @@ from fenics_contact.pairing.sliding.points import SlidingPoints
 from fenics_contact.pairing.sliding.shared import shared_once
 from fenics_contact.pairing.sliding.slip import LastPoints, MaterialPoints
 from fenics_contact.scene import MovingObstacle, Scene
-from fenics_contact.surface_shapes import asked
+from fenics_contact.surface_shapes import evaluate_shape
 from fenics_contact.surfaces import shape_functions
 
 Known: TypeAlias = ContactPoints | LastPoints
@@ -186,10 +186,10 @@ class SlidingContact:
         assert obstacle is not None
         shape = obstacle.at(time) if isinstance(obstacle, MovingObstacle) else obstacle
         place = coordinates[meeting.nodes]
-        gap, normal = asked(shape, "distance", place), asked(shape, "normals", place)
+        gap, normal = evaluate_shape(shape, "distance", place), evaluate_shape(shape, "normals", place)
         facing = np.einsum("nd,nd->n", meeting.normals(coordinates), normal) < 0
         chosen = np.flatnonzero(facing & (gap <= self.reach))
-        curvature = asked(shape, "curvatures", place[chosen])
+        curvature = evaluate_shape(shape, "curvatures", place[chosen])
         none = sp.csr_matrix((len(chosen), len(coordinates)))
         points = _points(meeting, chosen, normal[chosen], gap[chosen], none)
         points = replace(points, symmetric=meeting.slave.mirrored[meeting.candidates[chosen]])

@@ -9,7 +9,7 @@ import numpy as np
 from fenics_contact.gallery import rectangle
 from fenics_contact.mesh import BodyMesh, boundary_faces
 from fenics_contact.scene import (
-    Automatic,
+    AutomaticContact,
     Body,
     ContactPair,
     Coulomb,
@@ -192,6 +192,6 @@ def bellows_that_close_on_themselves() -> Case:
     scene = Scene(
         {"bellows": Body(mesh, RUBBER)},
         pressed(0.0),
-        contacts=Automatic(Coulomb(0.3), self_contact=("bellows",)),
+        contacts=AutomaticContact(Coulomb(0.3), self_contact=("bellows",)),
     )
     return Case(scene, ways(*map(pressed, (0.2, 0.6, 1.0, 1.4))), checks=closed)
