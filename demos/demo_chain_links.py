@@ -65,8 +65,8 @@ from fenics_contact.viz import (
     plot_contact_pressure,
     plot_control_net,
     plot_convergence,
+    plot_curves,
     plot_decomposition,
-    plot_residuals,
     plot_stress,
 )
 
@@ -210,7 +210,18 @@ kinds = [record.kind.value for record in result.history]
 with show_progress(comm), timer.phase("pictures"):
     plot_control_net(links.first.crown, (mesh.points, moved), nets, output / "control_net.png", comm=comm)
     plot_convergence(values, kinds, output / "convergence.png", label=label, comm=comm)
-    plot_residuals(before.state.solution.history, output / "residuals.png", title="First state", comm=comm)
+    steps = before.state.solution.history
+    products, natural = zip(*((step.products, step.residuals.natural) for step in steps), strict=True)
+    plot_curves(
+        {"natural residual": (products, natural)},
+        output / "residuals.png",
+        xlabel="products with F",
+        ylabel="relative residual",
+        connected=True,
+        logarithmic="y",
+        title="First state",
+        comm=comm,
+    )
     ends = (before.state, after.state) if aim == "pressure" else (before, after)  # named in any case
     plot_before_after(*ends, output / "before_after.png", label=label)
 
@@ -332,5 +343,5 @@ assert imbalance < 1e-9
 # - `tolerance=AdaptiveTolerance()` in `ShapeProblem` (from `fenics_contact.shape`): states are solved no more
 #   accurately than the optimiser needs, which saves a third of the products.
 # - A finer net, or `LinkShape(cell="tetrahedron")`.
-# - `interactive(after.state, "contact_pressure", path=output / "pressure.html")` (from `fenics_contact.viz`):
-#   a page on which the mouse turns the links; `after.state.to_pyvista()` for pictures of your own.
+# - `result_page(after.state, output / "links.html")` (from `fenics_contact.page`): a page on which the mouse
+#   turns the links; `after.state.to_pyvista()` for pictures of your own.

@@ -232,14 +232,14 @@ plot_contact_status(maps, title="Stick and slip while the chain swings", width=1
 #
 # ## In three dimensions
 #
-# `interactive(history[4], "contact_pressure")` alone in a cell shows the state here, to turn and to zoom.
+# `result_page(history[4], field="contact_pressure")` alone in a cell shows the state, to turn and to zoom.
 # It is larger than all pictures of this notebook together, so this cell puts it into a file instead: one
 # page that any browser opens, without a server or a network.
 
 # %%
-from fenics_contact.viz import interactive
+from fenics_contact.page import result_page
 
-page = interactive(history[4], "contact_pressure", path="output/notebooks/chain_links/swung.html")
+page = result_page(history[4], "output/notebooks/chain_links/swung.html", field="contact_pressure")
 print("to open in a browser:", page)
 
 # %% [markdown]

@@ -9,11 +9,12 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from fenics_contact._requirements import require_extra
 from fenics_contact.cli.desk import Desk, desk_of, facts
-from fenics_contact.cli.field_files import draw, fields_in, newest_member
 from fenics_contact.cli.forces import forces_table
-from fenics_contact.errors import InvalidInputError, MissingRequirementError, together
-from fenics_contact.io import FIELD_FILES, fields_of_result, read_result
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.io import FIELD_FILES, fields_of_result, read_result, stored_fields
+from fenics_contact.scene_file import suggestion
 
 #: Entries of a result that are shown, in this order; the others are long.
 SHOWN = (
@@ -56,19 +57,12 @@ def view(
         typer.Option("--field", help="Field shown by the colours, as in the list."),
     ] = "von_mises",
     scale: Annotated[float, typer.Option("--scale", help="Factor of the displacement.")] = 1.0,
-    window: Annotated[
-        bool, typer.Option("--window/--no-window", help="Open a window where there is a display.")
-    ] = True,
 ) -> None:
-    """Show a result: its numbers, its fields, and a picture.
-
-    With a display an interactive window opens; --save writes a PNG file instead, --page a web page. Without a
-    display nothing opens.
-    """
+    """Show a result: its numbers and its fields; --save draws a picture, --page makes a web page."""
     desk = desk_of(context)
     with together(desk.comm):
         if desk.comm.rank == 0:
-            _view(desk, result, save, (field, scale), window=window if page is None else None)
+            _view(desk, result, save, field, scale)
             if page is not None:
                 _write_page(desk, result, page)
 
@@ -93,10 +87,8 @@ def _write_page(desk: Desk, result: Path, name: str) -> None:
     desk.say(f"page in {target}, {target.stat().st_size / 1e6:.1f} MB: open it in a browser")
 
 
-def _view(
-    desk: Desk, result: Path, save: Path | None, look: tuple[str, float], *, window: bool | None
-) -> None:
-    """Print a result and draw it; without a file the picture is left out if window is None."""
+def _view(desk: Desk, result: Path, save: Path | None, field: str, scale: float) -> None:
+    """Print a result, and draw it to a file if one is given."""
     try:
         there, reason = result.exists(), "nothing is there"
     except OSError as error:
@@ -118,15 +110,31 @@ def _view(
     if fields is None:
         desk.say("no .vtm or .pvd file of fields is there to draw")
         return
-    desk.show(facts(fields_in(fields), f"fields of {newest_member(fields).file.name}"))
-    if save is None and window is None:
+    members = stored_fields(fields)
+    shown = next(member for member in members if member.value == members[-1].value)
+    bodies = shown.read()
+    ranges = _ranges(bodies)
+    desk.show(facts(ranges, f"fields of {shown.file.name}"))
+    if save is None:
         return
-    try:
-        desk.say(draw(fields, save, look, window=bool(window)))
-    except MissingRequirementError as missing:
-        if save is not None:
-            raise
-        desk.say(f"no picture: {missing}")
+    if field not in ranges:
+        raise InvalidInputError(
+            f"--field must be one of {list(ranges)}, got {field!r}: {suggestion(field, list(ranges))}choose "
+            "one of them"
+        )
+    from fenics_contact.viz import plot_field
+
+    plot_field(bodies, field, save, scale=scale)
+    desk.say(f"picture in {save}")
+
+
+def _ranges(bodies: dict[str, Any]) -> dict[str, str]:
+    """Return name -> range of every field of bodies."""
+    require_extra("lists of fields", "viz", "pyvista", "matplotlib")
+    from fenics_contact.viz import Units, field_entries
+
+    ends = {entry["name"]: entry["extremes"][0] for entry in field_entries([bodies], Units())}
+    return {name: f"{end[0]:.5g} to {end[1]:.5g}" if end else "" for name, end in ends.items()}
 
 
 def show_record(desk: Desk, record: dict[str, Any]) -> None:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh import boundary_faces, cell_type_of
+from fenics_contact.mesh import boundary_faces
 from fenics_contact.page.packing import Arrays
+from fenics_contact.viz import linear_cells
 
 if TYPE_CHECKING:
     import pyvista
@@ -28,7 +28,7 @@ def body_entry(name: str, grid: pyvista.UnstructuredGrid, arrays: Arrays) -> dic
         ``cells``, (c, 3 | 4 | 8) corners; ``nodes`` and ``on_cells``, the fields by name. Quadratic cells are
         cut into linear ones.
     """
-    cells, pieces, dim = _linear_cells(name, grid)
+    cells, pieces, dim = linear_cells(name, grid)
     faces, owner = boundary_faces(cells, 3) if dim == 3 else (cells, np.arange(len(cells)))
     quads = faces.shape[1] == 4
     triangles = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]]) if quads else faces
@@ -46,26 +46,6 @@ def body_entry(name: str, grid: pyvista.UnstructuredGrid, arrays: Arrays) -> dic
             for key, values in grid.cell_data.items()
         },
     }
-
-
-def is_plane(grid: pyvista.UnstructuredGrid) -> bool:
-    """Return whether a body is plane."""
-    return int(grid.get_cell(0).dimension) == 2
-
-
-def _linear_cells(name: str, grid: pyvista.UnstructuredGrid) -> tuple[np.ndarray, int, int]:
-    """Return the nodes of linear cells, how many of them one of the grid makes, and their dimension."""
-    if grid.n_cells == 0 or len(np.unique(grid.celltypes)) != 1:
-        raise InvalidInputError(
-            f"a page needs bodies with cells of one type, {name!r} has {len(np.unique(grid.celltypes))} "
-            "types: give files that write_vtu or ResultSeries wrote"
-        )
-    dim = 2 if is_plane(grid) else 3
-    cells = np.asarray(grid.cell_connectivity).reshape(grid.n_cells, -1)
-    kind = cell_type_of(cells, dim)
-    if kind.order == 1:
-        return cells, 1, dim
-    return cells[:, kind.pieces].reshape(-1, kind.pieces.shape[1]), len(kind.pieces), dim
 
 
 def _lines(points: np.ndarray, faces: np.ndarray, sharp: float = 30.0) -> tuple[np.ndarray, np.ndarray]:

@@ -30,6 +30,7 @@ function prepare() {
     page.fields.forEach((each, n) => each.part === part && group.append(new Option(each.label, n)));
     $("field").append(group);
   }
+  $("field").value = shown.field = page.first;
   setRange(field().range);
   choose("field", ({ value }) => {
     shown.field = Number(value);

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from contextlib import nullcontext
+from dataclasses import dataclass
+from dataclasses import field as attribute
 from html import escape
 from importlib import resources
 from pathlib import Path
@@ -16,23 +18,61 @@ from fenics_contact._requirements import require_extra
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.io import write_text
-from fenics_contact.page.bodies import body_entry, is_plane
+from fenics_contact.page.bodies import body_entry
 from fenics_contact.page.colours import colour_scales
-from fenics_contact.page.fields import field_entries
 from fenics_contact.page.obstacles import obstacle_entries
 from fenics_contact.page.packing import Arrays
 from fenics_contact.page.source import Source, source_of_files, source_of_states
 from fenics_contact.page.tables import sections, status_words
-from fenics_contact.viz import InteractiveScene, Units
+from fenics_contact.viz import Units, chosen_scale, field_entries, is_plane
+
+#: The page is a frame of its own, so that its styles do not affect the notebook's.
+_FRAME = '<iframe srcdoc="{page}" style="width: 100%; height: 900px; border: 1px solid #dddddd"></iframe>'
+
+
+@dataclass(frozen=True, eq=False)
+class Page:
+    """A web page that Jupyter shows as the value of a cell; it shows nothing on ranks that did not make it.
+
+    Attributes:
+        html: The page on the rank that made it, None on the others.
+        path: The file it was written to, None if it was not.
+    """
+
+    html: str | None = attribute(repr=False)
+    path: Path | None = None
+
+    def __fspath__(self) -> str:
+        """Return the path of the file.
+
+        Raises:
+            InvalidInputError: If the page was written to no file.
+        """
+        if self.path is None:
+            raise InvalidInputError(
+                "this needs the file of a page, but the page was not written: give result_page a path, such "
+                "as 'page.html'"
+            )
+        return str(self.path)
+
+    def __str__(self) -> str:
+        """Return the path of the file, or a text if there is none."""
+        return "page without a file" if self.path is None else str(self.path)
+
+    def _repr_mimebundle_(self, **_: Any) -> dict[str, str]:
+        if self.html is None:
+            return {"text/plain": ""}
+        return {"text/html": _FRAME.format(page=escape(self.html)), "text/plain": str(self)}
 
 
 def result_page(
     result: State | Mapping[str, State] | str | Path,
     path: str | Path | None = None,
     *,
+    field: str = "",
     title: str = "",
     units: Units | None = None,
-) -> InteractiveScene:
+) -> Page:
     """Make a web page of a result: bodies to turn, to cut and to colour, curves and tables. Collective.
 
     The page is one file that works without a server and without a network, and in notebooks. It shows the
@@ -47,6 +87,7 @@ def result_page(
             calling rank alone, and not collectively.
         path: HTML file to write, None to write none. A file of that name is replaced when the new one is
             complete.
+        field: Name of the field that is shown first, such as "contact_pressure"; the others are in its menu.
         title: Title of the page; that of the result unless given.
         units: Names of the units; those of the result unless given.
 
@@ -54,7 +95,7 @@ def result_page(
         The page, which Jupyter shows as the value of a cell.
 
     Raises:
-        InvalidInputError: If there is no such result, or it has no fields.
+        InvalidInputError: If there is no such result, or it has no fields, or not the one to show first.
         MissingRequirementError: If plotly or pyvista is missing.
         OutputError: If the file cannot be written.
 
@@ -72,18 +113,19 @@ def result_page(
     page = None
     with nullcontext() if source.comm is None else together(source.comm):
         if source.comm is None or source.comm.rank == 0:
-            page = _filled(source, title or source.title, units or source.units)
+            page = _filled(source, title or source.title, units or source.units, field)
             if target is not None:
                 write_text(target, page)
-    return InteractiveScene(page, target, height=900)
+    return Page(page, target)
 
 
-def _filled(source: Source, title: str, units: Units) -> str:
+def _filled(source: Source, title: str, units: Units, field: str) -> str:
     """Return the text of the page: the template with everything in its place."""
     from plotly.offline import get_plotlyjs
 
     arrays = Arrays()
     data = _data(source, title, units, arrays)
+    data["first"] = _first(data["fields"], field)
     parts = {
         "title": escape(title),
         "style": _file("page.css"),
@@ -127,7 +169,7 @@ def _data(source: Source, title: str, units: Units, arrays: Arrays) -> dict[str,
             }
             for label, grids in source.steps
         ],
-        "scale": 1.0 if obstacles else _visible_scale(everything, points),
+        "scale": 1.0 if obstacles else max(chosen_scale(grids) for _, grids in source.steps),
         "obstacles": obstacles,
         "status": status_words((source.record.get("scene") or {}).get("contacts") or ()),
         "colours": colour_scales(),
@@ -136,15 +178,14 @@ def _data(source: Source, title: str, units: Units, arrays: Arrays) -> dict[str,
     return {**data, "arrays": arrays.index}
 
 
-def _visible_scale(grids: list[Any], points: np.ndarray, visible: float = 0.03) -> float:
-    """Return the factor, 1, 2 or 5 times a power of ten, by which displacement becomes visible."""
-    moved = [grid.point_data["displacement"] for grid in grids if "displacement" in grid.point_data]
-    largest = max((float(np.linalg.norm(part, axis=1).max()) for part in moved), default=0.0)
-    if not largest > 0:
-        return 1.0
-    factor = max(1.0, visible * float(np.ptp(points, axis=0).max()) / largest)
-    power = 10.0 ** np.floor(np.log10(factor))
-    return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= factor * (1 + 1e-9)))
+def _first(fields: list[dict[str, Any]], name: str) -> int:
+    """Return the number of the field that is shown first."""
+    names = [entry["source"] for entry in fields]
+    if name and name not in names:
+        raise InvalidInputError(
+            f"field must be one of {', '.join(dict.fromkeys(names))}, got {name!r}: choose one of them"
+        )
+    return names.index(name) if name else 0
 
 
 def _history(record: Mapping[str, Any]) -> dict[str, Any]:

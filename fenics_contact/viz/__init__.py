@@ -7,7 +7,6 @@ returns a `Picture`, which Jupyter shows and which is written to a file if a pat
 
 from fenics_contact.viz._libraries import check_libraries
 from fenics_contact.viz.before_after import plot_before_after
-from fenics_contact.viz.browser import InteractiveScene
 from fenics_contact.viz.colours import (
     BLUE,
     FAMILIES,
@@ -25,14 +24,14 @@ from fenics_contact.viz.convergence import plot_convergence
 from fenics_contact.viz.curves import plot_curves
 from fenics_contact.viz.decomposition import plot_decomposition
 from fenics_contact.viz.error import plot_error
-from fenics_contact.viz.interactive import interactive
+from fenics_contact.viz.fields import field_entries, is_plane, linear_cells
+from fenics_contact.viz.obstacles import outline
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.pressure import plot_contact_pressure
 from fenics_contact.viz.renderer import check_renderer, rendering
-from fenics_contact.viz.residuals import plot_residuals
 from fenics_contact.viz.sheet import sheet
 from fenics_contact.viz.status import plot_contact_status
-from fenics_contact.viz.stress import plot_stress
+from fenics_contact.viz.stress import chosen_scale, plot_field, plot_stress
 from fenics_contact.viz.units import Units
 
 __all__ = [
@@ -46,13 +45,16 @@ __all__ = [
     "SIGNED_MAP",
     "SPARE",
     "STRESS_MAP",
-    "InteractiveScene",
     "Picture",
     "Units",
     "check_libraries",
     "check_renderer",
+    "chosen_scale",
     "draw_picture",
-    "interactive",
+    "field_entries",
+    "is_plane",
+    "linear_cells",
+    "outline",
     "plot_before_after",
     "plot_contact_pressure",
     "plot_contact_status",
@@ -61,7 +63,7 @@ __all__ = [
     "plot_curves",
     "plot_decomposition",
     "plot_error",
-    "plot_residuals",
+    "plot_field",
     "plot_stress",
     "png_path",
     "rendering",

@@ -7,33 +7,33 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+import pyvista as pv
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from scipy.spatial import cKDTree
 
-from fenics_contact.contact import State
+from fenics_contact.contact import State, body_grid, in_space
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.shape import DesignPoint
 from fenics_contact.viz.colours import BLUE, GREY, INK, ORANGE
+from fenics_contact.viz.fields import points_of
+from fenics_contact.viz.painting import REACH
 from fenics_contact.viz.patch import checked_pair, contact_patches
 from fenics_contact.viz.patch_axes import label_axes, label_patch, pressure_bar
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.pressure import draw_pressure
-from fenics_contact.viz.profile import Profile, profiles
+from fenics_contact.viz.section import cut, section_frame, sections_of, strongest_contact
 from fenics_contact.viz.sheet import sheet
 from fenics_contact.viz.trace import contact_trace
 from fenics_contact.viz.units import Units
-from fenics_contact.viz.view import Frame
-from fenics_contact.viz.words import change, checked_range, checked_reach, headline, written
+from fenics_contact.viz.view import IN_PLANE, Frame, View, frame_around, oblique_view
+from fenics_contact.viz.words import change, checked_range, checked_reach, headline, nice_number, written
 
-
-@dataclass(frozen=True)
-class _Look:
-    pair: int
-    clim: tuple[float, float] | None
-    reach: float | None
-    headline: str
-    units: Units
-    width: int
+#: Apparent size of the largest movement relative to the picture.
+VISIBLE = 0.06
+#: Margin around the bodies, relative to their size.
+BORDER = 0.08
 
 
 def plot_before_after(
@@ -76,22 +76,36 @@ def plot_before_after(
             before, or an option cannot be used.
     """
     target = png_path(path)
-    before, after = (point.state if isinstance(point, DesignPoint) else point for point in (first, best))
+    states = [point.state if isinstance(point, DesignPoint) else point for point in (first, best)]
+    before, after = states
     _check(before, after, pair)
     checked_reach(reach)
     given = None if clim is None else checked_range(clim)
-    named = units or Units()
-    contacts = before.contact, after.contact
-    peaks = [float(contact.pressure[contact.on_pair(pair)].max(initial=0.0)) for contact in contacts]
+    named, plane = units or Units(), before.scene.dim == 2
+    peaks = [float(state.contact.pressure[state.contact.on_pair(pair)].max(initial=0.0)) for state in states]
     values = [each.value for each in (first, best) if isinstance(each, DesignPoint)]
     facts = [f"{label} {change(*values)}"] if len(values) == 2 else []
     if len(values) < 2 or not np.allclose(values, peaks, rtol=1e-6):
         facts.append(f"largest pressure {written(peaks[0])} → {written(peaks[1])} {named.stress}")
     facts.append(f"seat gives way by {written(_retreat(before, after, pair), 2)} {named.length}")
-    look = _Look(pair, given, reach, headline(title, "; ".join(facts)), named, width)
-    draw = _draw_in_plane if before.scene.dim == 2 else _draw_in_space
-    comm = before.torn.decomposition.comm
-    return draw_picture(comm, target, lambda paper: draw(before, after, paper, look))
+    shown, words = given or (0.0, max(peaks) or 1.0), headline(title, "; ".join(facts))
+
+    def draw(paper: BinaryIO) -> None:
+        outlines = _outlines(before, after, reach, named.length)
+        with sheet(paper, (width, round((0.5 if plane else 0.95) * width)), words) as figure:
+            if plane:
+                left, *panels = figure.subplots(1, 2)
+                _draw_traces(left, states, pair, shown, reach, named)
+            else:
+                upper, lower = figure.subfigures(2, 1, height_ratios=[0.48, 0.47])
+                _draw_patches(upper, states, pair, shown, reach, named)
+                panels = list(lower.subplots(1, 2, width_ratios=[each.frame.proportion for each in outlines]))
+            for axes, outline in zip(panels, outlines, strict=True):
+                outline.draw(axes, min(each.factor for each in outlines), named)
+            lines = panels[0].get_legend_handles_labels()
+            figure.legend(*lines, loc="outside lower center", ncols=3)
+
+    return draw_picture(before.torn.decomposition.comm, target, draw)
 
 
 def _retreat(first: State, best: State, pair: int) -> float:
@@ -118,72 +132,116 @@ def _check(first: State, best: State, pair: int) -> None:
         )
 
 
-def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> None:
-    patches = contact_patches((first, best), look.pair, look.reach)
-    (one, other), peak = (
-        (patch.frame for patch in patches),
-        max(float(patch.pressure.max()) for patch in patches),
-    )
-    frame = Frame(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
-    shown = look.clim or (0.0, peak or 1.0)
-    outlines = profiles(first, best, look.reach, look.units.length)
-    # Sections have equal heights and together the width of the picture, but a limited height.
-    wide = [profile.frame.proportion for profile in outlines]
-    tall = [0.4 / frame.proportion + 0.08, min(0.8 / sum(wide), 0.45) + 0.13]
-    size = look.width, round((sum(tall) + 0.03) * look.width)
-    with sheet(paper, size, look.headline) as figure:
-        upper, lower = figure.subfigures(2, 1, height_ratios=tall)
-        panels = upper.subplots(1, 2)
-        for axes, patch, word in zip(panels, patches, ("before", "after"), strict=True):
-            draw_pressure(axes, patch, shown)
-            axes.set_title(f"{word}: pressure on {patch.name}{patch.behind}")
-            label_patch(axes, replace(patch, frame=frame), look.units)
-        pressure_bar(panels[1], shown, "max" if peak > shown[1] else "neither", look.units)
-        sections = lower.subplots(1, len(outlines), width_ratios=wide)
-        for axes, profile in zip(sections, outlines, strict=True):
-            _draw_profile(axes, profile, min(profile.factor for profile in outlines), look.units)
-        lower.legend(*sections[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+def _draw_patches(
+    figure: Figure,
+    states: list[State],
+    pair: int,
+    clim: tuple[float, float],
+    reach: float | None,
+    units: Units,
+) -> None:
+    """Draw the pressure before and after side by side in one frame."""
+    patches = contact_patches(states, pair, reach)
+    low, high = ([getattr(patch.frame, end) for patch in patches] for end in ("low", "high"))
+    frame = Frame(np.min(low, axis=0), np.max(high, axis=0))
+    panels = figure.subplots(1, 2)
+    for axes, patch, word in zip(panels, patches, ("before", "after"), strict=True):
+        draw_pressure(axes, patch, clim)
+        axes.set_title(f"{word}: pressure on {patch.name}{patch.behind}")
+        label_patch(axes, replace(patch, frame=frame), units)
+    beyond = max(float(patch.pressure.max()) for patch in patches) > clim[1]
+    pressure_bar(panels[1], clim, "max" if beyond else "neither", units)
 
 
-def _draw_in_plane(first: State, best: State, paper: BinaryIO, look: _Look) -> None:
-    traces = [contact_trace(state, look.pair) for state in (first, best)]
-    (profile,) = profiles(first, best, look.reach, look.units.length)
-    with sheet(paper, (look.width, round(0.5 * look.width)), look.headline) as figure:
-        left, right = figure.subplots(1, 2)
-        for trace, word, colour, line in zip(
-            traces, ("before", "after"), (GREY, ORANGE), ("--", "-"), strict=True
-        ):
-            left.plot(
-                trace.broken(trace.places),
-                trace.broken(trace.pressure),
-                line,
-                color=colour,
-                lw=2.2,
-                label=word,
-            )
-        ends = [end for trace in traces for end in trace.window(look.reach)]
-        top = max(float(trace.pressure.max()) for trace in traces) or 1.0
-        left.set(xlim=(min(ends), max(ends)), ylim=look.clim or (-0.03 * top, 1.08 * top))
-        words = f"{traces[0].axis} ({look.units.length})", f"contact pressure ({look.units.stress})"
-        left.set(xlabel=words[0], ylabel=words[1], title=f"pressure on {traces[0].name}")
-        left.grid(color=GREY, alpha=0.25)
-        left.legend(loc="upper right")
-        _draw_profile(right, profile, profile.factor, look.units)
-        right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
+def _draw_traces(
+    axes: Axes,
+    states: list[State],
+    pair: int,
+    clim: tuple[float, float],
+    reach: float | None,
+    units: Units,
+) -> None:
+    """Draw the pressure along a plane surface before and after."""
+    traces = [contact_trace(state, pair) for state in states]
+    looks = ({"ls": "--", "color": GREY, "label": "before"}, {"color": ORANGE, "label": "after"})
+    for trace, look in zip(traces, looks, strict=True):
+        axes.plot(trace.broken(trace.places), trace.broken(trace.pressure), lw=2.2, **look)
+    ends, room = [end for trace in traces for end in trace.window(reach)], clim[1] - clim[0]
+    axes.set(xlim=(min(ends), max(ends)), ylim=(clim[0] - 0.03 * room, clim[1] + 0.08 * room))
+    axes.set(xlabel=f"{traces[0].axis} ({units.length})", ylabel=f"contact pressure ({units.stress})")
+    axes.set_title(f"pressure on {traces[0].name}")
+    axes.grid(color=GREY, alpha=0.25)
+    axes.legend(loc="upper right")
 
 
-def _draw_profile(axes: Axes, profile: Profile, factor: float, units: Units) -> None:
-    drawn = [("before", 0.0, GREY, 3.5), (f"after, movement × {factor:g}", factor, ORANGE, 1.6)]
-    if factor > 1.0:
-        drawn.append(("after", 1.0, INK, 0.8))
-    for number, (name, lines) in enumerate(profile.before.items()):
-        for word, by, colour, width in drawn:
-            moved, label = lines + by * profile.moves[name], None if number else word
-            axes.add_collection(LineCollection(moved, colors=colour, linewidths=width, label=label))
-        place = profile.place_in(name)
-        if place is not None:
-            axes.text(*place, name, color=BLUE, ha="center", va="center")
-    profile.frame.fit(axes)
-    label_axes(axes, profile.view, units)
-    largest = f"{written(profile.largest, 2)} {units.length}"
-    axes.set_title(f"{profile.title}\nmoved by up to {largest}")
+@dataclass(frozen=True)
+class _Outlines:
+    """Outlines of bodies in a view: lines before, (n, 2 ends, 2), how their ends move, points within."""
+
+    title: str
+    view: View
+    frame: Frame
+    before: dict[str, np.ndarray]
+    moves: dict[str, np.ndarray]
+    inside: dict[str, np.ndarray]
+
+    @property
+    def largest(self) -> float:
+        """Largest visible movement, [length]."""
+        seen = {name: self.frame.holds(lines).all(axis=1) for name, lines in self.before.items()}
+        parts = [np.linalg.norm(self.moves[name][here], axis=-1).ravel() for name, here in seen.items()]
+        return float(np.concatenate(parts).max(initial=0.0))
+
+    @property
+    def factor(self) -> float:
+        """Round factor, at least 1, that makes the movement visible."""
+        size = float(np.max(self.frame.size))
+        return max(1.0, nice_number(VISIBLE * size / self.largest)) if self.largest > 0 else 1.0
+
+    def draw(self, axes: Axes, factor: float, units: Units) -> None:
+        """Draw the outlines before and after, the movement also magnified, and the bodies' names."""
+        drawn = [("before", 0.0, GREY, 3.5), (f"after, movement × {factor:g}", factor, ORANGE, 1.6)]
+        drawn += [("after", 1.0, INK, 0.8)] if factor > 1.0 else []
+        room = cKDTree(np.concatenate([lines.reshape(-1, 2) for lines in self.before.values()]))
+        for number, (name, lines) in enumerate(self.before.items()):
+            for word, by, colour, width in drawn:
+                moved, label = lines + by * self.moves[name], None if number else word
+                axes.add_collection(LineCollection(moved, colors=colour, linewidths=width, label=label))
+            places = self.inside[name][self.frame.holds(self.inside[name])]
+            if len(places):  # the name, far from all lines and from the border
+                border = np.minimum(places - self.frame.low, self.frame.high - places).min(axis=1)
+                place = places[np.argmax(np.minimum(room.query(places)[0], border))]
+                axes.text(*place, name, color=BLUE, ha="center", va="center")
+        self.frame.fit(axes)
+        label_axes(axes, self.view, units)
+        axes.set_title(f"{self.title}\nmoved by up to {written(self.largest, 2)} {units.length}")
+
+
+def _outlines(first: State, best: State, reach: float | None, unit: str) -> list[_Outlines]:
+    """Return the outlines around the strongest contact before: in the plane one, in space two sections."""
+    bodies: dict[str, pv.DataSet] = {}
+    for name, body in first.scene.bodies.items():
+        bodies[name] = body_grid(body.mesh.linear, in_space(body.mesh.points))
+        bodies[name].point_data["moves"] = in_space(best.scene.bodies[name].mesh.points - body.mesh.points)
+    spot, points = strongest_contact(first.contact, first.contact_places), points_of(bodies)
+    if first.scene.dim == 2:
+        half, whole = REACH * spot.radius if reach is None else reach, frame_around(IN_PLANE, points, BORDER)
+        frame = Frame(np.maximum(spot.centre - half, whole.low), np.minimum(spot.centre + half, whole.high))
+        return [_outlined("outlines", bodies, IN_PLANE, frame)]
+    outlines = []
+    for section in sections_of(spot, oblique_view(points)):
+        frame = section_frame(section.view, spot, points, reach)
+        outlines.append(_outlined(section.title(frame, unit), cut(bodies, section), section.view, frame))
+    return outlines
+
+
+def _outlined(title: str, faces: dict[str, pv.DataSet], view: View, frame: Frame) -> _Outlines:
+    """Return the outlines of plane faces, how they move, and the middles of their cells."""
+    before, moves, inside = {}, {}, {}
+    for name, face in faces.items():
+        edge = face.extract_feature_edges(feature_edges=False, manifold_edges=False)
+        ends = edge.lines.reshape(-1, 3)[:, 1:] if edge.n_cells else np.zeros((0, 2), dtype=int)
+        before[name] = view.project(np.asarray(edge.points))[ends]
+        moves[name] = view.project(np.asarray(edge["moves"]))[ends] if len(ends) else before[name]
+        inside[name] = view.project(np.asarray(face.cell_centers().points))
+    return _Outlines(title, view, frame, before, moves, inside)

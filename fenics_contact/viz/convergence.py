@@ -60,10 +60,28 @@ def plot_convergence(
             f"a logarithmic diagram needs a positive objective, got {np.nanmin(objective):g}: leave "
             "logarithmic=False"
         )
-    scale = "log" if logarithmic else "linear"
-    return draw_picture(
-        comm, target, lambda paper: _draw(objective, kind, paper, (label, title, scale), width)
-    )
+    number, centre = np.arange(len(objective)), np.isin(kind, ("start", "serious", "refined"))
+    first, last = objective[centre][0], objective[centre][-1]
+    words = headline(title, f"{label} {change(first, last)}")
+
+    def draw(paper: BinaryIO) -> None:
+        with sheet(paper, (width, round(0.6 * width)), words) as figure:
+            axes = figure.subplots()
+            axes.set(xlabel="evaluation", ylabel=label, yscale="log" if logarithmic else "linear")
+            main = {"color": BLUE, "lw": 2, "ms": 8, "label": "start and serious steps"}
+            axes.plot(number[centre], objective[centre], "-o", **main)
+            null, rejected = kind == "null", number[kind == "rejected"]
+            if np.any(null):
+                white = {"mfc": "white", "mec": ORANGE, "mew": 1.8, "ms": 8, "label": "null steps"}
+                axes.plot(number[null], objective[null], "o", **white)
+            if len(rejected):  # on the lower edge, as such a point has no value
+                look = {"color": GREY, "ms": 8, "transform": axes.get_xaxis_transform()}
+                axes.plot(rejected, np.full(len(rejected), 0.03), "x", label="rejected points", **look)
+            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+            axes.grid(axis="y", color=GREY, alpha=0.3)
+            axes.legend(loc="best")
+
+    return draw_picture(comm, target, draw)
 
 
 def _checked(
@@ -96,32 +114,3 @@ def _checked(
             "the objective must be finite wherever it was not rejected: mark rejected points"
         )
     return objective, kind
-
-
-def _draw(
-    values: np.ndarray, kind: np.ndarray, paper: BinaryIO, look: tuple[str, str, str], width: int
-) -> None:
-    label, title, scale = look
-    number = np.arange(len(values))
-    centre = np.isin(kind, ("start", "serious", "refined"))
-    first, last = values[centre][0], values[centre][-1]
-    words = headline(title, f"{label} {change(first, last)}")
-    with sheet(paper, (width, round(0.6 * width)), words) as figure:
-        axes = figure.subplots()
-        axes.plot(
-            number[centre], values[centre], "-o", color=BLUE, lw=2, ms=8, label="start and serious steps"
-        )
-        null, rejected = kind == "null", number[kind == "rejected"]
-        white = {"marker": "o", "facecolors": "white", "edgecolors": ORANGE, "linewidths": 1.8, "zorder": 3}
-        if np.any(null):
-            axes.scatter(number[null], values[null], label="null steps", s=64, **white)
-        if len(rejected):  # on the lower edge, as such a point has no value
-            low, places = np.full(len(rejected), 0.03), axes.get_xaxis_transform()
-            crosses = {"marker": "x", "color": GREY, "transform": places}
-            axes.scatter(rejected, low, label="rejected points", s=64, **crosses)
-        axes.set_xlabel("evaluation")
-        axes.set_ylabel(label)
-        axes.set_yscale(scale)
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-        axes.grid(axis="y", color=GREY, alpha=0.3)
-        axes.legend(loc="best")

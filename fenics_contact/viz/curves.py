@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, TypeAlias
+from typing import TYPE_CHECKING, BinaryIO, Literal, TypeAlias
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import BLUE, GREEN, GREY, INK, ORANGE
@@ -41,7 +41,7 @@ def plot_curves(
     ylabel: str,
     reference: Mapping[str, Curve] | None = None,
     connected: bool = False,
-    logarithmic: bool = False,
+    logarithmic: bool | Literal["y"] = False,
     title: str = "",
     width: int = 1200,
     comm: MPI.Comm | None = None,
@@ -55,7 +55,7 @@ def plot_curves(
         ylabel: Label of the ordinates with unit.
         reference: Name -> abscissas and ordinates of the reference curves.
         connected: Whether to connect the points of a series in their order.
-        logarithmic: Whether both axes are logarithmic, for convergence.
+        logarithmic: Whether both axes are logarithmic, for convergence; "y" for the ordinates alone.
         title: Title.
         width: Width of the picture in pixels.
         comm: If given, only rank 0 draws, and an error is raised on all ranks.
@@ -81,19 +81,25 @@ def plot_curves(
         raise InvalidInputError("a diagram needs at least one curve, got none: pass series={'name': (x, y)}")
 
     def draw(paper: BinaryIO) -> None:
-        size = (width, round(0.6 * width))
-        with sheet(paper, size, title) as figure:
+        with sheet(paper, (width, round(0.6 * width)), title) as figure:
             axes = figure.subplots()
-            _draw_reference(axes, behind)
-            _draw_series(axes, shown, connected)
-            axes.set_xlabel(xlabel)
-            axes.set_ylabel(ylabel)
+            for (name, (x, y)), style in zip(behind.items(), cycle(("-", "--", ":", "-."))):
+                axes.plot(x, y, style, color=INK, lw=1.6, label=name, zorder=2)
+            for (name, (x, y)), (colour, symbol) in zip(shown.items(), cycle(LOOKS)):
+                few = len(x) <= MOST_SYMBOLS
+                line, marker = "-" if connected or not few else "none", symbol if few else "none"
+                edge = {"ms": 7, "markeredgecolor": "white", "markeredgewidth": 0.6}
+                look = {"linestyle": line, "marker": marker, "color": colour, "lw": 2.2, **edge}
+                axes.plot(x, y, label=name, zorder=3, **look)
+            axes.set(xlabel=xlabel, ylabel=ylabel)
             if logarithmic:
-                axes.set_xscale("log")
                 axes.set_yscale("log")
+                axes.set_xscale("linear" if logarithmic == "y" else "log")
             axes.grid(color=GREY, alpha=0.3)
             axes.set_axisbelow(True)
-            figure.legend(loc="outside lower center", ncols=_columns([*shown, *behind]))
+            longest = max(map(len, (*shown, *behind)))
+            columns = min(len(shown) + len(behind), max(1, 110 // (longest + 8)))
+            figure.legend(loc="outside lower center", ncols=columns)
 
     return draw_picture(comm, target, draw)
 
@@ -106,26 +112,3 @@ def _checked(name: str, curve: Curve) -> tuple[np.ndarray, np.ndarray]:
             "arrays of the same length"
         )
     return x, y
-
-
-def _columns(names: Sequence[str]) -> int:
-    """Return how many names fit side by side."""
-    longest = max(len(name) for name in names)
-    return max(1, min(len(names), 110 // (longest + 8)))
-
-
-def _draw_reference(axes: Axes, curves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> None:
-    styles = ("-", "--", ":", "-.")
-    for number, (name, (x, y)) in enumerate(curves.items()):
-        axes.plot(x, y, styles[number % 4], color=INK, lw=1.6, label=name, zorder=2)
-
-
-def _draw_series(axes: Axes, curves: Mapping[str, tuple[np.ndarray, np.ndarray]], connected: bool) -> None:
-    for number, (name, (x, y)) in enumerate(curves.items()):
-        colour, symbol = LOOKS[number % len(LOOKS)]
-        few = len(x) <= MOST_SYMBOLS
-        line = "-" if connected or not few else "none"
-        axes.plot(
-            x, y, linestyle=line, marker=symbol if few else "none", color=colour, lw=2.2, ms=7,
-            markeredgecolor="white", markeredgewidth=0.6, label=name, zorder=3,
-        )  # fmt: skip

@@ -107,7 +107,6 @@ def _linear(mesh: BodyMesh, partition: np.ndarray) -> tuple[BodyMesh, np.ndarray
     return mesh.linear, np.repeat(np.asarray(partition), mesh.linear.n_cells // mesh.n_cells)
 
 
-
 def _draw_in_plane(
     parts: list[tuple[BodyMesh, np.ndarray]],
     points: np.ndarray,

@@ -13,9 +13,11 @@ from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import ERROR_MAP
 from fenics_contact.viz.fields import drawn_bodies
+from fenics_contact.viz.obstacles import obstacles_of
 from fenics_contact.viz.painting import paint
 from fenics_contact.viz.paints import Paints
 from fenics_contact.viz.picture import Picture, png_path
+from fenics_contact.viz.stress import contact_spot
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.words import checked_range, checked_reach, headline, written
 
@@ -72,11 +74,15 @@ def plot_error(
     total = float(np.sqrt(sum(np.sum(part**2) for part in values.values())))
     facts = f"estimated discretisation error {written(100 * total, 3)} % in energy norm, by cell"
     norm = LogNorm(*(given or error_range(values)), clip=False)
-    label, words = "part of a cell, relative", headline(title, facts)
-    bodies = drawn_bodies(state)
+    bodies, words = drawn_bodies(state), headline(title, facts)
     shown = {name: np.repeat(part, bodies[name].n_cells // len(part)) for name, part in values.items()}
-    paints = Paints(shown, ERROR_MAP, norm, label, words, 1.0, reach, units or Units(), width)
-    return paint(state, bodies, paints, target, sections=sections)
+    label, named = "part of a cell, relative", units or Units()
+    paints = Paints(shown, ERROR_MAP, norm, label, words, 1.0, reach, named, width)
+    spot = contact_spot(state, bodies) if sections else None
+    return paint(
+        bodies, paints, target,
+        obstacles=obstacles_of(state), spot=spot, comm=state.torn.decomposition.comm,
+    )  # fmt: skip
 
 
 def error_range(values: Mapping[str, np.ndarray]) -> tuple[float, float]:

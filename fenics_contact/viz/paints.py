@@ -31,7 +31,6 @@ class Paints:
         reach: Extent of details to each side of the contact's centre, [length], or None.
         units: Names of the units.
         width: Width of the picture in pixels.
-        told: Whether the title names the largest value.
     """
 
     values: Mapping[str, np.ndarray]
@@ -43,34 +42,25 @@ class Paints:
     reach: float | None
     units: Units
     width: int
-    told: bool = False
-
-    def shown(self, body: str) -> np.ndarray:
-        """Return the values of a body scaled to 0 to 1, the range of the colours."""
-        return np.ma.filled(self.norm(self.values[body], clip=False), 0.0)
 
     def on(self, bodies: Mapping[str, pv.UnstructuredGrid]) -> dict[str, pv.UnstructuredGrid]:
-        """Return the bodies with the field ``shown``."""
+        """Return the bodies with the field ``shown``, the values in terms of the colours, 0 to 1."""
         painted = {}
         for name, body in bodies.items():
-            painted[name], shown = body.copy(deep=False), self.shown(name)
+            shown = np.ma.filled(self.norm(self.values[name], clip=False), 0.0)
+            painted[name] = body.copy(deep=False)
             data = painted[name].point_data if len(shown) == body.n_points else painted[name].cell_data
             data["shown"] = shown
         return painted
 
     def add_bar(self, figure: Figure, panels: Iterable[Axes]) -> None:
         """Add a colour bar beside axes; its ends are pointed where values lie beyond, and say how far."""
-        low = min(float(values.min()) for values in self.values.values())
-        high = max(float(values.max()) for values in self.values.values())
+        low = min(float(np.nanmin(values)) for values in self.values.values())
+        high = max(float(np.nanmax(values)) for values in self.values.values())
         key = ScalarMappable(self.norm, self.colours)
-        add_colour_bar(figure, panels, key, self.label, beyond=(low, high), told=self.told)
+        add_colour_bar(figure, panels, key, self.label, beyond=(low, high))
 
     @property
     def of_surfaces(self) -> dict[str, Any]:
-        """Keywords of pyvista's ``add_mesh`` for `shown`."""
+        """Keywords of pyvista's ``add_mesh`` for the field ``shown``."""
         return {"scalars": "shown", "cmap": self.colours, "clim": (0.0, 1.0), "n_colors": 256}
-
-    @property
-    def of_cells(self) -> dict[str, Any]:
-        """Keywords of matplotlib for `shown`."""
-        return {"cmap": self.colours, "vmin": 0.0, "vmax": 1.0}

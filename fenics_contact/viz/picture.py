@@ -48,7 +48,12 @@ class Picture:
         Raises:
             InvalidInputError: If the picture was written to no file.
         """
-        return written_path(self.path, "plot_ function a path, such as 'stress.png'")
+        if self.path is None:
+            raise InvalidInputError(
+                "this needs the file of a picture, but the picture was not written: give the plot_ function "
+                "a path, such as 'stress.png'"
+            )
+        return str(self.path)
 
     def __str__(self) -> str:
         """Return the path of the file, or a text if there is none."""
@@ -67,14 +72,9 @@ class Picture:
 
 def png_path(path: str | Path | None) -> Path | None:
     """Return the path if it names a PNG file, else raise."""
-    return file_path(path, ".png", "pictures are PNG files")
-
-
-def file_path(path: str | Path | None, suffix: str, what: str) -> Path | None:
-    """Return the path if it has the required suffix, else raise."""
     target = None if path is None else Path(path)
-    if target is not None and target.suffix != suffix:
-        raise InvalidInputError(f"{what}, got the name {target.name!r}: let it end in {suffix!r}")
+    if target is not None and target.suffix != ".png":
+        raise InvalidInputError(f"pictures are PNG files, got the name {target.name!r}: let it end in '.png'")
     return target
 
 
@@ -95,12 +95,3 @@ def draw_picture(comm: MPI.Comm | None, path: Path | None, draw: Callable[[Binar
             if path is not None:
                 put_whole(path, png)
     return Picture(png, path)
-
-
-def written_path(path: Path | None, remedy: str) -> str:
-    """Return the path of a picture's file, or raise if none was written."""
-    if path is None:
-        raise InvalidInputError(
-            f"this needs the file of a picture, but the picture was not written: give the {remedy}"
-        )
-    return str(path)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import matplotlib as mpl
 import numpy as np
@@ -12,19 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
-from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
 from fenics_contact.viz.colours import INK
 from fenics_contact.viz.view import Frame
-from fenics_contact.viz.words import nice_number, written
+from fenics_contact.viz.words import written
 
 #: Width of every sheet in inches: fonts and lines scale with the number of pixels.
 INCHES = 16.0
 #: Size of the title, and its largest width relative to the sheet.
 HEADLINE, WIDEST = 18, 0.97
 
-#: Where the tip of a colour bar ends, relative to the bar's length.
-TIP = 0.06
 
 _STYLE = {
     "font.family": "sans-serif",
@@ -69,11 +66,13 @@ def sheet(paper: BinaryIO, size: tuple[int, int], title: str) -> Iterator[Figure
         figure.savefig(paper, dpi=dpi, format="png")
 
 
-def show_image(axes: Axes, image: np.ndarray, frame: Frame, title: str = "") -> None:
-    """Show an image of a frame's content, in the frame's coordinates, without axes."""
-    (left, low), (right, high) = frame.low, frame.high
-    axes.imshow(image, extent=(left, right, low, high))
-    axes.set_axis_off()
+def show_image(
+    axes: Axes, image: np.ndarray, frame: Frame, title: str = "", *, coordinates: bool = False
+) -> None:
+    """Show an image of a frame's content, in the frame's coordinates, with or without these at the axes."""
+    axes.imshow(image, extent=(frame.low[0], frame.high[0], frame.low[1], frame.high[1]))
+    if not coordinates:
+        axes.set_axis_off()
     axes.set_title(title)
 
 
@@ -84,40 +83,14 @@ def add_colour_bar(
     label: str,
     *,
     beyond: tuple[float, float] | None = None,
-    told: bool = False,
 ) -> None:
-    """Draw a colour bar to the right of panels without moving them.
+    """Draw a colour bar to the right of panels; its ends are pointed where ``beyond`` exceeds the colours.
 
-    Args:
-        figure: Where to.
-        panels: What it belongs to.
-        key: From values to colours.
-        label: Its label, with the unit.
-        beyond: Smallest and largest value: where they lie beyond the colours the bar ends in a tip, beside
-            which they are written.
-        told: Whether the largest value stands elsewhere.
+    ``beyond``, the smallest and largest value drawn, is written beside the label where it does.
     """
     low, high = beyond or key.get_clim()
     out = low < key.norm.vmin, high > key.norm.vmax
     extend = {(False, False): "neither", (True, False): "min", (False, True): "max"}.get(out, "both")
-    place = {"label": label, "aspect": 30, "shrink": 0.95, "panchor": False}
-    bar = figure.colorbar(key, ax=panels, extend=extend, **place)
-    for is_out, words, end, side in (
-        (out[0], f"smallest {written(low, 3)}", -TIP, "top"),
-        (out[1] and not told, f"largest {written(high, 3)}", 1 + TIP, "bottom"),
-    ):
-        if is_out:
-            bar.ax.text(0.5, end, words, transform=bar.ax.transAxes, ha="center", va=side)
-
-
-def scale_bar(axes: Axes, frame: Frame, unit: str, *, below: bool = False) -> None:
-    """Draw a scale bar of round length in the lower left corner of axes that show a frame, or below them."""
-    length = nice_number(float(frame.size[0]) / 3)
-    words, height = f"{written(length, 1)} {unit}", 0.012 * float(frame.size[1])
-    look: dict[str, Any] = {"label_top": True, "color": INK, "size_vertical": height, "pad": 0.4, "sep": 4}
-    if below:
-        look |= {"size_vertical": 0.006 * float(frame.size[0]), "bbox_transform": axes.transAxes}
-        look["bbox_to_anchor"] = (0.0, 0.0)
-    bar = AnchoredSizeBar(axes.transData, length, words, "upper left" if below else "lower left", **look)
-    bar.patch.set(facecolor="white", edgecolor="none", alpha=0.75)
-    axes.add_artist(bar)
+    ends = [f"smallest {written(low, 3)}"] * out[0] + [f"largest {written(high, 3)}"] * out[1]
+    words = f"{label}; {', '.join(ends)}" if ends else label
+    figure.colorbar(key, ax=panels, extend=extend, label=words, aspect=30, shrink=0.95, panchor=False)

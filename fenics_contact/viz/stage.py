@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pyvista as pv
 
+from fenics_contact.viz.colours import INK
 from fenics_contact.viz.renderer import rendering
 from fenics_contact.viz.view import Frame, View
 
 #: Images are rendered at this multiple of the resolution: matplotlib then smooths edges alike on all
 #: machines.
 SUPERSAMPLING = 2
+#: Side of the corner with the directions of the axes, relative to the smaller side of an image.
+AXES = 0.3
 
 
 @dataclass(frozen=True)
@@ -36,14 +38,12 @@ def balls(points: np.ndarray, radius: float) -> pv.PolyData:
     return pv.PolyData(np.asarray(points)).glyph(geom=pv.Sphere(radius=radius), scale=False, orient=False)
 
 
-def render(layers: Iterable[Layer], view: View, frame: Frame, width: int) -> np.ndarray:
-    """Render one image.
+def render(
+    layers: Iterable[Layer], view: View, frame: Frame, width: int, *, axes: bool = False
+) -> np.ndarray:
+    """Render one image of ``width`` pixels, with the directions of the axes in its corner if requested.
 
-    Args:
-        layers: Layers to draw.
-        view: Direction of view.
-        frame: Visible part; its proportions are those of the image.
-        width: Width of the image in pixels.
+    The proportions of the frame are those of the image.
 
     Returns:
         Image, (height, width, 3) uint8, at `SUPERSAMPLING` times the resolution.
@@ -51,30 +51,10 @@ def render(layers: Iterable[Layer], view: View, frame: Frame, width: int) -> np.
     Raises:
         MissingRequirementError: If this machine cannot render.
     """
-    size = SUPERSAMPLING * width, max(2, round(SUPERSAMPLING * width / frame.proportion))
-    with staged(layers, view, frame, size) as plotter:
-        return np.asarray(plotter.screenshot(None, return_img=True))[..., :3]
-
-
-@contextmanager
-def staged(layers: Iterable[Layer], view: View, frame: Frame, size: tuple[int, int]) -> Iterator[pv.Plotter]:
-    """Set up meshes, lamp and camera, and close them at the end.
-
-    Args:
-        layers: Layers to draw.
-        view: Direction of view.
-        frame: Visible part.
-        size: Width and height in pixels.
-
-    Yields:
-        The plotter.
-
-    Raises:
-        MissingRequirementError: If this machine cannot render.
-    """
+    size = [SUPERSAMPLING * width, max(2, round(SUPERSAMPLING * width / frame.proportion))]
     with rendering():
         theme = pv.themes.DocumentTheme()
-        plotter = pv.Plotter(off_screen=True, window_size=list(size), theme=theme, lighting="none")
+        plotter = pv.Plotter(off_screen=True, window_size=size, theme=theme, lighting="none")
         try:
             plotter.background_color = "white"
             # One lamp above the viewer's left shoulder: colours keep their brightness on all visible faces.
@@ -86,7 +66,12 @@ def staged(layers: Iterable[Layer], view: View, frame: Frame, size: tuple[int, i
                 )
                 middle = np.asarray(layer.mesh.center)
             _aim(plotter, view, frame, middle)
-            yield plotter
+            if axes:
+                side = AXES * min(size) / np.array(size)
+                ink = dict.fromkeys(("x_color", "y_color", "z_color", "color"), INK)
+                names = {"xlabel": "x", "ylabel": "y", "zlabel": "z", "label_size": (0.35, 0.14)}
+                plotter.add_axes(viewport=(0.0, 0.0, *side), line_width=3 * SUPERSAMPLING, **ink, **names)
+            return np.asarray(plotter.screenshot(None, return_img=True))[..., :3]
         finally:
             plotter.close()
 

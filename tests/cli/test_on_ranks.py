@@ -45,7 +45,7 @@ def test_one_rank_speaks_and_all_end_alike(tmp_path: Path) -> None:
         ["--help"],
         ["nothing"],
         ["accuracy", "hertz"],
-        ["view", str(tmp_path / "out"), "--no-window"],
+        ["view", str(tmp_path / "out")],
         ["view", "nowhere"],
         ["info"],
     ]

@@ -20,11 +20,11 @@ from fenics_contact import cli
 from fenics_contact.contact import State, Status
 from fenics_contact.errors import InvalidInputError, MissingRequirementError
 from fenics_contact.io import ResultSeries, result_record, write_result, write_vtu
-from fenics_contact.page import result_page
-from fenics_contact.page.fields import rounded_up
+from fenics_contact.page import Page, result_page
 from fenics_contact.page.packing import rounded
 from fenics_contact.page.tables import sections, status_words
 from fenics_contact.viz import Units
+from fenics_contact.viz.fields import rounded_up
 from tests.viz.moving_states import block_among_movers, pressed_by_a_lid
 from tests.viz.plane_states import plane_block
 from tests.viz.states import pulled, touching_blocks
@@ -230,21 +230,9 @@ def test_moments_of_plane_bodies_stand_under_z_and_energies_that_are_unknown_now
     assert "dual" not in told
 
 
-def test_a_tolerance_that_follows_the_mesh_is_told_in_words() -> None:
-    balanced = {"type": "BalancedTolerance", "share": 0.1, "loosest": 1e-3, "finest": 1e-10, "rounds": 4}
-    told = sections({"solver": {"tolerance": balanced}}, Units())
-    assert "solver&#x27;s error at most 10 % of the discretisation&#x27;s" in told
-    assert "loosest" not in told
-
-
 def test_motions_of_rigid_surfaces_are_told() -> None:
-    plane = {
-        "body": "arm",
-        "surface": "end",
-        "about": [1.0, 2.0],
-        "displacement": [0.5, -0.25],
-        "rotation": 0.01,
-    }
+    plane = {"body": "arm", "surface": "end", "about": [1.0, 2.0]}
+    plane |= {"displacement": [0.5, -0.25], "rotation": 0.01}
     told = sections({"rigid_motions": [plane]}, Units("m"))
     assert "0 arm end, point 1, 2" in told
     assert "displacement 0.5, −0.25 m; rotation 0.01 rad" in told
@@ -321,6 +309,7 @@ def test_a_page_is_whole_and_loads_nothing(tmp_path: Path) -> None:
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["page.html"]
     assert "default-src 'none'" in shown.html
     assert re.findall(r'<(?:script|link|img)[^>]*(?:src|href)="[^"]*"', shown.html) == []
+    assert str(shown) == str(tmp_path / "new" / "page.html")
     framed = shown._repr_mimebundle_()["text/html"]
     assert framed.startswith("<iframe srcdoc=")
     assert "height: 900px" in framed
@@ -341,6 +330,19 @@ def test_what_makes_no_page_is_refused(result: Any, path: str | None, message: s
     given = result.format(folder=tmp_path) if isinstance(result, str) else result
     with pytest.raises(InvalidInputError, match=message):
         result_page(given, path)
+
+
+def test_a_page_shows_the_field_of_choice_first() -> None:
+    data, _ = content(result_page(plane_block(), field="contact_pressure").html)
+    assert data["fields"][data["first"]]["label"] == "contact pressure"
+    with pytest.raises(InvalidInputError, match=r"field must be one of nodal_von_mises, .*, got 'heat': ch"):
+        result_page(plane_block(), field="heat")
+
+
+def test_a_page_without_a_file_has_no_path_and_shows_nothing_on_other_ranks() -> None:
+    with pytest.raises(InvalidInputError, match=r"the page was not written: give result_page a path"):
+        Path(Page("<html>"))
+    assert Page(None)._repr_mimebundle_() == {"text/plain": ""}
 
 
 def test_without_the_library_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -376,7 +378,7 @@ RANKS = """
     from pathlib import Path
     from mpi4py import MPI
     from fenics_contact.contact import solve_scene
-    from fenics_contact.page import result_page
+    from fenics_contact.page import Page, result_page
     from fenics_contact.scene import Coulomb
     from tests.contact.gallery import partitions, two_blocks
 

@@ -16,9 +16,9 @@ from mpi4py import MPI
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz import Units, before_after, plot_before_after
+from fenics_contact.viz.before_after import _outlines as profiles
 from fenics_contact.viz.colours import GREY, ORANGE
-from fenics_contact.viz.profile import profiles
-from fenics_contact.viz.view import Frame, axis_label
+from fenics_contact.viz.view import axis_label
 from tests.contact.gallery import partitions
 from tests.viz.plane_states import plane_block
 from tests.viz.states import contains, painted, pixels, pulled, touching_blocks
@@ -75,7 +75,7 @@ def test_outlines_move_as_the_design_does(dim: int) -> None:
 def test_outlines_after_are_drawn_in_true_scale_and_magnified() -> None:
     (profile,) = profiles(plane_block(), raised(2), None, "mm")
     axes = Figure().subplots()
-    before_after._draw_profile(axes, profile, profile.factor, Units())  # type: ignore[attr-defined]
+    profile.draw(axes, profile.factor, Units())
     lines = {each.get_label(): np.array(each.get_segments()) for each in axes.collections}
     assert profile.factor > 1.0
     words = ["before", f"after, movement × {profile.factor:g}", "after"]
@@ -96,12 +96,12 @@ def test_a_section_cuts_the_outline_where_it_is() -> None:
 def test_names_stand_in_their_bodies() -> None:
     scene = touching_blocks().scene
     for profile in profiles(touching_blocks(), raised(3), None, "mm"):
+        axes = Figure().subplots()
+        profile.draw(axes, profile.factor, Units())
+        places = {text.get_text(): text.get_position()[1] for text in axes.texts}
         for name, body in scene.bodies.items():
-            place, z = profile.place_in(name), body.mesh.points[:, 2]
-            assert place is not None
-            assert z.min() + 0.1 * np.ptp(z) < place[1] < z.max() - 0.1 * np.ptp(z)
-        gone = replace(profile, frame=Frame(profile.frame.high + 1.0, profile.frame.high + 2.0))
-        assert gone.place_in("lower") is None
+            z = body.mesh.points[:, 2]
+            assert z.min() + 0.1 * np.ptp(z) < places[name] < z.max() - 0.1 * np.ptp(z)
 
 
 def test_the_title_says_by_how_much_the_objective_fell(monkeypatch: pytest.MonkeyPatch) -> None:

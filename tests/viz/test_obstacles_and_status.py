@@ -14,9 +14,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import RigidCylinder, RigidPlane, RigidSphere
+from fenics_contact.surface_shapes import Plane, Sphere
 from fenics_contact.viz import plot_contact_status, plot_stress, status
-from fenics_contact.viz.obstacles import obstacle_layers, obstacles_of, shade_obstacles
+from fenics_contact.viz.obstacles import obstacle_layers, obstacles_of, outline, shade_obstacles
 from fenics_contact.viz.patch import contact_patches
 from fenics_contact.viz.section import strongest_contact
 from fenics_contact.viz.sheet import sheet
@@ -28,43 +28,44 @@ from tests.viz.states import contains, painted, pixels, touching_blocks
 
 def test_obstacles_in_space_are_drawn_where_they_are() -> None:
     state = caged_block()
-    points = state.scene.bodies["block"].mesh.points
+    points, obstacles = state.scene.bodies["block"].mesh.points, obstacles_of(state)
     view = oblique_view(points)
-    layers, corners = obstacle_layers(state, points, view)
-    assert [type(obstacle).__name__ for obstacle in obstacles_of(state)] == [
+    layers, corners = obstacle_layers(obstacles, points, view)
+    assert [type(obstacle).__name__ for obstacle in obstacles] == [
         "RigidPlane", "RigidSphere", "RigidCylinder", "DistanceObstacle", "RigidPlane"
     ]  # fmt: skip
-    # The floor as sheet and outline, ball and bar by outlines, the front wall, which would hide all, too.
-    assert len(layers) == 2 + 1 + 2 + 1
-    assert corners.shape == (8, 3)
-    np.testing.assert_allclose(corners[:4, 2], 0.0, atol=1e-12)
-    _, ball, bar, wall = (
-        o for o in obstacles_of(state) if isinstance(o, RigidPlane | RigidSphere | RigidCylinder)
-    )
-    circle = np.asarray(layers[2].mesh.points)
-    np.testing.assert_allclose(ball.distance(circle), 0.0, atol=1e-6)
-    np.testing.assert_allclose((circle - ball.centre) @ view.towards, 0.0, atol=1e-6)
-    for layer in layers[3:5]:
-        np.testing.assert_allclose(bar.distance(np.asarray(layer.mesh.points)), 0.0, atol=1e-6)
-    np.testing.assert_allclose(wall.distance(np.asarray(layers[5].mesh.points)), 0.0, atol=1e-6)
-    assert wall.normal == (0.0, 1.0, 0.0)
-    assert view.towards[1] < 0, "it stands between the viewer and the block"
+    # The floor as sheet and edge; ball and bar by circles and lines; of the front wall, which would hide all
+    # as it lies between the viewer and the block, the edge.
+    assert view.towards[1] < 0
+    assert len(layers) == 2 + 3 + 6 + 1
+    assert corners.shape == (10, 3)
+    shown = [0] * 2 + [1] * 3 + [2] * 6 + [4]
+    for number, layer in zip(shown, layers, strict=True):
+        np.testing.assert_allclose(obstacles[number].distance(np.asarray(layer.mesh.points)), 0.0, atol=1e-6)
+
+
+def test_outlines_in_the_plane_are_an_edge_and_a_circle() -> None:
+    points = np.array([[0.0, 0.0], [2.0, 1.0]])
+    disc = Sphere((1.0, 3.0), 0.5)
+    (edge,), (circle,) = outline(Plane((0.0, 0.0), (0.0, 1.0)), points), outline(disc, points)
+    np.testing.assert_allclose(np.sort(edge[:, 0]), [-0.12, 2.12])
+    np.testing.assert_allclose(disc.distance(circle), 0.0, atol=1e-12)
 
 
 def test_obstacles_that_move_are_drawn_where_they_are_in_each_state() -> None:
     for state, time in zip(block_among_movers(), (0.0, 0.5, 1.0), strict=True):
         points = state.scene.bodies["block"].mesh.points
-        floor, ball, bar = (pair.master.at(time) for pair in state.scene.contacts)  # type: ignore[union-attr]
-        layers, corners = obstacle_layers(state, points, oblique_view(points))
-        assert corners.shape == (4, 3)
-        for there, layer in zip((floor, floor, ball, bar, bar), layers, strict=True):
-            np.testing.assert_allclose(there.distance(np.asarray(layer.mesh.points)), 0.0, atol=1e-6)
+        there = [pair.master.at(time) for pair in state.scene.contacts]  # type: ignore[union-attr]
+        layers, corners = obstacle_layers(obstacles_of(state), points, oblique_view(points))
+        assert corners.shape == (5, 3)
+        for number, layer in zip([0] * 2 + [1] * 3 + [2] * 6, layers, strict=True):
+            np.testing.assert_allclose(there[number].distance(np.asarray(layer.mesh.points)), 0.0, atol=1e-6)
         assert np.ptp(corners[:, 2]) == pytest.approx(np.sin(0.05 * time) * np.ptp(corners[:, 0]), rel=2e-3)
 
 
 def test_a_picture_in_the_plane_shades_an_obstacle_where_it_has_moved(tmp_path: Path) -> None:
     state, axes = pressed_by_a_lid(), Figure().add_subplot()
-    shade_obstacles(axes, state, Frame(np.array([0.0, 0.0]), np.array([2.0, 2.0])))
+    shade_obstacles(axes, obstacles_of(state), Frame(np.array([0.0, 0.0]), np.array([2.0, 2.0])))
     *_, line = axes.collections
     (edge,) = line.get_paths()
     np.testing.assert_allclose(edge.vertices[:, 1], 0.9, atol=1e-9)

@@ -1,4 +1,4 @@
-"""Sections run through the middle of the contact, say where they are, and show how the axes run."""
+"""Sections run through the middle of the contact, and say where they are."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from fenics_contact.contact import State, solve_scene
 from fenics_contact.gallery import block
 from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, RigidPlane, Scene, Support, Surface
 from fenics_contact.viz import painting, plot_stress
-from fenics_contact.viz.axes_sign import arrows_of, empty_corner, far_corner
 from fenics_contact.viz.fields import contact_places, drawn_bodies, moved, points_of
 from fenics_contact.viz.section import Section, Spot, cut, section_frame, sections_of, strongest_contact
 from fenics_contact.viz.view import Frame, face_on, oblique_view
@@ -107,44 +106,19 @@ def test_a_section_says_where_it_is(normal: tuple[float, ...], place: float, wor
     assert section.title(Frame(np.zeros(2), np.full(2, 5.0)), "mm") == words
 
 
-def test_a_sign_has_the_axes_as_they_run() -> None:
-    front = arrows_of(face_on(np.array([1.0, 0.0, 0.0])))
-    assert set(front) == {"y", "z"}
-    np.testing.assert_allclose([front["y"], front["z"]], np.eye(2), atol=1e-12)
-    behind = arrows_of(face_on(np.array([-1.0, 0.0, 0.0])))
-    assert set(behind) == {"y", "z"}
-    np.testing.assert_allclose(behind["y"], [-1, 0], atol=1e-12)
-    oblique = arrows_of(oblique_view(np.diag([3.0, 1.0, 1.0])))
-    assert set(oblique) == {"x", "y", "z"}
-    assert oblique["x"][0] > 0.9
-    assert oblique["z"][1] > 0.7
+def test_sections_have_axes_with_coordinates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[tuple[str, str, str]] = []
+    draw = painting.label_axes  # type: ignore[attr-defined]
 
+    def noted(axes: Any, view: Any, units: Any) -> None:
+        draw(axes, view, units)
+        assert axes.axison
+        drawn.append((axes.get_title(), axes.get_xlabel(), axes.get_ylabel()))
 
-def test_a_sign_keeps_off_the_contact_and_off_the_bodies() -> None:
-    frame = Frame(np.array([1.0, 2.0]), np.array([3.0, 4.0]))
-    assert far_corner(frame, np.array([1.1, 3.0])) == "lower right"
-    assert far_corner(frame, np.array([2.9, 3.0])) == "upper left"
-    assert far_corner(frame, np.array([2.9, 2.1])) == "upper left"
-    assert far_corner(frame, np.array([1.5, 2.1])) == "upper right"
-    image = np.zeros((100, 200, 3), dtype=np.uint8)
-    image[80:, :30] = 255
-    assert empty_corner(image) == "lower left"
-
-
-def test_pictures_in_space_have_a_sign_in_every_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn: list[tuple[set[str], str]] = []
-    sign = painting.axes_sign  # type: ignore[attr-defined]
-
-    def noted(axes: Any, view: Any, corner: str, *, below: bool) -> None:
-        drawn.append((set(arrows_of(view)), axes.get_title()))
-        sign(axes, view, corner, below=below)
-
-    monkeypatch.setattr(painting, "axes_sign", noted)
+    monkeypatch.setattr(painting, "label_axes", noted)
     plot_stress(cut_model("x0 y1"), tmp_path / "stress.png", width=320)
-    whole, *sections = drawn
-    assert whole == ({"x", "y", "z"}, "")
     # Which comes first is rounding: both have the same stress.
-    assert sorted(sections, key=lambda section: section[1]) == [
-        ({"y", "z"}, "section at x = 0 mm; displacement × 1"),
-        ({"x", "z"}, "section at y = 1 mm; displacement × 1"),
-    ]
+    first, second = sorted(drawn)
+    assert first[0] == "section at x = 0 mm; displacement × 1"
+    assert first[1:] == ("y (mm), runs to the left: seen from −x", "z (mm)")
+    assert second == ("section at y = 1 mm; displacement × 1", "x (mm)", "z (mm)")

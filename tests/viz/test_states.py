@@ -10,12 +10,12 @@ import pytest
 
 from fenics_contact.contact import Status
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.viz import Units, plot_contact_pressure, plot_stress
-from fenics_contact.viz.fields import contact_places, drawn_bodies
+from fenics_contact.viz import Units, plot_contact_pressure, plot_field, plot_stress
+from fenics_contact.viz.fields import component, contact_places, drawn_bodies, field_entries
 from fenics_contact.viz.patch import contact_patches
 from fenics_contact.viz.plane import refined
-from fenics_contact.viz.stress import chosen_scale, stress_range
-from tests.viz.states import contains, painted, pixels, touching_blocks
+from fenics_contact.viz.stress import chosen_scale
+from tests.viz.states import contains, painted, pixels, pulled, touching_blocks
 
 SMALL = 320
 
@@ -52,8 +52,9 @@ def test_cellwise_and_smooth_stress_differ(tmp_path: Path) -> None:
 
 def test_chosen_scale_and_range_are_round_and_fit() -> None:
     bodies = drawn_bodies(touching_blocks())
-    low, high = stress_range(bodies)
     stresses = np.concatenate([body["von_mises"] for body in bodies.values()])
+    (entry,) = (each for each in field_entries([bodies], Units()) if each["name"] == "von_mises")
+    low, high = entry["range"]
     assert low == 0.0
     assert np.quantile(stresses, 0.99) < high < 2 * stresses.max()
     assert chosen_scale(bodies) >= 1.0
@@ -73,6 +74,22 @@ def test_stress_refuses_options_that_cannot_be_drawn(
     with pytest.raises(InvalidInputError, match=message):
         plot_stress(touching_blocks(), tmp_path / "stress.png", **options)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("cell", "name"), [("hexahedron27", "stress_xx"), ("triangle6", "displacement_x")])
+def test_any_field_of_bodies_is_drawn(cell: str, name: str, tmp_path: Path) -> None:
+    blocks = pulled(cell).to_pyvista()
+    bodies = {body: blocks[body] for body in blocks.keys()}
+    (entry,) = (each for each in field_entries([bodies], Units()) if each["name"] == name)
+    column = component(bodies["bar"], entry)
+    data = bodies["bar"].cell_data["stress"] if "stress" in name else bodies["bar"].point_data["displacement"]
+    np.testing.assert_array_equal(column, data[:, 0])
+    image = pixels(plot_field(bodies, name, tmp_path / "field.png", width=SMALL))
+    assert painted(image) > 0.2
+    other = pixels(plot_field(bodies, name, tmp_path / "more.png", width=SMALL, scale=20.0))
+    assert image.shape != other.shape or np.abs(image - other).max() > 0.1, "it is drawn where it moved"
+    with pytest.raises(InvalidInputError, match=r"field must be one of nodal_von_mises, .* got 'heat'"):
+        plot_field(bodies, "heat")
 
 
 def test_pressure_and_status_are_drawn(tmp_path: Path) -> None:
