@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-#: `fenics_contact.cli.Ending.MISSING`, which cannot be imported where something is missing.
+#: `fenics_contact.cli.ExitCode.MISSING`, which cannot be imported where something is missing.
 MISSING = 5
 
 for _name in ("stdout", "stderr"):

@@ -12,9 +12,9 @@ from fenics_contact.checkpoint.interruption import (
 from fenics_contact.checkpoint.whole_file import (
     CheckpointError,
     hidden_folder,
-    put_whole,
     remove_abandoned,
     replace_all,
+    write_atomically,
     write_whole,
 )
 
@@ -25,7 +25,6 @@ __all__ = [
     "Interruption",
     "hidden_folder",
     "interruptible",
-    "put_whole",
     "read_archive",
     "remove_abandoned",
     "replace_all",
@@ -33,5 +32,6 @@ __all__ = [
     "safe_point",
     "without_checkpoint",
     "write_archive",
+    "write_atomically",
     "write_whole",
 ]

@@ -30,7 +30,7 @@ class CheckpointError(FenicsContactError, OSError):
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a checkpoint by `put_whole`.
+    """Write a checkpoint by `write_atomically`.
 
     Args:
         path: The file; its folder is created.
@@ -40,7 +40,7 @@ def write_whole(path: Path, content: bytes) -> None:
         CheckpointError: If the disk is full or the folder cannot be written to; the target is then unchanged.
     """
     try:
-        put_whole(path, content)
+        write_atomically(path, content)
     except OSError as error:
         before = "the one before is as it was" if path.exists() else "there is none yet"
         raise CheckpointError(
@@ -50,7 +50,7 @@ def write_whole(path: Path, content: bytes) -> None:
         ) from error
 
 
-def put_whole(path: Path, content: bytes) -> None:
+def write_atomically(path: Path, content: bytes) -> None:
     """Replace a file by another, which is on the disk before it is renamed.
 
     Args:

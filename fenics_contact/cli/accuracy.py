@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand
 
-from fenics_contact.cli import accuracy_options as options
-from fenics_contact.cli.desk import desk_of
-from fenics_contact.cli.endings import Terminated
-from fenics_contact.cli.streams import complain
+from fenics_contact.cli.desk import ExitCode, Terminated, console_of, write_stderr
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.io import only_run_in
 from fenics_contact.study import (
+    BALANCED,
+    BUILT_IN,
+    DISCRETISATIONS,
+    RunTolerance,
     Settings,
     StudyPlan,
     Sweep,
@@ -28,72 +28,90 @@ from fenics_contact.study import (
     write_report,
 )
 
+NAMES = ", ".join(BUILT_IN)
 ABOUT = (
-    f"Measure what accuracy costs in time. SCENE is one of {options.NAMES}, or a Python file that defines "
+    f"Measure what accuracy costs in time. SCENE is one of {NAMES}, or a Python file that defines "
     "`study`, a fenics_contact.study.StudyScene. Results, tables and figures are written to a folder; "
     "what was measured already is not measured again. Runs have processes of their own: ask for ranks with "
-    "--ranks."
+    "--ranks. Options of the sweep are given once for each value: --sizes 2 --sizes 3."
 )
-#: Options that take any number of values: --sizes 2 3 4. Without a value the list is empty.
-LISTS = ("--sizes", "--tolerances", "--cells", "--discretisations", "--fixed-points", "--subdomains")
-
-
-class _Lists(TyperCommand):
-    """A command with options that take any number of values."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Repeat such options for each of their values."""
-        return super().parse_args(ctx, spread(args))
-
-
-def spread(arguments: Sequence[str]) -> list[str]:
-    """Return arguments with ``--sizes 2 3`` as ``--sizes 2 --sizes 3``."""
-    repeated: list[str] = []
-    option, pending = "", False
-    for argument in arguments:
-        if argument.startswith("-") and argument != "-":
-            repeated += [option, options.NOTHING] if pending else []
-            option, pending = (argument, True) if argument in LISTS else ("", False)
-            repeated += [] if option else [argument]
-        elif option:
-            repeated += [option, argument]
-            pending = False
-        else:
-            repeated.append(argument)
-    return [*repeated, option, options.NOTHING] if pending else repeated
 
 
 def add_to(app: typer.Typer) -> None:
     """Add the command to the program."""
-    words = "measure what accuracy costs in time"
-    app.command("accuracy", cls=_Lists, help=ABOUT, short_help=words)(accuracy)
+    app.command("accuracy", help=ABOUT, short_help="measure what accuracy costs in time")(accuracy)
+
+
+def _tolerance(text: str) -> RunTolerance:
+    if text == BALANCED:
+        return BALANCED
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < 1.0:
+        raise typer.BadParameter(f'a tolerance is a number between 0 and 1, or "balanced", got {text!r}')
+    return value
+
+
+def _discretisation(text: str) -> str:
+    if text not in DISCRETISATIONS:
+        raise typer.BadParameter(f"needs one of {list(DISCRETISATIONS)}, got {text!r}")
+    return text
+
+
+def _several(name: str, words: str, parser: Callable[[str], Any] | None = None, **more: Any) -> Any:
+    return typer.Option(f"--{name}", help=words, parser=parser, show_default=False, **more)
 
 
 def accuracy(
     context: typer.Context,
-    scene: options.SceneArgument,
-    quick: options.QuickOption = False,
-    output: options.OutputOption = None,
-    runs: options.RunsOption = None,
-    ranks: options.RanksOption = "1",
-    repeats: options.RepeatsOption = None,
-    limit: options.LimitOption = "600",
-    report: options.ReportOption = False,
-    no_figures: options.NoFiguresOption = False,
-    page: options.PageOption = False,
-    sizes: options.SizesOption = None,
-    tolerances: options.TolerancesOption = None,
-    cells: options.CellsOption = None,
-    discretisations: options.DiscretisationsOption = None,
-    fixed_points: options.FixedPointsOption = None,
-    subdomains: options.SubdomainsOption = None,
+    scene: Annotated[
+        str, typer.Argument(metavar="SCENE", help=f"{NAMES}, or a file that ends in .py", show_default=False)
+    ],
+    quick: Annotated[
+        bool, typer.Option("--quick", help="About a minute: coarse meshes, one repeat.")
+    ] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", help="Folder of the results (output/studies/NAME).")
+    ] = None,
+    runs: Annotated[
+        Path | None, typer.Option("--runs", help="Folder in which runs are stored (OUTPUT/runs).")
+    ] = None,
+    ranks: Annotated[int, typer.Option("--ranks", min=1, help="MPI ranks of every run.")] = 1,
+    repeats: Annotated[
+        int | None,
+        typer.Option("--repeats", min=1, help="Measurements of runs under 10 s (3; quick: 1)."),
+    ] = None,
+    limit: Annotated[
+        float, typer.Option("--limit", min=1e-3, help="Largest number of seconds that a run may take.")
+    ] = 600.0,
+    report: Annotated[
+        bool, typer.Option("--report", help="Measure nothing, write the results again.")
+    ] = False,
+    no_figures: Annotated[bool, typer.Option("--no-figures", help="Write no pictures.")] = False,
+    page: Annotated[
+        bool, typer.Option("--page", help="Also write README.md of all studies beside it.")
+    ] = False,
+    sizes: Annotated[list[int] | None, _several("sizes", "Meshes, larger is finer.", min=1)] = None,
+    tolerances: Annotated[
+        list[Any] | None, _several("tolerances", 'Numbers or "balanced".', _tolerance)
+    ] = None,
+    cells: Annotated[list[str] | None, _several("cells", "Cell types beside the base's.")] = None,
+    discretisations: Annotated[
+        list[Any] | None, _several("discretisations", "Beside the base's.", _discretisation)
+    ] = None,
+    fixed_points: Annotated[
+        list[float] | None, _several("fixed-points", "Tolerances of the fixed point of Coulomb.")
+    ] = None,
+    subdomains: Annotated[list[int] | None, _several("subdomains", "Numbers of subdomains.", min=1)] = None,
 ) -> None:
     """Measure what accuracy costs in time."""
-    desk = desk_of(context)
-    if desk.comm.size > 1:
+    console = console_of(context)
+    if console.comm.size > 1:
         raise InvalidInputError(
-            f"a study starts its own ranks, got mpirun with {desk.comm.size}: run it without mpirun and "
-            f"give --ranks {desk.comm.size}"
+            f"a study starts its own ranks, got mpirun with {console.comm.size}: run it without mpirun and "
+            f"give --ranks {console.comm.size}"
         )
     logging.getLogger("fenics_contact").setLevel(logging.INFO)
     study = find_study(scene)
@@ -105,15 +123,15 @@ def accuracy(
     folder = output or Path("output") / "studies" / study.name
     settings = Settings(ranks, repeats or (1 if quick else 3), limit)
     plan = prepare(scene, runs or folder / "runs", sweep=sweep, settings=settings)
-    with nullcontext() if report else only_run_in(folder, desk.comm):
+    with nullcontext() if report else only_run_in(folder, console.comm):
         status = 0 if report else _measure(plan)
         if status and (folder / "study.json").exists():
-            desk.say(f"results of an earlier run stay in {folder}/: --report writes those of what is done")
+            console.say(f"results of an earlier run stay in {folder}/: --report writes those of what is done")
             raise typer.Exit(status)
         words = _report(plan, folder, figures=not no_figures)
     if page:
         write_overview(folder.parent)
-    desk.say(f"{words}\nresults in {folder}/")
+    console.say(f"{words}\nresults in {folder}/")
     if status:
         raise typer.Exit(status)
 
@@ -124,7 +142,7 @@ def _report(plan: StudyPlan, folder: Path, *, figures: bool) -> str:
         reasons = "".join(f"\n  {run.failed}" for run in results.runs[:3])
         raise InvalidInputError(
             f"a report needs runs that have an answer, {folder} has none of this code and these options: "
-            f"run the study without --report, or mend what failed{reasons}"
+            f"run the study without --report, or repair what failed{reasons}"
         )
     return write_report(folder, results, figures=figures)
 
@@ -134,8 +152,8 @@ def _measure(plan: StudyPlan) -> int:
     try:
         plan.measure()
     except (KeyboardInterrupt, Terminated) as stop:
-        complain("interrupted: what is done is kept, and the same command goes on from there\n")
-        return 143 if isinstance(stop, Terminated) else 130
+        write_stderr("interrupted: what is done is kept, and the same command goes on from there\n")
+        return int(ExitCode.TERMINATED if isinstance(stop, Terminated) else ExitCode.INTERRUPTED)
     return 0
 
 
@@ -145,12 +163,7 @@ def _sweep(given: Mapping[str, Sequence[Any] | None], sweep: Sweep) -> Sweep:
     Raises:
         InvalidInputError: If a cell type is unknown.
     """
-    nothing = (None, options.NOTHING)  # option given without a value
-    known: dict[str, Any] = {
-        name: tuple(value for value in values if value not in nothing)
-        for name, values in given.items()
-        if values
-    }
+    known: dict[str, Any] = {name: tuple(values) for name, values in given.items() if values}
     chosen = replace(sweep, **known)
     if known.get("sizes") and sweep.base.size not in chosen.sizes:
         # The base is one of the meshes: around it one setting at a time is varied.

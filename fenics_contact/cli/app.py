@@ -14,9 +14,15 @@ from typer.core import TyperGroup
 
 from fenics_contact.checkpoint import Interrupted
 from fenics_contact.cli import accuracy, demos, info, optimize, run, schema, view
-from fenics_contact.cli.desk import Desk
-from fenics_contact.cli.endings import EPILOG, report_error, terminable
-from fenics_contact.cli.streams import complain, prepare_streams, say, unsaid
+from fenics_contact.cli.desk import (
+    EPILOG,
+    Console,
+    output_error,
+    report_error,
+    terminable,
+    write_stderr,
+    write_stdout,
+)
 from fenics_contact.io import versions
 from fenics_contact.progress import visible
 
@@ -67,7 +73,7 @@ for module in (run, optimize, demos, view, accuracy, info, schema):
 
 def _version(wanted: bool) -> None:
     if wanted:
-        say(f"fenics_contact {versions()['fenics_contact']}\n")
+        write_stdout(f"fenics_contact {versions()['fenics_contact']}\n")
         raise typer.Exit()
 
 
@@ -92,7 +98,9 @@ def main(comm: MPI.Comm, arguments: Sequence[str] | None = None) -> int:
         comm: All ranks of the program.
         arguments: The command line, without the program's name; that of the process unless given.
     """
-    prepare_streams()
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):  # characters that it cannot encode are written as escapes
+            stream.reconfigure(errors="backslashreplace")
     _log_to_stderr(comm)
     given = list(sys.argv[1:] if arguments is None else arguments)
     # Ranks above 0 print nothing: neither help nor the output of demos.
@@ -110,18 +118,18 @@ def _run(arguments: Sequence[str], comm: MPI.Comm) -> int:
     command = typer.main.get_command(app)
     try:
         whole = view.with_page_named(arguments)
-        code = command.main(whole, prog_name=PROGRAM, standalone_mode=False, obj=Desk(comm))
-        say("")  # what the library has written, as help does, goes out now
+        code = command.main(whole, prog_name=PROGRAM, standalone_mode=False, obj=Console(comm))
+        write_stdout("")  # what the library has written, as help does, goes out now
     except UsageProblem as problem:
         if comm.rank == 0:
             words = io.StringIO()
             problem.show(words)  # type: ignore[attr-defined]
-            complain(words.getvalue())
+            write_stderr(words.getvalue())
         return int(problem.exit_code)  # type: ignore[attr-defined]
     except BrokenPipeError:
         return 0
     except OSError as error:  # of the library: its own output, such as help, may fail on a full disk
-        return int(report_error(unsaid(error), comm))
+        return int(report_error(output_error(error), comm))
     return code if isinstance(code, int) else 0
 
 

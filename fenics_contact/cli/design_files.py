@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fenics_contact.cli.desk import Desk
+from fenics_contact.cli.desk import Console
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.io import CadError, file_of_each, write_design_table, write_step, write_stl
 from fenics_contact.scene_file import SceneFile
@@ -32,7 +32,7 @@ def check_design_files(file: SceneFile) -> None:
 
 
 def write_design_files(
-    desk: Desk, file: SceneFile, problem: ShapeProblem | LoadPath, alpha: np.ndarray
+    console: Console, file: SceneFile, problem: ShapeProblem | LoadPath, alpha: np.ndarray
 ) -> list[Path]:
     """Write the files of a design that the scene file asks for, and return them. Collective."""
     kinds, length, folder = file.document.output.design, file.document.units.length, file.folder
@@ -47,17 +47,17 @@ def write_design_files(
             written.append(write_stl(problem, alpha, path, body=body))
     if "step" in kinds:
         for body, path in file_of_each(bodies, folder, "design", ".step").items():
-            _write_step(desk, problem, alpha, path, body, _MILLIMETRES[length])
+            _write_step(console, problem, alpha, path, body, _MILLIMETRES[length])
             written.append(path)
     return written
 
 
 def _write_step(
-    desk: Desk, problem: ShapeProblem | LoadPath, alpha: np.ndarray, path: Path, body: str, scale: float
+    console: Console, problem: ShapeProblem | LoadPath, alpha: np.ndarray, path: Path, body: str, scale: float
 ) -> None:
     """Write a body, or what can be written of it. Collective."""
     try:
         write_step(problem, alpha, path, body=body, scale=scale)
     except CadError as error:
-        desk.say(f"{path.name} has the designed surface alone: {error}")
+        console.say(f"{path.name} has the designed surface alone: {error}")
         write_step(problem, alpha, path, body=body, scale=scale, solid=False)

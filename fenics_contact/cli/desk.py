@@ -1,20 +1,33 @@
-"""The communicator of a command, and its output."""
+"""Output and exit codes of commands, the same on every rank."""
 
 from __future__ import annotations
 
 import io
+import os
+import signal
 import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any, TextIO, cast
 
+import rich.console
 import typer
-from rich.console import Console, ConsoleOptions, RenderResult
 from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from fenics_contact.cli.streams import say
 from fenics_contact.display import counted
+from fenics_contact.errors import (
+    ConvergenceError,
+    FenicsContactError,
+    InfeasibleError,
+    InvalidInputError,
+    MissingRequirementError,
+)
+from fenics_contact.io import OutputError
 from fenics_contact.progress import at_terminal, visible
 
 if TYPE_CHECKING:
@@ -24,9 +37,38 @@ if TYPE_CHECKING:
 WIDTH = 110
 
 
+class ExitCode(IntEnum):
+    """Exit codes of all commands."""
+
+    OK = 0
+    FAILED = 1
+    WRONG_INPUT = 2
+    NOT_CONVERGED = 3
+    NO_EQUILIBRIUM = 4
+    MISSING = 5
+    INTERRUPTED = 130
+    STOPPED = 138
+    TERMINATED = 143
+
+
+MEANING = {
+    ExitCode.OK: "it did what was asked for",
+    ExitCode.FAILED: "something else went wrong, for instance a full disk",
+    ExitCode.WRONG_INPUT: "wrong input: an option, a scene file, a file that is not there",
+    ExitCode.NOT_CONVERGED: "a solver or the optimiser stopped before its tolerance was met",
+    ExitCode.NO_EQUILIBRIUM: "no equilibrium: nothing holds some body against its load",
+    ExitCode.MISSING: "a library is missing or too old",
+    ExitCode.INTERRUPTED: "interrupted from the keyboard",
+    ExitCode.STOPPED: "stopped by SIGUSR1, as batch systems send, where it can go on",
+    ExitCode.TERMINATED: "terminated by a signal",
+}
+#: For the end of the help text.
+EPILOG = "\b\nExit codes:\n" + "\n".join(f"{code.value:<4d} {words}" for code, words in MEANING.items())
+
+
 @dataclass(frozen=True)
-class Desk:
-    """A communicator and the console of rank 0.
+class Console:
+    """The ranks of a command; output is written by rank 0.
 
     Attributes:
         comm: All ranks of the program.
@@ -51,18 +93,13 @@ class Desk:
         """Write on rank 0: with colours to a terminal, else without trailing blanks."""
         if self.comm.rank != 0:
             return
-        drawn = at_terminal(sys.stdout)
-        console = Console(
-            file=io.StringIO(),
-            width=None if drawn else WIDTH,
-            force_terminal=drawn,
-            no_color=None if drawn else True,
-            highlight=False,
-        )
+        drawn, text = at_terminal(sys.stdout), io.StringIO()
+        look: dict[str, Any] = {} if drawn else {"width": WIDTH, "no_color": True}
+        console = rich.console.Console(file=text, force_terminal=drawn, highlight=False, **look)
         console.print(_Visible(what), soft_wrap=isinstance(what, Text))
-        lines = console.file.getvalue().split("\n")  # type: ignore[attr-defined]
+        lines = text.getvalue().split("\n")
         # Through sys.stdout itself, so that progress bars stay below.
-        say("\n".join(lines if drawn else [line.rstrip() for line in lines]))
+        write_stdout("\n".join(lines if drawn else [line.rstrip() for line in lines]))
 
 
 @dataclass(frozen=True)
@@ -71,15 +108,17 @@ class _Visible:
 
     what: Table | Text
 
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+    def __rich_console__(
+        self, console: rich.console.Console, options: rich.console.ConsoleOptions
+    ) -> rich.console.RenderResult:
         """Render the texts, with colours and alignment, and write anything else in them as escapes."""
         for segment in console.render(self.what, options):
             yield segment if segment.control else Segment(visible(segment.text), segment.style)
 
 
-def desk_of(context: typer.Context) -> Desk:
-    """Return the desk that the program passed to a command."""
-    return cast(Desk, context.obj)
+def console_of(context: typer.Context) -> Console:
+    """Return the console that the program passed to a command."""
+    return cast(Console, context.obj)
 
 
 def facts(rows: dict[str, Any], title: str = "") -> Table:
@@ -90,3 +129,97 @@ def facts(rows: dict[str, Any], title: str = "") -> Table:
     for name, value in rows.items():
         table.add_row(name, str(value))
     return table
+
+
+def write_stdout(text: str) -> None:
+    """Write to stdout; if its reader has closed it, write nothing and continue.
+
+    Raises:
+        OutputError: If it cannot be written, for instance to a full disk.
+    """
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        redirect_to_devnull(sys.stdout)
+    except OSError as error:
+        raise output_error(error) from error
+
+
+def write_stderr(text: str) -> None:
+    """Write to stderr with control characters escaped; a failure cannot be reported."""
+    with suppress(OSError):
+        sys.stderr.write(visible(text))
+        sys.stderr.flush()
+
+
+def output_error(error: OSError) -> OutputError:
+    """Return the error of a command that cannot write to stdout, whose further output is discarded."""
+    redirect_to_devnull(sys.stdout)
+    return OutputError(
+        f"the output of this command must be written to stdout, which failed: {error.strerror or error}. "
+        "Free space, or send it elsewhere"
+    )
+
+
+def redirect_to_devnull(stream: TextIO) -> None:
+    """Discard the buffer of a stream, so that it can be closed, and what is written to it later."""
+    with suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
+
+
+class Terminated(BaseException):
+    """The process received SIGTERM."""
+
+
+def exit_code_of(error: BaseException) -> ExitCode:
+    """Return the exit code of an error."""
+    kinds: tuple[tuple[type[BaseException], ExitCode], ...] = (
+        (InfeasibleError, ExitCode.NO_EQUILIBRIUM),
+        (ConvergenceError, ExitCode.NOT_CONVERGED),
+        (InvalidInputError, ExitCode.WRONG_INPUT),
+        (MissingRequirementError, ExitCode.MISSING),
+        (KeyboardInterrupt, ExitCode.INTERRUPTED),
+        (Terminated, ExitCode.TERMINATED),
+    )
+    return next((code for kind, code in kinds if isinstance(error, kind)), ExitCode.FAILED)
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Let SIGTERM end the block as Ctrl-C does, so that clean-up is done."""
+
+    def stop(*_: Any) -> None:
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def report_error(error: BaseException, comm: MPI.Comm) -> ExitCode:
+    """Report on rank 0 how a command ended, and return its exit code.
+
+    Errors of this package are raised on all ranks together. Any other may occur on one rank while the rest
+    wait for it: then all are ended. The same holds for an interrupt, which reaches ranks at different places.
+    """
+    code = exit_code_of(error)
+    known = isinstance(error, FenicsContactError)
+    if known and comm.rank == 0:
+        write_stderr(f"error: {error}\n")
+    if isinstance(error, KeyboardInterrupt | Terminated):
+        if comm.rank == 0:
+            write_stderr("interrupted\n" if isinstance(error, KeyboardInterrupt) else "terminated\n")
+        sys.stdout.flush()
+        sys.stderr.flush()
+        if comm.size > 1:
+            os._exit(int(code))  # without waiting for others, whose position is unknown
+    elif not known:
+        write_stderr("".join(traceback.format_exception(error)))
+        if comm.size > 1:
+            comm.Abort(int(code))
+    return code

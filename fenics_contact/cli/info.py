@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
+import re
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from fenics_contact import _dolfinx, _requirements
 from fenics_contact._libraries import MPI
-from fenics_contact.cli.blas import SLOW, loaded_blas, numpy_speed
-from fenics_contact.cli.desk import Desk, desk_of, facts
+from fenics_contact.cli.desk import Console, console_of, facts
 from fenics_contact.display import counted
 from fenics_contact.errors import MissingRequirementError
 from fenics_contact.io import json_text, versions
@@ -19,32 +20,30 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_BLAS = re.compile(r"/\S*/lib(?:openblas|mkl_rt|blis|atlas|satlas|tatlas|blas)[^/\s]*\.so\S*")
+_REFERENCE = re.compile(r"/blas/libblas|libblas\.so\.3\.\d")
 
 
 def add_to(app: typer.Typer) -> None:
     """Add the command to the program."""
-    app.command("info", short_help="versions, PETSc, BLAS and its speed, MPI, pictures")(info)
+    app.command("info", short_help="versions, PETSc, BLAS, MPI, pictures")(info)
 
 
 def info(
     context: typer.Context,
     as_json: Annotated[bool, typer.Option("--json", help="Write JSON, for programs.")] = False,
 ) -> None:
-    """Show versions, PETSc's packages, the BLAS and its speed, MPI, and whether pictures can be drawn."""
-    desk = desk_of(context)
-    known = gathered(desk.comm)
+    """Show versions, PETSc's packages, the BLAS, MPI, and whether pictures can be drawn."""
+    console = console_of(context)
+    known = gathered(console.comm)
     if as_json:
-        desk.say(json_text(known).rstrip())
+        console.say(json_text(known).rstrip())
         return
-    desk.show(facts(known["versions"], "versions"))
-    desk.say()
-    desk.show(facts({name: _words(value) for name, value in known["machine"].items()}, "machine"))
+    console.show(facts(known["versions"], "versions"))
+    console.say()
+    console.show(facts(known["machine"], "machine"))
     for line in known["advice"]:
-        desk.say(f"! {line}")
-
-
-def _words(value: Any) -> str:
-    return "\n".join(value) if isinstance(value, list) else str(value)
+        console.say(f"! {line}")
 
 
 def gathered(comm: MPI.Comm) -> dict[str, Any]:
@@ -53,19 +52,25 @@ def gathered(comm: MPI.Comm) -> dict[str, Any]:
     first = local.rank == 0
     local.Free()
     nodes = comm.allreduce(int(first))
-    libraries, speed = loaded_blas(), numpy_speed()
-    rates = [library.speed for library in libraries if library.speed is not None]
+    libraries = loaded_blas()
     machine = {
         "ranks": f"{comm.size} on {counted(nodes, 'node')}, {os.cpu_count()} cores on this one",
         "threads": ", ".join(f"{name}={os.environ.get(name, 'not set')}" for name in THREADS),
-        "BLAS": [str(library) for library in libraries] or "not found",
-        "NumPy's BLAS": f"{speed:.1f} GFLOP/s",
+        "BLAS": ", ".join(libraries) or "not found",
         "PETSc packages": ", ".join(_packages()),
         "pictures": _pictures(comm),
         "VTX files": "yes (ADIOS2)" if _dolfinx.has_vtx() else "no (dolfinx without ADIOS2)",
     }
-    slow = any(library.reference for library in libraries) or (bool(rates) and max(rates) < SLOW)
-    return {"versions": versions(), "machine": machine, "advice": list(_advice(comm, slow))}
+    return {"versions": versions(), "machine": machine, "advice": list(_advice(comm, libraries))}
+
+
+def loaded_blas() -> list[str]:
+    """Return the files of the BLAS libraries in this process, as far as the system reports them."""
+    try:
+        maps = Path("/proc/self/maps").read_text()
+    except OSError:
+        return []
+    return sorted({os.path.realpath(file) for file in _BLAS.findall(maps)})
 
 
 def _packages() -> Iterator[str]:
@@ -88,12 +93,12 @@ def _pictures(comm: MPI.Comm) -> str:
     return str(comm.bcast(words))
 
 
-def _advice(comm: MPI.Comm, slow: bool) -> Iterator[str]:
-    if slow:
+def _advice(comm: MPI.Comm, libraries: list[str]) -> Iterator[str]:
+    if any(map(_REFERENCE.search, libraries)):
         yield (
-            "the BLAS is slow: install OpenBLAS (Debian: apt-get install libopenblas0-pthread) and choose it "
-            "(update-alternatives --config libblas.so.3-x86_64-linux-gnu); factorisations take a fraction of "
-            "the time"
+            "the BLAS is the slow reference one: install OpenBLAS (Debian: apt-get install "
+            "libopenblas0-pthread) and choose it (update-alternatives --config "
+            "libblas.so.3-x86_64-linux-gnu); factorisations take a fraction of the time"
         )
     if comm.size > 1 and all(os.environ.get(name) != "1" for name in THREADS[:2]):
         yield (
@@ -101,4 +106,4 @@ def _advice(comm: MPI.Comm, slow: bool) -> Iterator[str]:
         )
 
 
-__all__ = ["Desk", "add_to", "gathered"]
+__all__ = ["Console", "add_to", "gathered", "loaded_blas"]

@@ -9,8 +9,7 @@ import numpy as np
 import typer
 
 from fenics_contact.cli.design_files import check_design_files, write_design_files
-from fenics_contact.cli.desk import Desk, desk_of, facts
-from fenics_contact.cli.endings import Ending
+from fenics_contact.cli.desk import Console, ExitCode, console_of, facts
 from fenics_contact.cli.options import (
     DryOption,
     OutputOption,
@@ -51,49 +50,49 @@ def optimize(
     python: PythonOption = True,
 ) -> None:
     """Optimise the contact shape described by the [design] of a scene file."""
-    desk = desk_of(context)
-    with show_progress(desk.comm):
-        file = read(desk, scene, output, tolerance, settings, python)
+    console = console_of(context)
+    with show_progress(console.comm):
+        file = read(console, scene, output, tolerance, settings, python)
         file.require_design()
         check_design_files(file)
-        show_plan(desk, file, sensitivity=True)
-        desk.say()
+        show_plan(console, file, sensitivity=True)
+        console.say()
         if dry_run:
-            show_outputs(desk, file, draws=pictures)
+            show_outputs(console, file, draws=pictures)
             return
         task = file.shape_task()
         words = file.document.design.objective_in_words  # type: ignore[union-attr]
-        desk.say(f"{task.problem.size} design variables, objective {words}")
-        with only_run_in(file.folder, desk.comm):
-            result, written = _minimised(desk, file, task, resume)
-            desk.show(facts(_facts(file, task, result)))
+        console.say(f"{task.problem.size} design variables, objective {words}")
+        with only_run_in(file.folder, console.comm):
+            result, written = _minimised(console, file, task, resume)
+            console.show(facts(_facts(file, task, result)))
             gallery = Gallery()
-            if pictures and can_draw(desk, file, gallery):
-                _draw(desk, file, task, result, gallery)
+            if pictures and can_draw(console, file, gallery):
+                _draw(console, file, task, result, gallery)
     names = ", ".join(["result.json", *(path.name for path in (*written, *gallery.drawn))])
-    desk.say(f"results in {file.folder}/: {names}")
+    console.say(f"results in {file.folder}/: {names}")
     if not result.reason.success:
-        desk.say(f"not converged: {result.reason.value}")
-        raise typer.Exit(int(Ending.NOT_CONVERGED))
+        console.say(f"not converged: {result.reason.value}")
+        raise typer.Exit(int(ExitCode.NOT_CONVERGED))
     gallery.require_all()
 
 
 def _minimised(
-    desk: Desk, file: SceneFile, task: ShapeTask, resume: bool | None
+    console: Console, file: SceneFile, task: ShapeTask, resume: bool | None
 ) -> tuple[Result, list[Path]]:
     """Run the optimisation and write its files; return these, too. Collective."""
     checkpoint = checkpoint_of(file, resume)
     kinds = file.document.output.files
-    series = ResultSeries(file.folder, "designs", desk.comm, formats=kinds) if kinds else None
+    series = ResultSeries(file.folder, "designs", console.comm, formats=kinds) if kinds else None
     follow = None if series is None else series.follow(task.problem)
-    with resumable(desk, checkpoint):
+    with resumable(console, checkpoint):
         result = task.minimize(callback=follow, checkpoint=checkpoint)
     more = {"scene_file": file.source.name, "title": file.title}
     write_optimisation_result(result, task.problem, file.folder, more=more)
     written = [] if series is None else [series.path]
-    written += write_design_files(desk, file, task.problem, result.x)
+    written += write_design_files(console, file, task.problem, result.x)
     # A run that stopped at a limit can continue from its checkpoint with a larger one.
-    if checkpoint is not None and result.reason.success and desk.comm.rank == 0:
+    if checkpoint is not None and result.reason.success and console.comm.rank == 0:
         Path(checkpoint.path).unlink(missing_ok=True)
     return result, written
 
@@ -124,24 +123,24 @@ def _facts(file: SceneFile, task: ShapeTask, result: Result) -> dict[str, str]:
     return rows
 
 
-def _draw(desk: Desk, file: SceneFile, task: ShapeTask, result: Result, gallery: Gallery) -> None:
+def _draw(console: Console, file: SceneFile, task: ShapeTask, result: Result, gallery: Gallery) -> None:
     """Draw the states before and after, the control net and the history. Collective."""
     from fenics_contact.viz import plot_control_net, plot_convergence
 
     problem = task.problem
     for name, point in (("before", problem.first), ("after", problem.at(result.x))):
         assert point is not None
-        draw_state(desk, file, {name: point.state}, gallery, f"_{name}")
+        draw_state(console, file, {name: point.state}, gallery, f"_{name}")
     moved, at = problem.points_of(result.x), 0
     for number, design in enumerate(problem.designs):
         points, part = file.scene.bodies[design.body].mesh.points, result.x[at : at + design.size]
         nets: Any = tuple(design.control_points(points, alpha) for alpha in (np.zeros(design.size), part))
         path = file.folder / ("control_net.png" if number == 0 else f"control_net_{number + 1}.png")
-        plot_control_net(design.lattice, (points, moved[design.body]), nets, path, comm=desk.comm)
+        plot_control_net(design.lattice, (points, moved[design.body]), nets, path, comm=console.comm)
         gallery.drawn.append(path)
         at += design.size
     values = [record.value for record in result.history]
     kinds = [record.kind.value for record in result.history]
     path = file.folder / "convergence.png"
-    plot_convergence(values, kinds, path, title=file.title, comm=desk.comm)
+    plot_convergence(values, kinds, path, title=file.title, comm=console.comm)
     gallery.drawn.append(path)

@@ -14,7 +14,7 @@ from fenics_contact.progress import is_visible
 from fenics_contact.scene_file import SceneFile, read_scene_file
 
 if TYPE_CHECKING:
-    from fenics_contact.cli.desk import Desk
+    from fenics_contact.cli.desk import Console
 
 SceneArgument: TypeAlias = Annotated[
     Path, typer.Argument(metavar="SCENE.toml", help="The scene file.", show_default=False)
@@ -63,7 +63,7 @@ PythonOption: TypeAlias = Annotated[
 
 
 def read(
-    desk: Desk,
+    console: Console,
     scene: Path,
     output: Path | None,
     tolerance: str | None,
@@ -78,7 +78,7 @@ def read(
         if not is_visible(str(output)):
             raise InvalidInputError(f"--output must be a path that can be shown, got {str(output)!r}")
         overrides.append(f"output.folder={json.dumps(str(output), ensure_ascii=False)}")
-    return read_scene_file(scene, desk.comm, overrides=overrides, python=python)
+    return read_scene_file(scene, console.comm, overrides=overrides, python=python)
 
 
 def checkpoint_of(file: SceneFile, resume: bool | None) -> Checkpoint | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fenics_contact.cli.desk import Desk
+from fenics_contact.cli.desk import Console
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, agree
 from fenics_contact.scene_file import SceneFile
@@ -42,11 +42,11 @@ class Gallery:
             )
 
 
-def can_draw(desk: Desk, file: SceneFile, gallery: Gallery) -> bool:
+def can_draw(console: Console, file: SceneFile, gallery: Gallery) -> bool:
     """Return whether pictures can be drawn; if not, say what is missing for them. Collective.
 
     Args:
-        desk: Output for the message.
+        console: Output for the message.
         file: The scene file.
         gallery: Receives the names of the pictures, if the file requests any itself.
     """
@@ -54,14 +54,14 @@ def can_draw(desk: Desk, file: SceneFile, gallery: Gallery) -> bool:
     try:
         from fenics_contact.viz import check_renderer
 
-        if desk.comm.rank == 0:
+        if console.comm.rank == 0:
             check_renderer()
     except MissingRequirementError as missing:
         error = missing
     try:
-        agree(desk.comm, error)
+        agree(console.comm, error)
     except MissingRequirementError as missing:
-        desk.say(f"no pictures: {missing}")
+        console.say(f"no pictures: {missing}")
         if "pictures" in file.document.output.model_fields_set:
             gallery.missing += [f"{kind}.png" for kind in file.document.output.pictures]
         return False
@@ -77,12 +77,12 @@ def units_of(file: SceneFile) -> Units:
 
 
 def draw_state(
-    desk: Desk, file: SceneFile, states: Mapping[str, State], gallery: Gallery, suffix: str = ""
+    console: Console, file: SceneFile, states: Mapping[str, State], gallery: Gallery, suffix: str = ""
 ) -> None:
     """Draw the pictures that a file requests. Collective.
 
     Args:
-        desk: Output for messages about omitted pictures.
+        console: Output for messages about omitted pictures.
         file: The scene file.
         states: Name -> state; the last one is drawn, all of them in maps of the status.
         gallery: Receives the names of the pictures.
@@ -94,7 +94,7 @@ def draw_state(
         try:
             _DRAWN[kind](file, states, state, path)
         except InvalidInputError as error:
-            desk.say(f"no picture {path.name}: {error}")
+            console.say(f"no picture {path.name}: {error}")
             gallery.missing.append(path.name)
         else:
             gallery.drawn.append(path)

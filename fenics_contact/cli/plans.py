@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from fenics_contact.cli.desk import Desk, facts
+from fenics_contact.cli.desk import Console, facts
 from fenics_contact.scene_file import SceneFile
 
 
-def show_plan(desk: Desk, file: SceneFile, *, sensitivity: bool = False) -> None:
+def show_plan(console: Console, file: SceneFile, *, sensitivity: bool = False) -> None:
     """Print the plan of a scene. Collective."""
     plan = file.scene.plan(file.partitions, sensitivity=sensitivity)
     rows = {line[:15].strip(): line[16:] for line in str(plan).splitlines()}
     if file.steps and not sensitivity:
         rows["load steps"] = str(len(file.steps))
-    desk.say(f"{file.title}: {file.source.name} on {desk.ranks}")
-    desk.show(facts(rows))
+    console.say(f"{file.title}: {file.source.name} on {console.ranks}")
+    console.show(facts(rows))
 
 
-def show_outputs(desk: Desk, file: SceneFile, *, draws: bool) -> None:
+def show_outputs(console: Console, file: SceneFile, *, draws: bool) -> None:
     """Report what a run would write."""
     output = file.document.output
     pictures = f", pictures of {', '.join(output.pictures)}" if draws and output.pictures else ""
@@ -24,5 +24,5 @@ def show_outputs(desk: Desk, file: SceneFile, *, draws: bool) -> None:
     shapes = (
         f", {', '.join(output.design)} files of the design" if file.document.design and output.design else ""
     )
-    desk.say(f"would write to {file.folder}/: result.json{kinds}{shapes}{pictures}")
-    desk.say("nothing was solved (--dry-run)")
+    console.say(f"would write to {file.folder}/: result.json{kinds}{shapes}{pictures}")
+    console.say("nothing was solved (--dry-run)")

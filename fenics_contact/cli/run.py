@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.cli.desk import Desk, desk_of, facts
+from fenics_contact.cli.desk import Console, console_of, facts
 from fenics_contact.cli.forces import forces_table
 from fenics_contact.cli.options import (
     DryOption,
@@ -64,21 +64,21 @@ def run(
     python: PythonOption = True,
 ) -> None:
     """Compute the equilibrium of a scene file, or its load steps."""
-    desk = desk_of(context)
-    with show_progress(desk.comm):
-        file = read(desk, scene, output, tolerance, settings, python)
-        show_plan(desk, file)
-        desk.say()
+    console = console_of(context)
+    with show_progress(console.comm):
+        file = read(console, scene, output, tolerance, settings, python)
+        show_plan(console, file)
+        console.say()
         if dry_run:
-            show_outputs(desk, file, draws=pictures)
+            show_outputs(console, file, draws=pictures)
             return
-        with only_run_in(file.folder, desk.comm):
-            states = _through_steps(desk, file, resume) if file.steps else _at_once(desk, file)
+        with only_run_in(file.folder, console.comm):
+            states = _through_steps(console, file, resume) if file.steps else _at_once(console, file)
             gallery = Gallery()
-            if pictures and _wanted(file) and can_draw(desk, file, gallery):
-                draw_state(desk, file, states, gallery)
+            if pictures and _wanted(file) and can_draw(console, file, gallery):
+                draw_state(console, file, states, gallery)
     names = ", ".join(["result.json", *_files(file), *(path.name for path in gallery.drawn)])
-    desk.say(f"results in {file.folder}/: {names}")
+    console.say(f"results in {file.folder}/: {names}")
     gallery.require_all()
 
 
@@ -94,11 +94,11 @@ def _wanted(file: SceneFile) -> bool:
     return bool(file.document.output.pictures)
 
 
-def _at_once(desk: Desk, file: SceneFile) -> dict[str, State]:
+def _at_once(console: Console, file: SceneFile) -> dict[str, State]:
     """Solve a scene without load steps and write its files. Collective."""
-    with _keeping_last(desk, file, lambda state: _write(file, state)):
+    with _keeping_last(console, file, lambda state: _write(file, state)):
         state = file.solve()
-    _show(desk, file, state)
+    _show(console, file, state)
     _write(file, state)
     return {file.title: state}
 
@@ -116,7 +116,9 @@ def _write(file: SceneFile, state: State) -> None:
 
 
 @contextmanager
-def _keeping_last(desk: Desk, file: SceneFile, write: Callable[[DeformedState], None]) -> Iterator[None]:
+def _keeping_last(
+    console: Console, file: SceneFile, write: Callable[[DeformedState], None]
+) -> Iterator[None]:
     """Write the last equilibrium if a load cannot be followed to its end. Collective."""
     try:
         yield
@@ -124,18 +126,18 @@ def _keeping_last(desk: Desk, file: SceneFile, write: Callable[[DeformedState], 
         if error.state is not None:
             write(error.state)
             part = error.state.fractions[-1]
-            desk.say(f"the last equilibrium, at {part:.3g} of the load step, is in {file.folder}/")
+            console.say(f"the last equilibrium, at {part:.3g} of the load step, is in {file.folder}/")
         raise
 
 
-def _show(desk: Desk, file: SceneFile, state: State, title: str = "") -> None:
+def _show(console: Console, file: SceneFile, state: State, title: str = "") -> None:
     """Print what was found, and forces and moments. Collective."""
-    desk.show(facts(state_facts(state, file.document.units), title))
-    desk.say()
-    desk.show(forces_table(forces_record(state), file.document.units.model_dump()))
+    console.show(facts(state_facts(state, file.document.units), title))
+    console.say()
+    console.show(forces_table(forces_record(state), file.document.units.model_dump()))
 
 
-def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str, State]:
+def _through_steps(console: Console, file: SceneFile, resume: bool | None) -> dict[str, State]:
     """Solve all load steps and write each. Collective.
 
     Returns:
@@ -144,9 +146,9 @@ def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str
     checkpoint = checkpoint_of(file, resume)
     rows, drawn = list[tuple[str, ...]](), dict[str, State]()
     chosen = set(np.unique(np.linspace(0, len(file.steps) - 1, MAPS).round().astype(int)))
-    with resumable(desk, checkpoint):
+    with resumable(console, checkpoint):
         sequence = file.sequence(checkpoint)
-        series = ResultSeries(file.folder, "history", desk.comm, formats=file.document.output.files)
+        series = ResultSeries(file.folder, "history", console.comm, formats=file.document.output.files)
 
         def keep(last: DeformedState) -> None:
             if file.document.output.files:
@@ -154,7 +156,7 @@ def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str
             write_result(last, file.folder, more={**_origin(file), "steps": _steps(rows, file)})
 
         for number, step in enumerate(file.steps):
-            with _keeping_last(desk, file, keep):
+            with _keeping_last(console, file, keep):
                 state = sequence.advance(step)
             if file.document.output.files:
                 series.add(state, number if step.time is None else step.time, step.name)
@@ -162,17 +164,17 @@ def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str
             if number in chosen:
                 drawn[f"{number}: {step.name}"] = state
         sequence.finish()
-    desk.show(step_table(rows, file))
-    _show(desk, file, state, f"{file.title}: after the last step")
+    console.show(step_table(rows, file))
+    _show(console, file, state, f"{file.title}: after the last step")
     more = {**_origin(file), "steps": _steps(rows, file)}
     write_result(state, file.folder, more=more, errors=state.known_errors is not None)
-    _done(desk, checkpoint)
+    _done(console, checkpoint)
     return drawn
 
 
-def _done(desk: Desk, checkpoint: Checkpoint | None) -> None:
+def _done(console: Console, checkpoint: Checkpoint | None) -> None:
     """Remove the checkpoint of a complete run: the next one starts anew."""
-    if checkpoint is not None and desk.comm.rank == 0:
+    if checkpoint is not None and console.comm.rank == 0:
         Path(checkpoint.path).unlink(missing_ok=True)
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fenics_contact.cli.desk import desk_of
+from fenics_contact.cli.desk import console_of
 from fenics_contact.io import json_text, write_json
 from fenics_contact.scene_file import json_schema
 
@@ -29,9 +29,9 @@ def schema(
     A scene file whose first line is "#:schema scene_file.schema.json" is checked while it is edited, by taplo
     or the extension Even Better TOML.
     """
-    desk = desk_of(context)
+    console = console_of(context)
     if file is None:
-        desk.say(json_text(json_schema()).rstrip())
+        console.say(json_text(json_schema()).rstrip())
         return
-    write_json(file, json_schema(), comm=desk.comm)
-    desk.say(f"schema of scene files in {file}")
+    write_json(file, json_schema(), comm=console.comm)
+    console.say(f"schema of scene files in {file}")

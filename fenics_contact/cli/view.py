@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from fenics_contact._requirements import require_extra
-from fenics_contact.cli.desk import Desk, desk_of, facts
+from fenics_contact.cli.desk import Console, console_of, facts
 from fenics_contact.cli.forces import forces_table
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.io import FIELD_FILES, fields_of_result, read_result, stored_fields
@@ -59,12 +59,12 @@ def view(
     scale: Annotated[float, typer.Option("--scale", help="Factor of the displacement.")] = 1.0,
 ) -> None:
     """Show a result: its numbers and its fields; --save draws a picture, --page makes a web page."""
-    desk = desk_of(context)
-    with together(desk.comm):
-        if desk.comm.rank == 0:
-            _view(desk, result, save, field, scale)
+    console = console_of(context)
+    with together(console.comm):
+        if console.comm.rank == 0:
+            _view(console, result, save, field, scale)
             if page is not None:
-                _write_page(desk, result, page)
+                _write_page(console, result, page)
 
 
 def with_page_named(arguments: Sequence[str]) -> list[str]:
@@ -79,15 +79,15 @@ def with_page_named(arguments: Sequence[str]) -> list[str]:
     ]
 
 
-def _write_page(desk: Desk, result: Path, name: str) -> None:
+def _write_page(console: Console, result: Path, name: str) -> None:
     from fenics_contact.page import result_page
 
     target = Path(name) if name else (result if result.is_dir() else result.parent) / "page.html"
     result_page(result, target)
-    desk.say(f"page in {target}, {target.stat().st_size / 1e6:.1f} MB: open it in a browser")
+    console.say(f"page in {target}, {target.stat().st_size / 1e6:.1f} MB: open it in a browser")
 
 
-def _view(desk: Desk, result: Path, save: Path | None, field: str, scale: float) -> None:
+def _view(console: Console, result: Path, save: Path | None, field: str, scale: float) -> None:
     """Print a result, and draw it to a file if one is given."""
     try:
         there, reason = result.exists(), "nothing is there"
@@ -101,20 +101,20 @@ def _view(desk: Desk, result: Path, save: Path | None, field: str, scale: float)
         fields: Path | None = result
     else:
         record = read_result(result)
-        show_record(desk, record)
+        show_record(console, record)
         folder = result if result.is_dir() else result.parent
         fields = fields_of_result(folder)
         pictures = sorted(path.name for path in folder.glob("*.png"))
         if pictures:
-            desk.say(f"pictures in {folder}/: {', '.join(pictures)}")
+            console.say(f"pictures in {folder}/: {', '.join(pictures)}")
     if fields is None:
-        desk.say("no .vtm or .pvd file of fields is there to draw")
+        console.say("no .vtm or .pvd file of fields is there to draw")
         return
     members = stored_fields(fields)
     shown = next(member for member in members if member.value == members[-1].value)
     bodies = shown.read()
     ranges = _ranges(bodies)
-    desk.show(facts(ranges, f"fields of {shown.file.name}"))
+    console.show(facts(ranges, f"fields of {shown.file.name}"))
     if save is None:
         return
     if field not in ranges:
@@ -125,7 +125,7 @@ def _view(desk: Desk, result: Path, save: Path | None, field: str, scale: float)
     from fenics_contact.viz import plot_field
 
     plot_field(bodies, field, save, scale=scale)
-    desk.say(f"picture in {save}")
+    console.say(f"picture in {save}")
 
 
 def _ranges(bodies: dict[str, Any]) -> dict[str, str]:
@@ -137,7 +137,7 @@ def _ranges(bodies: dict[str, Any]) -> dict[str, str]:
     return {name: f"{end[0]:.5g} to {end[1]:.5g}" if end else "" for name, end in ends.items()}
 
 
-def show_record(desk: Desk, record: dict[str, Any]) -> None:
+def show_record(console: Console, record: dict[str, Any]) -> None:
     """Print the entries of a result."""
     for name in SHOWN:
         value = record.get(name)
@@ -146,19 +146,19 @@ def show_record(desk: Desk, record: dict[str, Any]) -> None:
         if isinstance(value, dict):
             history = value.get("history")
             rest = {key: part for key, part in value.items() if key != "history"}
-            desk.show(facts(dict(_flat(rest)), name))
-            desk.say()
+            console.show(facts(dict(_flat(rest)), name))
+            console.say()
             if history:
-                desk.show(evaluations(history))
-                desk.say()
+                console.show(evaluations(history))
+                console.say()
         elif isinstance(value, list):
             for number, part in enumerate(value):
-                desk.show(facts(dict(_flat(part)), f"{name} {number}"))
-            desk.say()
+                console.show(facts(dict(_flat(part)), f"{name} {number}"))
+            console.say()
         else:
-            desk.show(facts({name: value}))
+            console.show(facts({name: value}))
     if record.get("forces"):
-        desk.show(forces_table(record["forces"], record.get("more", {}).get("unit_names")))
+        console.show(forces_table(record["forces"], record.get("more", {}).get("unit_names")))
 
 
 def evaluations(history: dict[str, list[Any]]) -> Table:

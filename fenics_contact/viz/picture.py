@@ -9,7 +9,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from fenics_contact.checkpoint import put_whole
+from fenics_contact.checkpoint import write_atomically
 from fenics_contact.errors import InvalidInputError, together
 
 if TYPE_CHECKING:
@@ -93,5 +93,5 @@ def draw_picture(comm: MPI.Comm | None, path: Path | None, draw: Callable[[Binar
             draw(paper)
             png = paper.getvalue()
             if path is not None:
-                put_whole(path, png)
+                write_atomically(path, png)
     return Picture(png, path)

@@ -38,7 +38,7 @@ def optimised(folder: Path, *settings: str, text: str = LID) -> int:
 
 def test_all_kinds_of_files_are_written_and_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     kinds = "output.design=['csv', 'stl', 'step']"
-    assert optimised(tmp_path, kinds, "units.length=m") == cli.Ending.NOT_CONVERGED
+    assert optimised(tmp_path, kinds, "units.length=m") == cli.ExitCode.NOT_CONVERGED
     assert "result.json, design.csv, design_upper.stl, design_upper.step\n" in capsys.readouterr().out
     assert "lengths in m," in (tmp_path / "design.csv").read_text()
     (upper,) = read_cad(tmp_path / "design_upper.step", 500.0).values()
@@ -48,10 +48,10 @@ def test_all_kinds_of_files_are_written_and_named(tmp_path: Path, capsys: pytest
 def test_files_that_a_scene_cannot_have_are_refused_before_it_is_solved(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert optimised(tmp_path, "output.design=['step']", "units.length=yd") == cli.Ending.WRONG_INPUT
+    assert optimised(tmp_path, "output.design=['step']", "units.length=yd") == cli.ExitCode.WRONG_INPUT
     assert "known in millimetres, got 'yd': name one of µm, um, mm," in capsys.readouterr().err
     plane = re.sub(r"(\[\S+), \S+, ", r"\1, ", LID.replace("net = [2, 1]", "net = 2")).replace("z", "y")
     plane = plane.replace('"block"', '"rectangle"').replace("young", 'model = "plane_strain"\nyoung')
-    assert optimised(tmp_path, "output.design=['stl']", text=plane) == cli.Ending.WRONG_INPUT
+    assert optimised(tmp_path, "output.design=['stl']", text=plane) == cli.ExitCode.WRONG_INPUT
     assert 'must be "csv" or "step" for a plane scene, got "stl"' in capsys.readouterr().err
     assert not (tmp_path / "result.json").exists()

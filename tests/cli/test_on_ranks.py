@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fenics_contact.cli import Ending
+from fenics_contact.cli import ExitCode
 from tests.conftest import LAUNCH, ROOT, launch
 from tests.scene_file.texts import GOOD, changed
 
@@ -83,7 +83,7 @@ def test_a_run_that_is_terminated_goes_on(ranks: int, tmp_path: Path) -> None:
     # What the launcher passes on to ranks and waits for; alone, the process hears it itself.
     stopped.send_signal(signal.SIGUSR1 if ranks > 1 else signal.SIGTERM)
     _, words = stopped.communicate(timeout=120.0)
-    assert stopped.returncode == (Ending.STOPPED if ranks > 1 else Ending.TERMINATED), words
+    assert stopped.returncode == (ExitCode.STOPPED if ranks > 1 else ExitCode.TERMINATED), words
     assert "Traceback" not in words
     assert (tmp_path / "checkpoint.npz").exists()
     assert not (tmp_path / "result.json").exists()

@@ -73,7 +73,7 @@ def test_options_count_more_than_the_file(tmp_path: Path) -> None:
     path = scene(tmp_path, GOOD)
     arguments = ("--no-pictures", "--set", "contacts.0.friction={law = 'none'}", "--tolerance", "1e-4")
     # Without friction nothing holds the upper block against the push.
-    assert run("run", path, "-o", tmp_path, *arguments) == cli.Ending.NO_EQUILIBRIUM == 4
+    assert run("run", path, "-o", tmp_path, *arguments) == cli.ExitCode.NO_EQUILIBRIUM == 4
     assert run("run", path, "-o", tmp_path, *arguments, "--set", "loads.0.value=[0, 0, -100]") == 0
     assert read_result(tmp_path)["solver"]["tolerance"] == 1e-4
 
@@ -111,7 +111,7 @@ def test_an_interrupted_history_goes_on_to_the_same_result(
         return advance(sequence, step)  # type: ignore[arg-type]
 
     monkeypatch.setattr(LoadSequence, "advance", stopped)
-    assert run("run", path, "-o", tmp_path / "cut") == cli.Ending.INTERRUPTED == 130
+    assert run("run", path, "-o", tmp_path / "cut") == cli.ExitCode.INTERRUPTED == 130
     monkeypatch.undo()
     assert not (tmp_path / "cut" / "result.json").exists()
     assert "interrupted" in capsys.readouterr().err
@@ -158,7 +158,7 @@ def test_a_checkpoint_that_is_demanded_must_be_there(
 def test_wrong_input_ends_with_two(
     arguments: Sequence[str], words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(*arguments) == cli.Ending.WRONG_INPUT == 2
+    assert run(*arguments) == cli.ExitCode.WRONG_INPUT == 2
     written = capsys.readouterr()
     assert words in written.err
     assert written.out == ""
@@ -189,9 +189,9 @@ def test_every_ending_has_its_number(
 
 
 def test_help_tells_the_exit_codes() -> None:
-    answer = CliRunner().invoke(cli.app, ["--help"], obj=cli.Desk(MPI.COMM_SELF))
+    answer = CliRunner().invoke(cli.app, ["--help"], obj=cli.Console(MPI.COMM_SELF))
     assert answer.exit_code == 0
-    for code in cli.Ending:
+    for code in cli.ExitCode:
         assert f"\n  {code.value} " in answer.output
     for command in ("run", "optimize", "accuracy", "demo", "view", "info", "schema"):
         assert f"\n  {command} " in answer.output
@@ -199,9 +199,9 @@ def test_help_tells_the_exit_codes() -> None:
 
 def test_commands_run_in_the_runner_of_the_library(tmp_path: Path) -> None:
     arguments = ["run", str(scene(tmp_path, GOOD)), "-o", str(tmp_path), "--dry-run"]
-    answer = CliRunner().invoke(cli.app, arguments, obj=cli.Desk(MPI.COMM_SELF))
+    answer = CliRunner().invoke(cli.app, arguments, obj=cli.Console(MPI.COMM_SELF))
     assert (answer.exit_code, "nothing was solved" in answer.output) == (0, True)
-    answer = CliRunner().invoke(cli.app, ["run", "nowhere.toml"], obj=cli.Desk(MPI.COMM_SELF))
+    answer = CliRunner().invoke(cli.app, ["run", "nowhere.toml"], obj=cli.Console(MPI.COMM_SELF))
     assert answer.exit_code == 2
 
 
@@ -224,7 +224,7 @@ def test_a_picture_that_cannot_be_drawn_is_named_once_all_else_is_written(
     text = GOOD[: GOOD.index("[[contacts]]")].replace('body = "upper"', 'body = "lower"')
     one_body = text[: text.index("[bodies.upper]")] + text[text.index("[[supports]]") :]
     path = scene(tmp_path, f'{one_body}[output]\npictures = ["stress", "pressure"]\n')
-    assert run("run", path, "-o", tmp_path) == cli.Ending.WRONG_INPUT
+    assert run("run", path, "-o", tmp_path) == cli.ExitCode.WRONG_INPUT
     told = capsys.readouterr()
     assert "no picture pressure.png: " in told.out
     assert "result.json, state.vtm, stress.png\n" in told.out
@@ -241,7 +241,7 @@ def test_without_the_libraries_for_pictures_requested_ones_are_missed(
 
     monkeypatch.setattr("fenics_contact.viz.check_renderer", missing)
     path = scene(tmp_path, changed(("[solver]", '[output]\npictures = ["stress", "pressure"]\n[solver]')))
-    assert run("run", path, "-o", tmp_path) == cli.Ending.WRONG_INPUT
+    assert run("run", path, "-o", tmp_path) == cli.ExitCode.WRONG_INPUT
     told = capsys.readouterr()
     assert "no pictures: pyvista is not installed\n" in told.out
     assert f"results in {tmp_path}/: result.json, state.vtm\n" in told.out
@@ -263,7 +263,7 @@ def test_an_optimisation_writes_its_designs_and_says_when_it_stopped_early(
     )  # fmt: skip
     settings = [part for value in small for part in ("--set", value)]
     arguments = ("optimize", SCENES / "chain_links.toml", "-o", tmp_path, *settings)
-    assert run(*arguments, "--set", "design.max_iterations=1") == cli.Ending.NOT_CONVERGED == 3
+    assert run(*arguments, "--set", "design.max_iterations=1") == cli.ExitCode.NOT_CONVERGED == 3
     assert "not converged: max_iterations serious steps" in capsys.readouterr().out
     assert (tmp_path / "checkpoint.npz").exists(), "it goes on with a larger limit"
     assert run(*arguments, "--set", "design.max_iterations=2") == 3
@@ -282,5 +282,5 @@ def test_what_is_said_while_bars_are_drawn_appears_above_them(monkeypatch: pytes
     drawn, underneath = io.StringIO(), io.StringIO()
     # Like this bars take over stdout while they are drawn.
     monkeypatch.setattr(sys, "stdout", FileProxy(Console(file=drawn), underneath))
-    cli.Desk(MPI.COMM_SELF).say("a line")
+    cli.Console(MPI.COMM_SELF).say("a line")
     assert (drawn.getvalue(), underneath.getvalue()) == ("a line\n", "")
