@@ -66,6 +66,16 @@ def test_a_function_costs_one_adjoint_at_a_design_that_is_known() -> None:
     assert "forces" in repr(function)
 
 
+def test_products_count_each_state_and_adjoint_once() -> None:
+    problem = posed()
+    state = problem.state_of(np.zeros(problem.size))
+    alone = problem.products
+    assert alone == state.dual.products > 0
+    point = problem.evaluate(np.full(problem.size, 0.004))
+    assert problem.products == alone + point.state.dual.products
+    assert 0 < point.adjoint_iterations < point.state.dual.products
+
+
 def test_the_volume_is_kept_and_the_force_meets_its_limit() -> None:
     problem, force, result = solved()
     assert result.reason.success

@@ -103,6 +103,25 @@ def test_what_was_stored_is_recalled() -> None:
     np.testing.assert_allclose(gradient, known, rtol=1e-6, atol=1e-9 * np.abs(known).max())
 
 
+@pytest.mark.parametrize("weighted", [True, False])
+def test_the_best_design_of_all_cases_is_kept_and_found_again(weighted: bool) -> None:
+    both = cases_of(MPI.COMM_SELF, WEIGHTS if weighted else None)
+    values = [both(design(seed, 0.003))[0] for seed in (0, 1, 2)]
+    assert both.first is not None
+    assert both.best is not None
+    assert (both.first.value, both.best.value, both.evaluations) == (values[0], min(values), 3)
+    assert both.best.parts.keys() == both.problems.keys()
+    solved = both.products
+    assert both.at(both.best.alpha) is both.best
+    assert both.products == solved
+    again = cases_of(MPI.COMM_SELF, WEIGHTS if weighted else None)
+    again.recall(both.memory())
+    assert again.evaluations == 3
+    assert again.best is not None
+    assert again.best.value == pytest.approx(min(values), rel=1e-9)
+    np.testing.assert_array_equal(again.best.alpha, both.best.alpha)
+
+
 def test_two_ranks_find_the_same(mpirun: Callable[..., str]) -> None:
     script = Path(__file__).with_name("load_cases_on_ranks.py")
     said = [np.array(mpirun(script, ranks).split(), dtype=float) for ranks in (1, 2)]
