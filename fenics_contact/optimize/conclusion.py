@@ -15,11 +15,7 @@ _LOG = logging.getLogger(__name__)
 
 
 def conclude(problem: PosedProblem, state: MethodState, reason: Reason, *, raises: bool) -> Result:
-    """Return the result at the centre.
-
-    Raises:
-        NotConvergedError: Then, with the history and the result.
-    """
+    """Return the result at the centre."""
     centre = state.centre
     result = Result(
         x=centre.x,

@@ -219,9 +219,6 @@ def feasible_set(
 
     Returns:
         The feasible set; the caller's arrays are copied.
-
-    Raises:
-        InvalidInputError: If a shape does not fit, a value is nan, or a lower bound lies above its upper one.
     """
     lower, upper = _box(n, bounds)
     given = [] if constraints is None else constraints

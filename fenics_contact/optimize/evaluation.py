@@ -46,9 +46,6 @@ def evaluate_problem(
     Args:
         x: Point, shape (n,).
         penalties: Weights of inequalities in the merit function by their numbers, units of J.
-
-    Raises:
-        InvalidDesignError: If one of them does not exist at x.
     """
     found = evaluate(problem.fun, x, number, accuracy)
     own = []

@@ -13,12 +13,7 @@ from fenics_contact.optimize.restoration import restored
 
 
 def first_centre(problem: PosedProblem, subgradient: float, feasibility: float) -> Evaluation:
-    """Evaluate the starting point, corrected to meet the equalities where it need not be feasible.
-
-    Raises:
-        InvalidDesignError: If a function does not exist there, or no point near it meets the equalities.
-        InvalidInputError: If it violates nonlinear constraints although it must not.
-    """
+    """Evaluate the starting point, corrected to meet the equalities where it need not be feasible."""
     equal, accuracy = problem.equalities, Accuracy(np.inf, subgradient)
     penalties = dict.fromkeys(problem.inequalities, 1.0)
     try:

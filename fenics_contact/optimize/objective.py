@@ -161,10 +161,6 @@ def evaluate(
 
     Returns:
         Copies of all three.
-
-    Raises:
-        InvalidInputError: If the result is not a finite number and n finite numbers.
-        InvalidDesignError: If the function raises it.
     """
     if accuracy is None or not (isinstance(fun, Inexact) and fun.inexact):
         evaluation = _checked(fun(x.copy()), x, f"at evaluation {number}", name)
@@ -201,9 +197,6 @@ def with_gradient_near(
     """Return a doubtful evaluation with a nearby gradient as its subgradient; any other unchanged.
 
     Where the function does not exist near the point, its result at the point is used.
-
-    Raises:
-        InvalidInputError: If the result is not n finite numbers.
     """
     if not (evaluation.doubtful and isinstance(fun, Kinked)):
         return evaluation
@@ -237,9 +230,6 @@ def require_finite(needed: str, numbers: Array, where: str) -> None:
 
     Args:
         numbers: The numbers, of any shape.
-
-    Raises:
-        InvalidInputError: If an entry is nan or infinite.
     """
     bad = np.flatnonzero(~np.isfinite(numbers))
     if bad.size:

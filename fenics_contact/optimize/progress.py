@@ -106,11 +106,7 @@ class Progress:
             self._fingerprint.update(self._fun.fingerprint())
 
     def recalled(self) -> MethodState | None:
-        """Return the stored state, None where the run starts anew. Collective.
-
-        Raises:
-            InvalidInputError: If the file is not a checkpoint of this problem; says what to do.
-        """
+        """Return the stored state, None where the run starts anew. Collective."""
         if self._checkpoint is None:
             return None
         stored = self._checkpoint.read(KIND, self._fingerprint, self.comm)
@@ -134,10 +130,6 @@ class Progress:
         """Report a state, store it, and stop here if a signal requested it. Collective.
 
         It is stored after the callback, so that the callback's output exists for every stored evaluation.
-
-        Raises:
-            CheckpointError: If it cannot be written; the file is then unchanged.
-            Interrupted: If a signal was received, see `fenics_contact.checkpoint.interruptible`.
         """
         self._tell(state)
         if self._callback is not None:
@@ -156,11 +148,7 @@ class Progress:
         self._task.step(record.evaluations, measure=measure, value=record.best, words=words, timed=timed)
 
     def keep(self, state: MethodState, *, last: bool = False) -> None:
-        """Write the state if that is due. Collective.
-
-        Raises:
-            CheckpointError: If it cannot be written; the file is then unchanged.
-        """
+        """Write the state if that is due. Collective."""
         if self._checkpoint is None:
             return
         due = 0 if last else self._checkpoint.every - 1

@@ -90,10 +90,6 @@ def solve(program: QuadraticProgram) -> QuadraticSolution:
     Returns:
         The minimiser, its multipliers and the status.
 
-    Raises:
-        InvalidInputError: If the constraints contradict each other.
-        SubproblemError: If every attempt failed; the message lists Clarabel's status of each.
-
     References:
         P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs with
         quadratic objectives, 2024.
@@ -159,10 +155,6 @@ def shortest(
         limits: c, shape (m,).
         far: Distance in units of the largest violation at y = 0 beyond which a limit is moved there, as it
             cannot matter: violations may be a rounding of the distances to other limits.
-
-    Raises:
-        InvalidInputError: If there is no such y.
-        SubproblemError: If Clarabel cannot solve the programme.
     """
     rows, limits = unit_rows(rows, limits)
     equality_rows, equality_values = unit_rows(equality_rows, equality_values)

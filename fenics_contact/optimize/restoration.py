@@ -26,9 +26,6 @@ def restored(
 
     Returns:
         The point and the equalities there.
-
-    Raises:
-        InvalidDesignError: If none is found.
     """
     equal = problem.equalities
     if not equal:

@@ -101,9 +101,6 @@ def solve_step(bundle: Bundle, near: Surroundings, t: float, soft: Sequence[Soft
     Returns:
         The step.
 
-    Raises:
-        SubproblemError: If Clarabel cannot solve the programme in any of the units.
-
     References:
         H. Schramm and J. Zowe, SIAM J. Optim. 2 (1992) 121-152, section 2.
     """

@@ -29,9 +29,6 @@ def with_fewest_weak_points(
     Args:
         alpha: Design variables, shape (size,), [length].
         end: A design nearby, shape (size,), [length].
-
-    Raises:
-        InvalidDesignError: If none of them has an equilibrium.
     """
     best: Point | None = None
     refused: InvalidDesignError | None = None

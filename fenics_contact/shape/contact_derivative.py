@@ -6,17 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact.contact import State
 from fenics_contact.errors import together
 from fenics_contact.feti import TornSystem
 from fenics_contact.pairing import ContactPoints
 from fenics_contact.scene import ContactPair, RigidObstacle, Surface, surface_of
-from fenics_contact.shape.adjoint import Adjoint
-from fenics_contact.shape.friction_derivative import bound_sensitivity, bounds_by_area, bounds_by_place
-from fenics_contact.shape.linearised_face import LinearisedFace
+from fenics_contact.shape.friction_derivative import bounds_by_area, bounds_by_place
 from fenics_contact.shape.mortar_derivative import MortarDerivatives, mortar_by_shape
-from fenics_contact.shape.objective import Partials
-from fenics_contact.shape.point_motions import PointMotions, point_motions
+from fenics_contact.shape.point_motions import PairedFields, PointMotions, point_motions
 from fenics_contact.shape.projection_derivative import (
     PointDerivatives,
     carriers,
@@ -41,21 +37,19 @@ class RowFields(PointMotions):
 
 
 def contact_by_shape(
-    state: State, adjoint: Adjoint, partials: Partials, linearised: LinearisedFace
+    torn: TornSystem, fields: PairedFields, by_bound: np.ndarray, by_area: np.ndarray | float
 ) -> np.ndarray:
     """Return the derivative by the geometry of the contact points, replicated, shape (n_nodes, dim).
 
     It is ∂/∂X of −λᵀ B w + (ζ − j)ᵀ(c − B u), with the objective's derivative j by B u − c, and the shares of
-    slip bounds and areas. Collective.
+    slip bounds and areas, by which the derivatives are given. Collective.
     """
-    torn = state.torn
     tearing, points = torn.decomposition.tearing, torn.points
     result = np.zeros((tearing.n_nodes, torn.dim))
     if points.count == 0:
         return result
-    rows = _row_fields(state, adjoint.multiplier - partials.by_jump, adjoint.displacement)
-    by_bound = bound_sensitivity(state, adjoint, partials, linearised)
-    by_area = bounds_by_area(torn, by_bound) + partials.by_area
+    rows = _row_fields(torn, fields)
+    by_area = bounds_by_area(torn, by_bound) + by_area
     with together(torn.decomposition.comm):
         np.add.at(result, points.slave, bounds_by_place(torn, rows.normal[0], by_bound))
     for index, pair in enumerate(torn.scene.contacts):
@@ -111,7 +105,7 @@ def _by_obstacle(torn: TornSystem, obstacle: RigidObstacle, rows: RowFields, min
     """Return the derivative by the slave nodes that face an obstacle, shape (n, dim)."""
     by, normal = _by_point(torn.points, rows, mine), torn.points.normal[mine]
     with together(torn.decomposition.comm):
-        bending = evaluate_shape(obstacle, "curvatures", _points(torn, torn.points.slave[mine]))
+        bending = evaluate_shape(obstacle, "curvatures", torn.scene.points[torn.points.slave[mine]])
     turning = by.normal + frames_pulled_back(normal, by.tangents, by.axes)
     return np.asarray(by.gap[:, None] * normal + np.einsum("nde,ne->nd", bending, turning))
 
@@ -133,24 +127,16 @@ def _add_projected(
     result[nodes] += by_master
 
 
-def _points(torn: TornSystem, nodes: np.ndarray) -> np.ndarray:
-    """Return the coordinates of nodes of all bodies, shape (n, dim)."""
-    return torn.scene.points[nodes]
-
-
-def _row_fields(state: State, multiplier: np.ndarray, displacement: np.ndarray) -> RowFields:
-    """Gather those of the state and the given ones beside them. Collective."""
-    system = state.dual
-    torn = system.torn
+def _row_fields(torn: TornSystem, fields: PairedFields) -> RowFields:
+    """Gather multipliers and displacements at all points. Collective."""
     points, width = torn.points, torn.dim - 1
-    multipliers = (state.solution.multiplier, multiplier)
-    normal = np.stack([torn.numbering.gather(x, torn.normal_rows) for x in multipliers])
+    normal = np.stack([torn.numbering.gather(x, torn.normal_rows) for x in fields.multipliers])
     friction = np.zeros((2, points.count, width))
-    for k, x in enumerate(multipliers):
+    for k, x in enumerate(fields.multipliers):
         gathered = torn.numbering.gather(x, torn.tangential_rows.ravel())
         friction[k, torn.frictional] = gathered.reshape(-1, width)
     masters = [pair.master for pair in torn.scene.contacts]
-    motions = point_motions(torn, points, masters, (displacement, state.torn_displacement))
+    motions = point_motions(torn, points, masters, fields)
     return RowFields(motions.nodes, motions.values, motions.relative, normal, friction)
 
 

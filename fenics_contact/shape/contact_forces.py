@@ -48,11 +48,7 @@ class ContactForces(Weighable):
             return float(value), np.asarray(normal), np.asarray(tangential)
 
     def _differentiated(self, state: State) -> tuple[float, np.ndarray, np.ndarray]:
-        """Return the checked result of the user's function.
-
-        Raises:
-            InvalidInputError: If that is not finite numbers of the right shapes.
-        """
+        """Return the checked result of the user's function."""
         count, width = state.torn.points.count, state.torn.dim - 1
         value, normal, tangential = self._asked(state)
         if normal.shape != (count,) or tangential.shape != (count, width):

@@ -14,9 +14,10 @@ from fenics_contact.nonlinear import tangent_adjoint
 from fenics_contact.qp import Stop
 from fenics_contact.shape.adjoint import NOT_HELD, Adjoint
 from fenics_contact.shape.contact_derivative import add_areas
-from fenics_contact.shape.friction_derivative import bound_sensitivity, bounds_by_area, bounds_by_place
+from fenics_contact.shape.friction_derivative import bounds_by_area, bounds_by_place
 from fenics_contact.shape.linearised_face import LinearisedFace, growth_of
 from fenics_contact.shape.objective import Partials
+from fenics_contact.shape.point_motions import PairedFields
 from fenics_contact.timing import PhaseTimer
 
 if TYPE_CHECKING:
@@ -35,11 +36,6 @@ def solve_deformed_adjoint(
 
     Its tangents are factored once more at the state itself, with the stiffness of forces that turn with
     their surfaces; the columns of the face's two bases are swapped.
-
-    Raises:
-        ConvergenceError: If the face does not hold every body, or the tolerance was not reached.
-        InvalidInputError: If friction depends on more than the derivative knows: a load step of
-            more than one part, or of a checkpoint.
     """
     _require_whole_step(state)
     evaluation, torn = state.equilibrium.evaluation, state.torn
@@ -82,7 +78,7 @@ def _require_whole_step(state: DeformedState) -> None:
 
 
 def deformed_contact_by_shape(
-    state: DeformedState, adjoint: Adjoint, partials: Partials, linearised: LinearisedFace
+    state: DeformedState, fields: PairedFields, by_bound: np.ndarray, by_area: np.ndarray | float
 ) -> np.ndarray:
     """Return the derivative by the geometry of contact, replicated, shape (n_nodes, dim). Collective.
 
@@ -95,9 +91,8 @@ def deformed_contact_by_shape(
     result = np.zeros((torn.decomposition.tearing.n_nodes, torn.dim))
     if points is None or points.points.count == 0:
         return result
-    normal, friction = meeting.at_points(state.solution.multiplier)
-    by_gap, by_slip = meeting.at_points(adjoint.multiplier - partials.by_jump)
-    w = _on_surfaces(torn, points, adjoint.displacement)
+    (normal, friction), (by_gap, by_slip) = (meeting.at_points(each) for each in fields.multipliers)
+    w = _on_surfaces(torn, points, fields.displacements[0])
     turning, rubbing = points.stiffness(np.maximum(normal, 0.0)), points.friction_stiffness(friction)
     by_nodes = -turning.assembled() @ w - rubbing.right @ (rubbing.left.T @ w) + points.gap_rows.T @ by_gap
     by_nodes += points.means_pulled_back(np.maximum(normal, 0.0), friction, by_gap, w)
@@ -105,8 +100,7 @@ def deformed_contact_by_shape(
         rows = points.slip_rows(start.material_points()) + points.slip_by_start(start)
         by_nodes -= rows.T @ by_slip.ravel()
     result += by_nodes.reshape(result.shape)
-    by_bound = bound_sensitivity(state, adjoint, partials, linearised)
-    by_area = bounds_by_area(torn, by_bound) + partials.by_area
+    by_area = bounds_by_area(torn, by_bound) + by_area
     with together(torn.decomposition.comm):
         np.add.at(result, torn.points.slave, bounds_by_place(torn, normal, by_bound))
     for index in range(len(torn.scene.contacts)):

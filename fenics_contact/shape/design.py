@@ -204,11 +204,7 @@ class SurfaceDesign:
 
 
 def checked_variables(alpha: np.ndarray, size: int, comm: MPI.Comm) -> np.ndarray:
-    """Return design variables as a checked array. Collective on ``comm``.
-
-    Raises:
-        InvalidInputError: If the shape is wrong, or they are not finite or differ from rank to rank.
-    """
+    """Return design variables as a checked array. Collective on ``comm``."""
     with together(comm):
         variables = np.asarray(alpha, dtype=float)
         if variables.shape != (size,):

@@ -235,11 +235,7 @@ class DesignFunction:
         return described(self.objective, f"function {self.name}")
 
     def __call__(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return c(α) and a subgradient, as accurately as the problem can. Collective.
-
-        Raises:
-            InvalidDesignError: If the design inverts a cell or has no equilibrium.
-        """
+        """Return c(α) and a subgradient, as accurately as the problem can. Collective."""
         point = self._solved_anew(alpha) if self.inexact else self._at_known_state(alpha)
         return point.value, point.gradient
 

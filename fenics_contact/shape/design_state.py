@@ -32,11 +32,6 @@ def design_state(
         scene: The scene in the shape of the design.
         start: State of a neighbouring design, or None for the first one.
         slip_from: State of the same design after the last load step, or None.
-
-    Raises:
-        InvalidInputError: If bodies that deform much have a load step before.
-        InvalidDesignError: If the design has no equilibrium.
-        ConvergenceError: If the first one is not found.
     """
     if scene.is_nonlinear and slip_from is not None:
         raise InvalidInputError(

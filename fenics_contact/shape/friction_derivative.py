@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.contact import State
-from fenics_contact.feti import TornSystem
+from fenics_contact.feti import DualSystem, TornSystem
 from fenics_contact.scene import Tresca, gradients_of
-from fenics_contact.shape.adjoint import Adjoint
 from fenics_contact.shape.linearised_face import LinearisedFace
-from fenics_contact.shape.objective import Partials
 
 
 def bound_sensitivity(
-    state: State, adjoint: Adjoint, partials: Partials, linearised: LinearisedFace
+    system: DualSystem, by_multiplier: np.ndarray, w: np.ndarray, linearised: LinearisedFace
 ) -> np.ndarray:
     """Return dJ by each slip bound at fixed geometry, d·(∂J/∂τ − B_T w), replicated. Collective."""
-    system = state.dual
-    force = partials.by_multiplier - system.jump(adjoint.displacement)
+    force = by_multiplier - system.jump(w)
     mine = np.einsum("na,na->n", linearised.slip_direction, force[system.problem.layout.tangential])
     result = np.zeros(len(system.torn.frictional))
     result[system.torn.owned_discs] = mine
@@ -47,9 +43,6 @@ def bounds_by_place(torn: TornSystem, normal_force: np.ndarray, by_bound: np.nda
     Args:
         normal_force: λ_N of the points, shape (n_points,), [force].
         by_bound: Derivative by each frictional point's slip bound, shape (n_friction,).
-
-    Raises:
-        InvalidInputError: If a function is not known, or no number, close to a node.
     """
     points = torn.points
     result, by_all = np.zeros((points.count, torn.dim)), np.zeros(points.count)

@@ -50,9 +50,6 @@ class DesignGeometry:
 
         Returns:
             Body name -> coordinates, shape (n_nodes, dim), [length].
-
-        Raises:
-            InvalidInputError: If alpha has another shape or is not finite.
         """
         alpha = checked_variables(alpha, self.size, self._decomposition.comm)
         if self._points is None or not np.array_equal(self._points[0], alpha):
@@ -71,9 +68,6 @@ class DesignGeometry:
         """Return a scene of these bodies in the shape of a design. Collective.
 
         The scenes of one design have the same meshes, so that they share matrices and factors.
-
-        Raises:
-            InvalidDesignError: If the design inverts a cell.
         """
         if self._last is None or not np.array_equal(self._last[0], alpha):
             points = self.points_of(alpha)

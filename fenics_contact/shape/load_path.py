@@ -221,12 +221,7 @@ def _check_names(names: Sequence[str]) -> None:
 def _checked(
     comm: MPI.Comm, names: Sequence[str], objectives: Mapping[str, Objective], *, last: bool = True
 ) -> dict[str, Objective]:
-    """Return the objectives of steps in the order of the steps.
-
-    Raises:
-        InvalidInputError: If there is none, one is that of no step, or ``last`` and none is that of the last
-            step.
-    """
+    """Return the objectives of steps in the order of the steps."""
     with together(comm):
         if not isinstance(objectives, Mapping):
             raise InvalidInputError(

@@ -187,11 +187,7 @@ def _stiffness(cell_type: str, stiffening: float) -> ufl.Form:
 
 
 def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign) -> MeshMotion:
-    """Return how the mesh of a body follows its design. Collective.
-
-    Raises:
-        InvalidInputError: If a moving surface is held.
-    """
+    """Return how the mesh of a body follows its design. Collective."""
     name = design.body
     body = scene.bodies[name]
     cut = mirrored(scene, name)

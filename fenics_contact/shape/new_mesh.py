@@ -29,10 +29,6 @@ def meshed(
 
     Args:
         scene: The scene in the shape of a design.
-
-    Raises:
-        InvalidInputError: If a mesh lacks nodes of a design surface, or does not tell where points of a pair
-            that gives its gap came from.
     """
     names = sorted({design.body for design in designs})
     made: dict[str, BodyMesh] = {}

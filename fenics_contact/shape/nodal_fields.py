@@ -24,9 +24,6 @@ def field_by_places(
 
     Args:
         moving: Marks of the nodes of all bodies that move, or None for all.
-
-    Raises:
-        InvalidInputError: If the function is not known, or no number, close to a node.
     """
     mesh, dim, mesh_of_body = subdomain.mesh, torn.dim, torn.scene.bodies[subdomain.mesh.body].mesh
     nodes = np.sort(mesh.nodes)

@@ -81,11 +81,7 @@ def asking(comm: MPI.Comm) -> AbstractContextManager[None]:
 
 
 def finite(name: str, numbers: np.ndarray) -> np.ndarray:
-    """Return what an objective gave.
-
-    Raises:
-        InvalidInputError: If an entry is no finite number.
-    """
+    """Return what an objective gave."""
     bad = np.flatnonzero(~np.isfinite(numbers))
     if bad.size:
         raise InvalidInputError(
@@ -97,11 +93,7 @@ def finite(name: str, numbers: np.ndarray) -> np.ndarray:
 
 
 def require_linear(state: State, objective: Objective) -> None:
-    """Reject an objective that knows linear materials alone.
-
-    Raises:
-        InvalidInputError: If the state has others.
-    """
+    """Reject an objective that knows linear materials alone."""
     if state.scene.is_nonlinear:
         raise InvalidInputError(
             f"{type(objective).__name__} needs linear materials, this state has others: take contact forces "

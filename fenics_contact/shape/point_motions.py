@@ -13,6 +13,19 @@ from fenics_contact.scene import Surface
 
 
 @dataclass(frozen=True, eq=False)
+class PairedFields:
+    """State and adjoint as derivatives by the geometry combine them: multipliers of one, motion of the other.
+
+    Attributes:
+        multipliers: λ and ζ − ∂J/∂(B u − c), owned.
+        displacements: w and u, torn displacements of this rank, shape (torn_size,) each.
+    """
+
+    multipliers: tuple[np.ndarray, np.ndarray]
+    displacements: tuple[np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
 class PointMotions:
     """Displacements of state and adjoint at points, replicated.
 
@@ -33,19 +46,18 @@ class PointMotions:
 
 
 def point_motions(
-    torn: TornSystem, points: ContactPoints, masters: Sequence[object], fields: Sequence[np.ndarray]
+    torn: TornSystem, points: ContactPoints, masters: Sequence[object], fields: PairedFields
 ) -> PointMotions:
     """Return the motions of points. Collective.
 
     Args:
         masters: The masters of the pairs that the points number; all nodes of surfaces are included, as some
             have no weight at any point but a derivative of it.
-        fields: Adjoint and state, torn displacements of this rank, shape (torn_size,) each.
     """
     tearing, scene = torn.decomposition.tearing, torn.scene
     surfaces = [master for master in masters if isinstance(master, Surface)]
     opposite = [tearing.global_nodes(each.body, np.unique(scene.facets(each))) for each in surfaces]
     nodes = np.unique(np.concatenate([points.jump.indices, *opposite]))
-    values = np.stack([nodal_mean_at(torn.decomposition, field, nodes) for field in fields])
+    values = np.stack([nodal_mean_at(torn.decomposition, field, nodes) for field in fields.displacements])
     jump = points.jump[:, nodes]
     return PointMotions(nodes, values, np.stack([jump @ value for value in values]))

@@ -78,11 +78,7 @@ class OfPressures(Weighable, ABC):
 
 
 def points_of(state: State, what: str, pair: int | None) -> np.ndarray:
-    """Return the numbers of the contact points of a pair, of all pairs if it is None.
-
-    Raises:
-        InvalidInputError: If the scene has no such pair.
-    """
+    """Return the numbers of the contact points of a pair, of all pairs if it is None."""
     if pair is None:
         return np.arange(state.contact.points.count)
     require_pair(state.scene, what, pair)
@@ -90,11 +86,7 @@ def points_of(state: State, what: str, pair: int | None) -> np.ndarray:
 
 
 def require_pair(scene: Scene, what: str, pair: int) -> None:
-    """Check the number of a pair.
-
-    Raises:
-        InvalidInputError: If the scene has no such pair.
-    """
+    """Check the number of a pair."""
     count = len(scene.contacts)
     if not 0 <= pair < count:
         known = f"0 to {count - 1}" if count else "but it has none"
@@ -167,11 +159,7 @@ class PressureNorm(OfPressures):
 
 
 def require_exponent(what: str, p: float) -> None:
-    """Check the exponent of a smooth bound of a largest value, of which powers must not overflow.
-
-    Raises:
-        InvalidInputError: If it is not from 2 to 100.
-    """
+    """Check the exponent of a smooth bound of a largest value, of which powers must not overflow."""
     if not 2.0 <= p <= 100.0:
         raise InvalidInputError(
             f"{what}.p must be a number from 2 to 100, got {p!r}: the larger, the closer to the largest "

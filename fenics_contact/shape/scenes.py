@@ -21,11 +21,7 @@ _LOG = logging.getLogger(__name__)
 
 
 def checked_contact(contact: ContactProblem) -> ContactProblem:
-    """Return the contact problem of a shape problem.
-
-    Raises:
-        InvalidInputError: If it is of another type.
-    """
+    """Return the contact problem of a shape problem."""
     if not isinstance(contact, ContactProblem):
         raise InvalidInputError(
             f"ShapeProblem needs a ContactProblem, got {type(contact).__name__}: write "
@@ -63,9 +59,6 @@ def require_influence(
 
     Where the gradient is rounding the objective may be stationary, as a norm of the pressure is where that is
     even: then it has a gradient nearby.
-
-    Raises:
-        InvalidInputError: If both gradients are zero, or rounding over the size of the scene.
     """
     size = float(np.ptp(scene.points))
     if _has_influence(point, size):
@@ -92,11 +85,7 @@ def _has_influence(point: DesignPoint, size: float) -> bool:
 
 
 def check_case(first: Scene, scene: Scene) -> None:
-    """Check that a scene is a load case of the same designs.
-
-    Raises:
-        InvalidInputError: Says what differs.
-    """
+    """Check that a scene is a load case of the same designs."""
     if set(scene.bodies) != set(first.bodies):
         raise InvalidInputError(
             f"load cases must share their bodies, got {sorted(scene.bodies)} beside {sorted(first.bodies)}: "

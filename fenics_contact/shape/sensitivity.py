@@ -8,8 +8,10 @@ from fenics_contact.contact import DeformedState, State
 from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
 from fenics_contact.shape.contact_derivative import contact_by_shape
 from fenics_contact.shape.forms import ShapeForms
+from fenics_contact.shape.friction_derivative import bound_sensitivity
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.objective import Partials
+from fenics_contact.shape.point_motions import PairedFields
 from fenics_contact.shape.state_error import StateError, state_error
 from fenics_contact.shape.tied_derivative import ties_by_shape
 from fenics_contact.shape.work_derivative import work_by_shape
@@ -51,13 +53,15 @@ def by_nodes(
     Returns:
         The derivative by the nodes of all bodies, replicated, shape (n_nodes, dim).
     """
-    torn = state.torn
-    work = work_by_shape(forms, torn, state.torn_displacement, adjoint.displacement)
+    torn, u, w = state.torn, state.torn_displacement, adjoint.displacement
+    work = work_by_shape(forms, torn, u, w)
+    fields = PairedFields((state.solution.multiplier, adjoint.multiplier - partials.by_jump), (w, u))
+    by_bound = bound_sensitivity(state.dual, partials.by_multiplier, w, linearised)
     if isinstance(state, DeformedState):
         from fenics_contact.shape.deformed_sensitivity import deformed_contact_by_shape
 
-        rows = deformed_contact_by_shape(state, adjoint, partials, linearised)
+        rows = deformed_contact_by_shape(state, fields, by_bound, partials.by_area)
     else:
-        rows = contact_by_shape(state, adjoint, partials, linearised)
-    rows = rows + ties_by_shape(state, adjoint, partials)
+        rows = contact_by_shape(torn, fields, by_bound, partials.by_area)
+    rows = rows + ties_by_shape(torn, fields)
     return np.asarray(torn.decomposition.comm.allreduce(partials.by_shape - work)) + rows

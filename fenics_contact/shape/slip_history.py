@@ -12,11 +12,7 @@ from fenics_contact.shape.objective import Partials
 
 
 def require_from_rest(state: State) -> None:
-    """Check that friction of a state does not depend on other states.
-
-    Raises:
-        InvalidInputError: If its slip is measured from that of an earlier load step.
-    """
+    """Check that friction of a state does not depend on other states."""
     if state.contact.slip_before[state.torn.frictional].any():
         raise InvalidInputError(
             "a state alone can be differentiated if it is a single load step from rest, got one with slip of "

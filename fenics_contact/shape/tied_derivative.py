@@ -4,30 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.contact import State
 from fenics_contact.feti import TornSystem
 from fenics_contact.scene import Tie, surface_of
-from fenics_contact.shape.adjoint import Adjoint
 from fenics_contact.shape.mortar_derivative import MortarDerivatives, mortar_by_shape
-from fenics_contact.shape.objective import Partials
-from fenics_contact.shape.point_motions import PointMotions, point_motions
+from fenics_contact.shape.point_motions import PairedFields, PointMotions, point_motions
 from fenics_contact.shape.projection_derivative import PointDerivatives, carriers, projection_pulled_back
 
 
-def ties_by_shape(state: State, adjoint: Adjoint, partials: Partials) -> np.ndarray:
+def ties_by_shape(torn: TornSystem, fields: PairedFields) -> np.ndarray:
     """Return the derivative by the geometry of tied points, replicated, shape (n_nodes, dim). Collective.
 
     It is ∂/∂X of −λᵀ B w − (ζ − j)ᵀ B u over the rows of ties, with the objective's derivative j by B u − c.
     Rows of bonded surfaces lie along the axes and change by the weights of the master alone, those of sliding
     ones by its normals, too.
     """
-    torn = state.torn
     result = np.zeros((torn.decomposition.tearing.n_nodes, torn.dim))
     if torn.ties.count == 0:
         return result
     masters = [tie.master for tie in torn.scene.ties]
-    motions = point_motions(torn, torn.ties, masters, (adjoint.displacement, state.torn_displacement))
-    forces = _forces(torn, (state.solution.multiplier, adjoint.multiplier - partials.by_jump))
+    motions = point_motions(torn, torn.ties, masters, fields)
+    forces = _forces(torn, fields.multipliers)
     for index, tie in enumerate(torn.scene.ties):
         mine = np.flatnonzero(torn.ties.pair == index)
         add = _add_tie if tie.discretisation == "node" else _add_mortar_tie

@@ -106,11 +106,7 @@ class BodyIntegral:
 
 
 def require_body(state: State, what: str, body: str) -> None:
-    """Check the name of a body.
-
-    Raises:
-        InvalidInputError: If the scene has no such body.
-    """
+    """Check the name of a body."""
     bodies = state.scene.bodies
     if body not in bodies:
         raise InvalidInputError(

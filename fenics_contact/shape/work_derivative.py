@@ -43,11 +43,7 @@ def strain_work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: 
 
 
 def load_work_by_shape(forms: ShapeForms, torn: TornSystem, w: np.ndarray) -> np.ndarray:
-    """Return ∂/∂X of L(w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim). Collective.
-
-    Raises:
-        InvalidInputError: If a load that is a function of position is not known close to the nodes.
-    """
+    """Return ∂/∂X of L(w), the share of this rank, by all nodes, shape (n_nodes, dim). Collective."""
     loads = moving_loads(torn, forms.moving)
     spread: list[Load] = [load for load in loads if not isinstance(load, TotalForce)]
     for load in spread:  # all ranks compile
