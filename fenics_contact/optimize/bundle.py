@@ -2,12 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A subgradient of one function at a point, in scaled variables, with what is known of it.
+
+    Attributes:
+        gradient: The subgradient, shape (n,).
+        value: Value of the function there.
+        noise: Error of the value.
+        pushes: Multiples of gradients of equalities that the subgradient contains, shape (r,).
+        steepness: Length of the subgradient without them.
+        doubtful: Whether it may not be a subgradient, see `Kinked`.
+    """
+
+    gradient: Array
+    value: float = 0.0
+    noise: float = 0.0
+    pushes: Array = field(default_factory=lambda: np.zeros(0))
+    steepness: float = 0.0
+    doubtful: bool = False
+
+    @property
+    def length(self) -> float:
+        """Length of the subgradient."""
+        return float(np.linalg.norm(self.gradient))
 
 
 @dataclass(frozen=True)
@@ -47,18 +73,11 @@ class Bundle:
     pushes: Array
 
     @classmethod
-    def of_centre(
-        cls,
-        gradient: Array,
-        locality: float,
-        noise: float = 0.0,
-        doubtful: bool = False,
-        pushes: ArrayLike = (),
-    ) -> Bundle:
+    def of_centre(cls, plane: Plane, locality: float) -> Bundle:
         """Return the bundle that holds only the centre's own plane."""
         zero = np.zeros(1)
-        marks, more = np.array([doubtful]), np.array([pushes], dtype=float)
-        return cls(gradient[None], zero, zero, locality, np.array([noise]), marks, more)
+        marks, noise = np.array([plane.doubtful]), np.array([plane.noise])
+        return cls(plane.gradient[None], zero, zero, locality, noise, marks, plane.pushes[None])
 
     @property
     def size(self) -> int:
@@ -76,39 +95,25 @@ class Bundle:
         """Return the predicted change of J, max_i (g_i·y - β_i), for a step y of shape (n,)."""
         return float(np.max(self.gradients @ step - self.measures))
 
-    def with_cut(
-        self,
-        gradient: Array,
-        error: float,
-        distance: float,
-        noise: float = 0.0,
-        doubtful: bool = False,
-        pushes: ArrayLike = (),
-    ) -> Bundle:
+    def with_cut(self, plane: Plane, error: float, distance: float) -> Bundle:
         """Return the bundle with one more plane at the end."""
         return Bundle(
-            np.vstack([self.gradients, gradient]),
+            np.vstack([self.gradients, plane.gradient]),
             np.append(self.errors, error),
             np.append(self.distances, distance),
             self.locality,
-            np.append(self.noise, noise),
-            np.append(self.doubtful, doubtful),
-            np.vstack([self.pushes, np.asarray(pushes, dtype=float)]),
+            np.append(self.noise, plane.noise),
+            np.append(self.doubtful, plane.doubtful),
+            np.vstack([self.pushes, plane.pushes]),
         )
 
-    def refined(
-        self, gradient: Array, change: float, noise: float, doubtful: bool = False, pushes: ArrayLike = ()
-    ) -> Bundle:
-        """Return the bundle after its centre was re-evaluated.
-
-        Args:
-            gradient: The centre's subgradient, shape (n,), scaled variables.
-            pushes: Multiples of gradients of equalities that it contains, shape (r,).
-        """
+    def refined(self, plane: Plane, change: float) -> Bundle:
+        """Return the bundle after its centre was re-evaluated: its plane, and the change of its value."""
         gradients, errors, noises = self.gradients.copy(), self.errors + change, self.noise.copy()
-        doubts, more = self.doubtful.copy(), self.pushes.copy()
-        gradients[0], errors[0], noises[0], doubts[0], more[0] = gradient, 0.0, noise, doubtful, pushes
-        return Bundle(gradients, errors, self.distances, self.locality, noises, doubts, more)
+        doubts, pushes = self.doubtful.copy(), self.pushes.copy()
+        errors[0], noises[0], doubts[0] = 0.0, plane.noise, plane.doubtful
+        gradients[0], pushes[0] = plane.gradient, plane.pushes
+        return Bundle(gradients, errors, self.distances, self.locality, noises, doubts, pushes)
 
     def moved(self, step: Array, change: float, locality: float, own: int = 1) -> Bundle:
         """Return the bundle seen from a new centre, whose own plane is the last one.
@@ -150,14 +155,13 @@ class Bundle:
             return self.chosen(np.concatenate([[0], np.sort(order[: room - 1])]))
         remaining = self.chosen(np.concatenate([[0], np.sort(order[: room - 2])]))
         share = weights / weights.sum()
-        return remaining.with_cut(
+        aggregate = Plane(
             share @ self.gradients,
-            float(share @ self.errors),
-            float(share @ self.distances),
-            float(share @ self.noise),
-            bool(np.any(self.doubtful & carrying)),
-            share @ self.pushes,
+            noise=float(share @ self.noise),
+            pushes=share @ self.pushes,
+            doubtful=bool(np.any(self.doubtful & carrying)),
         )
+        return remaining.with_cut(aggregate, float(share @ self.errors), float(share @ self.distances))
 
     def chosen(self, rows: NDArray[np.intp]) -> Bundle:
         """Return the bundle of some planes, given by their numbers."""

@@ -200,7 +200,7 @@ def _start(method: BundleTrust, problem: PosedProblem) -> MethodState:
     norm = planes[0].length
     t = method.first_step * problem.length / (norm or 1.0)
     locality, first = method.locality * norm / problem.length, planes[0]
-    bundle = Bundle.of_centre(first.gradient, locality, centre.error, centre.doubtful, first.pushes)
+    bundle = Bundle.of_centre(first, locality)
     bundle = with_pieces(bundle, problem, centre, centre.value, np.zeros(problem.start.size))
     radius = _RADIUS * problem.length
     trust = Trust(t, radius, _T_LEAST * t, _T_MOST * t, _RADIUS_LEAST * problem.length)
@@ -208,7 +208,7 @@ def _start(method: BundleTrust, problem: PosedProblem) -> MethodState:
     record = Record(
         0, StepKind.START, centre.value, centre.value, 0.0, t, 0.0, norm, 0.0, 1, 1, centre.error, violation
     )
-    soft = first_soft(planes, method.locality / problem.length, centre.doubtful)
+    soft = first_soft(planes, method.locality / problem.length)
     return MethodState(centre, bundle, trust, t, (record,), False, soft, np.zeros(len(problem.nonlinear)))
 
 
@@ -294,13 +294,12 @@ def _refined(problem: PosedProblem, state: MethodState, step: Step, accuracy: Ac
     centre, equal = state.centre, problem.equalities
     met = {k: replace(centre, value=centre.constraints[k], subgradient=centre.slopes[k]) for k in equal}
     evaluation = again(centre, _evaluated(problem, state, centre.x, accuracy, met))
-    planes, doubtful = merit_planes(problem, evaluation), evaluation.doubtful
-    change, first = evaluation.value - centre.value, planes[0]
+    (first, *others), change = merit_planes(problem, evaluation), evaluation.value - centre.value
     return replace(
         state,
         centre=evaluation,
-        bundle=state.bundle.refined(first.gradient, change, first.noise, doubtful, first.pushes),
-        soft=tuple(one.refined(plane, doubtful) for one, plane in zip(state.soft, planes[1:], strict=True)),
+        bundle=state.bundle.refined(first, change),
+        soft=tuple(one.refined(plane) for one, plane in zip(state.soft, others, strict=True)),
         history=recorded(problem, state, step, StepKind.REFINED, evaluation),
     )
 
@@ -368,13 +367,13 @@ def _judged(
     """Return the state after a trial that exists: a serious or a null step."""
     first, *others = merit_planes(problem, evaluation)
     change, slope = evaluation.value - state.centre.value, float(first.gradient @ step.move)
-    error, doubtful, room = slope - change, evaluation.doubtful, method.max_bundle - 1
+    error, room = slope - change, method.max_bundle - 1
     # Reduced before the cuts are added: the weights belong to the old planes, and the new ones must stay.
     bundle = state.bundle.reduced(step.weights, max(2, room - evaluation.pieces.size))
     bundle = with_pieces(bundle, problem, evaluation, state.centre.value, step.move)
-    bundle = bundle.with_cut(first.gradient, error, step.length, first.noise, doubtful, first.pushes)
+    bundle = bundle.with_cut(first, error, step.length)
     cuts = [
-        one.reduced(weights, room).with_cut(plane, step.move, doubtful)
+        one.reduced(weights, room).with_cut(plane, step.move)
         for one, weights, plane in zip(state.soft, step.soft_weights, others, strict=True)
     ]
     soft, rises = tuple(one for one, _ in cuts), [rise for _, rise in cuts]

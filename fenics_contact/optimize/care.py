@@ -42,9 +42,9 @@ def with_verified_centre(problem: PosedProblem, state: MethodState) -> MethodSta
     """
     centre = verified(problem, state.centre, state.evaluations + 1)
     planes = merit_planes(problem, centre)
-    bundle = state.bundle.refined(planes[0].gradient, 0.0, centre.error, pushes=planes[0].pushes)
+    bundle = state.bundle.refined(planes[0], 0.0)
     soft = [
-        one.refined(plane, False).without_doubtful_planes()
+        one.refined(plane).without_doubtful_planes()
         for one, plane in zip(state.soft, planes[1:], strict=True)
     ]
     trust = replace(state.trust, t=state.first_t) if state.trust.exhausted else state.trust

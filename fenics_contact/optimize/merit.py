@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize.bundle import Bundle
+from fenics_contact.optimize.bundle import Bundle, Plane
 from fenics_contact.optimize.constraints import Surroundings
 from fenics_contact.optimize.nonlinear import Scaled
 from fenics_contact.optimize.objective import Evaluation
 from fenics_contact.optimize.problem import PosedProblem
 from fenics_contact.optimize.quadratic_program import SubproblemError, shortest, unit_rows
-from fenics_contact.optimize.soft_constraint import Plane, SoftConstraint
+from fenics_contact.optimize.soft_constraint import SoftConstraint
 from fenics_contact.optimize.state import MethodState
 from fenics_contact.optimize.subproblem import Step, solve_step
 
@@ -47,8 +47,8 @@ def merit_planes(problem: PosedProblem, evaluation: Evaluation) -> list[Plane]:
     """
     gradient = evaluation.subgradient * problem.scale
     if not problem.nonlinear:
-        steepness = float(np.linalg.norm(gradient))
-        return [Plane(evaluation.value, gradient, evaluation.error, np.zeros(0), steepness)]
+        length = float(np.linalg.norm(gradient))
+        return [Plane(gradient, evaluation.value, evaluation.error, np.zeros(0), length, evaluation.doubtful)]
     here, slopes = _slopes(problem, evaluation)
     gradients, normals = np.vstack([gradient, slopes[~here.equal]]), slopes[here.equal]
     pushes: Array = np.zeros((len(gradients), len(normals)))
@@ -61,7 +61,7 @@ def merit_planes(problem: PosedProblem, evaluation: Evaluation) -> list[Plane]:
     noises = np.append(evaluation.error, (np.abs(here.factors) * evaluation.constraint_errors)[~here.equal])
     steep, along = np.linalg.norm(gradients, axis=1), gradients + pushes @ normals
     return [
-        Plane(float(values[k]), along[k], float(noises[k]), pushes[k], float(steep[k]))
+        Plane(along[k], float(values[k]), float(noises[k]), pushes[k], float(steep[k]), evaluation.doubtful)
         for k in range(len(values))
     ]
 
@@ -77,9 +77,7 @@ def with_pieces(
     for value, slope in zip(map(float, evaluation.pieces), evaluation.piece_slopes, strict=True):
         plane = merit_planes(problem, replace(evaluation, value=value, subgradient=slope))[0]
         error, length = float(plane.gradient @ move) - (value - centre), float(np.linalg.norm(move))
-        bundle = bundle.with_cut(
-            plane.gradient, error, length, plane.noise, evaluation.doubtful, plane.pushes
-        )
+        bundle = bundle.with_cut(plane, error, length)
     return bundle
 
 
@@ -90,7 +88,7 @@ def _slopes(problem: PosedProblem, evaluation: Evaluation) -> tuple[Scaled, Arra
 
 
 def first_soft(
-    planes: Sequence[Plane], locality: float, doubtful: bool, *, factor: float = 2.0
+    planes: Sequence[Plane], locality: float, *, factor: float = 2.0
 ) -> tuple[SoftConstraint, ...]:
     """Return the inequalities at the start, their penalty a multiple of the ratio of the gradients.
 
@@ -100,7 +98,7 @@ def first_soft(
     size = factor * (planes[0].steepness or 1.0)
     return tuple(
         SoftConstraint(
-            Bundle.of_centre(one.gradient, locality * one.length, one.noise, doubtful, one.pushes),
+            Bundle.of_centre(one, locality * one.length),
             one.value,
             *(2 * [size / (one.steepness or 1.0)]),
         )

@@ -7,33 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fenics_contact.optimize.bundle import Bundle
+from fenics_contact.optimize.bundle import Bundle, Plane
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Plane:
-    """Value and subgradient of one function at a point.
-
-    Attributes:
-        value: The value.
-        gradient: Subgradient, shape (n,), scaled variables.
-        noise: Error of the value.
-        pushes: Multiples of gradients of equalities that it contains, shape (r,).
-        steepness: Length of the subgradient without them.
-    """
-
-    value: float
-    gradient: Array
-    noise: float
-    pushes: Array
-    steepness: float
-
-    @property
-    def length(self) -> float:
-        """Length of the subgradient."""
-        return float(np.linalg.norm(self.gradient))
 
 
 @dataclass(frozen=True)
@@ -99,7 +75,7 @@ class SoftConstraint:
         """Return the constraint with a larger penalty."""
         return replace(self, penalty=min(factor * self.penalty, self._most))
 
-    def with_cut(self, plane: Plane, move: Array, doubtful: bool) -> tuple[SoftConstraint, Rise]:
+    def with_cut(self, plane: Plane, move: Array) -> tuple[SoftConstraint, Rise]:
         """Return the constraint with the plane of a trial point at the end, and what the point says.
 
         Args:
@@ -107,7 +83,7 @@ class SoftConstraint:
         """
         value, slope = plane.value, float(plane.gradient @ move)
         error, length = slope - (value - self.value), float(np.linalg.norm(move))
-        bundle = self.bundle.with_cut(plane.gradient, error, length, plane.noise, doubtful, plane.pushes)
+        bundle = self.bundle.with_cut(plane, error, length)
         seen = max(self.value + slope - float(bundle.measures[-1]), 0.0)
         return replace(self, bundle=bundle), Rise(
             self.penalty * (max(value, 0.0) - self.violation),
@@ -121,11 +97,9 @@ class SoftConstraint:
         shares = np.asarray(weights / (total if total > 0.0 else 1.0), dtype=np.float64)
         return replace(self, bundle=self.bundle.reduced(shares, room))
 
-    def refined(self, plane: Plane, doubtful: bool) -> SoftConstraint:
+    def refined(self, plane: Plane) -> SoftConstraint:
         """Return the constraint after its centre was re-evaluated."""
-        change = plane.value - self.value
-        bundle = self.bundle.refined(plane.gradient, change, plane.noise, doubtful, plane.pushes)
-        return replace(self, bundle=bundle, value=plane.value)
+        return replace(self, bundle=self.bundle.refined(plane, plane.value - self.value), value=plane.value)
 
     def moved(self, plane: Plane, move: Array, locality: float) -> SoftConstraint:
         """Return the constraint seen from a new centre, whose plane is the last one."""

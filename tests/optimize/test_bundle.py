@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenics_contact.optimize.bundle import Bundle
+from fenics_contact.optimize.bundle import Bundle, Plane
 from fenics_contact.optimize.constraints import feasible_set
 from fenics_contact.optimize.subproblem import solve_step
 from tests.optimize.functions import Array, crescent, maxquad
@@ -14,11 +14,11 @@ from tests.optimize.functions import Array, crescent, maxquad
 def bundle_of(fun, points: Array, locality: float = 0.0) -> Bundle:  # type: ignore[no-untyped-def]
     centre = points[0]
     value, gradient = fun(centre)
-    bundle = Bundle.of_centre(gradient, locality)
+    bundle = Bundle.of_centre(Plane(gradient), locality)
     for point in points[1:]:
         other, slope = fun(point)
         error = value - other - slope @ (centre - point)
-        bundle = bundle.with_cut(slope, error, float(np.linalg.norm(point - centre)))
+        bundle = bundle.with_cut(Plane(slope), error, float(np.linalg.norm(point - centre)))
     return bundle
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.optimize import NonlinearConstraint
-from fenics_contact.optimize.bundle import Bundle
+from fenics_contact.optimize.bundle import Bundle, Plane
 from fenics_contact.optimize.constraints import Surroundings, feasible_set
 from fenics_contact.optimize.first_centre import first_centre
 from fenics_contact.optimize.merit import correcting_step, priced_step, surroundings
@@ -16,14 +16,14 @@ from fenics_contact.optimize.subproblem import solve_step
 
 
 def soft(gradient: list[float], value: float, penalty: float = 1.0) -> SoftConstraint:
-    return SoftConstraint(Bundle.of_centre(np.array(gradient), 0.0), value, penalty, 1.0)
+    return SoftConstraint(Bundle.of_centre(Plane(np.array(gradient)), 0.0), value, penalty, 1.0)
 
 
 def around(bound: float = 9.0) -> Surroundings:
     return feasible_set(2, (-bound, bound)).around(np.zeros(2), np.ones(2))
 
 
-DOWN = Bundle.of_centre(np.array([-1.0, 0.0]), 0.0)
+DOWN = Bundle.of_centre(Plane(np.array([-1.0, 0.0])), 0.0)
 
 
 def test_a_penalty_that_is_large_enough_stays() -> None:

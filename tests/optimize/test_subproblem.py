@@ -14,7 +14,7 @@ from scipy.optimize import minimize as scipy_minimize
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.optimize import quadratic_program
-from fenics_contact.optimize.bundle import Bundle
+from fenics_contact.optimize.bundle import Bundle, Plane
 from fenics_contact.optimize.constraints import FeasibleSet, LinearConstraints, feasible_set
 from fenics_contact.optimize.quadratic_program import QuadraticProgram, SubproblemError, solve
 from fenics_contact.optimize.subproblem import solve_step
@@ -126,7 +126,7 @@ def test_planes_far_below_do_not_blur_the_step() -> None:
 
 
 def test_vanishing_subgradient_makes_no_step() -> None:
-    bundle = Bundle.of_centre(np.zeros(3), 0.0)
+    bundle = Bundle.of_centre(Plane(np.zeros(3)), 0.0)
     step = solve_step(bundle, feasible_set(3).around(np.zeros(3), np.ones(3)), 1.0)
     assert step.length == pytest.approx(0.0, abs=1e-8)
     assert step.decrease == 0.0
