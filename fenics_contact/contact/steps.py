@@ -100,7 +100,7 @@ class LoadSequence:
         except BaseException as error:
             self._task.end(error)
             raise
-        self._task.step(self._number, timed=not self._done.recalling)
+        self._task.step(self._number)
         if self._count in (None, self._number):
             self._task.end()
         return state

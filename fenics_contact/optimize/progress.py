@@ -117,7 +117,7 @@ class Progress:
             self._fun.recall({name.removeprefix(_OF_FUN): stored.pop(name) for name in names})
         state = MethodState.from_arrays(stored)
         self._written = state.evaluations
-        self._tell(state, timed=False)
+        self._tell(state)
         return state
 
     @contextmanager
@@ -139,13 +139,13 @@ class Progress:
         self.keep(state)
         safe_point(self._summary, lambda: self.keep(state, last=True), self.comm)
 
-    def _tell(self, state: MethodState, *, timed: bool = True) -> None:
+    def _tell(self, state: MethodState) -> None:
         self._state, record = state, state.history[-1]
         size = self._method.size_of(state.history[0].value) + abs(record.best)
         predicted = record.predicted_decrease / size
         words = f"violation {record.violation:.1e}" if self._constrained else ""
         measure = predicted or None
-        self._task.step(record.evaluations, measure=measure, value=record.best, words=words, timed=timed)
+        self._task.step(record.evaluations, measure=measure, value=record.best, words=words)
 
     def keep(self, state: MethodState, *, last: bool = False) -> None:
         """Write the state if that is due. Collective."""

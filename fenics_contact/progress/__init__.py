@@ -9,11 +9,17 @@ Example:
     ...     state = solve_scene(scene, comm)
 """
 
-from fenics_contact.progress.event import Event, Kind
-from fenics_contact.progress.places import at_terminal
 from fenics_contact.progress.show import show_progress
-from fenics_contact.progress.task import LOGGER_NAME, Task
-from fenics_contact.progress.words import duration, is_visible, visible
+from fenics_contact.progress.task import (
+    LOGGER_NAME,
+    Event,
+    Kind,
+    Task,
+    at_terminal,
+    duration,
+    is_visible,
+    visible,
+)
 
 __all__ = [
     "LOGGER_NAME",

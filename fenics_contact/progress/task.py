@@ -1,15 +1,24 @@
-"""A piece of work that reports its progress."""
+"""Progress of long work: events that every part of the package reports, and their display on request."""
 
 from __future__ import annotations
 
 import logging
+import math
+import os
+import re
+import sys
 from collections.abc import Callable
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from enum import Enum
+from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from fenics_contact.errors import tell
-from fenics_contact.progress.event import Event, Kind
+
+if TYPE_CHECKING:
+    pass
 
 #: Logger of all reports.
 LOGGER_NAME = "fenics_contact.progress"
@@ -17,6 +26,71 @@ LOGGER_NAME = "fenics_contact.progress"
 LISTENERS: list[Callable[[Event], None]] = []
 
 _LOGGER = logging.getLogger(LOGGER_NAME)
+
+
+class Kind(Enum):
+    """Kinds of events of a piece of work."""
+
+    BEGIN = "begins"
+    STEP = "step"
+    END = "done"
+    FAILED = "failed"
+    STOPPED = "stopped"
+
+
+@dataclass(frozen=True)
+class Event:
+    """One report. Unknown numbers are None.
+
+    Attributes:
+        task: Identifies a piece of work among those under way.
+        what: The work: "factor", "load steps".
+        kind: Kind of the event.
+        unit: Unit of the count: "products".
+        number: Number done.
+        total: Total number.
+        most: Largest number, if the total is unknown.
+        measure: Quantity that must become small: the residual.
+        target: Its target.
+        measured: Its name.
+        value: Best value so far, of an optimisation.
+        words: Further text for readers.
+    """
+
+    task: int
+    what: str
+    kind: Kind
+    unit: str = "steps"
+    number: int | None = None
+    total: int | None = None
+    most: int | None = None
+    measure: float | None = None
+    target: float | None = None
+    measured: str = "residual"
+    value: float | None = None
+    words: str = ""
+
+    def __str__(self) -> str:
+        """Return one line for readers."""
+        if self.kind is Kind.STEP:
+            return f"{self.what}: {self.details}"
+        return joined(f"{self.what}: {self.kind.value}", self.details)
+
+    @property
+    def details(self) -> str:
+        """The numbers as text."""
+        count = value = measure = ""
+        if self.number is not None:
+            unit = self.unit.removesuffix("s") if self.number == 1 else self.unit
+            count = f"{self.number} {unit}" if self.total is None else f"{self.number} of {self.total}"
+        if self.value is not None:
+            value = f"best {self.value:.6g}"
+        if self.measure is not None:
+            measure = f"{self.measured} {self.measure:.1e}"
+            if self.target is not None:
+                sign = "≤" if self.measure <= self.target else ">"
+                measure += f" {sign} {self.target:.1e}".replace(".0e", "e")
+        return joined(count, value, measure, self.words)
 
 
 class Task:
@@ -41,16 +115,7 @@ class Task:
         target: float | None = None,
         measured: str = "residual",
     ) -> None:
-        """Describe the work; nothing is reported before it begins.
-
-        Args:
-            what: Name of the work.
-            unit: Unit of the count, in the plural.
-            total: Total number, None if unknown.
-            most: Largest number.
-            target: Target of the steps' measure.
-            measured: Name of that measure.
-        """
+        """Describe the work by the attributes of an `Event`; nothing is reported before it begins."""
         self.outcome = ""
         self._event = Event(id(self), what, Kind.BEGIN, unit, None, total, most, None, target, measured)
 
@@ -65,14 +130,12 @@ class Task:
         measure: float | None = None,
         target: float | None = None,
         value: float | None = None,
-        left: float | None = None,
         words: str = "",
-        timed: bool = True,
     ) -> None:
         """Report progress by the attributes of an `Event`; a target only if it has changed."""
         if LISTENERS or _LOGGER.isEnabledFor(logging.DEBUG):
             known = {} if target is None else {"target": target}
-            given = {"measure": measure, "value": value, "left": left, "words": words, "timed": timed}
+            given = {"measure": measure, "value": value, "words": words}
             self._tell(Kind.STEP, number=number, **given, **known)
 
     def end(self, error: BaseException | None = None) -> None:
@@ -99,3 +162,171 @@ class Task:
             for listen in LISTENERS:
                 listen(event)
             tell(_LOGGER.debug, "%s", event, extra={"progress": event})
+
+
+#: Characters that a terminal interprets: control characters except newline and tab, line and paragraph
+#: separators, changes of writing direction, surrogates.
+_OBEYED = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def duration(seconds: float | None) -> str:
+    """Format a duration: 0.4 s, 8 s, 3 min, 1.5 h.
+
+    Args:
+        seconds: The duration, None if unknown.
+    """
+    if seconds is None:
+        return "?"
+    if 0.05 <= seconds < 0.95:
+        return f"{seconds:.1f} s"
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400.0 else f"{seconds / 3600:.1f} h"
+
+
+def joined(*parts: str) -> str:
+    """Join the non-empty parts by commas."""
+    return ", ".join(part for part in parts if part)
+
+
+def is_visible(text: str) -> bool:
+    """Return whether a text contains no characters that a terminal interprets."""
+    return not _OBEYED.search(text)
+
+
+def visible(text: str) -> str:
+    """Return a text with all characters that a terminal interprets as Python's escapes."""
+    return _OBEYED.sub(lambda match: match.group().encode("unicode_escape").decode("ascii"), text)
+
+
+@dataclass
+class Work:
+    """A piece of work under way: its last event, completed from earlier ones.
+
+    Attributes:
+        event: That event.
+        begun: Time of its start, [s].
+        stepped: Time of its last event, [s].
+        first: Its first measure.
+    """
+
+    event: Event
+    begun: float
+    stepped: float
+    first: float | None = None
+
+    def take(self, event: Event, moment: float) -> None:
+        """Process an event of this work."""
+        self.stepped = moment
+        if event.kind is not Kind.STEP:
+            self.event = replace(self.event, kind=event.kind, words=event.words)
+            return
+        names = ("number", "measure", "target", "value")
+        earlier = {name: getattr(self.event, name) for name in names if getattr(event, name) is None}
+        self.event = replace(event, **earlier)
+        self.first = event.measure if self.first is None else self.first
+
+    @property
+    def shows_numbers(self) -> bool:
+        """Whether there are numbers to report."""
+        return self.event.number is not None or self.event.total is not None
+
+    @property
+    def fraction(self) -> float | None:
+        """Fraction done, from 0 to 1, of the pieces or of the digits; None if unknown."""
+        event, first = self.event, self.first
+        if event.total:
+            return min((event.number or 0) / event.total, 1.0)
+        if event.measure and event.target and first is not None and first > event.target:
+            return min(max(math.log(first / event.measure) / math.log(first / event.target), 0.0), 1.0)
+        return None
+
+    @property
+    def line(self) -> str:
+        """One line about it."""
+        return f"{self.event.what}: {details}" if (details := self.event.details) else self.event.what
+
+    def summary(self) -> str:
+        """Return one line about it at its end."""
+        event = self.event
+        if event.measure is not None and event.target is not None and event.measure > event.target:
+            event = replace(event, measure=None)  # of the last step, but it ended for another reason
+        ending = "" if event.kind is Kind.END else event.kind.value
+        return f"{event.what}: {joined(ending, event.details, duration(self.stepped - self.begun))}"
+
+
+class Works:
+    """The pieces of work under way, outer ones first."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._under_way: dict[int, Work] = {}
+
+    def take(self, event: Event, moment: float) -> Work | None:
+        """Process an event at a time, [s]; return work that is over if no other is under way."""
+        if event.kind is Kind.BEGIN:
+            self._under_way.pop(event.task, None)
+        elif event.kind is not Kind.STEP and event.task not in self._under_way:
+            return None
+        work = self._under_way.setdefault(event.task, Work(replace(event, number=None), moment, moment))
+        work.take(replace(event, kind=Kind.STEP) if event.kind is Kind.BEGIN else event, moment)
+        return None if event.kind in (Kind.BEGIN, Kind.STEP) else self._ended(work)
+
+    def _ended(self, work: Work) -> Work | None:
+        del self._under_way[work.event.task]
+        if not self._under_way:
+            return work
+        outer = list(self._under_way.values())[-1]
+        if outer.event.what == work.event.what and not outer.shows_numbers:
+            # A phase and the solver within it share a name: the phase ends with the solver's numbers.
+            outer.event = replace(work.event, task=outer.event.task, kind=Kind.STEP)
+        return None
+
+    def shown(self) -> list[Work]:
+        """Return the work to report: all with numbers, and the innermost one."""
+        works = list(self._under_way.values())
+        return [work for work in works if work.shows_numbers or work is works[-1]]
+
+
+#: Programs that start ranks and forward their output.
+LAUNCHERS = {
+    "mpirun", "mpiexec", "mpiexec.hydra", "hydra_pmi_proxy", "orterun", "orted", "prterun", "prted", "srun",
+}  # fmt: skip
+
+
+def at_terminal(stream: TextIO | None) -> bool:
+    """Return whether a stream ends at a terminal that supports drawing.
+
+    The output of a rank goes to mpirun through a pipe, or through a pseudo-terminal even if mpirun's own
+    output is a file. So under mpirun its output is what counts.
+    """
+    if stream is None or os.environ.get("TERM") == "dumb":
+        return False
+    with suppress(OSError, ValueError, AttributeError):  # streams without a file descriptor decide themselves
+        launcher, descriptor = _launcher(), stream.fileno()
+        if launcher is not None and descriptor <= 2:
+            with suppress(OSError):
+                return os.readlink(f"/proc/{launcher}/fd/{descriptor}").startswith(("/dev/pts/", "/dev/tty"))
+            return False
+    with suppress(ValueError, AttributeError):
+        return stream.isatty()
+    return False
+
+
+def in_notebook() -> bool:
+    """Return whether this process is the kernel of a notebook."""
+    shell = sys.modules.get("IPython")
+    return getattr(shell and shell.get_ipython(), "kernel", None) is not None
+
+
+def _launcher() -> int | None:
+    """Return the process that started the ranks on this machine, None if this is not one of them."""
+    launcher, candidate = None, os.getppid()
+    with suppress(OSError):
+        while True:
+            status = Path(f"/proc/{candidate}/stat").read_text()
+            name, _, rest = status.partition("(")[2].rpartition(")")
+            if name not in LAUNCHERS:
+                break
+            launcher, candidate = candidate, int(rest.split()[1])
+    return launcher

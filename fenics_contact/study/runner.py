@@ -224,15 +224,14 @@ def _measure_each(jobs: Sequence[Job], store: Store, repeat: int, title: str) ->
     weights, spent = [job.weight for job in jobs], 0.0
     with Task(title, unit="runs", total=len(jobs)) as task:
         for number, job in enumerate(jobs, 1):
-            left = spent * sum(weights[number - 1 :]) / sum(weights[: number - 1]) if spent else None
-            task.step(number - 1, words=job.name, left=left)
+            task.step(number - 1, words=job.name)
             start = perf_counter()
             record = measure(job, first=repeat == 0)
             store.write(job, repeat, record)
             spent += perf_counter() - start
             left = spent * sum(weights[number:]) / sum(weights[:number])
             rest = f", {duration(left)} left" if number < len(jobs) else ""
-            task.step(number, left=left)
+            task.step(number)
             logger.info("%d/%d %s: %s%s", number, len(jobs), job.name, _outcome(record), rest)
 
 

@@ -16,7 +16,7 @@ from rich.table import Table
 from fenics_contact import cli
 from fenics_contact.io import only_run_in
 from fenics_contact.launching import clean_environment
-from fenics_contact.progress.words import is_visible
+from fenics_contact.progress import is_visible
 from tests.conftest import ROOT
 from tests.scene_file.texts import GOOD, STEPS, changed
 

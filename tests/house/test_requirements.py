@@ -18,9 +18,7 @@ import pytest
 
 from fenics_contact import _requirements
 from fenics_contact.errors import MissingRequirementError
-from fenics_contact.progress.show import _writer
-from fenics_contact.progress.works import Works
-from fenics_contact.progress.writers import Log
+from fenics_contact.progress.show import Log, _writer
 from tests.conftest import ROOT, launch
 
 LIBRARIES = ["numpy", "scipy", "clarabel", "mpi4py", "petsc4py", "dolfinx"]
@@ -284,4 +282,4 @@ def test_progress_is_told_in_lines_where_nothing_draws_bars(
 ) -> None:
     without("rich")
     monkeypatch.setattr(sys.modules[_writer.__module__], "at_terminal", lambda _: True)
-    assert isinstance(_writer(Works(), StringIO(), 1.0), Log)
+    assert isinstance(_writer(StringIO(), 1.0), Log)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from fenics_contact.progress.words import visible
+from fenics_contact.progress import visible
 from fenics_contact.scene_file import SceneFileError, read_scene_file
 from tests.scene_file.texts import GOOD, changed
 

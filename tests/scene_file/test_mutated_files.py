@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from fenics_contact.cli import main
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.progress.words import is_visible
+from fenics_contact.progress import is_visible
 from fenics_contact.scene_file import SceneFileError, read_scene_file
 from tests.scene_file.mutations import bases, mutated
 

