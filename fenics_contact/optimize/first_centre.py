@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
-from fenics_contact.optimize.evaluation import Known, evaluate_constraint, evaluate_problem
+from fenics_contact.optimize.evaluation import evaluate_constraint, evaluate_problem
 from fenics_contact.optimize.nonlinear import NonlinearConstraint, scaled_constraints
 from fenics_contact.optimize.objective import Accuracy, Evaluation
 from fenics_contact.optimize.problem import PosedProblem
@@ -22,7 +22,8 @@ def first_centre(problem: PosedProblem, subgradient: float, feasibility: float) 
         else:
             x = problem.start
             known = {k: evaluate_constraint(problem.nonlinear[k], x, 1) for k in equal}
-            _require_feasible(problem, known, feasibility)
+            constraints = tuple(problem.nonlinear[k] for k in known)
+            _refuse(constraints, [one.value for one in known.values()], feasibility)
         centre = evaluate_problem(problem, x, 1, accuracy, penalties, known)
     except InvalidDesignError as error:
         raise InvalidDesignError(f"the starting design must be valid: {error}") from error
@@ -30,11 +31,6 @@ def first_centre(problem: PosedProblem, subgradient: float, feasibility: float) 
     if not problem.restore and here.violation > feasibility:
         _refuse(problem.nonlinear, [float(value) for value in centre.constraints], feasibility)
     return centre
-
-
-def _require_feasible(problem: PosedProblem, known: Known, feasibility: float) -> None:
-    constraints = tuple(problem.nonlinear[k] for k in known)
-    _refuse(constraints, [one.value for one in known.values()], feasibility)
 
 
 def _refuse(constraints: tuple[NonlinearConstraint, ...], values: list[float], feasibility: float) -> None:

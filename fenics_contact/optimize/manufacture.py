@@ -32,7 +32,6 @@ def symmetric(design: Net, axis: int) -> LinearConstraints:
     The shape is symmetric where the reference and its parameters are.
 
     Args:
-        design: The net.
         axis: Number of the parameter, 0 or 1.
 
     Raises:
@@ -49,7 +48,6 @@ def monotone(design: Net, axis: int, sign: int = 1) -> LinearConstraints:
     The differences of neighbouring control points, which must not change sign, bound the derivative.
 
     Args:
-        design: The net.
         axis: Number of the parameter, 0 or 1.
         sign: 1 or -1.
 
@@ -70,7 +68,6 @@ def convex(design: Net, axis: int, points: Array | None = None) -> LinearConstra
     normals, see `smallest_radius`.
 
     Args:
-        design: The net.
         axis: Number of the parameter, 0 or 1.
         points: Reference coordinates of the body, shape (n_nodes, dim), for the curvature κ of the reference;
             None for a flat one.
@@ -92,7 +89,6 @@ def smallest_radius(design: Net, axis: int, radius: float, points: Array) -> Lin
     references and arcs.
 
     Args:
-        design: The net.
         axis: Number of the parameter, 0 or 1.
         radius: Smallest radius of curvature, [length].
         points: Reference coordinates of the body, shape (n_nodes, dim): ``mesh.points``.
@@ -118,7 +114,6 @@ def fixed_rim(design: Net, width: int | Sequence[int] = 1) -> LinearConstraints:
     """Hold the control points at the rim of the net, so that the surface keeps its edges.
 
     Args:
-        design: The net.
         width: Number of control points from the rim that are held; with two it keeps its tangents, too. One
             number for each direction of the net holds two opposite ends more than the others: (1, 0) only
             where the first parameter begins and ends.

@@ -70,18 +70,7 @@ def pose(
     *,
     restore: bool = False,
 ) -> PosedProblem:
-    """Check a problem and choose its scales.
-
-    Args:
-        fun: As for `minimize`.
-        x0: As for `minimize`, shape (n,).
-        bounds: As for `minimize`.
-        constraints: As for `minimize`.
-        scale: As for `minimize`.
-        restore: As for `minimize`.
-
-    Returns:
-        The checked problem; the caller's arrays are copied.
+    """Check a problem and choose its scales; the arguments are those of `minimize`, arrays are copied.
 
     Raises:
         InvalidInputError: If a shape does not fit, x0 is not finite or not feasible.

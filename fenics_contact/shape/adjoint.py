@@ -75,7 +75,6 @@ def solve_adjoint(
     objective rescales the adjoint, to rounding.
 
     Args:
-        state: A converged state.
         partials: Partial derivatives of the objective.
         linearised: Branch of the contact law.
         tolerance: Residual relative to that of the objective alone; what rounding leaves of the sums that it

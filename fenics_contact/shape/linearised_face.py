@@ -103,7 +103,6 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
     """Classify the contact points of a state and build both bases. Collective.
 
     Args:
-        state: A converged state.
         choice: Branch for weakly active points.
         coupling: If False, the growth of friction with the normal force is omitted; the derivative is then
             that of Tresca friction.

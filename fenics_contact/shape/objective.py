@@ -49,7 +49,6 @@ class Partials:
         """Return an objective of which only some derivatives do not vanish.
 
         Args:
-            state: The state.
             value: J.
             **known: Derivatives by their names, the others are zero.
         """

@@ -68,8 +68,6 @@ class ShapeProblem(SingleProblem):
 
         Args:
             contact: The problem that computes the states; its scene is the reference shape.
-            designs: The moving surfaces.
-            objective: The objective.
             choice: Branch for weakly active points.
             tolerance: Relative residual of all states, or `AdaptiveTolerance()`, with which an optimiser
                 requests the accuracy that it needs; None for that of ``contact``, or of its solver, as a

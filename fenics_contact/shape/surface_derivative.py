@@ -84,18 +84,15 @@ def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarr
         by_areas: Derivative by each nodal area, shape (n,).
     """
     if surface.whole is not None:
-        by_bearing = by_areas[surface.whole]
-        return _nodal_areas_pulled_back(surface.points, surface.whole, bearing_pulled_back(by_bearing))
+        by_nodal = bearing_pulled_back(by_areas[surface.whole])
+        return integral_pulled_back(
+            surface.points, surface.whole, lambda at: (by_nodal @ at.values, np.zeros((1, 1)))
+        )
     total = corner_products(surface.points, surface.facets).sum(axis=1)
     direction = total / np.linalg.norm(total, axis=1)[:, None]
     divisor = {2: 2, 3: 6, 4: 4}[surface.corners] * surface.corners
     by_total = by_areas[surface.facets].sum(axis=1)[:, None] * direction / divisor
     return _products_pulled_back(surface, np.repeat(by_total[:, None], surface.corners, axis=1))
-
-
-def _nodal_areas_pulled_back(points: np.ndarray, facets: np.ndarray, by_areas: np.ndarray) -> np.ndarray:
-    """Reverse of `nodal_areas`: from derivatives by the area of each node of each facet, facets' shape."""
-    return integral_pulled_back(points, facets, lambda at: (by_areas @ at.values, np.zeros((1, 1))))
 
 
 #: Returns an integrand at a Gauss point of every facet, shape (n_facets,), and its derivative by the place.

@@ -50,7 +50,7 @@ def load_work_by_shape(forms: ShapeForms, torn: TornSystem, w: np.ndarray) -> np
         body = torn.scene.bodies[load.body]
         for materials in material_sets(body):
             forms.load_by_shape(load, materials, body.mesh.cell_type)
-            if _of_position(load):
+            if callable(load.value):
                 forms.load_by_field(load, materials, body.mesh.cell_type)
 
     def on_subdomain(subdomain: Subdomain, functions: Functions) -> np.ndarray:
@@ -92,11 +92,6 @@ def _load_by_shape(
         by_values = _dolfinx.assemble_vector(form)
         result += field_by_places(torn, subdomain, load, field.function_space, by_values, forms.moving)
     return result
-
-
-def _of_position(load: Load) -> bool:
-    """Return whether a load is given as a function of position."""
-    return callable(load.value)
 
 
 def moving_loads(torn: TornSystem, moving: np.ndarray | None) -> list[Load]:
