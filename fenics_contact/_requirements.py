@@ -130,13 +130,13 @@ def load_petsc(world: MPI.Comm | None = None) -> ModuleType:
     if world is not None:
         _load(_PETSC4PY, "petsc4py").init(comm=world)
     petsc = _load(_PETSC4PY, "petsc4py.PETSc")
-    _hear_of_closed_pipes()
+    _restore_sigpipe()
     _check_petsc(_PETSC4PY, petsc)
     return petsc
 
 
-def _hear_of_closed_pipes() -> None:
-    """Let a write to a closed pipe be an error of Python again; PETSc's handler would end all ranks."""
+def _restore_sigpipe() -> None:
+    """Let writes to closed pipes raise errors of Python again: PETSc's handler would end all ranks."""
     handler = signal.getsignal(signal.SIGPIPE)
     if handler is not None and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGPIPE, handler)

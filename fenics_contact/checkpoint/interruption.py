@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from fenics_contact.errors import InvalidInputError, tell
+from fenics_contact.errors import InvalidInputError, safe_log
 
 if TYPE_CHECKING:  # the optimiser does without mpi4py
     from mpi4py import MPI
@@ -93,13 +93,13 @@ class Interruption:
         words = kept()
         message = f"stopped by {signal.Signals(number).name}" + (f": {words}" if words else "")
         if self.comm is None or self.comm.rank == 0:
-            tell(_LOG.warning, "%s", message)
+            safe_log(_LOG.warning, "%s", message)
         raise Interrupted(message, number)
 
     def _say(self, words: str, name: str) -> None:
         if self.comm is None or self.comm.rank == 0:
             # Launchers may kill the ranks a second later: report what is stored now.
-            tell(_LOG.warning, words, name, f"; so far {self._kept}" if self._kept else "")
+            safe_log(_LOG.warning, words, name, f"; so far {self._kept}" if self._kept else "")
 
 
 @contextmanager
@@ -161,5 +161,5 @@ def reporting_what_is_stored(kept: Callable[[], str], comm: MPI.Comm | None) -> 
         words = kept()
         stop.add_note(words)
         if comm is None or comm.rank == 0:
-            tell(_LOG.info, "interrupted: %s", words)
+            safe_log(_LOG.info, "interrupted: %s", words)
         raise

@@ -9,7 +9,7 @@ import numpy as np
 from fenics_contact.contact.coarse_peaks import ROUGH, coarse_peak
 from fenics_contact.contact.passing_nodes import passing_nodes
 from fenics_contact.contact.state import State
-from fenics_contact.errors import InvalidInputError, tell
+from fenics_contact.errors import InvalidInputError, safe_log
 from fenics_contact.feti import TornSystem
 from fenics_contact.mesh import computed_rounding
 from fenics_contact.pairing import ContactPoints
@@ -93,7 +93,7 @@ class ContactWarnings:
 
     def _tell(self, torn: TornSystem, pair: int, kind: str, words: str) -> None:
         if (pair, kind) not in self._told and torn.decomposition.comm.rank == 0:
-            tell(_LOG.info if kind == ROUGH else _LOG.warning, "%s", words)
+            safe_log(_LOG.info if kind == ROUGH else _LOG.warning, "%s", words)
         self._told.add((pair, kind))
 
 
@@ -180,7 +180,7 @@ def _finer_gap(torn: TornSystem) -> np.ndarray:
         return torn.finer_gap()
     except InvalidInputError as error:
         if torn.decomposition.comm.rank == 0:
-            tell(_LOG.info, "the error of the facets is not known: %s", error)
+            safe_log(_LOG.info, "the error of the facets is not known: %s", error)
         return torn.points.gap
 
 

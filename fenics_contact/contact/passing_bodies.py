@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fenics_contact.contact.state import State
-from fenics_contact.errors import tell, together
+from fenics_contact.errors import safe_log, together
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import Outline, Scene, bodies_near, outline_of, unpaired
 
@@ -46,7 +46,7 @@ class PassingBodies:
             if words := replace(part, counts=tuple(whole)).in_words():
                 self._told.add(part.bodies)
                 if comm.rank == 0:
-                    tell(_LOG.warning, "%s", words)
+                    safe_log(_LOG.warning, "%s", words)
 
     def _outline(self, scene: Scene, name: str) -> Outline:
         """Return the boundary of a body, which meshes of the same cells share."""

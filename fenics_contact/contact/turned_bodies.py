@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.errors import tell
+from fenics_contact.errors import safe_log
 from fenics_contact.mesh import BodyMesh
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class TurnedBodies:
                     "body %r has turned by %.2g rad; its material is for small rotations, %.1g of strain is "
                     "due to this alone: give it a material for large deformations, such as StVenantKirchhoff"
                 )
-                tell(_LOG.warning, words, name, angle, angle**2 / 2)
+                safe_log(_LOG.warning, words, name, angle, angle**2 / 2)
 
     def _bound(self, name: str, mesh: BodyMesh) -> float:
         """Return `_Arms.largest` of a body, computed once for a mesh."""

@@ -14,8 +14,8 @@ from fenics_contact.errors.kinds import (
     RemoteError,
     UserCodeError,
 )
-from fenics_contact.errors.telling import tell
-from fenics_contact.errors.user_code import calling, running
+from fenics_contact.errors.telling import safe_log
+from fenics_contact.errors.user_code import scene_file_code, user_code
 
 __all__ = [
     "ConvergenceError",
@@ -30,12 +30,12 @@ __all__ = [
     "RemoteError",
     "UserCodeError",
     "agree",
-    "calling",
     "collective",
     "collectively",
-    "running",
-    "tell",
+    "safe_log",
+    "scene_file_code",
     "together",
+    "user_code",
 ]
 
 for _kind in [value for value in globals().values() if isinstance(value, type)]:

@@ -17,7 +17,7 @@ from array import array
 from functools import cache
 from typing import TYPE_CHECKING, Any, cast
 
-from fenics_contact.errors.telling import tell
+from fenics_contact.errors.telling import safe_log
 
 if TYPE_CHECKING:  # these errors also report that mpi4py is missing
     from mpi4py import MPI
@@ -78,7 +78,7 @@ def _duplicated(comm: MPI.Comm) -> MPI.Comm:
         waited = time.monotonic() - begun
         if waited > PATIENCE and not warned:
             warned = True
-            tell(_LOG.warning, _WAITING, comm.rank, waited, _FIRST)
+            safe_log(_LOG.warning, _WAITING, comm.rank, waited, _FIRST)
         time.sleep(min(PAUSE * waited, LONGEST_PAUSE))
     return own
 
@@ -135,11 +135,11 @@ def exchanged(
                 return list(post.places), error
             waited = time.monotonic() - begun
             if error is not None and wait is not None and waited > wait:
-                tell(_LOG.critical, _ENDING, own.rank, where or "a collective call", exc_info=error)
+                safe_log(_LOG.critical, _ENDING, own.rank, where or "a collective call", exc_info=error)
                 own.Abort(1)
             if error is None and waited > PATIENCE and not warned:
                 warned = True
-                tell(_LOG.warning, _WAITING, own.rank, waited, where)
+                safe_log(_LOG.warning, _WAITING, own.rank, waited, where)
             time.sleep(min(PAUSE * waited, LONGEST_PAUSE))
         except BaseException as caught:
             # The exchange must end before its buffers are freed: an interrupt waits for that, but not for

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 
-def tell(log: Callable[..., None], message: str, *arguments: Any, **named: Any) -> None:
+def safe_log(log: Callable[..., None], message: str, *arguments: Any, **named: Any) -> None:
     """Log a message, whatever handlers raise.
 
     A user's handler that raises is treated as in the standard library: its traceback goes to stderr if
@@ -20,7 +20,7 @@ def tell(log: Callable[..., None], message: str, *arguments: Any, **named: Any) 
         **named: Keyword arguments of the method.
 
     Example:
-        >>> tell(logging.getLogger("fenics_contact").debug, "%d products", 3)
+        >>> safe_log(logging.getLogger("fenics_contact").debug, "%d products", 3)
     """
     try:
         log(message, *arguments, stacklevel=2, **named)

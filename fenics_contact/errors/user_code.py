@@ -10,7 +10,7 @@ from fenics_contact.errors.kinds import FenicsContactError, InvalidInputError, U
 
 
 @contextmanager
-def calling(what: str) -> Iterator[None]:
+def user_code(what: str) -> Iterator[None]:
     """Call user code: its exceptions become a `UserCodeError` that names it.
 
     An exit counts as a failure, too: a load or a material may not end a program, least of all on one rank.
@@ -23,7 +23,7 @@ def calling(what: str) -> Iterator[None]:
         UserCodeError: If the block raises; the cause is chained.
 
     Example:
-        >>> with calling("the stress of material Foam"):
+        >>> with user_code("the stress of material Foam"):
         ...     1 / 0
         Traceback (most recent call last):
         ...
@@ -39,11 +39,12 @@ def calling(what: str) -> Iterator[None]:
 
 def failure(what: str, error: BaseException) -> UserCodeError:
     """Return the exception for an error of user code."""
-    return UserCodeError(f"{what} failed with {described_error(error)}: mend it, or catch the error there")
+    reason = described_error(error)
+    return UserCodeError(f"{what} failed with {reason}: fix it, or handle the exception inside it")
 
 
 @contextmanager
-def running(what: str) -> Iterator[None]:
+def scene_file_code(what: str) -> Iterator[None]:
     """Run code that a scene file names: any exception, also an exit, is a mistake in the file.
 
     Raises:

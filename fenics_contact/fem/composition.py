@@ -9,7 +9,7 @@ import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
-from fenics_contact.errors import calling
+from fenics_contact.errors import user_code
 from fenics_contact.fem.templates import Constants, scalar_constants
 from fenics_contact.scene import Body, Material
 
@@ -79,7 +79,7 @@ def integrate(
     form = None
     for number, material in enumerate(materials):
         constants = scalar_constants(cell_type, len(material.parameters))
-        with calling(f"the UFL of material {type(material).__name__}"):
+        with user_code(f"the UFL of material {type(material).__name__}"):
             density = integrand(material, constants)
         all_constants.extend(constants)
         if density is not None:

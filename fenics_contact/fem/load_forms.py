@@ -10,7 +10,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
-from fenics_contact.errors import InvalidInputError, calling
+from fenics_contact.errors import InvalidInputError, user_code
 from fenics_contact.fem.composition import Composition, integrate
 from fenics_contact.fem.templates import Constants, scalar_constants, surface_measure, volume_measure
 from fenics_contact.scene import BodyForce, Load, Material, Pressure, ThermalStrain, Ufl, evaluate, strain
@@ -60,7 +60,7 @@ def from_ufl(load: Load, value: Ufl, cell_type: str) -> Expr:
     """Return a value given as `Ufl`, written on the template, after a check of its shape."""
     dim = _dolfinx.dimension(cell_type)
     shape = () if is_scalar(load) else (dim,)
-    with calling(f"the function given as Ufl of {type(load).__name__} on body {load.body!r}"):
+    with user_code(f"the function given as Ufl of {type(load).__name__} on body {load.body!r}"):
         result = value.function(ufl.SpatialCoordinate(_dolfinx.template(cell_type)))
         result = ufl.as_vector(list(result)) if isinstance(result, list | tuple) else ufl.as_ufl(result)
     if result.ufl_shape != shape:

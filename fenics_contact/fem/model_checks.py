@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact import _dolfinx
-from fenics_contact.errors import InvalidInputError, calling
+from fenics_contact.errors import InvalidInputError, user_code
 from fenics_contact.mesh import CELL_TYPES
 from fenics_contact.scene import Material
 
@@ -109,7 +109,7 @@ def kernel_of(material: Material, points: np.ndarray) -> np.ndarray:
         UserCodeError: If it raises.
     """
     name = type(material).__name__
-    with calling(f"the kernel of material {name}"):
+    with user_code(f"the kernel of material {name}"):
         modes = np.asarray(material.kernel(points), dtype=np.float64)
     if modes.ndim != 3 or modes.shape[:2] != points.shape or not np.isfinite(modes).all():
         raise InvalidInputError(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.errors import calling, together
+from fenics_contact.errors import together, user_code
 from fenics_contact.fem import is_scalar
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.scene import Scene, Support, SurfaceLoad, Ufl, evaluate
@@ -47,7 +47,7 @@ def _values(scene: Scene) -> dict[str, str]:
     for name, body in scene.bodies.items():
         for material in body.materials:
             kind = type(material).__name__
-            with calling(f"the parameters of material {kind}"):
+            with user_code(f"the parameters of material {kind}"):
                 numbers = np.asarray(material.parameters, dtype=np.float64)
             descriptions.update(described(numbers.tolist(), f"parameters of {kind} in body {name!r}"))
     for number, support in enumerate(scene.supports):

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.display import displayed
-from fenics_contact.errors import tell, together
+from fenics_contact.errors import safe_log, together
 from fenics_contact.fem import as_tractions
 from fenics_contact.feti.contact_rows import (
     Relations,
@@ -365,7 +365,7 @@ def _log_held(rows: Relations, fixed: np.ndarray) -> None:
     held = int(rows.held(fixed).sum())
     if held:
         words = "%d of %d friction rows are left to the supports, which hold slip there"
-        tell(_LOG.info, words, held, rows.count)
+        safe_log(_LOG.info, words, held, rows.count)
 
 
 def _own_part(

@@ -6,7 +6,7 @@ import logging
 import os
 from functools import lru_cache
 
-from fenics_contact.errors import tell
+from fenics_contact.errors import safe_log
 
 _LOG = logging.getLogger(__name__)
 
@@ -24,7 +24,7 @@ def warn_of_threads(ranks: int) -> None:
         ranks: Number of ranks.
     """
     if ranks > 1 and not any(os.environ.get(name) for name in SETTINGS):
-        tell(
+        safe_log(
             _LOG.warning,
             "%d ranks share the cores, and the BLAS of each may start threads on all of them, which can take "
             "several times as long: export OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 before Python starts",

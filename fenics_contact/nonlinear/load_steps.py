@@ -12,7 +12,7 @@ import numpy as np
 
 from fenics_contact.checks import checked
 from fenics_contact.display import displayed
-from fenics_contact.errors import ConvergenceError, InvalidInputError, tell
+from fenics_contact.errors import ConvergenceError, InvalidInputError, safe_log
 from fenics_contact.feti import TornSystem
 from fenics_contact.nonlinear.equations import Configuration, Equations, Linearisation
 from fenics_contact.nonlinear.loading import Loading
@@ -167,7 +167,7 @@ class AutomaticSteps:
                     raise
                 part *= 0.5
                 if part >= smallest:
-                    tell(_LOG.info, "load step cut to %.3g: %s", part, failure)
+                    safe_log(_LOG.info, "load step cut to %.3g: %s", part, failure)
                     continue
                 if not self.snaps:
                     raise walk.ends(
@@ -241,7 +241,7 @@ class _Walk:
         moved = (found.evaluation.at.displacement - before).reshape(-1, self._torn.dim)
         way = global_max(self._torn.numbering.comm, np.linalg.norm(moved, axis=1).max(initial=0.0))
         self._snaps.append(Snap(fraction, float(way), snapping.dissipated, snapping.stages))
-        tell(_LOG.info, "%s", self._snaps[-1])
+        safe_log(_LOG.info, "%s", self._snaps[-1])
         return self._reach(fraction, found, anew=True)
 
     def _load(self, fraction: float, at: Configuration, before: TornSystem) -> Loading:

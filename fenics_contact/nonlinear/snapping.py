@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenics_contact.display import displayed
-from fenics_contact.errors import ConvergenceError, tell
+from fenics_contact.errors import ConvergenceError, safe_log
 from fenics_contact.feti import TornSystem
 from fenics_contact.nonlinear.equations import Configuration, Equations, Linearisation
 from fenics_contact.nonlinear.loading import Drag, Loading
@@ -168,5 +168,5 @@ class Snapping:
         )
         self.dissipated += float(work)
         part = float(np.sqrt(square)) / residuals.force_scale
-        tell(_LOG.info, "stage %d of a snap: drag %.1e of the forces", self.stages, part)
+        safe_log(_LOG.info, "stage %d of a snap: drag %.1e of the forces", self.stages, part)
         return part

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.errors import InvalidDesignError, InvalidInputError, tell
+from fenics_contact.errors import InvalidDesignError, InvalidInputError, safe_log
 from fenics_contact.optimize.bundle import Bundle
 from fenics_contact.optimize.care import verified, with_verified_centre
 from fenics_contact.optimize.conclusion import conclude
@@ -186,7 +186,7 @@ class BundleTrust:
             try:
                 state, reason = _iterated(self, problem, state)
             except SubproblemError as error:
-                tell(_LOG.warning, "%s", error)
+                safe_log(_LOG.warning, "%s", error)
                 reason = Reason.STEP_FAILED
             if reason is None:
                 progress.evaluated(state)
@@ -353,7 +353,7 @@ def _advanced(
         x, known = restored(problem, x, state.evaluations + 1, method.feasibility)
         evaluation = _evaluated(problem, state, x, needed.asked, known)
     except InvalidDesignError as error:
-        tell(_LOG.info, "trial design %d is invalid: %s", state.evaluations + 1, error)
+        safe_log(_LOG.info, "trial design %d is invalid: %s", state.evaluations + 1, error)
         trust = state.trust.after_rejection(step.length)
         return replace(
             state, trust=trust, history=recorded(problem, state, step, StepKind.REJECTED, None, str(error))

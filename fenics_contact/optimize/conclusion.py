@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from fenics_contact.errors import tell
+from fenics_contact.errors import safe_log
 from fenics_contact.optimize.nonlinear import ConstraintValue
 from fenics_contact.optimize.objective import Remarked
 from fenics_contact.optimize.problem import PosedProblem
@@ -30,7 +30,7 @@ def conclude(problem: PosedProblem, state: MethodState, reason: Reason, *, raise
     )
     if isinstance(problem.fun, Remarked):
         for words in dict.fromkeys(problem.fun.remarks(centre.x.copy())):
-            tell(_LOG.warning, "at the end of the minimisation: %s", words)
+            safe_log(_LOG.warning, "at the end of the minimisation: %s", words)
     if reason.success or not raises:
         return result
     refusals = [record.note for record in state.history if record.kind is StepKind.REJECTED]

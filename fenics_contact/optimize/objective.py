@@ -10,7 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fenics_contact.errors import InvalidDesignError, InvalidInputError, tell
+from fenics_contact.errors import InvalidDesignError, InvalidInputError, safe_log
 
 Array = NDArray[np.float64]
 Fun = Callable[[Array], tuple[float, ArrayLike]]
@@ -203,7 +203,7 @@ def with_gradient_near(
     try:
         gradient = fun.gradient_near(evaluation.x.copy(), end.copy())
     except InvalidDesignError as error:
-        tell(_LOG.warning, "the subgradient of evaluation %d may be invalid: %s", number, error)
+        safe_log(_LOG.warning, "the subgradient of evaluation %d may be invalid: %s", number, error)
         return replace(evaluation, doubtful=False)
     checked = _checked((evaluation.value, gradient), evaluation.x, f"near evaluation {number}", name)
     return replace(evaluation, subgradient=checked.subgradient, doubtful=False)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fenics_contact.errors import InvalidInputError, tell
+from fenics_contact.errors import InvalidInputError, safe_log
 from fenics_contact.optimize.bundle import Bundle
 from fenics_contact.optimize.constraints import Surroundings
 from fenics_contact.optimize.quadratic_program import (
@@ -127,7 +127,7 @@ def _solved(model: Model, t: float, lengths: Array) -> tuple[Step, float]:
         try:
             return _step(model, _solution(model, t, unit), t, unit), unit
         except SubproblemError as error:
-            tell(_LOG.debug, "step's programme not solved in units of %g: %s", unit, error)
+            safe_log(_LOG.debug, "step's programme not solved in units of %g: %s", unit, error)
     return _step(model, _solution(model, t, units[-1]), t, units[-1]), units[-1]
 
 

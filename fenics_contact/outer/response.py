@@ -17,10 +17,10 @@ from fenics_contact.errors import (
     InfeasibleError,
     InvalidDesignError,
     InvalidInputError,
-    calling,
     collective,
     collectively,
     together,
+    user_code,
 )
 from fenics_contact.outer.answer import Answer
 from fenics_contact.qp import DualSolver
@@ -214,7 +214,7 @@ class SceneResponse(Response):
         return tuple(self._of_state)
 
     def _answer(self, values: dict[str, float]) -> tuple[dict[str, float], dict[str, np.ndarray], int]:
-        with together(self.comm), calling("the function that builds the scene of a response"):
+        with together(self.comm), user_code("the function that builds the scene of a response"):
             scene = self._build(**values)
         with together(self.comm):
             if self._problem is None:

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._libraries import MPI
-from fenics_contact.errors import InvalidInputError, tell, together
+from fenics_contact.errors import InvalidInputError, safe_log, together
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.mesh import computed_rounding, coordinate_rounding
 from fenics_contact.pairing.contact_points import (
@@ -172,7 +172,7 @@ def _measured(
                 warn_of_edge(pair, slave.surface, held, master.surface, comm)
         points = replace(points, symmetric=_symmetric(points, slave, master))
     if comm.rank == 0 and not movable.all():
-        tell(
+        safe_log(
             _LOG.info,
             "%d of %d nodes of %s %d are left out as supports hold them in all directions",
             np.count_nonzero(~movable), len(movable), type(pair).__name__, index,
@@ -213,7 +213,7 @@ def _by_projection(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.C
 
 def _tell_of_lost(places: np.ndarray, count: int) -> None:
     where = ", ".join(f"{x:.6g}" for x in places[0])
-    tell(
+    safe_log(
         _LOG.warning,
         "%d of %d slave nodes face their master, but no point of it was found for them, the first at (%s): "
         "nothing keeps them out of it; refine the master there, or let the other surface be the slave",

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.errors import InvalidDesignError, tell, together
+from fenics_contact.errors import InvalidDesignError, safe_log, together
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.mesh import computed_rounding
 from fenics_contact.pairing.contact_points import ContactPoints
@@ -78,9 +78,9 @@ def _tell_of_adjusted(pair: ContactPair, near: np.ndarray, measured: np.ndarray)
             _LOG.info,
             "%d of %d points of %s lie within %g of the master and get the gap of the pair",
         )
-        tell(log, words, np.count_nonzero(near), len(near), pair.place, pair.adjust)
+        safe_log(log, words, np.count_nonzero(near), len(near), pair.place, pair.adjust)
         return
-    tell(
+    safe_log(
         _LOG.warning,
         "no point of %s lies within adjust=%g of the master, the nearest has a distance of %.3g: nothing is "
         "put in touch; give a larger adjust, or move the bodies",

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.display import counted
-from fenics_contact.errors import tell
+from fenics_contact.errors import safe_log
 from fenics_contact.pairing.contact_points import HELD, ContactPoints
 from fenics_contact.scene import ContactPair, Scene, Surface, Tie
 
@@ -190,7 +190,7 @@ def _tell(words: str, lost: _Side, kept: _Side) -> None:
     (pairs, points, one), (others, those, other) = lost, kept
     for here, there, which in _by_pairs(points.pair[one], those.pair[other]):
         left_out = counted(len(np.unique(one[which])), "node")
-        tell(_LOG.info, words, pairs[here].place, left_out, others[there].place)
+        safe_log(_LOG.info, words, pairs[here].place, left_out, others[there].place)
 
 
 def _by_pairs(left: np.ndarray, right: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:

@@ -7,7 +7,7 @@ import logging
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.errors import tell
+from fenics_contact.errors import safe_log
 from fenics_contact.scene import Scene, Surface
 from fenics_contact.surfaces import FacetedSurface, Geometry
 
@@ -35,7 +35,7 @@ def warn_of_surface(
     if comm.rank > 0:
         return
     if away is not None and (off := np.count_nonzero(away > ON_SHAPE)):
-        tell(
+        safe_log(
             _LOG.warning,
             "%d of %d nodes of %s lie off its shape, %s, by up to %.3g of an edge: gaps are measured "
             "from the nodes where they are; move them onto the shape, or correct it",
@@ -43,7 +43,7 @@ def warn_of_surface(
         )  # fmt: skip
     flattened = 0 if faceted.relief is None else faceted.relief.flattened
     if flattened:
-        tell(
+        safe_log(
             _LOG.warning,
             "%d of %d facets of %s stay flat, as the surface that their nodes suggest has cusps there or "
             "folds: refine the mesh there, give the surface its shape, or take geometry='faceted'",

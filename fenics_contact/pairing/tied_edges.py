@@ -7,7 +7,7 @@ import logging
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.errors import tell
+from fenics_contact.errors import safe_log
 from fenics_contact.pairing.shared_projection import shared_projection
 from fenics_contact.scene import Tie
 from fenics_contact.surfaces import FacetedSurface, shape_functions
@@ -43,7 +43,7 @@ def warn_of_edge(
     crossed = off & some[hit.facet]
     share = master.areas[hit.point[crossed]].sum() / max(master.areas[hit.point].sum(), np.finfo(float).tiny)
     if share > 0.0 and comm.rank == 0:
-        tell(
+        safe_log(
             _LOG.warning,
             "the tie of %s is by nodes, and the master ends within %d of %d facets of the slave that meet "
             "it: only some of their nodes are tied, %.2g %% of the master's surface lies under them, and "

@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import cg
 
 from fenics_contact._libraries import MPI
-from fenics_contact.errors import tell, together
+from fenics_contact.errors import safe_log, together
 from fenics_contact.pairing.shared_projection import shared_projection
 from fenics_contact.scene import ContactPair, Scene, Tie, master_share
 from fenics_contact.surfaces import FacetedSurface, Projection, bearing_areas, nodal_areas, node_weights
@@ -57,7 +57,7 @@ def warn_of_uneven_pressure(
             return
         swapped = unevenness(master, back, slave, there, 1.0 - share)
     better = "swap them" if swapped < error else "it would not help to swap them"
-    tell(
+    safe_log(
         _LOG.warning,
         "%s are by nodes, of quadratic cells, and their meshes do not match: where a pressure is uniform, "
         "that of single nodes is off by up to about %.0f %%, and by %.0f %% with slave and master swapped: "

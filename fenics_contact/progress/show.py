@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TextIO
 
-from fenics_contact.errors import tell
+from fenics_contact.errors import safe_log
 from fenics_contact.progress.task import (
     LISTENERS,
     LOGGER_NAME,
@@ -100,7 +100,7 @@ class Log:
 
     def leave(self, line: str) -> None:
         """Log the outcome."""
-        tell(logging.getLogger(LOGGER_NAME).info, "%s", line)
+        safe_log(logging.getLogger(LOGGER_NAME).info, "%s", line)
 
     def stop(self) -> None:
         """Do nothing."""

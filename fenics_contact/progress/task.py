@@ -15,7 +15,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TextIO
 
-from fenics_contact.errors import tell
+from fenics_contact.errors import safe_log
 
 if TYPE_CHECKING:
     pass
@@ -161,7 +161,7 @@ class Task:
             event = replace(self._event, kind=kind, **attributes)
             for listen in LISTENERS:
                 listen(event)
-            tell(_LOGGER.debug, "%s", event, extra={"progress": event})
+            safe_log(_LOGGER.debug, "%s", event, extra={"progress": event})
 
 
 #: Characters that a terminal interprets: control characters except newline and tab, line and paragraph

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from fenics_contact.checks import checked
 from fenics_contact.display import displayed
-from fenics_contact.errors import InvalidInputError, tell
+from fenics_contact.errors import InvalidInputError, safe_log
 from fenics_contact.mesh import BodyMesh, boundary_faces, corners_of, near_surfaces
 from fenics_contact.scene.approach import master_share
 from fenics_contact.scene.body import Body
@@ -109,7 +109,7 @@ class AutomaticContact(Sequence[ContactPair]):
         for whole in (Surface(name, "boundary") for name in self.self_contact):
             pairs += (ContactPair(whole, whole, self.friction, geometry=self.geometry),)
         words = "%d contact pairs are found within a distance of %.4g: %s"
-        tell(_LOG.info, words, len(pairs), distance, "; ".join(pair.place for pair in pairs))
+        safe_log(_LOG.info, words, len(pairs), distance, "; ".join(pair.place for pair in pairs))
         return bodies, pairs
 
     def _with_boundary(self, meshes: dict[str, BodyMesh], name: str) -> BodyMesh:

@@ -9,7 +9,7 @@ import numpy as np
 
 from fenics_contact.checks import brief, checked
 from fenics_contact.display import displayed
-from fenics_contact.errors import InvalidInputError, calling
+from fenics_contact.errors import InvalidInputError, user_code
 from fenics_contact.mesh import CELL_TYPES, BodyMesh
 from fenics_contact.scene.materials import HistoryMaterial, Material, has_mean_dilatation, is_finite_strain
 
@@ -79,7 +79,7 @@ def _check_regions(mesh: BodyMesh, materials: Mapping[str, Material]) -> None:
 def _check_material(material: Material, dim: int) -> None:
     name = type(material).__name__
     needed = ("dims", "parameters", "stress", "stiffness", "kernel")
-    with calling(f"reading {', '.join(needed)} of material {name}"):
+    with user_code(f"reading {', '.join(needed)} of material {name}"):
         missing = [part for part in needed if not hasattr(material, part)]
     if missing:
         raise InvalidInputError(

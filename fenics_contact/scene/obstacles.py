@@ -10,7 +10,7 @@ import numpy as np
 
 from fenics_contact.checks import checked
 from fenics_contact.display import displayed
-from fenics_contact.errors import InvalidInputError, calling
+from fenics_contact.errors import InvalidInputError, user_code
 from fenics_contact.surface_shapes import (
     Cylinder,
     Plane,
@@ -97,7 +97,7 @@ class MovingObstacle:
             InvalidInputError: If the path returns anything else.
             UserCodeError: If it raises.
         """
-        with calling("the path of MovingObstacle"):
+        with user_code("the path of MovingObstacle"):
             rotation, translation = self.path(time)
             shift = np.asarray(translation, dtype=np.float64)
             turn = np.eye(shift.size) if rotation is None else np.asarray(rotation, dtype=np.float64)

@@ -10,7 +10,7 @@ import numpy as np
 
 from fenics_contact.checks import checked
 from fenics_contact.display import displayed
-from fenics_contact.errors import InvalidInputError, calling
+from fenics_contact.errors import InvalidInputError, user_code
 from fenics_contact.scene.loads import Load
 from fenics_contact.scene.rigid_surfaces import AnySupport
 from fenics_contact.scene.scene import Scene
@@ -96,9 +96,9 @@ class LoadStep:
         time: float,
     ) -> Scene:
         if callable(loads):
-            with calling(f"the loads of LoadStep {self.name!r} at time {time:g}"):
+            with user_code(f"the loads of LoadStep {self.name!r} at time {time:g}"):
                 loads = tuple(loads(time))
         if callable(supports):
-            with calling(f"the supports of LoadStep {self.name!r} at time {time:g}"):
+            with user_code(f"the supports of LoadStep {self.name!r} at time {time:g}"):
                 supports = tuple(supports(time))
         return replace(scene, loads=loads, supports=supports)

@@ -10,7 +10,7 @@ import numpy as np
 from ufl.core.expr import Expr
 
 from fenics_contact.checks import checked
-from fenics_contact.errors import InvalidInputError, calling
+from fenics_contact.errors import InvalidInputError, user_code
 
 #: A function of points, shape (n, dim), [length], with a row (a vector) or a number (a scalar) for each.
 OfPosition = Callable[[np.ndarray], np.ndarray]
@@ -99,7 +99,7 @@ def evaluate(name: str, function: OfPosition, points: np.ndarray, shape: tuple[i
         InvalidInputError: If it returns another shape or something other than finite numbers.
         UserCodeError: If it raises.
     """
-    with calling(f"the function given as {name}"):
+    with user_code(f"the function given as {name}"):
         values = finite_numbers(function(points.copy()))
     wanted = (len(points), *shape)
     if values is None or values.shape != wanted:

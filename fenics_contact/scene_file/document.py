@@ -20,7 +20,7 @@ from fenics_contact.scene_file.places import as_toml, branches, written
 from fenics_contact.scene_file.solver import SolverPart
 from fenics_contact.scene_file.source import Source
 from fenics_contact.scene_file.steps import StepPart
-from fenics_contact.scene_file.values import PlaceOfFile, Read, said
+from fenics_contact.scene_file.values import PlaceOfFile, Read, with_message
 
 FileKind: TypeAlias = Literal["vtu", "vtx", "xdmf"]
 DesignFileKind: TypeAlias = Literal["csv", "stl", "step"]
@@ -28,7 +28,7 @@ PictureKind: TypeAlias = Literal["stress", "pressure", "status", "decomposition"
 _ByRegion = Annotated[dict[str, str], Field(min_length=1)]
 Materials: TypeAlias = Annotated[
     Any,
-    Read(Annotated[str | _ByRegion, said("the name of a material, or a table: region = material")]),
+    Read(Annotated[str | _ByRegion, with_message("the name of a material, or a table: region = material")]),
 ]
 
 

@@ -9,7 +9,7 @@ from pydantic import Discriminator, Field, Tag
 
 from fenics_contact import mesh_io
 from fenics_contact.scene_file.part import Part, keys_of
-from fenics_contact.scene_file.values import MARK, Read, one_of, said
+from fenics_contact.scene_file.values import MARK, Read, one_of, with_message
 
 
 @keys_of(mesh_io.InBox)
@@ -40,14 +40,15 @@ def _either(kind: type, this: Any, other: Any) -> Any:
 
 
 _LABEL = Annotated[
-    str | int, said("the name or number of a group or face, a list of them, or a table that chooses faces")
+    str | int,
+    with_message("the name or number of a group or face, a list of them, or a table that chooses faces"),
 ]
 _ONE: Any = _either(dict, Annotated[Any, one_of("faces", InBox, OnPlane, OnCylinder)], _LABEL)
 _SEVERAL = Annotated[list[Annotated[Any, Read(_ONE)]], Field(min_length=1, strict=False)]
 _LIST = Annotated[
     list[str | int],
     Field(min_length=1, strict=False),
-    said("a list of groups, or a table: surface = group, or surface = [groups]"),
+    with_message("a list of groups, or a table: surface = group, or surface = [groups]"),
 ]
 _OF_SURFACES = dict[str, Annotated[Any, Read(_either(list, _SEVERAL, _ONE))]]
 #: A list of groups, or surface to group, groups, or tables that choose faces.

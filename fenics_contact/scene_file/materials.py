@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
 
 from fenics_contact import scene
-from fenics_contact.errors import InvalidInputError, running
+from fenics_contact.errors import InvalidInputError, scene_file_code
 from fenics_contact.scene import Material
 from fenics_contact.scene_file.own_python import is_reference, load
 from fenics_contact.scene_file.part import Part, keys_of
@@ -144,7 +144,7 @@ class OwnMaterial(Part):
             InvalidInputError: If the class does not exist or does not take these parameters.
         """
         kind = load(self.model, folder)
-        with running(f"{self.model!r} with the parameters {sorted(self.parameters)}"):
+        with scene_file_code(f"{self.model!r} with the parameters {sorted(self.parameters)}"):
             try:
                 return kind(**self.parameters)
             except TypeError as error:

@@ -13,7 +13,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene_file.face_choices import SurfaceGroups, by_place, made_choice
 from fenics_contact.scene_file.placing import Placed, Shaped
-from fenics_contact.scene_file.values import PlaceOfFile, Read, said
+from fenics_contact.scene_file.values import PlaceOfFile, Read, with_message
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -29,7 +29,7 @@ BodyGroups: TypeAlias = Annotated[
     Read(
         Annotated[
             _Labels | _OfBodies,
-            said(
+            with_message(
                 "a list of groups, or a table: body = group, body = [groups], or body = {region = group}, "
                 "where a group is a name or a number"
             ),

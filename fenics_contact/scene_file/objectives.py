@@ -10,7 +10,7 @@ from pydantic import Discriminator, Field, Tag
 from fenics_contact import shape
 from fenics_contact.scene_file.own_python import is_reference
 from fenics_contact.scene_file.part import Part, keys_of
-from fenics_contact.scene_file.values import MARK, Read, Vector, one_of, said
+from fenics_contact.scene_file.values import MARK, Read, Vector, one_of, with_message
 from fenics_contact.shape import Objective
 
 _Exponent: TypeAlias = Annotated[float, Field(ge=2, le=100)]
@@ -103,7 +103,7 @@ class MovementPart(ObjectivePart):
     """The mean displacement of a surface along a direction, or that of a node."""
 
     kind: Literal["movement"]
-    at: Annotated[str | int, said("the name of a surface in quotes, or the number of a node")]
+    at: Annotated[str | int, with_message("the name of a surface in quotes, or the number of a node")]
     direction: Vector
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fenics_contact.checks import require_file
-from fenics_contact.errors import InvalidInputError, running
+from fenics_contact.errors import InvalidInputError, scene_file_code
 
 _NOTHING = object()
 
@@ -38,7 +38,7 @@ def load(reference: str, folder: Path) -> Any:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[module_name] = module  # dataclasses of the file are looked up there
-    with running(f"the Python file '{path}'"):
+    with scene_file_code(f"the Python file '{path}'"):
         spec.loader.exec_module(module)
         loaded = getattr(module, name, _NOTHING)
     if loaded is _NOTHING:

@@ -16,7 +16,7 @@ from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG, Smalse
 from fenics_contact.scene import Scene, choose_solver
 from fenics_contact.scene_file.newton import NewtonPart
 from fenics_contact.scene_file.part import Part
-from fenics_contact.scene_file.values import Read, said
+from fenics_contact.scene_file.values import Read, with_message
 
 if TYPE_CHECKING:
     from fenics_contact.contact import Tolerance
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 BALANCED = "balanced"
 
 
-_TOLERANCES = said(f'a number between 0 and 1, or "{BALANCED}"')
+_TOLERANCES = with_message(f'a number between 0 and 1, or "{BALANCED}"')
 _Tolerance = Annotated[Annotated[float, Field(gt=0, lt=1)] | Literal["balanced"], _TOLERANCES]
 _Boxes = Annotated[list[PositiveInt], Field(min_length=2, max_length=3, strict=False), AfterValidator(tuple)]
 _ByBody = Annotated[dict[str, PositiveInt | _Boxes], Field(min_length=1)]
-_CUTS = said(
+_CUTS = with_message(
     '"auto", a positive integer, three integers in brackets (boxes of a structured mesh; two in the plane), '
     "or a table: body = integer or boxes"
 )

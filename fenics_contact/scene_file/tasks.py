@@ -10,7 +10,7 @@ import numpy as np
 
 from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.contact import ContactProblem
-from fenics_contact.errors import InvalidInputError, running, together
+from fenics_contact.errors import InvalidInputError, scene_file_code, together
 from fenics_contact.optimize import (
     BundleTrust,
     Callback,
@@ -136,7 +136,7 @@ def _objective(name: Any, source: Source) -> Objective:
     if not is_reference(name):
         return objective_of(name)
     given: Any = load(name, source.folder)
-    with running(f"objective {name!r}"):
+    with scene_file_code(f"objective {name!r}"):
         missing = [part for part in ("value", "partials") if not hasattr(given, part)]
     if missing or isinstance(given, type):
         raise InvalidInputError(

@@ -50,12 +50,12 @@ class Read:
         return handler.generate_schema(self.annotation)
 
 
-def needs(needed: str) -> PydanticCustomError:
+def needed_error(needed: str) -> PydanticCustomError:
     """Return the error of a value that does not meet ``needed``."""
     return PydanticCustomError("needed", "must be {needed}", {"needed": needed})
 
 
-def said(needed: str) -> WrapValidator:
+def with_message(needed: str) -> WrapValidator:
     """Report what is ``needed`` for a rejected value, unless a formula in it has its own message."""
 
     def check(value: Any, handler: Callable[[Any], Any]) -> Any:
@@ -64,7 +64,9 @@ def said(needed: str) -> WrapValidator:
         except ValidationError as error:
             contexts = (each["ctx"] for each in error.errors() if each["type"] == "sentence")
             sentence = next(contexts, None)
-            raise PydanticCustomError("sentence", "{sentence}", sentence) if sentence else needs(needed)
+            raise (
+                PydanticCustomError("sentence", "{sentence}", sentence) if sentence else needed_error(needed)
+            )
 
     return WrapValidator(check)
 
@@ -107,7 +109,7 @@ def one_of(
 def _row(kind: Any, least: int, most: int | None, needed: str) -> Read:
     """Read a list with a given number of entries as a tuple."""
     length = Field(min_length=least, max_length=most, strict=False)
-    return Read(Annotated[list[kind], length, AfterValidator(tuple), said(needed)])
+    return Read(Annotated[list[kind], length, AfterValidator(tuple), with_message(needed)])
 
 
 def _formula(text: str) -> Expression:
@@ -120,10 +122,10 @@ def _formula(text: str) -> Expression:
 def _place_of_file(value: str) -> str:
     """Check a path without testing whether it exists."""
     if not value.strip():
-        raise needs("the path of a file or folder, in quotes")
+        raise needed_error("the path of a file or folder, in quotes")
     longest = max(len(os.fsencode(part)) for part in value.split("/"))
     if longest > LONGEST_NAME or len(os.fsencode(value)) > LONGEST_PATH:
-        raise needs(
+        raise needed_error(
             f"a path of at most {LONGEST_PATH} bytes in which no name has more than {LONGEST_NAME} bytes"
         )
     return value
@@ -155,7 +157,7 @@ CountPair: TypeAlias = Annotated[tuple[int, int], _row(_COUNT, 2, 2, f"two {_COU
 #: Number of control points along a curve, or along both directions of a surface.
 Net: TypeAlias = Annotated[
     _COUNT | CountPair,
-    said(f"an integer from 1 to {MOST} for a curve, or two in brackets for a surface"),
+    with_message(f"an integer from 1 to {MOST} for a curve, or two in brackets for a surface"),
 ]
 CountTriple: TypeAlias = Annotated[tuple[int, int, int], _row(_COUNT, 3, 3, f"three {_COUNTS}")]
 Names: TypeAlias = Annotated[tuple[str, ...], _row(str, 0, None, "names in quotes, in brackets")]
@@ -166,25 +168,31 @@ Row: TypeAlias = Annotated[
 Formula: TypeAlias = Annotated[Any, Read(Annotated[str, AfterValidator(_formula)])]
 _FIELD = "or a table {file = ..., field = ...}"
 #: A number or a formula in x, y, z; a formula becomes an `Expression`, a free component None.
-Scalar: TypeAlias = Annotated[float | Formula, said("a finite number, or a formula in x, y and z in quotes")]
+Scalar: TypeAlias = Annotated[
+    float | Formula, with_message("a finite number, or a formula in x, y and z in quotes")
+]
 #: A number, a formula or a field from a file.
 ScalarField: TypeAlias = Annotated[
-    float | Formula | FieldFile, said(f"a finite number, a formula in x, y and z in quotes, {_FIELD}")
+    float | Formula | FieldFile, with_message(f"a finite number, a formula in x, y and z in quotes, {_FIELD}")
 ]
 #: The same for what cannot be negative.
 NotNegativeField: TypeAlias = Annotated[
     Annotated[float, Field(ge=0)] | Formula | FieldFile,
-    said(f"a number of at least 0, a formula in x, y and z in quotes, {_FIELD}"),
+    with_message(f"a number of at least 0, a formula in x, y and z in quotes, {_FIELD}"),
 ]
 FieldOrMeasured: TypeAlias = Annotated[
     Literal["measured"] | Annotated[float, Field(ge=0)] | Formula | FieldFile,
-    said(f"'measured', a number of at least 0, a formula in x, y and z in quotes, {_FIELD}"),
+    with_message(f"'measured', a number of at least 0, a formula in x, y and z in quotes, {_FIELD}"),
 ]
 _FREE = Annotated[Literal["free"], AfterValidator(lambda _: None)]
 _OF_LOAD = f"three numbers or formulas {_AXES}, {_FIELD}"
 VectorOrFormulas: TypeAlias = Annotated[
     Any,
-    Read(Annotated[_row(float | Formula | FieldFile, 2, 3, _OF_LOAD).annotation | FieldFile, said(_OF_LOAD)]),
+    Read(
+        Annotated[
+            _row(float | Formula | FieldFile, 2, 3, _OF_LOAD).annotation | FieldFile, with_message(_OF_LOAD)
+        ]
+    ),
 ]
 _HELD = f"three numbers, formulas or '{FREE}' {_AXES}, or tables {{file = ..., field = ...}} among them"
 Components: TypeAlias = Annotated[Any, _row(float | _FREE | Formula | FieldFile, 2, 3, _HELD)]
@@ -203,8 +211,8 @@ Motion: TypeAlias = Annotated[
         "them (in the plane three: along x and y, rotation)",
     ),
 ]  # fmt: skip
-_LOAD = said(
+_LOAD = with_message(
     f"a number or a formula, or two or three of them in brackets, {_FIELD}, like the load's own value"
 )
 LoadValue: TypeAlias = Annotated[Any, Read(Annotated[float | Formula | VectorOrFormulas | FieldFile, _LOAD])]
-Line: TypeAlias = Annotated[str, Field(pattern=r"^[^\n\r]*$"), said("one line of text in quotes")]
+Line: TypeAlias = Annotated[str, Field(pattern=r"^[^\n\r]*$"), with_message("one line of text in quotes")]

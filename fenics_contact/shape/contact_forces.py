@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fenics_contact.contact import ContactResult, State
-from fenics_contact.errors import InvalidInputError, calling, together
+from fenics_contact.errors import InvalidInputError, together, user_code
 from fenics_contact.shape.forms import ShapeForms
 from fenics_contact.shape.objective import Partials
 from fenics_contact.shape.sums import Weighable
@@ -43,7 +43,7 @@ class ContactForces(Weighable):
             return _finite(self._asked(state)[0])[0]
 
     def _asked(self, state: State) -> tuple[float, np.ndarray, np.ndarray]:
-        with calling("ContactForces.function"):
+        with user_code("ContactForces.function"):
             value, normal, tangential = self.function(state.contact)
             return float(value), np.asarray(normal), np.asarray(tangential)
 

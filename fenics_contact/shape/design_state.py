@@ -11,7 +11,7 @@ from fenics_contact.errors import (
     InfeasibleError,
     InvalidDesignError,
     InvalidInputError,
-    tell,
+    safe_log,
 )
 from fenics_contact.scene import Scene
 
@@ -47,7 +47,7 @@ def design_state(
     except ConvergenceError as error:
         if start is None:
             raise
-        tell(logger.warning, "a warm start failed, a cold one follows: %s", error)
+        safe_log(logger.warning, "a warm start failed, a cold one follows: %s", error)
     try:
         return solve(start=None)
     except (ConvergenceError, InfeasibleError) as error:

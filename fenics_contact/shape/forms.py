@@ -12,7 +12,7 @@ from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI
-from fenics_contact.errors import calling
+from fenics_contact.errors import user_code
 from fenics_contact.fem import (
     Constants,
     Symbol,
@@ -142,7 +142,7 @@ class ShapeForms:
             stress_of = stress_in_space if density.in_space else stress_left
 
             def write_density(material: Material, constants: Constants) -> Expr:
-                with calling(f"the integrand of {density.name!r}"):
+                with user_code(f"the integrand of {density.name!r}"):
                     return density.integrand(u, x, stress_of(material, u, constants, change), *own)
 
             form, constants = integrate(materials, cell_type, write_density, volume_measure(cell_type, 2))

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact._libraries import MPI
-from fenics_contact.errors import InvalidInputError, calling, together
+from fenics_contact.errors import InvalidInputError, together, user_code
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import Scene, Surface, keeping_discretisation
 from fenics_contact.shape.design import SurfaceDesign
@@ -34,7 +34,7 @@ def meshed(
     made: dict[str, BodyMesh] = {}
     with together(comm):
         if comm.rank == 0:
-            with calling("the mesher of a design"):
+            with user_code("the mesher of a design"):
                 made = {name: mesher(scene.bodies[name].mesh) for name in names}
             given = _with_given_gaps(scene)
             made = {name: _from_origin(scene, name, mesh, given) for name, mesh in made.items()}

@@ -11,7 +11,7 @@ import numpy as np
 from fenics_contact._libraries import MPI
 from fenics_contact.contact import ContactProblem, State
 from fenics_contact.display import displayed
-from fenics_contact.errors import InvalidInputError, collectively, tell
+from fenics_contact.errors import InvalidInputError, collectively, safe_log
 from fenics_contact.fingerprint import described
 from fenics_contact.scene import Scene
 from fenics_contact.shape.beside import with_fewest_weak_points
@@ -310,7 +310,7 @@ class ShapeProblem(SingleProblem):
         # Ranks must take the same decisions, whatever the rounding in sums over ranks.
         value, gradient, error = self.comm.bcast((value, gradient, error))
         finite("gradient", gradient)
-        tell(logger.info, "J = %.9g ± %.1e, %d products", value, error.size, before + spent)
+        safe_log(logger.info, "J = %.9g ± %.1e, %d products", value, error.size, before + spent)
         return DesignPoint(
             alpha=np.array(alpha, dtype=float), value=value, gradient=gradient, state=state,
             weak=linearised.weak, adjoint_iterations=spent, tolerance=tolerance,

@@ -11,7 +11,7 @@ import numpy as np
 
 from fenics_contact.contact import State
 from fenics_contact.display import displayed
-from fenics_contact.errors import InvalidDesignError, InvalidInputError, tell
+from fenics_contact.errors import InvalidDesignError, InvalidInputError, safe_log
 from fenics_contact.mesh import BodyMesh, jacobians
 from fenics_contact.scene import Scene
 from fenics_contact.shape.design import checked_variables
@@ -223,7 +223,7 @@ class Remeshed(SingleProblem):
         self._add(k, origin)
         after = self.problems[-1].value_of(np.zeros(self.size))
         self.remeshings.append(Remeshing(origin, before, after))
-        tell(logger.info, "mesh %d: J = %.9g, %.9g before", len(self.remeshings), after, before)
+        safe_log(logger.info, "mesh %d: J = %.9g, %.9g before", len(self.remeshings), after, before)
         return len(self.problems) - 1
 
     def _add(self, k: int, origin: np.ndarray) -> None:

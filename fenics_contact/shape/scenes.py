@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fenics_contact.contact import ContactProblem
-from fenics_contact.errors import InvalidDesignError, InvalidInputError, tell
+from fenics_contact.errors import InvalidDesignError, InvalidInputError, safe_log
 from fenics_contact.linalg import LAST_PLACES
 from fenics_contact.scene import HistoryMaterial, Scene, has_mean_dilatation
 from fenics_contact.shape.memory import DesignPoint
@@ -67,7 +67,7 @@ def require_influence(
     way = np.random.default_rng(0).standard_normal(number)
     try:
         if _has_influence(evaluate(point.alpha + BESIDE * size * way), size):
-            tell(_LOG.info, "the objective is stationary at the first design, to rounding")
+            safe_log(_LOG.info, "the objective is stationary at the first design, to rounding")
             return
     except InvalidDesignError:
         return  # not known

@@ -6,7 +6,7 @@ from typing import Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
-from fenics_contact.errors import InvalidInputError, calling
+from fenics_contact.errors import InvalidInputError, user_code
 
 
 @runtime_checkable
@@ -45,7 +45,7 @@ def evaluate_shape(shape: SurfaceShape, what: Quantity, points: np.ndarray) -> n
         UserCodeError: If it raises.
     """
     name = f"the {what} of {type(shape).__name__}"
-    with calling(name):
+    with user_code(name):
         values = np.asarray(getattr(shape, what)(points), dtype=np.float64)
     order = ("distance", "normals", "curvatures").index(what)
     needed = (len(points), *[points.shape[1]] * order)

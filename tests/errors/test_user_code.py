@@ -11,16 +11,16 @@ from fenics_contact.errors import (
     InvalidDesignError,
     InvalidInputError,
     UserCodeError,
-    calling,
     collective,
     collectively,
-    tell,
+    safe_log,
     together,
+    user_code,
 )
 
 
 def failing(error: BaseException) -> None:
-    with calling("the load of the test"):
+    with user_code("the load of the test"):
         raise error
 
 
@@ -31,7 +31,7 @@ def test_a_failure_names_function_error_and_line(error: BaseException) -> None:
     words = f"the load of the test failed with {type(error).__name__}"
     assert str(caught.value).startswith(words)
     line = failing.__code__.co_firstlineno + 2
-    assert f"({__file__}, line {line}): mend it" in str(caught.value)
+    assert f"({__file__}, line {line}): fix it" in str(caught.value)
     assert caught.value.__cause__ is error
 
 
@@ -69,7 +69,7 @@ class Failing(logging.Handler):
 def test_a_handler_that_fails_is_shown_and_stops_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     logger = logging.Logger("a logger of its own")
     logger.addHandler(Failing())
-    tell(logger.info, "%d products", 3)
+    safe_log(logger.info, "%d products", 3)
     shown = capsys.readouterr().err
     assert "ZeroDivisionError: a bug in a handler" in shown
     assert "%d products" in shown
@@ -80,7 +80,7 @@ def test_a_report_names_its_own_place() -> None:
     handler = logging.Handler()
     handler.emit = heard.append  # type: ignore[method-assign]
     logger.addHandler(handler)
-    tell(logger.info, "%d products", 3, extra={"progress": 1})
+    safe_log(logger.info, "%d products", 3, extra={"progress": 1})
     assert (heard[0].getMessage(), heard[0].filename, heard[0].progress) == (
         "3 products",
         "test_user_code.py",

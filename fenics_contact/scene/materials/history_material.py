@@ -12,7 +12,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from fenics_contact.display import displayed
-from fenics_contact.errors import InvalidInputError, calling
+from fenics_contact.errors import InvalidInputError, user_code
 from fenics_contact.scene.materials.elasticity import Elasticity, strain
 from fenics_contact.scene.materials.voigt import (
     as_tensor,
@@ -118,7 +118,7 @@ class HistoryMaterial(Elasticity):
             UserCodeError: If it raises.
         """
         name, n = type(self).__name__, len(gradient)
-        with calling(f"respond of material {name}"):
+        with user_code(f"respond of material {name}"):
             given = self.respond(gradient, history, duration)
         shapes = {"stress": (n, 3, 3), "tangent": (n, 3, 3, 3, 3), "history": (n, self.history_size)}
         arrays = {part: np.asarray(getattr(given, part, None), dtype=np.float64) for part in shapes}

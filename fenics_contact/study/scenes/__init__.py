@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from fenics_contact.checks import require_file
-from fenics_contact.errors import InvalidInputError, running
+from fenics_contact.errors import InvalidInputError, scene_file_code
 from fenics_contact.study.protocol import StudyScene
 
 #: Names of the built-in studies.
@@ -48,7 +48,7 @@ def _from_file(path: Path) -> StudyScene:
         raise InvalidInputError(f"{str(path)!r} cannot be read as Python: give a file that ends in '.py'")
     module = importlib.util.module_from_spec(spec)
     sys.modules[module_name] = module  # dataclasses of the file are looked up there
-    with running(f"the Python file '{path}'"):
+    with scene_file_code(f"the Python file '{path}'"):
         spec.loader.exec_module(module)
     return _checked(getattr(module, "study", None), str(path))
 
