@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import NoReturn
 
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
-from fenics_contact.qp.forcing import Forcing
+from fenics_contact.qp.forcing import Forcing, Progress, run_newton
 from fenics_contact.qp.iterate import Certificate, Iterate, Start, certify
-from fenics_contact.qp.newton_steps import NewtonState, NewtonSteps
+from fenics_contact.qp.newton_steps import FaceState, FaceSteps
 from fenics_contact.qp.not_held import (
     FrictionAlone,
     error_without_contact,
@@ -29,9 +29,8 @@ HARDLY = 1e-2
 SLIDING = 5
 #: Number of the rescue before which it is tested whether friction can suffice, and the tolerance of the test.
 DOUBT, ROUGH = 4, 1e-3
-#: After this many steps without progress each further one solves its face more accurately by this factor:
-#: where forces vanish in the limit, residuals relative to them do not measure the accuracy of the gaps.
-CARELESS, CARE = 2, 0.25
+#: Steps without progress after which faces are solved more accurately.
+CARELESS = 2
 #: Number of consecutive rescues to the same iterate after which to stop, and agreement of their residuals.
 VAIN, SAME = 7, 1e-6
 
@@ -61,6 +60,8 @@ class FaceNewton:
         forcing: Largest inner tolerance relative to the outer residual.
         loosest: Largest absolute inner tolerance.
         patience: Steps in which the residual must halve before a rescue is called.
+        care: Factor on the inner tolerance after each step without progress beyond the second: where forces
+            vanish in the limit, residuals relative to them do not measure the accuracy of the gaps.
         rescue: Parameters of the fallback of problems without a preconditioner.
         rescue_products: Products that a rescue may use; doubled each time Newton fails again.
         doubts: Whether to ask, without progress, if friction can suffice at all: more solves, of no use
@@ -78,6 +79,7 @@ class FaceNewton:
     forcing: float = 0.25
     loosest: float = 0.1
     patience: int = 6
+    care: float = 0.25
     rescue: Smalse = field(default_factory=Smalse)
     rescue_products: int = 300
     doubts: bool = True
@@ -95,14 +97,7 @@ class FaceNewton:
             ConvergenceError: Steps or products were used up; carries the history.
         """
         run = _Run.build(self, problem, start)
-        state = run.init()
-        while not run.exhausted(state):
-            state = run.step(state)
-            if state.answer is None and state.stuck:
-                state = run.rescued(state)
-            if state.answer is not None:
-                return state.answer.solution(state.history, start.operator.products, state.memory)
-        run.fail(state)
+        return run_newton(run, run.init())
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,23 +124,21 @@ class _State:
     Attributes:
         newton: The present iterate, with faces and ρ.
         best: The last iterate that halved the residual, or the outcome of a later rescue.
+        progress: Its residuals, and the Newton steps since.
         memory: Estimates from SMALSE.
         history: One line per step or rescue.
-        since_best: Newton steps since the best iterate.
         care: Factor on the tolerance of the next face.
-        stuck: Whether the last steps call for a rescue.
         rescues: Rescues so far.
         last_rescue: The last of them.
         answer: The certified solution, once there is one.
     """
 
-    newton: NewtonState
+    newton: FaceState
     best: Iterate
+    progress: Progress
     memory: SmalseMemory | None
     history: tuple[SolverStep, ...] = ()
-    since_best: int = 0
     care: float = 1.0
-    stuck: bool = False
     rescues: int = 0
     last_rescue: _LastRescue | None = None
     answer: Certificate | None = None
@@ -167,7 +160,7 @@ class _Run:
     parameters: FaceNewton
     problem: DualProblem
     start: Start
-    steps: NewtonSteps
+    steps: FaceSteps
     rescue: Rescue
     friction_alone: FrictionAlone
 
@@ -176,7 +169,7 @@ class _Run:
         """Prepare a solve. Collective."""
         most = parameters.max_products
         forcing = Forcing(parameters.forcing, parameters.loosest, parameters.tolerance)
-        steps = NewtonSteps.build(problem, start.operator, forcing, most)
+        steps = FaceSteps.build(problem, start.operator, forcing, most)
         rough = replace(parameters, tolerance=ROUGH, max_products=10 * parameters.rescue_products)
         rescue = Rescue(problem, forcing, most, parameters.rescue)
         if not start.cold:
@@ -186,20 +179,31 @@ class _Run:
     def init(self) -> _State:
         """Return the state before the first step."""
         first = self.start.iterate
-        return _State(self.steps.init(first), first, self.start.memory)
+        return _State(self.steps.init(first), first, Progress(first.residuals), self.start.memory)
 
-    def exhausted(self, state: _State) -> bool:
-        """Return whether steps or products are used up, or rescues are in vain."""
-        parameters, products = self.parameters, self.start.operator.products
-        in_vain = state.last_rescue is not None and state.last_rescue.vain >= VAIN
-        return in_vain or len(state.history) >= parameters.max_steps or products >= parameters.max_products
-
-    def step(self, state: _State) -> _State:
-        """Take a Newton step and check its progress. Collective.
+    def terminate(self, state: _State) -> DualSolution | None:
+        """Return the certified solution, None if a further step is needed. Collective.
 
         Raises:
-            InfeasibleError: All contacts stay open, and some body moves that only they could hold.
+            InfeasibleError: As in `FaceNewton.run`.
+            ConvergenceError: Steps or products are used up, or rescues are in vain.
         """
+        parameters, products = self.parameters, self.start.operator.products
+        if state.answer is not None:
+            return state.answer.solution(state.history, products, state.memory)
+        in_vain = state.last_rescue is not None and state.last_rescue.vain >= VAIN
+        if in_vain or len(state.history) >= parameters.max_steps or products >= parameters.max_products:
+            self._fail(state)
+        return None
+
+    def step(self, state: _State) -> _State:
+        """Take a Newton step; without progress a rescue follows. Collective.
+
+        Raises:
+            InfeasibleError: All contacts stay open, and some body moves that only they could hold, or friction
+                is far from sufficient.
+        """
+        # (a)-(d) Forcing term, face, linear system, damped step: see `FaceSteps.step`.
         newton, line = self.steps.step(state.newton, len(state.history), state.care)
         history = (*state.history, line)
         self.start.reached(line)
@@ -210,20 +214,22 @@ class _Run:
         lost = without_contact(history, self.parameters.patience)
         if lost and state.rescues:  # an active set may also lose bodies that contact can hold
             raise error_without_contact(line)
-        before, after = state.best.residuals, iterate.residuals
-        progress = after.worst_beside(before) < 0.5 * before.worst_beside(after)
-        since_best = 0 if progress else state.since_best + 1
-        return replace(
+        # (e) Progress: without any, faces are solved more accurately, and at last a rescue is called.
+        progress = state.progress.after(iterate.residuals)
+        lasting = state.care * self.parameters.care if progress.since > CARELESS else state.care
+        diverged = not iterate.residuals.worst_beside(state.progress.best) < DIVERGED
+        state = replace(
             state,
             newton=newton,
             history=history,
-            best=iterate if progress else state.best,
-            since_best=since_best,
-            care=1.0 if progress else state.care * CARE if since_best > CARELESS else state.care,
-            stuck=lost or since_best >= self.parameters.patience or not after.worst_beside(before) < DIVERGED,
+            progress=progress,
+            best=state.best if progress.since else iterate,
+            care=lasting if progress.since else 1.0,
         )
+        stuck = lost or diverged or progress.since >= self.parameters.patience
+        return self._rescued(state) if stuck else state
 
-    def rescued(self, state: _State) -> _State:
+    def _rescued(self, state: _State) -> _State:
         """Continue from the best iterate improved by a rescue. Collective.
 
         Raises:
@@ -251,15 +257,15 @@ class _Run:
             state,
             newton=replace(state.newton, iterate=iterate),
             best=iterate,
+            progress=Progress(iterate.residuals),
             memory=outcome.memory,
             history=(*state.history, line),
-            since_best=0,
             rescues=state.rescues + 1,
             last_rescue=_LastRescue(origin, iterate, budget, vain),
             answer=answer,
         )
 
-    def fail(self, state: _State) -> NoReturn:
+    def _fail(self, state: _State) -> NoReturn:
         """Raise the error of a solve that is exhausted. Collective."""
         failure = ConvergenceError(self._failed(state), state.history)
         if self.parameters.doubts and state.rescues >= DOUBT:

@@ -11,7 +11,7 @@ from fenics_contact._libraries import MPI
 from fenics_contact.qp.contradiction import Contradiction, contradiction
 from fenics_contact.qp.face import Face, classify
 from fenics_contact.qp.face_system import CoupledFace, FaceSystem, FaceSystems, couple
-from fenics_contact.qp.forcing import Forcing, residual_weights
+from fenics_contact.qp.forcing import FRACTIONS, Damped, Forcing, damp, residual_weights
 from fenics_contact.qp.iterate import Iterate, apply_unless_zero, iterate_at, iterate_between
 from fenics_contact.qp.krylov import FaceStep, Stop, projected_cg, projected_gmres
 from fenics_contact.qp.problem import CountedOperator, DualProblem, ShiftedOperator
@@ -23,43 +23,27 @@ from fenics_contact.qp.solution import Residuals, SolverStep, contact_step
 LONGEST_CYCLE = 6
 #: Factor on ρ of a disc whose friction force would reverse.
 TURNED = 0.3
-#: Fractions of a step that are tried where the full one increases the residual.
-FRACTIONS = (0.5, 0.25, 0.1)
 #: Used only near a solution: far from one, a step as short as this makes no progress.
 SHORTEST = 0.01
 #: The largest relative residual that counts as near.
 NEAR = 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class Damped:
-    """The iterate that is taken and the fraction of the step that led to it."""
-
-    iterate: Iterate
-    fraction: float
-
-
-def damp(problem: DualProblem, before: Iterate, after: Iterate, earlier: Residuals | None = None) -> Damped:
-    """Return the best of a few points between two iterates if the second is worse than the first. Collective.
+def shorten(
+    problem: DualProblem, before: Iterate, after: Iterate, earlier: Residuals | None = None
+) -> Damped[Iterate]:
+    """Return the end of a step from one iterate to another, or the best of a few between. Collective.
 
     F λ and r are linear in λ and α, so no product is needed; the natural residual is not, and often has its
-    minimum inside: where the active set alternates between two faces the solution lies between them. The way
-    to the right face may lead over a worse one: a full step is taken if it improves on either of the last
-    two.
-
-    Args:
-        problem: The dual problem.
-        before: Start of the step.
-        after: End of the step.
-        earlier: Residuals of the iterate before that, if there was one.
+    minimum inside.
     """
-    for residuals in (before.residuals, earlier):
-        if residuals is not None and not after.residuals.is_worse_than(residuals):
-            return Damped(after, 1.0)
-    candidates = [Damped(after, 1.0)]
-    fractions = (*FRACTIONS, SHORTEST) if before.residuals.worst < NEAR else FRACTIONS
-    candidates += [Damped(iterate_between(problem, before, after, part), part) for part in fractions]
-    return min(candidates, key=lambda candidate: candidate.iterate.residuals.worst_beside(after.residuals))
+    return damp(
+        after,
+        lambda part: iterate_between(problem, before, after, part),
+        lambda iterate: iterate.residuals,
+        (before.residuals, earlier),
+        (*FRACTIONS, SHORTEST) if before.residuals.worst < NEAR else FRACTIONS,
+    )
 
 
 @dataclass(frozen=True)
@@ -73,13 +57,13 @@ class Safeguards:
         moves_held: Whether floating bodies are equilibrated also where the face holds them all.
     """
 
-    shorten: Callable[[DualProblem, Iterate, Iterate, Residuals | None], Damped] = damp
+    shorten: Callable[[DualProblem, Iterate, Iterate, Residuals | None], Damped[Iterate]] = shorten
     adapts_step: bool = True
     moves_held: bool = True
 
 
 @dataclass(frozen=True, eq=False)
-class NewtonState:
+class FaceState:
     """The data passed from one Newton step to the next.
 
     Attributes:
@@ -133,7 +117,7 @@ class _SolvedFace:
 
 
 @dataclass(frozen=True, eq=False)
-class NewtonSteps:
+class FaceSteps:
     """Newton's method on the faces of one problem: `init` makes the first state, `step` the following ones.
 
     Attributes:
@@ -164,7 +148,7 @@ class NewtonSteps:
         forcing: Forcing,
         max_products: int,
         safeguards: Safeguards | None = None,
-    ) -> NewtonSteps:
+    ) -> FaceSteps:
         """Prepare the coarse spaces of all faces. Collective."""
         return cls(
             problem,
@@ -177,13 +161,13 @@ class NewtonSteps:
             RigidMotionCorrection.build(problem),
         )
 
-    def moved(self, problem: DualProblem) -> NewtonSteps:
+    def moved(self, problem: DualProblem) -> FaceSteps:
         """Return the method for a problem that differs only in its right side or law."""
         return replace(self, problem=problem, correction=replace(self.correction, problem=problem))
 
-    def init(self, iterate: Iterate) -> NewtonState:
+    def init(self, iterate: Iterate) -> FaceState:
         """Return the state before the first step."""
-        return NewtonState(iterate, self.natural_step)
+        return FaceState(iterate, self.natural_step)
 
     def at_rest(self, iterate: Iterate) -> Iterate:
         """Return an iterate of another load or position with floating bodies in equilibrium. Collective."""
@@ -192,7 +176,7 @@ class NewtonSteps:
         alpha = alpha + self.correction(iterate.multiplier, iterate.residual, self.natural_step)
         return iterate_at(problem, iterate.multiplier, iterate.product, alpha)
 
-    def step(self, state: NewtonState, number: int, care: float = 1.0) -> tuple[NewtonState, SolverStep]:
+    def step(self, state: FaceState, number: int, care: float = 1.0) -> tuple[FaceState, SolverStep]:
         """Take one step and return the state after it with its line of history. Collective.
 
         Args:
@@ -207,17 +191,17 @@ class NewtonSteps:
         changed = round(float(global_sum(self.problem.comm, count)[0]))
         # 2. Its solution, as accurate as the last face's prediction warrants.
         expected = None if changed else state.mismatch
-        solved = self._solve(face, before, self.forcing.tolerance_of_face(before.residuals, expected, care))
+        solved = self._solve(face, before, self.forcing.by_prediction(before.residuals, expected, care))
         # 3. Rigid motions, then the damped step.
         alpha = self._motions(solved, before, step)
         after = iterate_at(self.problem, self._relieved(solved, alpha, step), solved.product, alpha)
         mismatch = abs(after.residuals.size - solved.inner.measure) / (before.residuals.size or 1.0)
         taken = self.safeguards.shorten(self.problem, before, after, state.before)
         faces = (face, *state.faces[:LONGEST_CYCLE])
-        following = NewtonState(taken.iterate, step, faces, mismatch, before.residuals)
+        following = FaceState(taken.point, step, faces, mismatch, before.residuals)
         return following, self._record(number, taken, solved, changed)
 
-    def _next_face(self, state: NewtonState) -> tuple[Vector, Face]:
+    def _next_face(self, state: FaceState) -> tuple[Vector, Face]:
         """Classify, with a smaller ρ for discs whose force would otherwise reverse."""
         layout, iterate = self.problem.layout, state.iterate
         bound = self.problem.law.bound(iterate.multiplier)
@@ -276,7 +260,7 @@ class NewtonSteps:
         residual = flexed - problem.coarse.transpose(alpha)
         return np.asarray(alpha + self.correction(solved.multiplier, residual, step), dtype=np.float64)
 
-    def _record(self, number: int, taken: Damped, solved: _SolvedFace, changed: int) -> SolverStep:
+    def _record(self, number: int, taken: Damped[Iterate], solved: _SolvedFace, changed: int) -> SolverStep:
         inner, face, coarse = solved.inner, solved.system.face, solved.system.coarse
         counts = global_sum(
             self.problem.comm,
@@ -294,5 +278,5 @@ class NewtonSteps:
             note += f", {inner.stop.value}"
         if coarse.gram.rank < coarse.m:
             note += f", {coarse.m - coarse.gram.rank} rigid motions not held by the face"
-        residuals, products = taken.iterate.residuals, self.operator.products
+        residuals, products = taken.point.residuals, self.operator.products
         return SolverStep("face Newton", number, products, residuals, closed, stick, slip, note)

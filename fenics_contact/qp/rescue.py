@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact.qp.forcing import Forcing
+from fenics_contact.qp.forcing import Damped, Forcing
 from fenics_contact.qp.iterate import Iterate, Start, certify, iterate_at, iterate_between
-from fenics_contact.qp.newton_steps import Damped, NewtonState, NewtonSteps, Safeguards
+from fenics_contact.qp.newton_steps import FaceState, FaceSteps, Safeguards
 from fenics_contact.qp.problem import CountedOperator, DualProblem, ShiftedOperator
 from fenics_contact.qp.reductions import Vector, global_sum
 from fenics_contact.qp.slip_law import TrescaLaw
@@ -111,7 +111,7 @@ class ProximalPoint:
 
 def descend(
     problem: DualProblem, before: Iterate, after: Iterate, earlier: Residuals | None = None
-) -> Damped:
+) -> Damped[Iterate]:
     """Return the minimum between two iterates of the potential that a proximal point minimises. Collective.
 
     The potential energy of displacements u(λ, α) together with that of springs ρ in all contacts and discs is
@@ -257,10 +257,10 @@ class Rescue:
         newton = replace(path.newton, iterate=point.enter(iterate))
         return _ProximalPath(point, path.steps.moved(point.problem), newton)
 
-    def _steps(self, point: ProximalPoint) -> NewtonSteps:
+    def _steps(self, point: ProximalPoint) -> FaceSteps:
         """Prepare Newton's method for a proximal point. Collective."""
         forcing = self.forcing.at_most(FORCING, LOOSEST)
-        return NewtonSteps.build(point.problem, point.operator, forcing, self.max_products, WITH_SPRINGS)
+        return FaceSteps.build(point.problem, point.operator, forcing, self.max_products, WITH_SPRINGS)
 
     def _by_smalse(self, start: Start, limit: int) -> tuple[Iterate, SolverStep, SmalseMemory]:
         """Take SMALSE steps. Collective."""
@@ -288,8 +288,8 @@ class _ProximalPath:
     """
 
     point: ProximalPoint
-    steps: NewtonSteps
-    newton: NewtonState
+    steps: FaceSteps
+    newton: FaceState
     since: int = 0
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from fenics_contact.qp import DualProblem, FaceNewton, TrescaLaw, solve
 from fenics_contact.qp.iterate import Iterate, iterate_at
-from fenics_contact.qp.newton_steps import damp
+from fenics_contact.qp.newton_steps import shorten
 from fenics_contact.qp.problem import CountedOperator
 from fenics_contact.qp.rescue import ProximalPoint, descend
 from tests.qp.published_friction import CYCLING, published
@@ -35,11 +35,11 @@ def test_solution_between_two_iterates_is_found():
     offset = np.random.default_rng(0).standard_normal(len(problem.d))
     before = iterate(problem, solution.multiplier - 0.1 * offset, solution.alpha - 0.1)
     after = iterate(problem, solution.multiplier + 0.3 * offset, solution.alpha + 0.3)
-    damped = damp(dual, before, after)
+    damped = shorten(dual, before, after)
     assert damped.fraction == 0.25
-    assert damped.iterate.residuals.size < 1e-8 < before.residuals.size < after.residuals.size
-    np.testing.assert_allclose(damped.iterate.multiplier, solution.multiplier, atol=1e-8)
-    np.testing.assert_allclose(damped.iterate.product, problem.F @ damped.iterate.multiplier, atol=1e-12)
+    assert damped.point.residuals.size < 1e-8 < before.residuals.size < after.residuals.size
+    np.testing.assert_allclose(damped.point.multiplier, solution.multiplier, atol=1e-8)
+    np.testing.assert_allclose(damped.point.product, problem.F @ damped.point.multiplier, atol=1e-12)
 
 
 def test_step_that_improves_is_kept_whole():
@@ -47,9 +47,9 @@ def test_step_that_improves_is_kept_whole():
     solution = solve(problem.dual, problem.slip_bound, FaceNewton(tolerance=1e-10))
     worse = iterate(problem, 1.1 * solution.multiplier, solution.alpha)
     better = iterate(problem, 1.01 * solution.multiplier, solution.alpha)
-    damped = damp(with_bounds(problem), worse, better)
+    damped = shorten(with_bounds(problem), worse, better)
     assert damped.fraction == 1.0
-    assert damped.iterate is better
+    assert damped.point is better
 
 
 def test_a_huge_wrong_force_is_worse_than_one_that_is_nearly_right():
@@ -60,7 +60,7 @@ def test_a_huge_wrong_force_is_worse_than_one_that_is_nearly_right():
     small = iterate(problem, np.zeros_like(solution.multiplier), solution.alpha)
     assert small.residuals.worst > 0.5 * huge.residuals.worst
     assert huge.residuals.worst_beside(small.residuals) > 100 * small.residuals.worst_beside(huge.residuals)
-    assert damp(with_bounds(problem), huge, small).iterate is small
+    assert shorten(with_bounds(problem), huge, small).point is small
 
 
 def test_a_step_may_be_worse_than_the_last_iterate_if_it_is_better_than_the_one_before():
@@ -69,8 +69,8 @@ def test_a_step_may_be_worse_than_the_last_iterate_if_it_is_better_than_the_one_
     good, fair, bad = (
         iterate(problem, part * solution.multiplier, solution.alpha) for part in (1.01, 1.1, 2.0)
     )
-    assert damp(with_bounds(problem), good, fair).iterate is not fair
-    assert damp(with_bounds(problem), good, fair, bad.residuals).iterate is fair
+    assert shorten(with_bounds(problem), good, fair).point is not fair
+    assert shorten(with_bounds(problem), good, fair, bad.residuals).point is fair
 
 
 @pytest.mark.parametrize(("size", "fraction"), [(1.0, 0.01), (100.0, 0.1)], ids=["near", "far"])
@@ -81,7 +81,7 @@ def test_the_shortest_step_is_taken_near_a_solution_only(size, fraction):
     before, after = (
         iterate(problem, solution.multiplier, solution.alpha + size * part) for part in (-0.01, 0.99)
     )
-    assert damp(with_bounds(problem), before, after).fraction == fraction
+    assert shorten(with_bounds(problem), before, after).fraction == fraction
 
 
 def test_the_minimum_of_the_potential_on_a_segment_is_found():
@@ -94,7 +94,7 @@ def test_the_minimum_of_the_potential_on_a_segment_is_found():
     ends = [iterate(problem, solution.multiplier, solution.alpha + part * offset) for part in (-1e-3, 4e-3)]
     found = descend(point.problem, *(point.enter(end) for end in ends))
     assert found.fraction == pytest.approx(0.2, abs=0.03)
-    assert found.iterate.residuals.natural < 0.2 * point.enter(ends[0]).residuals.natural
+    assert found.point.residuals.natural < 0.2 * point.enter(ends[0]).residuals.natural
     assert descend(point.problem, point.enter(ends[0]), begin).fraction == 1.0
 
 

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from fenics_contact.qp import ContactLayout, CoulombLaw, CountedOperator, DualProblem, Face, classify
 from fenics_contact.qp.forcing import Forcing
 from fenics_contact.qp.iterate import iterate_fitted
-from fenics_contact.qp.newton_steps import NewtonState, NewtonSteps
+from fenics_contact.qp.newton_steps import FaceState, FaceSteps
 from tests.qp.torn_bricks import Bricks, torn_problem
 
 
@@ -30,7 +30,7 @@ def face(*closed: bool) -> Face:
 def test_a_step_from_the_same_state_is_the_same_step() -> None:
     dual = problem()
     operator = CountedOperator(dual.operator)
-    steps = NewtonSteps.build(dual, operator, Forcing(0.25, 0.1, 1e-8), 1000)
+    steps = FaceSteps.build(dual, operator, Forcing(0.25, 0.1, 1e-8), 1000)
     far = dual.coarse.particular()
     state = steps.init(iterate_fitted(dual, far, operator(far)))
     for number in range(3):
@@ -49,7 +49,7 @@ def test_a_step_from_the_same_state_is_the_same_step() -> None:
 def test_a_disc_whose_force_would_turn_back_gets_a_smaller_step() -> None:
     dual = problem()
     operator = CountedOperator(dual.operator)
-    steps = NewtonSteps.build(dual, operator, Forcing(0.25, 0.1, 1e-8), 1000)
+    steps = FaceSteps.build(dual, operator, Forcing(0.25, 0.1, 1e-8), 1000)
     far = dual.coarse.particular()
     state, _ = steps.step(steps.init(iterate_fitted(dual, far, operator(far))), 0)
     last = state.faces[0]
@@ -83,5 +83,5 @@ def test_a_disc_whose_force_would_turn_back_gets_a_smaller_step() -> None:
 def test_the_last_faces_say_why_steps_led_nowhere(faces: list[Face], reason: str) -> None:
     dual = problem()
     far = dual.coarse.particular()
-    state = NewtonState(iterate_fitted(dual, far, dual.operator(far)), far, tuple(faces))
+    state = FaceState(iterate_fitted(dual, far, dual.operator(far)), far, tuple(faces))
     assert state.stall(MPI.COMM_SELF) == reason
