@@ -170,7 +170,7 @@ record = {
     "flow": flow,
     "stored": stored,
     "residual": float(states[-1].gather_von_mises("plate").max()),
-    "left": newton.left,
+    "reduction": newton.reduction,
 }
 write_result(states[-1], output, more=record)
 
@@ -199,7 +199,7 @@ assert 0.93 < (flow + stored) / work < 1.0
 assert record["residual"] > first, "it yields again as the ball leaves"
 assert force[-1] < 1e-6 * force[IN]
 assert imbalance < 1e-8
-assert np.median(newton.left) < 1e-3
+assert np.median(newton.reduction) < 1e-3
 
 # ## What to try next
 #

@@ -148,7 +148,7 @@ record = {
     "forces": forces,
     "pressures": pressures,
     "ring": spring,
-    "left": newton.left,
+    "reduction": newton.reduction,
 }
 write_result(states[-1], output, more=record)
 
@@ -173,7 +173,7 @@ assert 0.75 < forces["lid"][0] / closure[0] / spring < 0.85
 assert forces["wall"][6] == 0 < forces["wall"][-1]
 assert forces["bore"][-4] == 0 < forces["bore"][-1]
 assert imbalance < 1e-8
-assert np.median(newton.left) < 1e-3
+assert np.median(newton.reduction) < 1e-3
 
 # ## What to try next
 #

@@ -136,7 +136,7 @@ record = {
     "time": time,
     "vertical": -force[:, 1],
     "horizontal": force[:, 0],
-    "left": newton.left,
+    "reduction": newton.reduction,
 }
 write_result(states[-1], output, more=record)
 
@@ -160,7 +160,7 @@ for number, moment in ((1, 0), (3, 1), (13, 2), (23, 3), (33, 4), (41, 5)):
         known = [curves[part][moment] for curves in published.values()]
         assert 0.97 * min(known) < found < 1.03 * max(known)
 assert imbalance < 1e-8
-assert np.median(newton.left) < 1e-3
+assert np.median(newton.reduction) < 1e-3
 
 # ## What to try next
 #

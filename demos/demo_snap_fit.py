@@ -147,7 +147,7 @@ record = {
     "outward": outward,
     "snap": float(push[:IN, 0].min()),
     "formula": formula,
-    "left": newton.left,
+    "reduction": newton.reduction,
 }
 write_result(states[-1], output, more=record)
 
@@ -171,7 +171,7 @@ for found, name in ((inward, "in"), (outward, "out")):
     assert abs(found / formula[name][1] - 1) < 0.2
 assert outward > 1.3 * inward > 0 > record["snap"]
 assert imbalance < 1e-8
-assert np.median(newton.left) < 1e-3
+assert np.median(newton.reduction) < 1e-3
 
 # ## What to try next
 #

@@ -153,7 +153,7 @@ from fenics_contact.contact import NewtonSteps
 newton = NewtonSteps.of(states)
 for step, residuals in zip(steps, newton.residuals, strict=True):
     print(f"{step.name:27s}", " ".join(f"{each:.0e}" for each in residuals[-5:]))
-assert np.median(newton.left) < 1e-3
+assert np.median(newton.reduction) < 1e-3
 
 # %% [markdown]
 # ## Energies

@@ -27,22 +27,22 @@ from fenics_contact.errors import InfeasibleError, InvalidInputError, LoadStepEr
 from fenics_contact.feti import Decomposition, TornSystem, build_torn_system, prescribed_displacements
 from fenics_contact.nonlinear import (
     AutomaticSteps,
-    Contact,
+    ContactConfiguration,
+    Effort,
     Equations,
-    Evaluation,
     FollowingPressures,
     Loading,
-    Meeting,
     MovingContact,
     NonlinearEquilibrium,
     NotHeldError,
     Path,
     PathEndsError,
+    ResidualState,
     Snap,
     StillContact,
     TurnedSurface,
 )
-from fenics_contact.qp import DualSolution, Vector
+from fenics_contact.qp import DualSolution
 from fenics_contact.scene import HistoryMaterial, LoadStep, RigidSurface, Scene
 from fenics_contact.timing import PhaseTimer
 
@@ -84,9 +84,6 @@ class DeformedEquilibria:
         self._assembled: TornSystem | None = None if beside is None else beside._assembled
         self._unresisted: tuple[UnheldMotion, ...] | None = None
         self._turned, self._doubts = TurnedBodies(), ContactWarnings()
-        self._contact: Contact = StillContact()
-        if scene.contacts and scene.deforms_much:
-            self._contact = MovingContact(scene, decomposition)
 
     def solve(
         self,
@@ -138,9 +135,7 @@ class DeformedEquilibria:
                 self._unresisted = unresisted_motions(load.torn)
             require_resisted(self._unresisted, load.torn, load.prescribed)
         try:
-            path = steps.follow(
-                equations, self._contact, before, load, start, timer, known, held=not self._unresisted
-            )
+            path = steps.follow(equations, before, load, start, timer, known, held=not self._unresisted)
         except (InfeasibleError, NotHeldError) as failure:
             if not self._unresisted:
                 raise
@@ -148,12 +143,12 @@ class DeformedEquilibria:
         except PathEndsError as failure:
             last = None if failure.path is None else _state_after(failure.path, origin, timer)
             where = "" if step is None else f"load step {step.name!r}: "
-            hints = advice(scene, last or origin, moves=isinstance(self._contact, MovingContact))
+            hints = advice(scene, last or origin, moves=isinstance(equations.contact, MovingContact))
             words = f"{where}{failure}{hints}"
             raise LoadStepError(words, failure.history, last) from failure
         state = _state_after(path, origin, timer)
         self._turned.tell(state)
-        if isinstance(self._contact, StillContact):
+        if isinstance(equations.contact, StillContact):
             self._doubts.warn_of_sliding(state)
         return state
 
@@ -170,22 +165,17 @@ class DeformedEquilibria:
         timer, equations = self._timer, self._equations
         with timer.phase("assemble"):
             load = whole = self._loading(scene, float(stored["times"][1]))
-            at, load = stored_configuration(stored, load, self._contact, self._decomposition)
-            meeting = at.meeting
-            assert meeting is not None
-            law = meeting.torn.law
-            step: Vector = np.zeros(meeting.torn.layout.size)
-            evaluation = equations.evaluate(meeting, law, at, step, load)
+            at, load = stored_configuration(stored, load, equations.contact, self._decomposition)
+            evaluation = equations.evaluate_at(load, at)
         near = evaluation.linearised(timer, None)
-        step = near.natural_step(meeting, 1.0)
-        evaluation = equations.evaluate(meeting, law, at, step, load)
-        end = NonlinearEquilibrium(evaluation, near, (), load.time, 0, 1)
+        evaluation = equations.evaluate_at(load, near.of(evaluation).at)
+        end = NonlinearEquilibrium(evaluation, near, Effort(factorisations=1))
         fractions = tuple(map(float, stored["parts"]))
         rows = stored.get("snaps", ())
         snaps = tuple(Snap(fraction, way, work, int(stages)) for fraction, way, work, stages in rows)
         since = float(stored.get("since", 0.0))
         rubbed = float(stored.get("rubbed", 0.0))
-        path = Path(whole, end, None, None, fractions, since, snaps, rubbed, (), 0, 1)
+        path = Path(whole, end, None, None, fractions, since, snaps, rubbed, end.effort)
         return _state_after(path, None, timer, stored.get("slip"))
 
     def _require_later(self, scene: Scene, before: float, time: float) -> None:
@@ -253,51 +243,54 @@ def _state_after(
     """
     end = path.end
     evaluation, at = end.evaluation, end.evaluation.at
-    law, near = evaluation.law, end.linearisation
+    law, diagonal = evaluation.torn.law, at.diagonal
+    assert diagonal is not None
     ended = f", at {path.fractions[-1]:.3g} of the load step" if path.fractions[-1] < 1.0 else ""
-    diagonal = evaluation.meeting.carried(near.diagonal, near.meeting, spread=True)
-    system = near.system.on_rows_of(evaluation.loaded, law, diagonal, -evaluation.lacking)
+    open_ = evaluation.constraint_residual
+    system = end.linearisation.system.on_rows_of(evaluation.loaded, law, diagonal, -open_)
     solution = DualSolution(
         problem=system.problem,
         multiplier=at.multiplier,
-        residual=evaluation.lacking,
+        residual=open_,
         product=np.zeros_like(at.multiplier),
         alpha=np.zeros(system.kernel.shape[1]),
         slip_bound=law.bound(at.multiplier),
         residuals=evaluation.residuals,
-        iterations=len(path.history),
-        products=path.products,
-        history=path.history,
-        reason=f"every residual is below the tolerance{ended}" if path.history else "read from a checkpoint",
+        iterations=len(path.effort.history),
+        products=path.effort.products,
+        history=path.effort.history,
+        reason=f"every residual is below the tolerance{ended}"
+        if path.effort.history
+        else "read from a checkpoint",
     )
     with timer.phase("state"):
         contact = contact_result(system, solution, at.displacement)
-        if evaluation.meeting.points is not None and path.start is not None:
-            contact = _of_moved(contact, evaluation.meeting, path.start, origin)
+        if evaluation.contact.points is not None and path.start is not None:
+            contact = _of_moved(contact, evaluation.contact, path.start, origin)
         if known is not None:
             contact = replace(contact, slip=known[0], slip_before=known[1])
         energies = _energies(evaluation, path.rubbed)
     return DeformedState(
         system, solution, at.displacement, contact, energies, dict(timer.seconds), equilibrium=end,
         load=path.load, begun=path.begun, fractions=path.fractions, since=path.since, snaps=path.snaps,
-        factorisations=path.factorisations,
+        factorisations=path.effort.factorisations,
     )  # fmt: skip
 
 
 def _of_moved(
-    contact: ContactResult, meeting: Meeting, start: MaterialPoints, origin: State | None
+    contact: ContactResult, now: ContactConfiguration, start: MaterialPoints, origin: State | None
 ) -> ContactResult:
     """Return the contact of moved bodies with its areas, the slip of its load step and of all before."""
-    slip, points = meeting.slip(start), meeting.points
+    slip, points = now.slip(start), now.points
     assert points is not None
     before = np.zeros_like(slip)
-    if isinstance(origin, DeformedState) and (stood := origin.equilibrium.evaluation.meeting.points):
-        before = points.carry_slip(origin.contact.total_slip, stood)
-    areas = points.areas(meeting.torn.scene)
+    if isinstance(origin, DeformedState) and (old := origin.equilibrium.evaluation.contact.points):
+        before = points.carry_slip(origin.contact.total_slip, old)
+    areas = points.areas(now.torn.scene)
     return replace(contact, slip=slip, slip_before=before, area=areas.true, nominal_area=areas.nominal)
 
 
-def _energies(evaluation: Evaluation, rubbed: float) -> Energies:
+def _energies(evaluation: ResidualState, rubbed: float) -> Energies:
     """Return the stored energy, the work of dead loads and of friction in the last load step. Collective.
 
     The work of pressures that follow their surfaces depends on the way: then it is not known.

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import dolfinx
 
     from fenics_contact.accuracy import StateErrors
-    from fenics_contact.nonlinear import Loading, Meeting, NonlinearEquilibrium, Snap
+    from fenics_contact.nonlinear import ContactConfiguration, Loading, NonlinearEquilibrium, Snap
 
 
 @displayed
@@ -48,7 +48,7 @@ class DeformedState(State):
 
     equilibrium: NonlinearEquilibrium = field(kw_only=True)
     load: Loading = field(kw_only=True)
-    begun: Meeting | None = field(kw_only=True)
+    begun: ContactConfiguration | None = field(kw_only=True)
     fractions: tuple[float, ...] = field(kw_only=True)
     since: float = field(kw_only=True)
     snaps: tuple[Snap, ...] = field(kw_only=True)

@@ -33,15 +33,15 @@ class NewtonSteps:
         Args:
             states: States after load steps.
         """
-        runs = (state.equilibrium.history for state in states if isinstance(state, DeformedState))
+        runs = (state.equilibrium.effort.history for state in states if isinstance(state, DeformedState))
         return cls(tuple(tuple(line.residuals.worst for line in run) for run in runs if run))
 
     @property
-    def left(self) -> np.ndarray:
-        """What the best of the last three steps left of the residual, shape (n,), dimensionless.
+    def reduction(self) -> np.ndarray:
+        """Best residual reduction of the last three steps, shape (n,), dimensionless.
 
-        Where Newton's method is superlinear that is little: the smaller the residual is, the less is left of
-        it. Load steps of one Newton step, as of bodies that touch nothing, are left out.
+        Where Newton's method is superlinear it is small, the smaller the smaller the residual. Load steps of
+        one Newton step, as of bodies that touch nothing, are left out.
         """
         ends = [np.array(end) for end in self._ends]
         return np.array([float((end[1:] / end[:-1]).min()) for end in ends])
@@ -52,14 +52,14 @@ class NewtonSteps:
         return [run[-LAST - 1 :] for run in self.residuals if len(run) > 1]
 
     def __str__(self) -> str:
-        """Return numbers of steps, the last residuals of the median load step, and what was left of them."""
-        left = self.left
-        if not left.size:
+        """Return numbers of steps, the last residuals of the median load step, and the reductions."""
+        reduction = self.reduction
+        if not reduction.size:
             return "Newton's method: no load step with several steps"
         counts = [len(run) for run in self.residuals]
-        usual = self._ends[int(np.argsort(left)[len(left) // 2])]
+        usual = self._ends[int(np.argsort(reduction)[len(reduction) // 2])]
         ends = ", ".join(f"{value:.0e}" for value in usual)
-        median, worst = f"{np.median(left):.0e}", f"{left.max():.0e}"
+        median, worst = f"{np.median(reduction):.0e}", f"{reduction.max():.0e}"
         return (
             f"Newton's method: {np.mean(counts):.1f} steps a load step, at most {max(counts)}; residuals at "
             f"the end of a median one {ends}; its best step leaves {median} of them, of the worst load step "

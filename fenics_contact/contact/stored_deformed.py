@@ -11,7 +11,7 @@ from fenics_contact.contact.stored_rows import Stored, require_rows, with_stored
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.fem import History
 from fenics_contact.feti import Decomposition
-from fenics_contact.nonlinear import Configuration, Contact, Loading, Meeting, MovingContact
+from fenics_contact.nonlinear import Configuration, Contact, Loading, MovingContact
 
 
 def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
@@ -48,7 +48,7 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
     parts = [(mesh.body, mesh.cells, values) for mesh, values in pairs if values is not None]
     history = History.unloaded(state.scene).advanced(comm, parts)
     stored |= {f"history.{name}": values for name, values in history.values.items()}
-    points, start = evaluation.meeting.points, evaluation.meeting.start
+    points, start = evaluation.contact.points, evaluation.contact.start
     if points is None or start is None:
         torn = evaluation.torn
         origin = numbering.gather(torn.right + torn.supported, rows)
@@ -86,13 +86,12 @@ def stored_configuration(
         stored[f"history.{mesh.body}"][mesh.cells] if f"history.{mesh.body}" in stored else None
         for mesh in decomposition.meshes
     )
-    meeting: Meeting
     if isinstance(contact, MovingContact):
-        meeting = contact.found_again(load, displacement, stored)
-        require_rows(meeting.torn, stored)
+        found = contact.found_again(load, displacement, stored)
+        require_rows(found.torn, stored)
     else:
         load = replace(load, torn=with_stored_slip(load.torn, stored))
-        meeting = contact.at(load, displacement, None, None)
+        found = contact.at(load, displacement, None)
     begin, _, largest = stored["times"]
-    multiplier = stored["multiplier"][meeting.torn.numbering.owned]
-    return Configuration(displacement, multiplier, history, float(begin), float(largest), meeting), load
+    multiplier = stored["multiplier"][found.torn.numbering.owned]
+    return Configuration(displacement, multiplier, history, float(begin), float(largest), found), load

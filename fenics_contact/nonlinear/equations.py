@@ -13,15 +13,14 @@ from fenics_contact.errors import ConvergenceError, together
 from fenics_contact.fem import Mechanics, Response, composition
 from fenics_contact.feti import Decomposition, TornSystem
 from fenics_contact.nonlinear.loading import Loading
-from fenics_contact.nonlinear.meeting import Meeting
-from fenics_contact.nonlinear.residuals import ROUNDED, Sizes, beyond
+from fenics_contact.nonlinear.meeting import Contact, ContactConfiguration, MovingContact, StillContact
+from fenics_contact.nonlinear.residuals import ROUNDED, beyond, relative_residuals
 from fenics_contact.nonlinear.rigid_start import RigidStart
 from fenics_contact.nonlinear.tangent_step import TangentProblem
 from fenics_contact.nonlinear.tangent_system import TangentSystem, linearised
 from fenics_contact.nonlinear.turning import NO_ROWS, FurtherRows, stiffened, unsymmetric_at, with_added
 from fenics_contact.qp import (
     Residuals,
-    SlipLaw,
     Vector,
     contact_step,
     global_max,
@@ -43,7 +42,8 @@ class Configuration:
         time: The time at which it was reached.
         largest: Size of the largest displacement that there has been, as in `Residuals.gluing_scale`: where
             bodies return to rest, residuals are relative to that.
-        meeting: The contact points whose rows the multiplier has; None at the start.
+        contact: The contact points whose rows the multiplier has; None at the start.
+        diagonal: Of F on these rows, at a configuration near this one, owned; None where it is not known.
     """
 
     displacement: Vector
@@ -51,67 +51,90 @@ class Configuration:
     history: tuple[np.ndarray | None, ...]
     time: float
     largest: float
-    meeting: Meeting | None
+    contact: ContactConfiguration | None
+    diagonal: Vector | None = None
 
-    def meeting_at(self, meeting: Meeting) -> Configuration:
+    def natural_step(self, caution: float = 1.0) -> Vector:
+        """Return ρ of the natural map, owned, times a factor; zero where the diagonal of F is not known."""
+        assert self.contact is not None
+        layout = self.contact.torn.layout
+        if self.diagonal is None:
+            return np.zeros(layout.size)
+        return caution * contact_step(layout, self.diagonal)
+
+    def on(self, contact: ContactConfiguration) -> Configuration:
         """Return the configuration with its forces on the rows of other contact points. Collective."""
-        if self.meeting is None:
-            multiplier: Vector = np.zeros(len(meeting.torn.numbering.owned))
-        else:
-            multiplier = meeting.carried(self.multiplier, self.meeting)
-        return replace(self, multiplier=multiplier, meeting=meeting)
+        multiplier, diagonal = np.zeros(len(contact.torn.numbering.owned)), None
+        if self.contact is not None:
+            multiplier = contact.carried(self.multiplier, self.contact)
+            if self.diagonal is not None:
+                diagonal = contact.carried(self.diagonal, self.contact, spread=True)
+        return replace(self, multiplier=multiplier, diagonal=diagonal, contact=contact)
 
 
 @displayed
 @dataclass(frozen=True, eq=False)
-class Evaluation:
-    """The equations at a configuration.
+class ResidualState:
+    """The equations at a configuration, under a load.
 
     Attributes:
-        meeting: The contact points, with the system of their rows.
-        law: The law of friction there.
-        at: The configuration.
+        equations: Internal forces, and how bodies meet.
+        load: What acts.
+        at: The configuration; its history and its time are those before the load step.
         responses: Internal forces and tangents of this rank's subdomains.
-        load: f(u) of this rank, torn, [force].
+        external: f(u) of this rank, torn, [force].
         softening: −∂f/∂u of this rank, torn; None where all loads are dead.
-        rim: Marks of the nodes where neighbours do not balance the unsymmetric part of that, (n_nodes,).
         unbalanced: f(u) − f_int(u) − Bᵀλ of this rank, torn, [force].
-        lacking: c − B u, owned, [length]: gaps, minus the slip, and openings of glued rows.
+        constraint_residual: c − B u, owned, [length]: gaps, minus the slip, and openings of glued rows.
         residuals: Their size, relative.
         least_jacobian: Smallest det F of all bodies; 1 where none is strained much.
-        stiff: Largest entry of the tangents' diagonals, [force / length].
     """
 
-    meeting: Meeting
-    law: SlipLaw
+    equations: Equations
+    load: Loading
     at: Configuration
     responses: tuple[Response, ...]
-    load: Vector
+    external: Vector
     softening: sp.csr_matrix | None
-    rim: np.ndarray
     unbalanced: Vector
-    lacking: Vector
+    constraint_residual: Vector
     residuals: Residuals
     least_jacobian: float
-    stiff: float
+
+    def evaluate(self, displacement: Vector, multiplier: Vector, caution: float = 1.0) -> ResidualState:
+        """Return the equations after a Newton step from here. Collective.
+
+        Args:
+            displacement: u of this rank, torn, shape (torn_size,), [length].
+            multiplier: λ on the rows of the present contact points, owned, [force].
+            caution: Factor on ρ of the natural map.
+        """
+        at = replace(self.at, displacement=displacement, multiplier=multiplier)
+        return self.equations.evaluate(self.load, at, caution, self.at.displacement)
+
+    @property
+    def contact(self) -> ContactConfiguration:
+        """The contact points, with the system of their rows."""
+        assert self.at.contact is not None
+        return self.at.contact
 
     @property
     def rubbing(self) -> float:
         """Work of friction Σ τ·slip since histories began their step, [force · length]. Collective."""
-        _, friction = self.meeting.at_points(self.at.multiplier)
-        _, against = self.meeting.at_points(self.lacking)
+        _, friction = self.contact.at_points(self.at.multiplier)
+        _, against = self.contact.at_points(self.constraint_residual)
         return -float(np.sum(friction * against))
 
     @property
     def torn(self) -> TornSystem:
         """The system with load, supports and the rows of the contact points."""
-        return self.meeting.torn
+        return self.contact.torn
 
     @property
     def loaded(self) -> TornSystem:
         """The system with the load as it is on the deformed bodies."""
         each = zip(self.torn.subdomains, self.torn.decomposition.parts, strict=True)
-        subdomains = tuple(replace(subdomain, load=self.load[part]) for subdomain, part in each)
+        subdomains = tuple(replace(subdomain, load=self.external[part]) for subdomain, part in each)
         return replace(self.torn, subdomains=subdomains)
 
     @property
@@ -152,7 +175,7 @@ class Evaluation:
             Change of multipliers, owned, zero but in gluing rows and those of supports, [force].
         """
         torn = self.torn
-        taken = np.zeros(len(self.lacking))
+        taken = np.zeros(len(self.constraint_residual))
         if self.softening is None:
             return taken
         left = 0.5 * (self.softening.T - self.softening) @ moved
@@ -176,25 +199,23 @@ class Evaluation:
         self._require_finite_tangents()
         uneven = None
         if self.softening is not None:
-            uneven = unsymmetric_at(self.torn.decomposition, self.softening, self.rim)
-        turning = self.meeting.turning(self.at.multiplier, uneven)
+            uneven = unsymmetric_at(self.torn.decomposition, self.softening, self.load.rim)
+        turning = self.contact.turning(self.at.multiplier, uneven)
         tangents = self._tangents
         torn, further = self.torn, NO_ROWS
         if turning is not None:
             if turning.normal is not None:
                 tangents = stiffened(torn, tangents, turning.normal)
             if turning.count:
-                torn = self.meeting.with_rows_of(turning)
+                torn = self.contact.with_rows_of(turning)
                 further = FurtherRows.of(torn, self.torn, turning)
-        lacking = np.concatenate([self.lacking, np.zeros(further.count)])
-        increments = linearised(torn, self.at.displacement, tangents, self.unbalanced, lacking)
-        diagonal, operators = None, {}
-        if known is not None:
-            diagonal = self.meeting.carried(known.diagonal, known.meeting, spread=True)
+        right = np.concatenate([self.constraint_residual, np.zeros(further.count)])
+        increments = linearised(torn, self.at.displacement, tangents, self.unbalanced, right)
+        diagonal = self.at.diagonal
+        if diagonal is not None:
             diagonal = np.concatenate([diagonal, np.ones(further.count)])
-            operators = known.system.operators
-        system = TangentSystem(increments, timer, diagonal=diagonal, earlier=operators)
-        return Linearisation(system, self.meeting, further)
+        earlier = {} if known is None else known.system.operators
+        return Linearisation(TangentSystem(increments, timer, diagonal=diagonal, earlier=earlier), further)
 
 
 @displayed
@@ -204,65 +225,56 @@ class Linearisation:
 
     Attributes:
         system: The factored system; rows of turning forces come after all others.
-        meeting: The contact points.
         further: The rows of turning forces.
     """
 
     system: TangentSystem
-    meeting: Meeting
     further: FurtherRows
 
-    def spend(self) -> None:
-        """Leave the factors to the linearisation that comes next: this one is not applied any more."""
+    def release_factors(self) -> None:
+        """Hand the factorisation to the next linearisation; do not use this one afterwards."""
         for operator in self.system.inverse.tangents:
-            operator.spend()
+            operator.release_factors()
 
-    @property
-    def diagonal(self) -> Vector:
-        """Of F on the rows of the meeting, owned."""
-        return self.system.problem.diagonal[: len(self.meeting.torn.numbering.owned)]
+    def of(self, evaluation: ResidualState) -> ResidualState:
+        """Return the equations that were linearised with the diagonal of F that is known since."""
+        diagonal = self.system.problem.diagonal[: len(evaluation.constraint_residual)]
+        return replace(evaluation, at=replace(evaluation.at, diagonal=diagonal))
 
-    def natural_step(self, meeting: Meeting, caution: float) -> Vector:
-        """Return ρ of the natural map on the rows of a meeting, owned, times a factor. Collective."""
-        diagonal = meeting.carried(self.diagonal, self.meeting, spread=True)
-        return caution * contact_step(meeting.torn.layout, diagonal)
-
-    def problem(self, evaluation: Evaluation) -> TangentProblem:
+    def problem(self, evaluation: ResidualState) -> TangentProblem:
         """Return the problem of one Newton step from the configuration of the linearisation."""
-        nothing, further, torn = np.zeros(self.further.count), self.further, self.system.torn
+        nothing, stiff = np.zeros(self.further.count), evaluation.equations.stiffness
         return TangentProblem(
-            self.system.problem.with_law(torn.law),
+            self.system.problem.with_law(self.system.torn.law),
             self.system.stiffness,
             np.concatenate([evaluation.at.multiplier, nothing]),
-            np.concatenate([evaluation.lacking, nothing]),
-            np.concatenate([np.zeros(len(evaluation.lacking)), further.compliance]),
-            further.acting,
-            further.felt,
-            further.share,
-            further.lacking,
-            further.completed,
-            np.ones(len(further.lacking)),
-            1.0 / evaluation.stiff if evaluation.stiff > 0.0 else 1.0,
+            np.concatenate([evaluation.constraint_residual, nothing]),
+            self.further,
+            1.0 / stiff if stiff > 0.0 else 1.0,
         )
 
 
 @displayed
 class Equations:
-    """Internal forces of all bodies of a scene, whose meshes and numbering do not change.
+    """Internal forces of the bodies of a scene, whose meshes and numbering do not change, and their contact.
 
     Attributes:
         decomposition: The subdomains.
         rigid_start: Moves bodies as their supports do.
+        contact: How bodies meet: at their undeformed places unless some deform much.
     """
 
     def __init__(self, scene: Scene, decomposition: Decomposition) -> None:
-        """Bind the forms of every subdomain. Collective."""
+        """Bind the forms of every subdomain, and prepare the surfaces of contact pairs. Collective."""
         self.decomposition, self.rigid_start = decomposition, RigidStart(scene, decomposition)
         forms = decomposition.forms
         forms.prepare_mechanics(scene)
         with together(decomposition.comm):
             self._mechanics = tuple(self._of(scene, number) for number in range(len(decomposition.meshes)))
         meshes = [body.mesh for body in scene.bodies.values()]
+        self.contact: Contact = StillContact()
+        if scene.contacts and scene.deforms_much:
+            self.contact = MovingContact(scene, decomposition)
         self._reach = max(float(np.abs(mesh.points).max()) for mesh in meshes)
         self._cell = max(float(mesh.volume / mesh.n_cells) ** (1.0 / scene.dim) for mesh in meshes)
 
@@ -304,25 +316,26 @@ class Equations:
         return global_min(comm, least)
 
     def evaluate(
-        self,
-        meeting: Meeting,
-        law: SlipLaw,
-        at: Configuration,
-        step: Vector,
-        load: Loading,
-        origin: Vector | None = None,
-    ) -> Evaluation:
-        """Return forces, openings and their residuals. Collective.
+        self, load: Loading, near: Configuration, caution: float = 1.0, origin: Vector | None = None
+    ) -> ResidualState:
+        """Search for the contact points at a displacement; return forces, openings and residuals. Collective.
 
         Args:
-            meeting: The contact points, with supports.
-            law: Of friction.
-            at: The configuration; its history and its time are those before the load step.
-            step: ρ of the natural map, owned.
             load: What acts.
+            near: The displacement, with contact points of a neighbouring one, whose rows the forces have.
+            caution: Factor on ρ of the natural map.
             origin: Displacement before the last Newton step, torn; None where there was none.
         """
-        comm, torn = self.decomposition.comm, meeting.torn
+        contact = self.contact.at(load, near.displacement, near.contact)
+        return self.evaluate_at(load, near.on(contact), caution, origin)
+
+    def evaluate_at(
+        self, load: Loading, at: Configuration, caution: float = 1.0, origin: Vector | None = None
+    ) -> ResidualState:
+        """Return forces, openings and residuals at contact points that are known. Collective."""
+        comm, contact = self.decomposition.comm, at.contact
+        assert contact is not None
+        torn = contact.torn
         with together(comm):
             each = zip(self._mechanics, self.decomposition.parts, at.history, strict=True)
             duration = load.time - at.time
@@ -333,26 +346,18 @@ class Equations:
             external, softening = load.at(at.displacement)
         internal = np.concatenate([np.zeros(0), *(response.force for response in responses)])
         bound = torn.B.T @ torn.numbering.to_local(at.multiplier)
-        stiff, lacking = self.stiffness, meeting.lacking(at.displacement)
         # What is no more than rounding of strains and of positions is none.
-        unbalanced = beyond(external - internal - bound, ROUNDED * stiff * self._cell)
-        feasible = law.feasible(at.multiplier)
-        mapped = feasible.project(at.multiplier - step * lacking)
-        natural = beyond(at.multiplier - mapped, ROUNDED * self._reach * step)
-        sizes = Sizes(natural, unbalanced, internal, bound, external, lacking, at.displacement, at.largest)
-        residuals = sizes.residuals(torn, feasible.violation(at.multiplier), stiff)
+        unbalanced = beyond(external - internal - bound, ROUNDED * self.stiffness * self._cell)
         least = global_min(comm, min((r.least_jacobian for r in responses), default=1.0))
-        return Evaluation(
-            meeting,
-            law,
-            at,
-            responses,
-            external,
-            softening,
-            load.rim,
-            unbalanced,
-            lacking,
-            residuals,
-            least,
-            stiff,
+        open_ = contact.constraint_residual(at.displacement)
+        step, feasible = at.natural_step(caution), torn.law.feasible(at.multiplier)
+        mapped = feasible.project(at.multiplier - step * open_)
+        natural = beyond(at.multiplier - mapped, ROUNDED * self._reach * step)
+        forces = unbalanced, internal, bound, external
+        residuals = relative_residuals(
+            torn, natural, feasible.violation(at.multiplier), forces, open_, at.displacement, at.largest,
+            self.stiffness,
+        )  # fmt: skip
+        return ResidualState(
+            self, load, at, responses, external, softening, unbalanced, open_, residuals, least
         )

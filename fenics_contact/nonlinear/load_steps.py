@@ -16,9 +16,10 @@ from fenics_contact.errors import ConvergenceError, InvalidInputError, safe_log
 from fenics_contact.feti import TornSystem
 from fenics_contact.nonlinear.equations import Configuration, Equations, Linearisation
 from fenics_contact.nonlinear.loading import Loading
-from fenics_contact.nonlinear.meeting import Contact, Meeting
-from fenics_contact.nonlinear.newton import NonlinearEquilibrium, NotHeldError, TangentNewton
+from fenics_contact.nonlinear.meeting import ContactConfiguration
+from fenics_contact.nonlinear.newton import NotHeldError, TangentNewton
 from fenics_contact.nonlinear.snapping import Snap, Snapping
+from fenics_contact.nonlinear.starts import Effort, NonlinearEquilibrium
 from fenics_contact.qp import SolverStep, global_max
 from fenics_contact.timing import PhaseTimer
 
@@ -41,31 +42,27 @@ class Path:
     Attributes:
         load: What acts at the end.
         end: The last equilibrium.
-        begun: Where bodies met at the start; None where that is not known.
-        start: Where nodes stood on their masters then, or where they were first found; None where contact is
-            that of the undeformed bodies.
+        begun: Contact points at the start; None where they are not known.
+        start: These in material coordinates of the master, of others where they were first found; None where
+            contact is that of the undeformed bodies.
         fractions: Parts of the load at which equilibria were found, the last one being 1.
         since: The part from which slip and the histories of materials are one step up to the end: 0, unless
             parts are steps of their own or bodies snapped.
         snaps: Where bodies snapped.
         rubbed: Work of friction before the last step of histories, zero where the whole load is one,
             [force · length].
-        history: One line for each Newton step of all parts, those of parts that were cut included.
-        products: Applications of F.
-        factorisations: Factored tangents, counting all subdomains as one.
+        effort: That of all parts, those that were cut included.
     """
 
     load: Loading
     end: NonlinearEquilibrium
-    begun: Meeting | None
+    begun: ContactConfiguration | None
     start: MaterialPoints | None
     fractions: tuple[float, ...]
     since: float
     snaps: tuple[Snap, ...]
     rubbed: float
-    history: tuple[SolverStep, ...]
-    products: int
-    factorisations: int
+    effort: Effort
 
 
 class PathEndsError(ConvergenceError):
@@ -125,7 +122,6 @@ class AutomaticSteps:
     def follow(
         self,
         equations: Equations,
-        contact: Contact,
         before: Loading | None,
         target: Loading,
         start: Configuration,
@@ -137,8 +133,7 @@ class AutomaticSteps:
         """Return the equilibrium at a load, with the path to it. Collective.
 
         Args:
-            equations: Internal forces.
-            contact: How the bodies meet.
+            equations: Internal forces, and how bodies meet.
             before: What acts at the start; None for bodies at rest without loads.
             target: What acts at the end.
             start: The configuration at the start.
@@ -152,58 +147,56 @@ class AutomaticSteps:
         """
         first = target.removed() if before is None else before
         # Slip begins where bodies are before supports and obstacles move.
-        at = start if start.meeting else start.meeting_at(contact.at(first, start.displacement, None, None))
-        walk = _Walk(self, equations, contact, first, target, at, timer, known)
-        part, longest = self.first, contact.longest_part(first, target)
+        at = start if start.contact else start.on(equations.contact.at(first, start.displacement, None))
+        stepper = _LoadStepper(self, equations, first, target, at, timer, known)
+        part, longest = self.first, equations.contact.longest_part(first, target)
         smallest = max(self.smallest, SNAPPING) if self.snaps else self.smallest
-        while walk.reached < 1.0:
-            left = 1.0 - walk.reached
+        while stepper.reached < 1.0:
+            left = 1.0 - stepper.reached
             part = left / np.ceil(left / min(part, longest) - 1e-9)
-            fraction = 1.0 if walk.reached + part > 1.0 - 1e-12 else walk.reached + part
+            fraction = 1.0 if stepper.reached + part > 1.0 - 1e-12 else stepper.reached + part
             try:
-                steps = walk.advance(fraction)
+                steps = stepper.advance(fraction)
             except ConvergenceError as failure:
-                if not held and isinstance(failure, NotHeldError) and walk.reached == 0.0:
+                if not held and isinstance(failure, NotHeldError) and stepper.reached == 0.0:
                     raise
                 part *= 0.5
                 if part >= smallest:
                     safe_log(_LOG.info, "load step cut to %.3g: %s", part, failure)
                     continue
                 if not self.snaps:
-                    raise walk.ends(
+                    raise stepper.ends(
                         f"a further {2 * part:.1e} of it fails: {failure}, or let bodies snap where no "
                         "equilibrium is near (snaps=True)"
                     ) from failure
                 try:
-                    steps = walk.snap(fraction)
+                    steps = stepper.snap(fraction)
                 except ConvergenceError as unrest:
-                    raise walk.ends(f"{failure}; {unrest}") from unrest
+                    raise stepper.ends(f"{failure}; {unrest}") from unrest
             part *= 2.0 if steps <= EASY else 1.0
-        return walk.path()
+        return stepper.path()
 
 
-class _Walk:
-    """The path as far as it goes, and what it took."""
+class _LoadStepper:
+    """Equilibria found so far and their cost."""
 
     def __init__(
         self,
         steps: AutomaticSteps,
         equations: Equations,
-        contact: Contact,
         first: Loading,
         target: Loading,
         at: Configuration,
         timer: PhaseTimer,
         known: Linearisation | None,
     ) -> None:
-        assert at.meeting is not None
+        assert at.contact is not None
         self._newton, self._finer = steps.newton, steps.finer_history
-        self._equations, self._contact, self._timer = equations, contact, timer
+        self._equations, self._timer = equations, timer
         self._first, self._target, self._at, self._known = first, target, at, known
-        self._torn, self._begun, self._stood = first.torn, at.meeting, at.meeting.stood
+        self._torn, self._begun, self._start = first.torn, at.contact, at.contact.material_points
         self._end: NonlinearEquilibrium | None = None
-        self._fractions, self._snaps, self._history = list[float](), list[Snap](), list[SolverStep]()
-        self._products = self._factorisations = 0
+        self._fractions, self._snaps, self._effort = list[float](), list[Snap](), Effort()
         # Where the step of histories begins, with the system of then.
         self._origin, self._since = (at, first.torn), 0.0
         # Work of friction of those before it, and whether the last equilibrium ends one.
@@ -214,30 +207,27 @@ class _Walk:
         """Go on to a part of the load; return the number of Newton steps. Collective."""
         try:
             load = self._load(fraction, *self._origin)
-            assert self._at.meeting is not None
+            assert self._at.contact is not None
             moved = self._equations.rigid_start.moved(
-                self._at.meeting.prescribed, load, self._at.displacement
+                self._at.contact.prescribed, load, self._at.displacement
             )
-            found = self._newton.solve(
-                self._equations, self._contact, load, self._at, self._timer, self._known, moved
-            )
+            found = self._newton.solve(self._equations, load, self._at, self._timer, self._known, moved)
         except ConvergenceError as failure:
-            products = failure.history[-1].products if failure.history else 0
-            self._count(failure.history, products, len(failure.history))
+            self._count(Effort.until(failure))
             raise
-        self._count(found.history, found.products, found.factorisations)
+        self._count(found.effort)
         return self._reach(fraction, found)
 
     def snap(self, fraction: float) -> int:
         """Go on to an equilibrium that is not near; return the number of its Newton steps. Collective."""
         load = partial(self._load, fraction)
-        snapping = Snapping(self._newton, self._equations, self._contact, load, self._timer)
+        snapping = Snapping(self._newton, self._equations, load, self._timer)
         before = self._at.displacement
         try:
             at = self._at if self._end is None else self._end.configuration
             found = snapping.to_rest(at, self._torn, self._known)
         finally:
-            self._count(snapping.history, snapping.products, snapping.factorisations)
+            self._count(snapping.effort)
         moved = (found.evaluation.at.displacement - before).reshape(-1, self._torn.dim)
         way = global_max(self._torn.numbering.comm, np.linalg.norm(moved, axis=1).max(initial=0.0))
         self._snaps.append(Snap(fraction, float(way), snapping.dissipated, snapping.stages))
@@ -272,17 +262,12 @@ class _Walk:
         else:
             self._at = found.continued(self._origin[0])
         self._known, self.reached = found.linearisation, fraction
-        new = found.evaluation.meeting.start
-        self._stood = new if self._stood is None or new is None else self._stood.extended(new)
-        return len(found.history)
+        new = found.evaluation.contact.start
+        self._start = new if self._start is None or new is None else self._start.extended(new)
+        return len(found.effort.history)
 
-    def _count(self, history: Sequence[SolverStep], products: int, factorisations: int) -> None:
-        part = len(self._fractions)
-        self._history += [
-            replace(line, products=self._products + line.products, outer=part) for line in history
-        ]
-        self._products += products
-        self._factorisations += factorisations
+    def _count(self, effort: Effort) -> None:
+        self._effort = self._effort.followed_by(effort, len(self._fractions))
 
     def path(self) -> Path:
         """Return the path."""
@@ -291,18 +276,16 @@ class _Walk:
             self._target.between(self._first, self.reached),
             self._end,
             self._begun,
-            self._stood,
+            self._start,
             tuple(self._fractions),
             self._since,
             tuple(self._snaps),
             self._rubbed,
-            tuple(self._history),
-            self._products,
-            self._factorisations,
+            self._effort,
         )
 
     def ends(self, reason: str) -> PathEndsError:
         """Return the error where it ends."""
         path = None if self._end is None else self.path()
         message = f"the load can be followed up to {self.reached:.3g} of this step, but {reason}"
-        return PathEndsError(message, self._history, path)
+        return PathEndsError(message, self._effort.history, path)

@@ -15,7 +15,7 @@ from fenics_contact.errors import together
 from fenics_contact.feti import Decomposition, TornSystem, meeting_at, nodal_mean_at, on_copies
 from fenics_contact.linalg import scaled_rows
 from fenics_contact.nonlinear.loading import Loading
-from fenics_contact.nonlinear.turning import LackingRows, TurningForces, UnevenStiffness
+from fenics_contact.nonlinear.turning import RowCorrections, TurningForces, UnevenStiffness
 from fenics_contact.pairing import sliding_contact
 from fenics_contact.qp import Vector
 from fenics_contact.scene import MovingObstacle, RigidObstacle, RigidPlane, Scene, Surface
@@ -31,13 +31,13 @@ FACETS = 2.0
 
 @displayed
 @dataclass(frozen=True, eq=False)
-class Meeting:
+class ContactConfiguration:
     """The contact points at a displacement.
 
     Attributes:
         torn: The system with the rows of these points.
         points: The points of bodies that have moved; None where those of the undeformed bodies are used.
-        start: Where the nodes stood on their masters at the start of the load step; None likewise.
+        start: The points at the start of the load step, in material coordinates of the master; None likewise.
         prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
     """
 
@@ -47,23 +47,26 @@ class Meeting:
     prescribed: np.ndarray
 
     @property
-    def stood(self) -> MaterialPoints | None:
-        """Where nodes stand on their masters; None where contact is that of the undeformed bodies."""
+    def material_points(self) -> MaterialPoints | None:
+        """The points in material coordinates of the master; None for those of the undeformed bodies."""
         return None if self.points is None else self.points.material_points()
 
-    def from_here(self) -> Meeting:
-        """Return the meeting with slip that begins where nodes stand now."""
-        return replace(self, start=self.stood)
+    def from_here(self) -> ContactConfiguration:
+        """Return the same points with slip that begins here."""
+        return replace(self, start=self.material_points)
 
-    def lacking(self, displacement: Vector) -> Vector:
-        """Return c − B u, owned, [length]: gaps, minus the slip, and openings of glued rows. Collective."""
-        lacking = self.torn.right - self.torn.jump(displacement)
+    def constraint_residual(self, displacement: Vector) -> Vector:
+        """Return c − B u of contact, friction and gluing rows, owned, [length]. Collective.
+
+        Gaps, minus the slip, and openings of glued rows.
+        """
+        residual = self.torn.right - self.torn.jump(displacement)
         if self.points is None or self.start is None:
-            return lacking
-        return self._placed(lacking, self.points.points.gap, -self.slip(self.start))
+            return residual
+        return self._with_contact_rows(residual, self.points.points.gap, -self.slip(self.start))
 
     def slip(self, start: MaterialPoints) -> np.ndarray:
-        """Return the slip since nodes stood there, none across planes of symmetry, shape (n, dim − 1)."""
+        """Return the slip since other material points, none across planes of symmetry, shape (n, dim − 1)."""
         assert self.points is not None
         return np.where(self._across, 0.0, self.points.slip(start))
 
@@ -101,15 +104,16 @@ class Meeting:
         # In the order of the rows of contact, of which those of gaps measure −n·[u].
         slips = scaled_rows(means.slip, 1.0 - self._across.ravel())
         rows = sp.vstack([-means.gap, slips[rubbed]], "csr")
-        lacking = LackingRows.of(rows, slave[np.concatenate([np.arange(len(slave)), rubbed // width])])
-        return TurningForces.of(stiffness, further, slave[stiffness.point], lacking)
+        point = np.concatenate([np.arange(len(slave)), rubbed // width])
+        corrections = RowCorrections.of(rows, slave[point])
+        return TurningForces.of(stiffness, further, slave[stiffness.point], corrections)
 
-    def carried(self, values: Vector, other: Meeting, spread: bool = False) -> Vector:
-        """Return a vector on the rows of another meeting on these rows. Collective.
+    def carried(self, values: Vector, other: ContactConfiguration, spread: bool = False) -> Vector:
+        """Return a vector on the rows of other points on the rows of these. Collective.
 
         Args:
             values: By row, owned there.
-            other: The other meeting.
+            other: The other points.
             spread: Whether points that are new get the mean of the others, rather than zero.
         """
         if self.points is None or other.points is None:
@@ -125,7 +129,7 @@ class Meeting:
         result = np.empty(len(torn.numbering.owned))
         equality = torn.numbering.owned < torn.n_equality
         result[equality] = values[before.numbering.owned < before.n_equality]
-        return self._placed(result, normal, friction)
+        return self._with_contact_rows(result, normal, friction)
 
     def at_points(self, values: Vector) -> tuple[np.ndarray, np.ndarray]:
         """Return the part of a vector on normal rows, shape (n,), and on tangents, (n, dim − 1). Collective.
@@ -140,7 +144,7 @@ class Meeting:
         tangential[torn.frictional] = gathered[count:].reshape(-1, width)
         return gathered[:count], tangential
 
-    def _placed(self, values: Vector, normal: np.ndarray, tangential: np.ndarray) -> Vector:
+    def _with_contact_rows(self, values: Vector, normal: np.ndarray, tangential: np.ndarray) -> Vector:
         """Write values at points into the contact rows of a vector, and return it."""
         torn = self.torn
         contact = np.concatenate([normal, tangential[torn.frictional].ravel()])
@@ -148,7 +152,7 @@ class Meeting:
         values[mine] = contact[torn.numbering.owned[mine] - torn.n_equality]
         return values
 
-    def _filled(self, values: np.ndarray, other: Meeting) -> np.ndarray:
+    def _filled(self, values: np.ndarray, other: ContactConfiguration) -> np.ndarray:
         assert self.points is not None
         assert other.points is not None
         carried = self.points.carry(values, other.points)
@@ -159,13 +163,8 @@ class Meeting:
         """Return the system with the rows of turning forces after all others, in lengths. Collective."""
         decomposition = self.torn.decomposition
         points = self.torn.points if self.points is None else self.points.points
-        parts = [(turning.acting, turning.owner), (turning.felt, turning.owner)]
-        if turning.normal is not None:
-            parts = [(turning.normal.columns, turning.normal_owner), *parts]
-        if turning.lacking is not None:
-            parts.append((turning.lacking.columns, turning.lacking.owner))
         further = []
-        for columns, owner in parts:
+        for columns, owner in turning.columns:
             entries = columns.T.tocoo()
             node, component = np.divmod(entries.col, self.torn.dim)
             free = ~decomposition.fixed[node, component]
@@ -188,15 +187,15 @@ class Contact(Protocol):
         """
 
     def at(
-        self, load: Loading, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
-    ) -> Meeting:
+        self, load: Loading, displacement: Vector, last: ContactConfiguration | None
+    ) -> ContactConfiguration:
         """Return the contact points at a displacement. Collective.
 
         Args:
             load: What acts.
             displacement: u of this rank, torn, shape (torn_size,), [length].
-            start: Where nodes stood at the start of the load step; None for where they are now.
-            last: The meeting at a neighbouring displacement, or None.
+            last: The points at a neighbouring displacement, with the start of their slip; None where slip
+                starts here.
         """
 
 
@@ -208,10 +207,10 @@ class StillContact:
         return 1.0
 
     def at(
-        self, load: Loading, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
-    ) -> Meeting:
+        self, load: Loading, displacement: Vector, last: ContactConfiguration | None
+    ) -> ContactConfiguration:
         """Return the points of the undeformed bodies."""
-        return Meeting(load.torn, None, None, load.prescribed)
+        return ContactConfiguration(load.torn, None, None, load.prescribed)
 
 
 class MovingContact:
@@ -248,20 +247,24 @@ class MovingContact:
         return min(1.0, FACETS * self._facet / moved) if moved > 0.0 else 1.0
 
     def at(
-        self, load: Loading, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
-    ) -> Meeting:
+        self, load: Loading, displacement: Vector, last: ContactConfiguration | None
+    ) -> ContactConfiguration:
         """Search for the points at a displacement. Collective."""
-        known = None if last is None else last.points
+        known, start = (None, None) if last is None else (last.points, last.start)
         found = self._sliding.at(self._coordinates(load, displacement), known, load.time, start)
         here = found.material_points()
         start = here if start is None else start.extended(here)
-        return Meeting(meeting_at(load.torn, found.points, load.prescribed), found, start, load.prescribed)
+        torn = meeting_at(load.torn, found.points, load.prescribed)
+        return ContactConfiguration(torn, found, start, load.prescribed)
 
-    def found_again(self, load: Loading, displacement: Vector, stored: Mapping[str, np.ndarray]) -> Meeting:
-        """Return the points of a meeting that was stored by `SlidingPoints.stored`. Collective."""
+    def found_again(
+        self, load: Loading, displacement: Vector, stored: Mapping[str, np.ndarray]
+    ) -> ContactConfiguration:
+        """Return the points that were stored by `SlidingPoints.stored`. Collective."""
         coordinates = self._coordinates(load, displacement)
         found, start = self._sliding.found_again(stored, coordinates, load.time)
-        return Meeting(meeting_at(load.torn, found.points, load.prescribed), found, start, load.prescribed)
+        torn = meeting_at(load.torn, found.points, load.prescribed)
+        return ContactConfiguration(torn, found, start, load.prescribed)
 
     def _coordinates(self, load: Loading, displacement: Vector) -> np.ndarray:
         """Return where all nodes are that may meet, shape (n_nodes, dim), [length]. Collective."""

@@ -2,41 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from fenics_contact.checks import check_count, checked
 from fenics_contact.display import counted, displayed
 from fenics_contact.errors import ConvergenceError, FoldedFacetsError, InfeasibleError, InvalidInputError
-from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation
+from fenics_contact.nonlinear.equations import Configuration, Equations, Linearisation, ResidualState
 from fenics_contact.nonlinear.loading import Loading
-from fenics_contact.nonlinear.meeting import Contact, Meeting
-from fenics_contact.nonlinear.starts import starts
-from fenics_contact.nonlinear.tangent_step import TangentStep, tangent_step
-from fenics_contact.nonlinear.tangent_system import TangentSystem
+from fenics_contact.nonlinear.starts import Effort, NonlinearEquilibrium, starts
+from fenics_contact.nonlinear.tangent_step import TangentStep, tangent_step, whole_step
 from fenics_contact.qp import (
+    Damped,
     FaceNewton,
+    Forcing,
     Residuals,
     SolverStep,
     Stop,
     Vector,
-    apply_unless_zero,
-    classify,
+    damp,
     global_sum,
-    solve,
+    run_newton,
 )
 from fenics_contact.timing import PhaseTimer
 
-if TYPE_CHECKING:
-    from fenics_contact.pairing import MaterialPoints
-
-#: Fractions of a step that are tried where it and its contact are worse than at the last two configurations.
-FRACTIONS = (0.5, 0.25, 0.1)
-#: Factor on the residual of linear systems after each step without progress, and the least of these factors:
-#: near a loss of stability a small residual may hide a large error.
-CARE, LEAST_CARE = 0.1, 1e-3
+#: Least factor on the residual of linear systems, see `TangentNewton.care`.
+LEAST_CARE = 1e-3
 #: Errors at contact below this part of the forces out of balance say nothing of the active set.
 HIDDEN = 1e-2
 #: Residual below which a step without progress is reason enough for that care.
@@ -45,11 +39,6 @@ NEAR = 1e-2
 SLIPPED = 1e-6
 #: Residual of a linear system that is small enough, relative to the tolerance of the step.
 FINE = 1e-4
-#: Part of the smallest det F that a step must leave.
-ROOM = 0.2
-#: Steps without half the residual after which systems are solved more accurately, and from the second time
-#: on the natural map becomes more cautious, by this factor.
-PATIENCE, CAUTION = 4, 0.2
 #: Residual of contact problems that are solved as a whole, at the start of a history.
 NESTED = 1e-2
 #: What to do where closed contacts and supports leave some body free to move.
@@ -61,40 +50,6 @@ HOLD = (
 
 class NotHeldError(ConvergenceError):
     """Contact could not be solved as a whole: perhaps nothing holds some body."""
-
-
-@displayed
-@dataclass(frozen=True, eq=False)
-class NonlinearEquilibrium:
-    """The end of a load step.
-
-    Attributes:
-        evaluation: The equations there; all residuals are below the tolerance.
-        linearisation: The last one, from a little before.
-        history: One line for each Newton step.
-        time: When it is reached.
-        products: Applications of F.
-        factorisations: Factored tangents, counting all subdomains as one.
-    """
-
-    evaluation: Evaluation
-    linearisation: Linearisation
-    history: tuple[SolverStep, ...]
-    time: float
-    products: int
-    factorisations: int
-
-    @property
-    def configuration(self) -> Configuration:
-        """The configuration, with histories up to date: the next load step begins here."""
-        found = self.evaluation
-        at = replace(found.at, history=found.history, meeting=found.meeting.from_here())
-        return replace(at, time=self.time, largest=found.residuals.gluing_scale)
-
-    def continued(self, origin: Configuration) -> Configuration:
-        """Return the configuration within a step of histories that began at another one."""
-        largest = self.evaluation.residuals.gluing_scale
-        return replace(self.evaluation.at, history=origin.history, time=origin.time, largest=largest)
 
 
 @displayed
@@ -112,6 +67,12 @@ class TangentNewton:
         max_steps: Largest number of Newton steps of a load step.
         max_products: Largest number of F-products of one Newton step.
         forcing: Largest residual of a linear system, relative to its start.
+        care: Factor on that after each step that does not halve the residual: near a loss of stability a
+            small residual may hide a large error.
+        patience: Steps in which the residual must halve; else this care begins, and from the second time on
+            the natural map becomes more cautious.
+        caution: Factor on ρ of the natural map then.
+        room: Part of the smallest det F that a step must leave.
 
     References:
         S. C. Eisenstat, H. F. Walker, Choosing the forcing terms in an inexact Newton method, SIAM J. Sci.
@@ -122,26 +83,29 @@ class TangentNewton:
     max_steps: int = 25
     max_products: int = 400
     forcing: float = 0.1
+    care: float = 0.1
+    patience: int = 4
+    caution: float = 0.2
+    room: float = 0.2
 
     def __post_init__(self) -> None:
         """Check the numbers.
 
         Raises:
-            InvalidInputError: If tolerance or forcing are not between 0 and 1, or a count is not positive.
+            InvalidInputError: If one is not between 0 and 1, or a count is not positive.
         """
-        for name in ("tolerance", "forcing"):
+        for name in ("tolerance", "forcing", "care", "caution", "room"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise InvalidInputError(
                     f"{name} of TangentNewton must lie between 0 and 1, got {getattr(self, name)!r}: it is a "
-                    f"relative residual, by default {getattr(TangentNewton, name)}"
+                    f"ratio, by default {getattr(TangentNewton, name)}"
                 )
-        for name in ("max_steps", "max_products"):
+        for name in ("max_steps", "max_products", "patience"):
             check_count(getattr(self, name), f"{name} of TangentNewton")
 
     def solve(
         self,
         equations: Equations,
-        contact: Contact,
         load: Loading,
         start: Configuration,
         timer: PhaseTimer,
@@ -151,10 +115,9 @@ class TangentNewton:
         """Return the equilibrium next to a configuration. Collective.
 
         Args:
-            equations: Internal forces.
-            contact: How the bodies meet.
+            equations: Internal forces, and how bodies meet.
             load: What acts, with the origin of slip where bodies do not move far.
-            start: Where Newton's method starts, with where nodes stood and with the history of materials
+            start: Where Newton's method starts, with the start of slip and with the history of materials
                 before the load step.
             timer: Collects the wall time.
             known: A linearisation near the start, or None.
@@ -164,232 +127,247 @@ class TangentNewton:
         Raises:
             ConvergenceError: With the history, which ends with the reason.
         """
-        return _Run(self, equations, contact, load, timer).to_equilibrium(start, known, moved)
+        run = _Run(self, equations, load, timer)
+        return run_newton(run, run.init(start, known, moved))
 
 
+@dataclass(frozen=True)
+class _Pace:
+    """How accurately a step is solved, and how cautiously its face is chosen.
+
+    Attributes:
+        forcing: η, residual of the linear system relative to its start.
+        late: The last residuals since the last stall, oldest first.
+        care: Factor on η.
+        caution: Factor on ρ of the natural map.
+        stalls: How often residuals have not halved in time.
+    """
+
+    forcing: float
+    late: tuple[float, ...] = ()
+    care: float = 1.0
+    caution: float = 1.0
+    stalls: int = 0
+
+    def after(self, method: TangentNewton, worst: float) -> _Pace:
+        """Return the pace of the next step, given the residual at its start."""
+        last, care = self.late[-1] if self.late else None, self.care
+        if last and (self.stalls or worst < NEAR):
+            care = 1.0 if worst < 0.5 * last else max(method.care * care, LEAST_CARE)
+        rule = Forcing(method.forcing, np.inf, method.tolerance)
+        forcing = rule.by_reduction(worst, last, self.forcing, care)
+        late = (*self.late, worst)[-method.patience - 1 :]
+        if len(late) <= method.patience or min(late[1:]) <= 0.5 * late[0]:
+            return _Pace(forcing, late, care, self.caution, self.stalls)
+        caution = self.caution * (method.caution if self.stalls else 1.0)
+        return _Pace(forcing, (worst,), care, caution, self.stalls + 1)
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """The data passed from one Newton step to the next.
+
+    Attributes:
+        evaluation: The equations at the start of the next step.
+        near: The last linearisation; None before the first.
+        pace: That of the last step.
+        before: Residuals before the last step; None before the first.
+        instead: Where to start from if the first step fails; None otherwise.
+        loose: Whether contact had to be solved as a whole since its face did not hold every body.
+        effort: That of all steps.
+    """
+
+    evaluation: ResidualState
+    near: Linearisation | None
+    pace: _Pace
+    before: Residuals | None = None
+    instead: Configuration | None = None
+    loose: bool = False
+    effort: Effort = field(default_factory=Effort)
+
+    @property
+    def history(self) -> tuple[SolverStep, ...]:
+        """One line for each step."""
+        return self.effort.history
+
+
+@dataclass(frozen=True, eq=False)
 class _Run:
-    """One load step."""
+    """One load step: the data that all its steps share; a `NewtonMethod`."""
 
-    def __init__(
-        self, method: TangentNewton, equations: Equations, contact: Contact, load: Loading, timer: PhaseTimer
-    ) -> None:
-        self._method, self._equations, self._contact, self._load = method, equations, contact, load
-        self._timer, self._comm = timer, load.torn.numbering.comm
-        self._caution = self._care = 1.0
-        self._stalls, self._loose, self._whole_step = 0, False, False
-        self._start: MaterialPoints | None = None
-        self.history: list[SolverStep] = []
-        self._residuals: list[float] = []
-        self._forcing = method.forcing
-        self.products = self.factorisations = 0
+    method: TangentNewton
+    equations: Equations
+    load: Loading
+    timer: PhaseTimer
 
-    def to_equilibrium(
-        self, at: Configuration, known: Linearisation | None, moved: Vector | None
-    ) -> NonlinearEquilibrium:
-        evaluation, instead = starts(lambda at: self._from(at, known), at, moved)
-        near, earlier, first = known, None, evaluation.residuals
-        if near is None and first.force_scale > 0.0 and first.within(self._method.tolerance):
-            near = evaluation.linearised(self._timer, None)
-            self.factorisations += 1
-            evaluation = self._evaluated(evaluation.at, near)  # which tells of gaps only now
-        while near is None or not evaluation.residuals.within(self._method.tolerance):
-            self._require_progress(evaluation)
-            if near is not None and near is not known:
-                near.spend()
-            near = evaluation.linearised(self._timer, near)
-            self.factorisations += 1
-            following = self._advanced(evaluation, earlier, near)
-            promising = self._whole_step and following.residuals.worst < evaluation.residuals.worst
-            if instead is not None and not promising:
-                evaluation = self._begins_again(instead, known)
-            else:
-                evaluation, earlier = following, evaluation.residuals
-            instead = None
-        return NonlinearEquilibrium(
-            evaluation, near, tuple(self.history), self._load.time, self.products, self.factorisations
-        )
+    def init(self, start: Configuration, known: Linearisation | None, moved: Vector | None) -> _State:
+        """Return the state before the first step. Collective."""
+        evaluation, instead = starts(self._started, start, moved)
+        first = evaluation.residuals
+        state = _State(evaluation, known, _Pace(self.method.forcing), instead=instead)
+        if known is None and first.force_scale > 0.0 and first.within(self.method.tolerance):
+            # Gaps are measured by the diagonal of F, which is known only now.
+            near = evaluation.linearised(self.timer, None)
+            with self.timer.phase("assemble"):
+                evaluation = self.equations.evaluate_at(self.load, near.of(evaluation).at)
+            state = replace(state, evaluation=evaluation, near=near, effort=Effort(factorisations=1))
+        return state
 
-    def _from(self, at: Configuration, known: Linearisation | None) -> Evaluation:
-        """Return the equations at a configuration before the first step. Collective."""
-        self._start = None if at.meeting is None else at.meeting.start
-        return self._evaluated(at, known)
-
-    def _begins_again(self, instead: Configuration, known: Linearisation | None) -> Evaluation:
-        """Forget a first step that failed; return the equations to start from instead. Collective."""
-        self.history[-1] = replace(self.history[-1], note=f"{self.history[-1].note}, begun again")
-        self._caution, self._care, self._forcing, self._residuals = 1.0, 1.0, self._method.forcing, []
-        return self._from(instead, known)
-
-    def _evaluated(
-        self, at: Configuration, near: Linearisation | None, origin: Vector | None = None
-    ) -> Evaluation:
-        """Return the equations at a configuration, with its contact points. Collective."""
-        with self._timer.phase("assemble"):
-            meeting = self._meeting(at)
-            self._start, at = meeting.start, at.meeting_at(meeting)
-            step: Vector = np.zeros(meeting.torn.layout.size)
-            if near is not None:
-                step = near.natural_step(meeting, self._caution)
-            return self._equations.evaluate(meeting, meeting.torn.law, at, step, self._load, origin)
-
-    def _meeting(self, at: Configuration) -> Meeting:
-        """Return the contact points at a configuration, which must not fold facets. Collective."""
-        try:
-            return self._contact.at(self._load, at.displacement, self._start, at.meeting)
-        except FoldedFacetsError as folded:
-            raise ConvergenceError(
-                "a Newton step must not fold facets that meet, but after "
-                f"{counted(len(self.history), 'step')} {folded}; or take smaller load steps",
-                self.history,
-            ) from folded
-
-    def _require_progress(self, evaluation: Evaluation) -> None:
-        """Adapt the forcing term and ρ. Collective.
+    def terminate(self, state: _State) -> NonlinearEquilibrium | None:
+        """Return the equilibrium, None if a further step is needed. Collective.
 
         Raises:
             ConvergenceError: Steps are used up, or residuals grow without bound.
         """
-        worst, method = evaluation.residuals.worst, self._method
-        previous = self._residuals[-1] if self._residuals else None
-        self._residuals.append(worst)
-        if len(self.history) >= method.max_steps or not worst < 1e6:
-            last = self.history[-1] if self.history else "no step"
+        residuals, method, history = state.evaluation.residuals, self.method, state.history
+        if state.near is not None and residuals.within(method.tolerance):
+            return NonlinearEquilibrium(state.evaluation, state.near, state.effort)
+        if len(history) >= method.max_steps or not residuals.worst < 1e6:
             raise ConvergenceError(
                 f"Newton's method needs residuals below {method.tolerance:.1e}, got after "
-                f"{counted(len(self.history), 'step')}: {last}: "
-                f"{HOLD if self._loose else 'take smaller load steps'}",
-                self.history,
+                f"{counted(len(history), 'step')}: {history[-1] if history else 'no step'}: "
+                f"{HOLD if state.loose else 'take smaller load steps'}",
+                history,
             )
-        if not previous or previous >= 1.0:
-            self._forcing = method.forcing
-        else:
-            chosen = 0.9 * (worst / previous) ** 2
-            careful = 0.9 * self._forcing**2
-            self._forcing = min(method.forcing, max(chosen, careful if careful > 0.1 else 0.0))
-        if previous and (self._stalls or worst < NEAR):
-            self._care = 1.0 if worst < 0.5 * previous else max(CARE * self._care, LEAST_CARE)
-        least = 0.3 * method.tolerance / max(worst, method.tolerance)
-        self._forcing = self._care * max(self._forcing, least)
-        late = self._residuals[-PATIENCE - 1 :]
-        if len(late) > PATIENCE and min(late[1:]) > 0.5 * late[0]:
-            self._stalls += 1
-            self._caution *= CAUTION if self._stalls > 1 else 1.0
-            self._residuals = [worst]
+        return None
 
-    def _advanced(self, evaluation: Evaluation, earlier: Residuals | None, near: Linearisation) -> Evaluation:
-        """Take one step. Collective.
+    def step(self, state: _State) -> _State:
+        """Take one step. Collective."""
+        # (a) The forcing term and ρ.
+        pace = state.pace.after(self.method, state.evaluation.residuals.worst)
+        # The tangents; factors of those before are refilled, unless they belong to the load step before.
+        if state.near is not None and state.effort.factorisations:
+            state.near.release_factors()
+        near = state.evaluation.linearised(self.timer, state.near)
+        evaluation = near.of(state.evaluation)
+        state = replace(state, evaluation=evaluation, near=near, pace=pace)
+        # (b), (c) The face and its linear system.
+        with self.timer.phase("solve"):
+            taken, whole = self._solved(state)
+            change = taken.multiplier[: len(evaluation.at.multiplier)] - evaluation.at.multiplier
+            further = taken.multiplier[len(change) :]
+            moved = near.system.displacement(np.concatenate([change, further]), taken.motions)
+            change = change + evaluation.passed_on(moved)
+        # (d) The step, as far as cells and the active set allow.
+        damped = self._damped(state, moved, change)
+        # (e) The next state, or the other start if the first step has failed.
+        line = self._line(state, damped, taken, whole)
+        promising = damped.fraction == 1.0 and line.residuals.worst < evaluation.residuals.worst
+        again = state.instead if not promising else None
+        if again is not None:
+            line = replace(line, note=f"{line.note}, begun again")
+        loose = whole and self._forces_known(evaluation)
+        effort = state.effort.followed_by(Effort((line,), taken.products, 1))
+        state = replace(state, instead=None, loose=loose, effort=effort)
+        if again is not None:
+            return replace(
+                state, evaluation=self._started(again, effort.history), pace=_Pace(self.method.forcing)
+            )
+        return replace(state, evaluation=damped.point, before=evaluation.residuals)
 
-        Args:
-            evaluation: The equations at its start.
-            earlier: Residuals before the last step, or None.
-            near: The tangents at its start.
-        """
-        at, size, method = evaluation.at, len(evaluation.lacking), self._method
-        further = np.zeros(near.further.count)
-        step = np.concatenate([near.natural_step(evaluation.meeting, self._caution), further])
-        floor = FINE * method.tolerance * evaluation.residuals.gluing_scale
-        taken = None
-        with self._timer.phase("solve"):
-            if self.history or evaluation.torn.points.count == 0 or self._forces_known(evaluation):
-                problem = near.problem(evaluation)
-                # What slipped in the last load step will mostly go on: its forces are at the bound.
-                margin = 0.0 if self.history else SLIPPED
-                taken = tangent_step(problem, step, self._forcing, floor, method.max_products, margin=margin)
-            whole = taken is None
-            self._loose = whole and self._forces_known(evaluation)
-            if taken is None:
-                taken = self._held_whole(near.system, evaluation, step)
-            self.products += taken.products
-            change = taken.multiplier - np.concatenate([at.multiplier, further])
-            moved = near.system.displacement(change, taken.motions)
-            change[:size] += evaluation.passed_on(moved)
+    def _started(self, at: Configuration, history: tuple[SolverStep, ...] = ()) -> ResidualState:
+        """Return the equations where Newton's method starts. Collective."""
+        with self._assembling(history):
+            return self.equations.evaluate(self.load, at)
 
-        def after(part: float) -> Evaluation:
-            displacement, multiplier = at.displacement + part * moved, at.multiplier + part * change[:size]
-            following = replace(at, displacement=displacement, multiplier=multiplier)
-            return self._evaluated(following, near, at.displacement)
-
-        part = self._room(evaluation, moved)
-        best = after(part)
-        before = evaluation.residuals
-        olds = [old.at_rows for old in (before, earlier) if old is not None]
-        worse = all(best.residuals.at_rows.is_worse_than(old) for old in olds)
-        hidden = HIDDEN * best.residuals.coarse
-        if worse and best.residuals.natural > max(before.natural, hidden):
-            # The active set alternates between two faces: the solution lies between them. Forces out of
-            # balance are no reason: a step that turns a body strains it until the next one.
-            candidates = [(best, part), *((after(f * part), f * part) for f in FRACTIONS)]
-            full = best.residuals.at_rows
-            best, part = min(candidates, key=lambda c: c[0].residuals.at_rows.worst_beside(full))
-        self._whole_step = part == 1.0
-        self._record(best, near.system, taken, part, whole)
-        return best
-
-    def _forces_known(self, evaluation: Evaluation) -> bool:
-        return global_sum(self._comm, np.count_nonzero(evaluation.at.multiplier))[0] > 0.0
-
-    def _held_whole(self, system: TangentSystem, evaluation: Evaluation, step: Vector) -> TangentStep:
-        """Solve contact as a whole; a body that nothing holds any more ends the load step. Collective."""
+    @contextmanager
+    def _assembling(self, history: tuple[SolverStep, ...]) -> Iterator[None]:
+        """Time an evaluation of the equations, which must not fold facets."""
         try:
-            return self._whole(system, evaluation, step)
+            with self.timer.phase("assemble"):
+                yield
+        except FoldedFacetsError as folded:
+            raise ConvergenceError(
+                "a Newton step must not fold facets that meet, but after "
+                f"{counted(len(history), 'step')} {folded}; or take smaller load steps",
+                history,
+            ) from folded
+
+    def _forces_known(self, evaluation: ResidualState) -> bool:
+        comm = evaluation.torn.numbering.comm
+        return global_sum(comm, np.count_nonzero(evaluation.at.multiplier))[0] > 0.0
+
+    def _solved(self, state: _State) -> tuple[TangentStep, bool]:
+        """Solve the face at the present point, or contact as a whole; return whether that was. Collective.
+
+        At the start of a history nothing is known of the active set.
+        """
+        evaluation, method, near = state.evaluation, self.method, state.near
+        assert near is not None
+        step = np.concatenate([evaluation.at.natural_step(state.pace.caution), np.zeros(near.further.count)])
+        if state.history or evaluation.torn.points.count == 0 or self._forces_known(evaluation):
+            floor = FINE * method.tolerance * evaluation.residuals.gluing_scale
+            # What slipped in the last load step will mostly go on: its forces are at the bound.
+            margin = 0.0 if state.history else SLIPPED
+            problem, forcing = near.problem(evaluation), state.pace.forcing
+            taken = tangent_step(problem, step, forcing, floor, method.max_products, margin=margin)
+            if taken is not None:
+                return taken, False
+        try:
+            return whole_step(near.system, evaluation.at.multiplier, step, self._whole(evaluation)), True
         except InfeasibleError as reason:
             if not self._forces_known(evaluation):  # bodies at rest: nothing holds them from the start
                 raise
             raise NotHeldError(
                 f"Newton's method needs tangents that the rows of supports and contacts hold, got after "
-                f"{counted(len(self.history), 'step')}: {reason}: {HOLD}",
-                self.history,
+                f"{counted(len(state.history), 'step')}: {reason}: {HOLD}",
+                state.history,
             ) from reason
         except ConvergenceError as reason:
             raise NotHeldError(str(reason), reason.history) from reason
 
-    def _whole(self, system: TangentSystem, evaluation: Evaluation, step: Vector) -> TangentStep:
-        """Solve the linearised contact problem as a whole, its rigid motions without stiffness. Collective.
+    def _whole(self, evaluation: ResidualState) -> FaceNewton:
+        """Return the solver of contact as a whole: where forces are known a failure cuts the load step."""
+        if not self._forces_known(evaluation):
+            return FaceNewton(NESTED)
+        return FaceNewton(NESTED, max_products=self.method.max_products, doubts=False)
 
-        At the start of a history nothing is known of the active set, and without stress they have none.
+    def _damped(self, state: _State, moved: Vector, change: Vector) -> Damped[ResidualState]:
+        """Return the end of a step as long as cells allow, or a better point of it. Collective.
+
+        Forces out of balance are no reason for that: a step that turns a body strains it until the next one.
         """
-        torn, before, problem = system.torn, system.products, system.problem
-        multiplier = np.zeros(len(torn.numbering.owned))
-        multiplier[: len(evaluation.lacking)] = evaluation.at.multiplier
-        load = problem.coarse.load + problem.coarse.apply(multiplier)
-        scaling = None if problem.scaling is None else problem.scaling.with_load(load)
-        flexed = apply_unless_zero(problem, system.apply, multiplier)
-        coarse = problem.coarse.with_load(load)
-        problem = replace(problem, rhs=problem.rhs + flexed, coarse=coarse, scaling=scaling, reach=None)
-        tresca, coefficient = torn.friction
-        solver = FaceNewton(NESTED)
-        if self._forces_known(evaluation):  # then a failure cuts the load step, whatever its reason
-            solver = replace(solver, max_products=self._method.max_products, doubts=False)
-        solution = solve(problem, tresca, solver, multiplier, friction_coefficient=coefficient)
-        bound = torn.law.bound(solution.multiplier)
-        face = classify(problem.layout, bound, solution.multiplier, solution.residual, step)
-        return TangentStep(
-            solution.multiplier, solution.alpha, face, system.products - before, Stop.CONVERGED
-        )
+        start = state.evaluation
+        at, caution = start.at, state.pace.caution
+        longest = self._room(state, moved)
 
-    def _room(self, evaluation: Evaluation, moved: Vector) -> float:
+        def after(part: float) -> ResidualState:
+            part *= longest
+            with self._assembling(state.history):
+                return start.evaluate(at.displacement + part * moved, at.multiplier + part * change, caution)
+
+        full, before = after(1.0), start.residuals
+        if full.residuals.natural <= max(before.natural, HIDDEN * full.residuals.coarse):
+            return Damped(full, longest)
+        earlier = (None if old is None else old.at_rows for old in (before, state.before))
+        found = damp(full, after, lambda each: each.residuals.at_rows, earlier)
+        return replace(found, fraction=found.fraction * longest)
+
+    def _room(self, state: _State, moved: Vector) -> float:
         """Return the part of a step that keeps cells from being inverted. Collective."""
-        part, wanted = 1.0, ROOM * evaluation.least_jacobian
+        part, start = 1.0, state.evaluation
         while part > 1e-3:
-            if self._equations.least_jacobian(evaluation.at.displacement + part * moved) > wanted:
+            least = self.equations.least_jacobian(start.at.displacement + part * moved)
+            if least > self.method.room * start.least_jacobian:
                 return part
             part *= 0.5
         raise ConvergenceError(
             "a Newton step must not turn cells inside out, but every part of this one does: take smaller "
             "load steps, or refine the mesh where cells are flattened",
-            self.history,
+            state.history,
         )
 
-    def _record(
-        self, evaluation: Evaluation, system: TangentSystem, taken: TangentStep, part: float, whole: bool
-    ) -> None:
-        face = taken.face
-        counts = global_sum(self._comm, *(np.count_nonzero(m) for m in (face.closed, face.stick, face.slip)))
+    def _line(
+        self, state: _State, damped: Damped[ResidualState], taken: TangentStep, whole: bool
+    ) -> SolverStep:
+        """Return the line of history of a step. Collective."""
+        assert state.near is not None
+        face, comm, softened = taken.face, state.evaluation.torn.numbering.comm, state.near.system.softened
+        counts = global_sum(comm, *(np.count_nonzero(m) for m in (face.closed, face.stick, face.slip)))
         closed, stick, slip = (round(float(count)) for count in counts)
-        notes = ["contact solved as a whole"] if whole else [f"forcing {self._forcing:.1e}"]
-        notes += [f"cut to {part:g} of the step"] if part < 1.0 else []
+        notes = ["contact solved as a whole"] if whole else [f"forcing {state.pace.forcing:.1e}"]
+        notes += [f"cut to {damped.fraction:g} of the step"] if damped.fraction < 1.0 else []
         notes += [taken.stop.value] if taken.stop is not Stop.CONVERGED else []
-        notes += [f"{system.softened} soft motions held"] if system.softened else []
-        residuals, words = evaluation.residuals, ", ".join(notes)
-        line = SolverStep("Newton", len(self.history), self.products, residuals, closed, stick, slip, words)
-        self.history.append(line)
+        notes += [f"{softened} soft motions held"] if softened else []
+        number, residuals = len(state.history), damped.point.residuals
+        return SolverStep("Newton", number, taken.products, residuals, closed, stick, slip, ", ".join(notes))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from fenics_contact.feti import TornSystem
@@ -20,55 +18,43 @@ def beyond(values: Vector, rounding: float | Vector) -> Vector:
     return np.asarray(np.sign(values) * np.maximum(np.abs(values) - rounding, 0.0))
 
 
-@dataclass(frozen=True, eq=False)
-class Sizes:
-    """What is out of balance or open, and the forces with which it is compared.
+def relative_residuals(
+    torn: TornSystem,
+    natural: Vector,
+    violation: float,
+    forces: tuple[Vector, Vector, Vector, Vector],
+    constraint_residual: Vector,
+    displacement: Vector,
+    largest: float,
+    stiff: float,
+) -> Residuals:
+    """Return the relative residuals of a configuration: forces out of balance as `coarse`. Collective.
 
-    Attributes:
+    Args:
+        torn: The system.
         natural: λ − P(λ − ρ r), owned, [force].
-        unbalanced: Forces out of balance, torn, shape (torn_size,), [force].
-        internal: Internal forces, torn, [force].
-        bound: Bᵀλ, torn, [force].
-        external: Loads, torn, [force].
-        lacking: c − B u, owned, [length].
+        violation: Largest violation of a bound or disc by this rank's multipliers, [force].
+        forces: Out of balance, internal, Bᵀλ, loads; each torn, shape (torn_size,), [force].
+        constraint_residual: c − B u, owned, [length].
         displacement: u of this rank, torn, shape (torn_size,), [length].
         largest: A norm that displacements have had on the way, with which small ones are compared, [length].
+        stiff: Largest entry of the tangents' diagonals, [force / length].
     """
-
-    natural: Vector
-    unbalanced: Vector
-    internal: Vector
-    bound: Vector
-    external: Vector
-    lacking: Vector
-    displacement: Vector
-    largest: float
-
-    def residuals(self, torn: TornSystem, violation: float, stiff: float) -> Residuals:
-        """Return the relative residuals: forces out of balance as `coarse`. Collective.
-
-        Args:
-            torn: The system.
-            violation: Largest violation of a bound or disc by this rank's multipliers, [force].
-            stiff: Largest entry of the tangents' diagonals, [force / length].
-        """
-        comm, contact = torn.numbering.comm, torn.numbering.owned >= torn.n_equality
-        forces = self.unbalanced, self.internal, self.bound, self.external
-        lengths = self.displacement, self.lacking[~contact], torn.right[~contact]
-        squares = (x @ x for x in (*forces, *lengths, self.natural[contact]))
-        *sums, count = global_sum(comm, *squares, len(self.displacement))
-        unbalanced, internal, bound, load, moved, open_, given, natural = np.sqrt(sums)
-        moved = max(moved, given, self.largest)
-        floor = FORCE_FLOOR * stiff * moved / np.sqrt(count)
-        # Before anything acts, what is to act is all there is: a tool in a body at rest is no equilibrium.
-        force = max(min(internal, bound) if internal > 0 else bound, load, floor) or max(natural, unbalanced)
-        violation = global_max(comm, violation)
-        ratio = 1.0 / force if force > 0.0 else 0.0
-        return Residuals(
-            natural * ratio,
-            open_ / moved if moved > 0.0 else 0.0,
-            unbalanced * ratio,
-            violation * ratio,
-            force,
-            moved,
-        )
+    comm, contact = torn.numbering.comm, torn.numbering.owned >= torn.n_equality
+    lengths = displacement, constraint_residual[~contact], torn.right[~contact]
+    squares = (x @ x for x in (*forces, *lengths, natural[contact]))
+    *sums, count = global_sum(comm, *squares, len(displacement))
+    unbalanced, internal, bound, load, moved, open_, given, wrong = np.sqrt(sums)
+    moved = max(moved, given, largest)
+    floor = FORCE_FLOOR * stiff * moved / np.sqrt(count)
+    # Before anything acts, what is to act is all there is: a tool in a body at rest is no equilibrium.
+    force = max(min(internal, bound) if internal > 0 else bound, load, floor) or max(unbalanced, wrong)
+    ratio = 1.0 / force if force > 0.0 else 0.0
+    return Residuals(
+        wrong * ratio,
+        open_ / moved if moved > 0.0 else 0.0,
+        unbalanced * ratio,
+        global_max(comm, violation) * ratio,
+        force,
+        moved,
+    )

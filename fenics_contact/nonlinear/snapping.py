@@ -9,7 +9,7 @@ Newton's method finds the equilibrium without it.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,9 +19,9 @@ from fenics_contact.errors import ConvergenceError, safe_log
 from fenics_contact.feti import TornSystem
 from fenics_contact.nonlinear.equations import Configuration, Equations, Linearisation
 from fenics_contact.nonlinear.loading import Drag, Loading
-from fenics_contact.nonlinear.meeting import Contact
-from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
-from fenics_contact.qp import SolverStep, global_sum
+from fenics_contact.nonlinear.newton import TangentNewton
+from fenics_contact.nonlinear.starts import Effort, NonlinearEquilibrium
+from fenics_contact.qp import global_sum
 from fenics_contact.timing import PhaseTimer
 
 _LOG = logging.getLogger(__name__)
@@ -71,9 +71,7 @@ class Snapping:
     """One such motion.
 
     Attributes:
-        history: One line for each Newton step, those of stages that failed included.
-        products: Applications of F.
-        factorisations: Factored tangents, counting all subdomains as one.
+        effort: That of all stages, those that failed included.
         dissipated: As in `Snap`.
         stages: As there.
     """
@@ -82,7 +80,6 @@ class Snapping:
         self,
         newton: TangentNewton,
         equations: Equations,
-        contact: Contact,
         load: Callable[[Configuration, TornSystem], Loading],
         timer: PhaseTimer,
     ) -> None:
@@ -90,16 +87,12 @@ class Snapping:
 
         Args:
             newton: Solves each stage, and the end as accurately as it asks for.
-            equations: Internal forces.
-            contact: How the bodies meet.
+            equations: Internal forces, and how bodies meet.
             load: What acts, for slip that begins at a configuration, with the system in which it was found.
             timer: Collects the wall time.
         """
-        self._newton, self._equations, self._contact = newton, equations, contact
-        self._load, self._timer = load, timer
-        self.history: list[SolverStep] = []
-        self.products = self.factorisations = self.stages = 0
-        self.dissipated = 0.0
+        self._newton, self._equations, self._load, self._timer = newton, equations, load, timer
+        self.effort, self.stages, self.dissipated = Effort(), 0, 0.0
 
     def to_rest(
         self, at: Configuration, torn: TornSystem, known: Linearisation | None
@@ -123,7 +116,7 @@ class Snapping:
             if found is None:
                 size, in_a_row = MORE * size, 0
                 continue
-            if not found.history and loose.tolerance > exact.tolerance:
+            if not found.effort.history and loose.tolerance > exact.tolerance:
                 loose = replace(loose, tolerance=max(TENTH * loose.tolerance, exact.tolerance))
                 continue
             self.stages, in_a_row = self.stages + 1, in_a_row + 1
@@ -138,7 +131,7 @@ class Snapping:
         raise ConvergenceError(
             f"bodies that snap must come to rest, but after {self.stages} stages they still move, the drag "
             f"being {size:.1e} of their stiffness: take smaller load steps, or hold them better",
-            self.history,
+            self.effort.history,
         )
 
     def _tried(
@@ -146,18 +139,12 @@ class Snapping:
     ) -> NonlinearEquilibrium | None:
         """Return the equilibrium, None where there is none near. Collective."""
         try:
-            found = newton.solve(self._equations, self._contact, load, at, self._timer, known)
+            found = newton.solve(self._equations, load, at, self._timer, known)
         except ConvergenceError as failure:
-            products = failure.history[-1].products if failure.history else 0
-            self._count(failure.history, products, len(failure.history))
+            self.effort = self.effort.followed_by(Effort.until(failure))
             return None
-        self._count(found.history, found.products, found.factorisations)
+        self.effort = self.effort.followed_by(found.effort)
         return found
-
-    def _count(self, history: Sequence[SolverStep], products: int, factorisations: int) -> None:
-        self.history += [replace(line, products=self.products + line.products) for line in history]
-        self.products += products
-        self.factorisations += factorisations
 
     def _dragged(self, drag: Drag, at: Configuration, found: NonlinearEquilibrium) -> float:
         """Add the work of a stage; return the drag, relative to all forces. Collective."""

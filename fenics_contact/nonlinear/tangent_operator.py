@@ -88,8 +88,8 @@ class TangentOperator(FactoredOperator):
         self._factors = factor, inner
         super().__init__(K, interface, whole, inside)
 
-    def spend(self) -> None:
-        """Leave the factors to the operator of the next shape: this one is not applied any more."""
+    def release_factors(self) -> None:
+        """Hand the factorisation to the operator of the next shape; do not use this one afterwards."""
         self._spent = self._factors
 
     def _soft_motions(

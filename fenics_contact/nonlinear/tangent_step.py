@@ -11,21 +11,23 @@ exact for any columns. Without stress S = 0, and it is the usual problem with it
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.display import displayed
 from fenics_contact.linalg import ROUNDING, scaled_columns
+from fenics_contact.nonlinear.tangent_system import TangentSystem
+from fenics_contact.nonlinear.turning import FurtherRows
 from fenics_contact.qp import (
     CountedOperator,
+    CoupledSystem,
     DualProblem,
     Face,
+    FaceNewton,
     FacePreconditioner,
     FaceSystem,
     Kept,
-    ObliqueProjector,
     Stop,
     Vector,
     apply_unless_zero,
@@ -33,6 +35,7 @@ from fenics_contact.qp import (
     global_max,
     global_sum,
     gmres,
+    solve,
 )
 
 
@@ -47,16 +50,7 @@ class TangentProblem:
         stiffness: S of the rigid motions, shape (m, m), replicated.
         multiplier: λ, owned.
         residual: c − B u, owned: the residual r of the natural map, gaps and minus the slip.
-        compliance: Compliances of rows of equality, owned, shape (size,): B u = c + compliance · λ; of either
-            sign, zero on most rows.
-        acting: Positions of rows whose multipliers act without being felt: each is what the row of `felt` of
-            the same number measures, an unsymmetric stiffness; shape (k,).
-        felt: Positions of these rows, which have no multipliers, shape (k,).
-        share: What each of them measures for a multiplier of one, shape (k,).
-        lacking: Positions of rows without multipliers that others lack where displacements are measured: the
-            derivative of a gap need not be the row of its force; shape (m,).
-        completed: Positions of these others, shape (m,).
-        completing: How much of the former the latter lack, shape (m,).
+        further: The last rows, for the stiffness of forces that turn.
         flexibility: A typical entry of F, [length / force].
     """
 
@@ -64,18 +58,19 @@ class TangentProblem:
     stiffness: sp.csr_matrix
     multiplier: Vector
     residual: Vector
-    compliance: Vector
-    acting: np.ndarray
-    felt: np.ndarray
-    share: Vector
-    lacking: np.ndarray
-    completed: np.ndarray
-    completing: Vector
+    further: FurtherRows
     flexibility: float
 
-    def complete(self, rows: sp.csr_matrix) -> sp.csr_matrix:
-        """Return columns of weights of rows, shape (n_owned, n), with those of the rows that they lack."""
-        entries = self.completing, (self.lacking, self.completed)
+    @property
+    def compliance(self) -> Vector:
+        """Compliances of rows of equality, owned, of either sign: B u = c + compliance · λ."""
+        usual = np.zeros(len(self.multiplier) - self.further.count)
+        return np.concatenate([usual, self.further.compliance])
+
+    def corrected(self, rows: sp.csr_matrix) -> sp.csr_matrix:
+        """Return columns of weights of rows, shape (n_owned, n), with those of the rows that correct them."""
+        further = self.further
+        entries = further.correction, (further.correction_rows, further.corrected_rows)
         return (rows + sp.csr_matrix(entries, shape=(rows.shape[0],) * 2) @ rows).tocsr()
 
     def scaled(self) -> TangentProblem:
@@ -88,9 +83,7 @@ class TangentProblem:
             problem=self.problem.scaled_problem,
             multiplier=np.asarray(self.multiplier / s, dtype=np.float64),
             residual=np.asarray(self.residual * s, dtype=np.float64),
-            compliance=np.asarray(self.compliance * s**2, dtype=np.float64),
-            share=np.asarray(self.share * s[self.felt] * s[self.acting], dtype=np.float64),
-            completing=np.asarray(self.completing * s[self.completed] / s[self.lacking], dtype=np.float64),
+            further=self.further.scaled(s),
         )
 
 
@@ -154,6 +147,32 @@ def tangent_step(
     return TangentStep(multiplier, motions, face, operator.products, stop)
 
 
+def whole_step(system: TangentSystem, multiplier: Vector, step: Vector, solver: FaceNewton) -> TangentStep:
+    """Solve the linearised contact problem as a whole, its rigid motions without stiffness. Collective.
+
+    At the start of a history nothing is known of the active set, and without stress they have none.
+
+    Args:
+        system: The tangents.
+        multiplier: λ, owned, without rows of forces that turn.
+        step: ρ of the natural map on all rows, owned.
+        solver: Solves the dual problem.
+    """
+    torn, before, problem = system.torn, system.products, system.problem
+    multiplier = np.concatenate([multiplier, np.zeros(len(step) - len(multiplier))])
+    load = problem.coarse.load + problem.coarse.apply(multiplier)
+    scaling = None if problem.scaling is None else problem.scaling.with_load(load)
+    flexed = apply_unless_zero(problem, system.apply, multiplier)
+    coarse = problem.coarse.with_load(load)
+    problem = replace(problem, rhs=problem.rhs + flexed, coarse=coarse, scaling=scaling, reach=None)
+    tresca, coefficient = torn.friction
+    solution = solve(problem, tresca, solver, multiplier, friction_coefficient=coefficient)
+    bound = torn.law.bound(solution.multiplier)
+    face = classify(problem.layout, bound, solution.multiplier, solution.residual, step)
+    products = system.products - before
+    return TangentStep(solution.multiplier, solution.alpha, face, products, Stop.CONVERGED)
+
+
 def tangent_adjoint(
     tangent: TangentProblem,
     face: Face,
@@ -190,82 +209,74 @@ def tangent_adjoint(
     solved = _StiffFace.build(at, replace(face, flexibility=flexibility), coupling, operator)
     if solved is None:
         return None
-    transposed = solved.transposed()
+    transposed = solved.coupled.transposed(at.problem.coarse)
     if transposed is None:
         return None
-    change, motions, stop = transposed.solve(nothing, tolerance, 0.0, max_products)
+    swapped = replace(solved, coupled=transposed)
+    change, motions, stop = swapped.solve(nothing, tolerance, 0.0, max_products)
     return TangentStep(change * factor, motions, face, operator.products, stop)
 
 
 @dataclass(frozen=True, eq=False)
 class _StiffFace:
-    """(Wᵀ F Z + κ) y − (G W)ᵀβ = g with G Z y + S β = b: a face with stiff rigid motions.
+    """A face with stiff rigid motions: (Wᵀ F Z + κ) y − (G W)ᵀβ = g with G Z y + S β = b.
+
+    W and Z have the columns of the face in common but for growing friction; then W has the rows that measure
+    without multipliers, and Z those whose multipliers act without being measured.
 
     Attributes:
         at: The linearised problem.
-        system: The face without stiffness, whose preconditioner is used.
+        coupled: The face without S; κ is that of slipping discs, of rows with a compliance, and one of rows
+            that act.
         shared: Columns of the face that W and Z have in common, as numbers, shape (n_shared,).
-        tested: W: those, and the rows that are felt, shape (n_owned, n).
-        moving: Z: those with growing friction, and the rows that act, shape (n_owned, n).
-        compliance: κ, of slipping discs, of rows with a compliance, and one of acting rows, shape (n,).
-        further: Marks of the columns with a compliance of their own, shape (n,).
-        oblique: Projector to equilibrium.
-        operator: F, counted.
+        soft: Marks of the columns with a compliance of their own, shape (n,).
     """
 
     at: TangentProblem
-    system: FaceSystem
+    coupled: CoupledSystem
     shared: np.ndarray
-    tested: sp.csr_matrix
-    moving: sp.csr_matrix
-    compliance: Vector
-    further: np.ndarray
-    oblique: ObliqueProjector
-    operator: CountedOperator
+    soft: np.ndarray
 
     @classmethod
     def build(
         cls, at: TangentProblem, face: Face, coupling: sp.csr_matrix | None, operator: CountedOperator
     ) -> _StiffFace | None:
         """Prepare the face; None where it does not hold every body. Collective."""
-        problem, coarse, equality = at.problem, at.problem.coarse, at.problem.layout.equality
+        problem, further, equality = at.problem, at.further, at.problem.layout.equality
         basis = face.restriction
-        felt, acting, lacking = (np.searchsorted(equality, x) for x in (at.felt, at.acting, at.lacking))
-        shared = np.setdiff1d(np.arange(basis.shape[1]), np.concatenate([felt, acting, lacking]))
+        measuring, acting, correcting = (
+            np.searchsorted(equality, rows)
+            for rows in (further.displacement_rows, further.force_rows, further.correction_rows)
+        )
+        shared = np.setdiff1d(np.arange(basis.shape[1]), np.concatenate([measuring, acting, correcting]))
         moving = basis if coupling is None else (basis + coupling).tocsr()
-        tested = at.complete(basis[:, np.concatenate([shared, felt])])
+        tested = at.corrected(basis[:, np.concatenate([shared, measuring])])
         moving = moving[:, np.concatenate([shared, acting])]
-        own = face.restrict(at.compliance)
-        compliance = np.concatenate([(face.curvature + own)[shared], at.share])
-        further = np.concatenate([own[shared] != 0.0, np.ones(len(at.share), dtype=bool)])
-        scale = _scale(at, compliance, further)
-        tested, moving = scaled_columns(tested, scale), scaled_columns(moving, scale)
-        oblique = ObliqueProjector.build(sp.csr_matrix(coarse.matrix @ tested), coarse.restricted(moving))
-        if oblique is None:
-            return None
+        own, share = face.restrict(at.compliance), further.share
+        compliance = np.concatenate([(face.curvature + own)[shared], share])
+        soft = np.concatenate([own[shared] != 0.0, np.ones(len(share), dtype=bool)])
+        scale = _scale(at, compliance, soft)
         preconditioner = problem.preconditioner
         if isinstance(preconditioner, FacePreconditioner):
             # The other rows are nearly combinations of contact rows: the preconditioner is that of these.
             preconditioner = preconditioner.on_face(basis[:, shared[own[shared] == 0.0]])
-        system = FaceSystem(problem.comm, face, operator, coarse.restricted(basis), preconditioner)
-        return cls(at, system, shared, tested, moving, compliance * scale**2, further, oblique, operator)
-
-    def transposed(self) -> _StiffFace | None:
-        """Return the face with its bases swapped; None where that does not hold every body. Collective."""
-        coarse = self.at.problem.coarse
-        matrix, moving = sp.csr_matrix(coarse.matrix @ self.moving), coarse.restricted(self.tested)
-        oblique = ObliqueProjector.build(matrix, moving)
-        if oblique is None:
-            return None
-        return replace(self, tested=self.moving, moving=self.tested, oblique=oblique)
+        system = FaceSystem(problem.comm, face, operator, problem.coarse.restricted(basis), preconditioner)
+        coupled = CoupledSystem.build(
+            system,
+            problem.coarse,
+            scaled_columns(tested, scale),
+            scaled_columns(moving, scale),
+            curvature=compliance * scale**2,
+        )
+        return None if coupled is None else cls(at, coupled, shared, soft)
 
     def solve(
         self, fixed: Vector, forcing: float, floor: float, max_products: int
     ) -> tuple[Vector, Vector, Stop]:
         """Return δλ, owned, β, replicated, and why the iteration ended. Collective.
 
-        GMRES on the whole residual v of the first equation: its part across the rigid motions is met by
-        multipliers in equilibrium, the rest by the motions, with the multipliers that bear their stiffness.
+        GMRES on the whole residual v of the first equation: its part across the rigid motions is cancelled by
+        multipliers in equilibrium, the rest by the motions, with multipliers that balance their stiffness.
 
         Args:
             fixed: The part of λ that is given on the face, owned.
@@ -273,18 +284,18 @@ class _StiffFace:
             floor: As there.
             max_products: As there.
         """
-        problem, comm, oblique = self.at.problem, self.at.problem.comm, self.oblique
+        problem, comm, coupled = self.at.problem, self.at.problem.comm, self.coupled
+        oblique, moving, operator = coupled.oblique, coupled.moving, coupled.system.operator
         # From λ onto the face, into the equilibrium of β = 0.
         load = problem.coarse.load + problem.coarse.apply(self.at.multiplier - fixed)
-        y = np.concatenate([self.system.face.restrict(self.at.multiplier)[self.shared], self._nothing])
-        y = y - oblique.transposed @ oblique.solve(oblique.moving.apply(y) - load)
-        change = fixed + self.moving @ y - self.at.multiplier
-        product = apply_unless_zero(problem, self.operator, change)
-        gradient = self._testing @ (product - problem.rhs) + self.compliance * y
+        on_face = coupled.system.face.restrict(self.at.multiplier)[self.shared]
+        y = coupled.balanced(self._filled(on_face), load)
+        change = fixed + moving @ y - self.at.multiplier
+        gradient = coupled.operate(y, apply_unless_zero(problem, operator, change) - problem.rhs)
 
         def expand(vector: Vector) -> tuple[Vector, Kept]:
             step, motions = self._direction(vector)
-            image = self._testing @ self.operator(self.moving @ step) + self.compliance * step
+            image = coupled.operate(step, operator(moving @ step))
             return image - oblique.transposed @ motions, (step, motions)
 
         across = oblique(gradient)
@@ -292,46 +303,36 @@ class _StiffFace:
         # oblique projection; what rounding leaves of them is small enough.
         size, seen = np.sqrt(global_sum(comm, gradient @ gradient, across @ across))
         tolerance = max(forcing * float(min(size, seen)), floor, ROUNDING * float(size))
-        found = gmres(comm, -gradient, expand, tolerance, max_products, self.system.patience)
-        change = change + self.moving @ found.combined(0, len(gradient))
+        found = gmres(comm, -gradient, expand, tolerance, max_products, coupled.system.patience)
+        change = change + moving @ found.combined(0, len(gradient))
         return np.asarray(change, dtype=np.float64), found.combined(1, problem.coarse.m), found.stop
 
-    @cached_property
-    def _testing(self) -> sp.csr_matrix:
-        """Wᵀ."""
-        return self.tested.T.tocsr()
-
-    @property
-    def _nothing(self) -> Vector:
-        """No multipliers of acting rows."""
-        return np.zeros(self.tested.shape[1] - len(self.shared))
+    def _filled(self, on_shared: Vector) -> Vector:
+        """Return multipliers of the shared columns with none of the others, shape (n,)."""
+        return np.concatenate([on_shared, np.zeros(len(self.soft) - len(self.shared))])
 
     def _direction(self, vector: Vector) -> tuple[Vector, Vector]:
         """Return a step y and motions β with G Z y + S β = 0 for a residual. Collective."""
-        oblique, motions = self.oblique, -self.oblique.coefficients(vector)
+        coupled, oblique, soft = self.coupled, self.coupled.oblique, self.soft
+        motions = -oblique.coefficients(vector)
         across = vector + oblique.transposed @ motions
-        residual = np.zeros(self.system.face.n_face)
+        residual = np.zeros(coupled.system.face.n_face)
         residual[self.shared] = across[: len(self.shared)]
-        step = np.concatenate([self.system.precondition(residual)[self.shared], self._nothing])
-        step[self.further] = across[self.further] / self.compliance[self.further]
-        borne = oblique.transposed @ oblique.solve(self.at.stiffness @ motions)
-        return np.asarray(oblique.moving.project(step) - borne, dtype=np.float64), motions
+        step = self._filled(coupled.system.precondition(residual)[self.shared])
+        step[soft] = across[soft] / coupled.curvature[soft]
+        balancing = oblique.transposed @ oblique.solve(self.at.stiffness @ motions)
+        return np.asarray(oblique.moving.project(step) - balancing, dtype=np.float64), motions
 
 
-def _scale(at: TangentProblem, compliance: Vector, further: np.ndarray) -> Vector:
+def _scale(at: TangentProblem, compliance: Vector, soft: np.ndarray) -> Vector:
     """Return factors of columns that give soft rows the usual flexibility, shape (n,). Collective.
 
     An error in a soft row causes little force: unscaled, its residual would swamp all others, first where
     rigid motions take their part of it.
-
-    Args:
-        at: The linearised problem.
-        compliance: Of each column, shape (n,).
-        further: Marks of the columns with a compliance of their own, shape (n,).
     """
     problem, contact = at.problem, at.problem.layout.contact
     total, count = global_sum(problem.comm, problem.diagonal[contact].sum(), len(contact))
     usual = total / count if count > 0.0 else at.flexibility
     scale = np.ones(len(compliance))
-    scale[further] = np.sqrt(np.minimum(usual / np.abs(compliance[further]), 1.0))
+    scale[soft] = np.sqrt(np.minimum(usual / np.abs(compliance[soft]), 1.0))
     return scale

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -39,54 +39,50 @@ class UnevenStiffness:
 
 @displayed
 @dataclass(frozen=True, eq=False)
-class LackingRows:
-    """What rows of contact lack to be derivatives of gap and slip.
+class RowCorrections:
+    """The differences of derivatives of gap and slip from the rows of their forces.
 
     Attributes:
-        columns: Of each such row, shape (n_dofs, m); dof dim · node + component of all nodes.
-        completed: Number of the row that lacks it among those of contact, shape (m,).
+        columns: Of each row that is not the derivative, shape (n_dofs, m); dof dim · node + component of all
+            nodes.
+        corrected: Number of that row among those of contact, shape (m,).
         owner: Node whose rank owns both, shape (m,).
     """
 
     columns: sp.csr_matrix
-    completed: np.ndarray
+    corrected: np.ndarray
     owner: np.ndarray
 
     @classmethod
-    def of(cls, rows: sp.csr_matrix, owner: np.ndarray) -> LackingRows:
-        """Return those of rows of contact that lack something.
-
-        Args:
-            rows: What each row of contact lacks, zero where it is the derivative, shape (n, n_dofs).
-            owner: Node whose rank owns each row, shape (n,).
-        """
-        completed = np.flatnonzero(_lengths(rows.T.tocsr()) > ROUNDING)
-        return cls(rows[completed].T.tocsr(), completed, owner[completed])
+    def of(cls, rows: sp.csr_matrix, owner: np.ndarray) -> RowCorrections:
+        """Return those that are not zero, of all rows of contact, shape (n, n_dofs), with their owners."""
+        corrected = np.flatnonzero(_lengths(rows.T.tocsr()) > ROUNDING)
+        return cls(rows[corrected].T.tocsr(), corrected, owner[corrected])
 
 
 @displayed
 @dataclass(frozen=True, eq=False)
 class TurningForces:
-    """How forces change as surfaces turn under them, at fixed multipliers, and gaps beside their rows.
+    """How forces change as surfaces turn under them, at fixed multipliers, and gaps other than by their rows.
 
     Attributes:
         normal: Of the normal forces of contact, symmetric; None where contact points do not move.
         normal_owner: Node whose rank owns the row of each of its columns.
-        acting: Directions of changes of friction forces and pressures, columns of length one, shape (n_dofs,
+        forces: Directions of changes of friction forces and pressures, columns of length one, shape (n_dofs,
             k).
-        felt: The displacements that change them, columns of length one, shape (n_dofs, k).
+        displacements: The displacements that change them, columns of length one, shape (n_dofs, k).
         stiffness: Change of force for a displacement of one, shape (k,), [force / length].
         owner: Node whose rank owns the rows of each of these, shape (k,).
-        lacking: What rows of contact lack; None where contact points do not move.
+        corrections: Those of rows of contact; None where contact points do not move.
     """
 
     normal: GeometricStiffness | None
     normal_owner: np.ndarray
-    acting: sp.csr_matrix
-    felt: sp.csr_matrix
+    forces: sp.csr_matrix
+    displacements: sp.csr_matrix
     stiffness: np.ndarray
     owner: np.ndarray
-    lacking: LackingRows | None
+    corrections: RowCorrections | None
 
     @classmethod
     def of(
@@ -94,19 +90,20 @@ class TurningForces:
         normal: GeometricStiffness | None,
         others: Sequence[UnevenStiffness],
         normal_owner: np.ndarray = _NONE,
-        lacking: LackingRows | None = None,
+        corrections: RowCorrections | None = None,
     ) -> TurningForces:
         """Return those of several stiffnesses, with at least one unsymmetric one."""
         others = [each for each in others if each.left.shape[1]] or others[:1]
-        L, R = (_beside([getattr(each, side) for each in others]) for side in ("left", "right"))
+        L, R = (_joined([getattr(each, side) for each in others]) for side in ("left", "right"))
         owner = np.concatenate([each.owner for each in others])
         left, right = _lengths(L), _lengths(R)
         kept = np.flatnonzero(left * right > ROUNDING * (left * right).max(initial=0.0))
-        acting, felt = (
+        forces, displacements = (
             scaled_columns(columns[:, kept], 1.0 / lengths[kept])
             for columns, lengths in ((L, left), (R, right))
         )
-        return cls(normal, normal_owner, acting, felt, (left * right)[kept], owner[kept], lacking)
+        stiffness = (left * right)[kept]
+        return cls(normal, normal_owner, forces, displacements, stiffness, owner[kept], corrections)
 
     @property
     def compliance(self) -> np.ndarray:
@@ -114,17 +111,26 @@ class TurningForces:
         return np.zeros(0) if self.normal is None else 1.0 / self.normal.values
 
     @property
-    def count(self) -> int:
-        """Number of rows: one for each value of `normal`, two for each other stiffness, what rows lack."""
-        return len(self.compliance) + 2 * len(self.stiffness) + len(self.completed)
+    def columns(self) -> list[tuple[sp.csr_matrix, np.ndarray]]:
+        """Columns of all rows with the nodes whose ranks own them, in the order of `FurtherRows`."""
+        parts = [] if self.normal is None else [(self.normal.columns, self.normal_owner)]
+        parts += [(self.forces, self.owner), (self.displacements, self.owner)]
+        if self.corrections is not None:
+            parts.append((self.corrections.columns, self.corrections.owner))
+        return parts
 
     @property
-    def completed(self) -> np.ndarray:
-        """Numbers of rows of contact that lack something, shape (m,)."""
-        return _NONE if self.lacking is None else self.lacking.completed
+    def count(self) -> int:
+        """Number of rows."""
+        return sum(len(owner) for _, owner in self.columns)
+
+    @property
+    def corrected(self) -> np.ndarray:
+        """Numbers of rows of contact that are corrected, shape (m,)."""
+        return _NONE if self.corrections is None else self.corrections.corrected
 
 
-def _beside(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
+def _joined(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
     return parts[0] if len(parts) == 1 else sp.hstack(parts, "csr")
 
 
@@ -158,31 +164,36 @@ def unsymmetric_at(
     # Between neighbours it cancels but for rounding.
     matrix.data[np.abs(matrix.data) <= ROUNDING * max(part[3] for part in parts)] = 0.0
     matrix.eliminate_zeros()
-    felt = np.flatnonzero(np.diff(matrix.indptr))
-    left = sp.csr_matrix((np.ones(len(felt)), (felt, np.arange(len(felt)))), shape=(len(free), len(felt)))
-    return UnevenStiffness(left, matrix[felt].T.tocsr(), felt // dim)
+    changed = np.flatnonzero(np.diff(matrix.indptr))
+    entries = np.ones(len(changed)), (changed, np.arange(len(changed)))
+    left = sp.csr_matrix(entries, shape=(len(free), len(changed)))
+    return UnevenStiffness(left, matrix[changed].T.tocsr(), changed // dim)
 
 
 @displayed
 @dataclass(frozen=True, eq=False)
 class FurtherRows:
-    """The rows of turning forces, after all others.
+    """The rows of turning forces, after all others; positions are among all owned rows.
 
     Attributes:
         compliance: Of rows of normal forces, of either sign, zero of others, owned, shape (count,).
-        acting: Positions among all owned rows of those on which friction acts, shape (k,).
-        felt: Positions of those whose displacement changes it, shape (k,).
-        share: Displacement in each of these for a force of one, shape (k,).
-        lacking: Positions of rows that others lack to be derivatives of gap and slip, shape (m,).
-        completed: Positions of these others, shape (m,).
+        force_rows: Positions of rows whose multipliers act without being measured: each is what the row of
+            `displacement_rows` of the same number measures, an unsymmetric stiffness; shape (k,).
+        displacement_rows: Positions of these rows, which have no multipliers, shape (k,).
+        share: What each of them measures for a multiplier of one, shape (k,).
+        correction_rows: Positions of rows without multipliers that others need where displacements are
+            measured: the derivative of a gap need not be the row of its force; shape (m,).
+        corrected_rows: Positions of these others, shape (m,).
+        correction: The factor with which the former are added to the latter, shape (m,).
     """
 
     compliance: Vector
-    acting: np.ndarray
-    felt: np.ndarray
+    force_rows: np.ndarray
+    displacement_rows: np.ndarray
     share: Vector
-    lacking: np.ndarray
-    completed: np.ndarray
+    correction_rows: np.ndarray
+    corrected_rows: np.ndarray
+    correction: Vector
 
     @classmethod
     def of(cls, torn: TornSystem, before: TornSystem, turning: TurningForces) -> FurtherRows:
@@ -192,20 +203,35 @@ class FurtherRows:
         pairs = len(turning.stiffness)
         compliance = np.concatenate([turning.compliance, np.zeros(turning.count - normal)])
         place, ends = begin + np.arange(len(number)), normal + pairs * np.arange(3)
-        acting, felt = ((number >= first) & (number < last) for first, last in pairwise(ends))
-        share = 1.0 / turning.stiffness[number[acting] - normal]
-        lacking = number >= ends[-1]
-        row = before.n_equality + turning.completed[number[lacking] - ends[-1]]
-        completed = np.searchsorted(before.numbering.owned, row)
-        return cls(compliance[number], place[acting], place[felt], share, place[lacking], completed)
+        forces, displacements = ((number >= first) & (number < last) for first, last in pairwise(ends))
+        correcting = number >= ends[-1]
+        row = before.n_equality + turning.corrected[number[correcting] - ends[-1]]
+        return cls(
+            compliance[number],
+            place[forces],
+            place[displacements],
+            1.0 / turning.stiffness[number[forces] - normal],
+            place[correcting],
+            np.searchsorted(before.numbering.owned, row),
+            np.ones(np.count_nonzero(correcting)),
+        )
 
     @property
     def count(self) -> int:
         """Number of rows of this rank."""
         return len(self.compliance)
 
+    def scaled(self, s: Vector) -> FurtherRows:
+        """Return the rows for multipliers λ / s, with s of all owned rows."""
+        return replace(
+            self,
+            compliance=np.asarray(self.compliance * s[len(s) - self.count :] ** 2),
+            share=np.asarray(self.share * s[self.displacement_rows] * s[self.force_rows]),
+            correction=np.asarray(self.correction * s[self.corrected_rows] / s[self.correction_rows]),
+        )
 
-NO_ROWS = FurtherRows(np.zeros(0), _NONE, _NONE, np.zeros(0), _NONE, _NONE)
+
+NO_ROWS = FurtherRows(np.zeros(0), _NONE, _NONE, np.zeros(0), _NONE, _NONE, np.zeros(0))
 
 
 def stiffened(

@@ -13,6 +13,7 @@ from fenics_contact.qp.face import STEEP, Face, Marks, classify, face_basis
 from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG
 from fenics_contact.qp.face_system import CoupledSystem, FaceSystem, FaceSystems, ObliqueProjector
 from fenics_contact.qp.feasible import FeasibleSet
+from fenics_contact.qp.forcing import Damped, Forcing, damp, run_newton
 from fenics_contact.qp.iterate import Start, apply_unless_zero, iterate_at
 from fenics_contact.qp.krylov import FaceStep, Kept, Stop, gmres, projected_cg, projected_gmres
 from fenics_contact.qp.layout import ContactLayout
@@ -47,6 +48,7 @@ __all__ = [
     "CoulombLaw",
     "CountedOperator",
     "CoupledSystem",
+    "Damped",
     "DualProblem",
     "DualSolution",
     "DualSolver",
@@ -58,6 +60,7 @@ __all__ = [
     "FaceSystem",
     "FaceSystems",
     "FeasibleSet",
+    "Forcing",
     "Kept",
     "Marks",
     "Mpgp",
@@ -78,6 +81,7 @@ __all__ = [
     "apply_unless_zero",
     "classify",
     "contact_step",
+    "damp",
     "face_basis",
     "find_equilibrium",
     "global_max",
@@ -90,5 +94,6 @@ __all__ = [
     "projected_cg",
     "projected_gmres",
     "require_equilibrium",
+    "run_newton",
     "solve",
 ]

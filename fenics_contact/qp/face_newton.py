@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import NoReturn
 
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
-from fenics_contact.qp.forcing import Forcing, Progress, run_newton
+from fenics_contact.qp.forcing import Forcing, run_newton
 from fenics_contact.qp.iterate import Certificate, Iterate, Start, certify
 from fenics_contact.qp.newton_steps import FaceState, FaceSteps
 from fenics_contact.qp.not_held import (
@@ -124,9 +124,9 @@ class _State:
     Attributes:
         newton: The present iterate, with faces and ρ.
         best: The last iterate that halved the residual, or the outcome of a later rescue.
-        progress: Its residuals, and the Newton steps since.
         memory: Estimates from SMALSE.
         history: One line per step or rescue.
+        since_best: Newton steps since the best iterate.
         care: Factor on the tolerance of the next face.
         rescues: Rescues so far.
         last_rescue: The last of them.
@@ -135,9 +135,9 @@ class _State:
 
     newton: FaceState
     best: Iterate
-    progress: Progress
     memory: SmalseMemory | None
     history: tuple[SolverStep, ...] = ()
+    since_best: int = 0
     care: float = 1.0
     rescues: int = 0
     last_rescue: _LastRescue | None = None
@@ -179,7 +179,7 @@ class _Run:
     def init(self) -> _State:
         """Return the state before the first step."""
         first = self.start.iterate
-        return _State(self.steps.init(first), first, Progress(first.residuals), self.start.memory)
+        return _State(self.steps.init(first), first, self.start.memory)
 
     def terminate(self, state: _State) -> DualSolution | None:
         """Return the certified solution, None if a further step is needed. Collective.
@@ -200,8 +200,8 @@ class _Run:
         """Take a Newton step; without progress a rescue follows. Collective.
 
         Raises:
-            InfeasibleError: All contacts stay open, and some body moves that only they could hold, or friction
-                is far from sufficient.
+            InfeasibleError: All contacts stay open, and some body moves that only they could hold, or
+                friction is far from sufficient.
         """
         # (a)-(d) Forcing term, face, linear system, damped step: see `FaceSteps.step`.
         newton, line = self.steps.step(state.newton, len(state.history), state.care)
@@ -215,18 +215,14 @@ class _Run:
         if lost and state.rescues:  # an active set may also lose bodies that contact can hold
             raise error_without_contact(line)
         # (e) Progress: without any, faces are solved more accurately, and at last a rescue is called.
-        progress = state.progress.after(iterate.residuals)
-        lasting = state.care * self.parameters.care if progress.since > CARELESS else state.care
-        diverged = not iterate.residuals.worst_beside(state.progress.best) < DIVERGED
-        state = replace(
-            state,
-            newton=newton,
-            history=history,
-            progress=progress,
-            best=state.best if progress.since else iterate,
-            care=lasting if progress.since else 1.0,
-        )
-        stuck = lost or diverged or progress.since >= self.parameters.patience
+        best, now = state.best.residuals, iterate.residuals
+        state = replace(state, newton=newton, history=history)
+        if now.worst_beside(best) < 0.5 * best.worst_beside(now):
+            state = replace(state, best=iterate, since_best=0, care=1.0)
+        else:
+            factor = self.parameters.care if state.since_best >= CARELESS else 1.0
+            state = replace(state, since_best=state.since_best + 1, care=factor * state.care)
+        stuck = lost or state.since_best >= self.parameters.patience or not now.worst_beside(best) < DIVERGED
         return self._rescued(state) if stuck else state
 
     def _rescued(self, state: _State) -> _State:
@@ -257,9 +253,9 @@ class _Run:
             state,
             newton=replace(state.newton, iterate=iterate),
             best=iterate,
-            progress=Progress(iterate.residuals),
             memory=outcome.memory,
             history=(*state.history, line),
+            since_best=0,
             rescues=state.rescues + 1,
             last_rescue=_LastRescue(origin, iterate, budget, vain),
             answer=answer,

@@ -176,9 +176,10 @@ class CoupledSystem:
     growth: the column of a normal multiplier includes the slipping friction μ ŵ. The adjoint swaps the two.
 
     Attributes:
-        system: The symmetric system of the face: F, κ and the preconditioner.
+        system: The symmetric system of the face: F and the preconditioner.
         tested: W, shape (n_owned, n_face).
         moving: Z, shape (n_owned, n_face).
+        curvature: κ, shape (n_face,).
         oblique: Projector that preserves G Z y and ignores what rigid motions absorb.
         damped: Preserves equilibrium where offsets are held in place; None where all entries share equally.
     """
@@ -186,6 +187,7 @@ class CoupledSystem:
     system: FaceSystem
     tested: sp.csr_matrix
     moving: sp.csr_matrix
+    curvature: Vector
     oblique: ObliqueProjector
     damped: DampedEquilibrium | None = None
 
@@ -197,6 +199,7 @@ class CoupledSystem:
         tested: sp.csr_matrix,
         moving: sp.csr_matrix,
         *,
+        curvature: Vector | None = None,
         damped: bool = False,
     ) -> CoupledSystem | None:
         """Join both bases; None where the face does not hold every body. Collective.
@@ -206,19 +209,32 @@ class CoupledSystem:
             coarse: Equilibrium of all multipliers.
             tested: W, shape (n_owned, n_face).
             moving: Z, shape (n_owned, n_face).
+            curvature: κ, by default that of the face.
             damped: Whether to move offsets that κ holds in place less: for systems that must be solved to the
                 last digits, also near switches of the contact law.
         """
         oblique = ObliqueProjector.build(sp.csr_matrix(coarse.matrix @ tested), coarse.restricted(moving))
-        if oblique is None or not damped:
-            return None if oblique is None else cls(system, tested, moving, oblique)
+        if oblique is None:
+            return None
+        kappa = system.face.curvature if curvature is None else curvature
+        if not damped:
+            return cls(system, tested, moving, kappa, oblique)
         damping = np.maximum(system.face.damping, LEAST_DAMPING)
         spared = coarse.restricted(sp.csr_matrix(moving @ sp.diags(damping)))
-        return cls(system, tested, moving, oblique, DampedEquilibrium(damping, spared))
+        return cls(system, tested, moving, kappa, oblique, DampedEquilibrium(damping, spared))
+
+    def transposed(self, coarse: CoarseSpace) -> CoupledSystem | None:
+        """Return the system with its bases swapped; None where that does not hold every body. Collective."""
+        return CoupledSystem.build(self.system, coarse, self.moving, self.tested, curvature=self.curvature)
+
+    @cached_property
+    def _testing(self) -> sp.csr_matrix:
+        """Wᵀ."""
+        return self.tested.T.tocsr()
 
     def operate(self, z: Vector, full: Vector) -> Vector:
         """Return (Wᵀ F Z + κ) z, shape (n_face,), where full = F Z z."""
-        return self.tested.T @ full + self.system.face.curvature * z
+        return self._testing @ full + self.curvature * z
 
     def image(self, z: Vector, full: Vector) -> Vector:
         """Return the projected image of z, shape (n_face,), where full = F Z z. Collective."""
@@ -234,7 +250,7 @@ class CoupledSystem:
         missing = self.oblique.moving.apply(y) - load
         if self.damped is not None:
             return y - self.damped.bearing(missing)
-        return y - self.oblique.tested.T @ self.oblique.solve(missing)
+        return y - self.oblique.transposed @ self.oblique.solve(missing)
 
 
 @dataclass(frozen=True, eq=False)

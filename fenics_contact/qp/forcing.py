@@ -1,11 +1,11 @@
-"""What Newton's methods on faces share: named steps on frozen states, forcing terms, progress and damping.
+"""What Newton's methods on faces share: named steps on frozen states, forcing terms and damping.
 
-Two methods are built on it: `FaceNewton` on a dual problem, whose operator is constant, and `TangentNewton` of
-large deformations, whose tangents change. Only operators and rules for a failed step differ.
+Two methods are built on it: `FaceNewton` on a dual problem, whose operator is constant, and `TangentNewton`
+of large deformations, whose tangents change. Only operators and rules for a failed step differ.
 
 References:
-    S. C. Eisenstat, H. F. Walker, Choosing the forcing terms in an inexact Newton method, SIAM J. Sci. Comput.
-    17 (1996). Z. Dostál, Optimal Quadratic Programming Algorithms, Springer (2009).
+    S. C. Eisenstat, H. F. Walker, Choosing the forcing terms in an inexact Newton method, SIAM J. Sci.
+    Comput. 17 (1996). Z. Dostál, Optimal Quadratic Programming Algorithms, Springer (2009).
 """
 
 from __future__ import annotations
@@ -96,25 +96,6 @@ class Forcing:
             safeguard = 0.9 * last**2
             term = min(term, max(0.9 * (worst / before) ** 2, safeguard if safeguard > 0.1 else 0.0))
         return care * max(term, 0.3 * self.tolerance / max(worst, self.tolerance))
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Whether residuals halve.
-
-    Attributes:
-        best: The last residuals that were less than half of the `best` before them.
-        since: Steps since then.
-    """
-
-    best: Residuals
-    since: int = 0
-
-    def after(self, residuals: Residuals) -> Progress:
-        """Return the progress with the residuals after one more step."""
-        if residuals.worst_beside(self.best) < 0.5 * self.best.worst_beside(residuals):
-            return Progress(residuals)
-        return replace(self, since=self.since + 1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ def by_true_areas(state: State, by_area: np.ndarray) -> dict[str, np.ndarray]:
     Args:
         by_area: Derivative by `ContactResult.area`, replicated, shape (n_points,).
     """
-    moved = state.equilibrium.evaluation.meeting if isinstance(state, DeformedState) else None
+    moved = state.equilibrium.evaluation.contact if isinstance(state, DeformedState) else None
     points = None if moved is None else moved.points
     if moved is None or points is None:
         return {"by_area": by_area}

@@ -61,7 +61,7 @@ def solve_deformed_adjoint(
 
 def _require_whole_step(state: DeformedState) -> None:
     """Reject friction whose derivative needs more than the start of the load step."""
-    torn, points = state.torn, state.equilibrium.evaluation.meeting.points
+    torn, points = state.torn, state.equilibrium.evaluation.contact.points
     if len(torn.frictional) == 0:
         return
     if state.since > 0.0:
@@ -86,12 +86,12 @@ def deformed_contact_by_shape(
     displacement does: through −wᵀ ∂(Bᵀλ)/∂x and ζᵀ ∂(c − B u)/∂x. Only slip depends on its start, too, and
     areas and friction coefficients are those of the undeformed body.
     """
-    torn, meeting = state.torn, state.equilibrium.evaluation.meeting
-    points = meeting.points
+    torn, contact = state.torn, state.equilibrium.evaluation.contact
+    points = contact.points
     result = np.zeros((torn.decomposition.tearing.n_nodes, torn.dim))
     if points is None or points.points.count == 0:
         return result
-    (normal, friction), (by_gap, by_slip) = (meeting.at_points(each) for each in fields.multipliers)
+    (normal, friction), (by_gap, by_slip) = (contact.at_points(each) for each in fields.multipliers)
     w = _on_surfaces(torn, points, fields.displacements[0])
     turning, rubbing = points.stiffness(np.maximum(normal, 0.0)), points.friction_stiffness(friction)
     by_nodes = -turning.assembled() @ w - rubbing.right @ (rubbing.left.T @ w) + points.gap_rows.T @ by_gap

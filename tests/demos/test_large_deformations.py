@@ -33,7 +33,7 @@ def run(
     assert {path.stem for path in output.glob("*.png")} == pictures
     assert min(path.stat().st_size for path in output.glob("*.png")) > 10_000
     more: dict[str, Any] = result["more"]
-    left = np.asarray(more["left"])
+    left = np.asarray(more["reduction"])
     assert len(left) > steps
     assert np.median(left) < 1e-3, "superlinear"
     assert np.quantile(left, 0.9) < 0.01, "nearly everywhere"

@@ -23,8 +23,8 @@ LARGE_MUTATIONS = (
     Mutation(
         "soft rows of forces that turn keep columns of length one",
         "nonlinear/tangent_step.py",
-        "np.minimum(usual / np.abs(compliance[further]), 1.0)",
-        "np.ones(np.count_nonzero(further))",
+        "np.minimum(usual / np.abs(compliance[soft]), 1.0)",
+        "np.ones(np.count_nonzero(soft))",
         (
             "tests/nonlinear/test_following_pressure.py::test_soft_rows_of_rims_between_many_parts_neither_cost"
             "_products_nor_accuracy",
@@ -32,9 +32,9 @@ LARGE_MUTATIONS = (
     ),
     Mutation(
         "slip of bodies that move far begins anew in every part of a load step",
-        "nonlinear/newton.py",
-        "None if at.meeting is None else at.meeting.start",
-        "None if at.meeting is None else at.meeting.stood",
+        "nonlinear/meeting.py",
+        "(None, None) if last is None else (last.points, last.start)",
+        "(None, None) if last is None else (last.points, last.material_points)",
         (f"{ONE_STEP}[plane]",),
     ),
     Mutation(
@@ -46,7 +46,7 @@ LARGE_MUTATIONS = (
     ),
     Mutation(
         "plastic strain goes on from every part of a load step",
-        "nonlinear/newton.py",
+        "nonlinear/starts.py",
         "history=origin.history, time=origin.time",
         "history=self.evaluation.history, time=origin.time",
         (f"{ONE_STEP}[metal]",),

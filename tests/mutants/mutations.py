@@ -307,8 +307,8 @@ MUTATIONS = (
     Mutation(
         "slip of earlier steps does not turn with the master",
         "contact/deformed_equilibria.py",
-        "points.carry_slip(origin.contact.total_slip, stood)",
-        "points.carry_tangential(origin.contact.total_slip, stood)",
+        "points.carry_slip(origin.contact.total_slip, old)",
+        "points.carry_tangential(origin.contact.total_slip, old)",
         ("tests/nonlinear/test_reported_values.py::test_slip_of_earlier_steps_turns_about_the_normal",),
     ),
     Mutation(

@@ -85,9 +85,7 @@ def test_friction_and_plastic_flow_do_not_depend_on_how_a_load_step_is_cut(
     scene, steps = posed()
     in_parts = AutomaticSteps(first=0.3)
     each_a_step = replace(in_parts, finer_history=True)
-    whole, parts, finer = (
-        followed(scene, how, steps) for how in (AutomaticSteps(), in_parts, each_a_step)
-    )
+    whole, parts, finer = (followed(scene, how, steps) for how in (AutomaticSteps(), in_parts, each_a_step))
     for one, cut, history in zip(whole, parts, finer, strict=True):
         assert one.fractions == (1.0,)
         assert len(cut.fractions) == len(history.fractions) > 1
