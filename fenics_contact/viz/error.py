@@ -70,54 +70,31 @@ def plot_error(
     given = None if clim is None else checked_range(clim)
     if given is not None and given[0] <= 0:
         raise InvalidInputError(f"clim of a logarithmic scale must be positive, got {clim}: try (1e-5, 1e-2)")
-    values = _estimated(state) if by_cell is None else _checked(state, by_cell)
-    total = float(np.sqrt(sum(np.sum(part**2) for part in values.values())))
+    if by_cell is None:
+        estimate = discretisation_error(state.torn, state.conforming_displacement)
+        size = np.sqrt(2 * state.energies.strain) or np.inf  # a body at rest has no error
+        by_cell = {name: estimate.by_cell(name) / size for name in state.scene.bodies}
+    parts = {name: _checked(name, body.mesh.n_cells, by_cell) for name, body in state.scene.bodies.items()}
+    every = np.concatenate(list(parts.values()))
+    total, top = float(np.linalg.norm(every)), float(every.max()) or 1.0
+    ends = given or (min(max(float(every.min()), SPAN * top), top / 10), top)
     facts = f"estimated discretisation error {written(100 * total, 3)} % in energy norm, by cell"
-    norm = LogNorm(*(given or error_range(values)), clip=False)
-    bodies, words = drawn_bodies(state), headline(title, facts)
-    shown = {name: np.repeat(part, bodies[name].n_cells // len(part)) for name, part in values.items()}
-    label, named = "part of a cell, relative", units or Units()
-    paints = Paints(shown, ERROR_MAP, norm, label, words, 1.0, reach, named, width)
+    bodies, named = drawn_bodies(state), units or Units()
+    shown = {name: np.repeat(part, bodies[name].n_cells // len(part)) for name, part in parts.items()}
+    words, label = headline(title, facts), "part of a cell, relative"
+    paints = Paints(shown, ERROR_MAP, LogNorm(*ends), label, words, 1.0, reach, named, width)
     spot = contact_spot(state, bodies) if sections else None
-    return paint(
-        bodies, paints, target,
-        obstacles=obstacles_of(state), spot=spot, comm=state.torn.decomposition.comm,
-    )  # fmt: skip
+    comm = state.torn.decomposition.comm
+    return paint(bodies, paints, target, obstacles=obstacles_of(state), spot=spot, comm=comm)
 
 
-def error_range(values: Mapping[str, np.ndarray]) -> tuple[float, float]:
-    """Return the default range of the colours: half decades around the parts, about one to four decades."""
-    parts = np.concatenate(list(values.values()))
-    top = float(parts.max(initial=0.0))
-    if top <= 0:
-        return SPAN, 1.0
-    low = min(max(float(parts.min()), SPAN * top), top / 10)
-    half = np.log10(np.array([low, top])) * 2  # half decades: 1, 3, 10, 30
-    ends = 10.0 ** (np.array([np.floor(half[0]), np.ceil(half[1])]) / 2)
-    return float(ends[0]), float(ends[1])
-
-
-def _estimated(state: State) -> dict[str, np.ndarray]:
-    estimate = discretisation_error(state.torn, state.conforming_displacement)
-    size = np.sqrt(2 * state.energies.strain)
-    cells = {name: estimate.by_cell(name) for name in state.scene.bodies}
-    return {name: part / size if size > 0 else np.zeros_like(part) for name, part in cells.items()}
-
-
-def _checked(state: State, by_cell: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    values = {}
-    for name, body in state.scene.bodies.items():
-        part = np.asarray(by_cell[name], dtype=np.float64) if name in by_cell else np.zeros(0)
-        if part.shape != (body.mesh.n_cells,) or not np.all(np.isfinite(part) & (part >= 0)):
-            raise InvalidInputError(
-                f"by_cell[{name!r}] must hold {body.mesh.n_cells} numbers, one per cell, finite and not "
-                f"negative, got {_described(part) if name in by_cell else 'none'}: give the by_cell(body) of "
-                "an estimate, divided by the norm of the displacement"
-            )
-        values[name] = part
-    return values
-
-
-def _described(part: np.ndarray) -> str:
-    worst = f", the smallest {part.min()}" if part.size else ""
-    return f"shape {part.shape}{worst}"
+def _checked(name: str, cells: int, by_cell: Mapping[str, np.ndarray]) -> np.ndarray:
+    part = np.asarray(by_cell[name], dtype=np.float64) if name in by_cell else np.zeros(0)
+    if part.shape != (cells,) or not np.all(np.isfinite(part) & (part >= 0)):
+        smallest = f", the smallest {part.min()}" if part.size else ""
+        raise InvalidInputError(
+            f"by_cell[{name!r}] must hold {cells} numbers, one per cell, finite and not negative, got "
+            f"{f'shape {part.shape}{smallest}' if name in by_cell else 'none'}: give the by_cell(body) of an "
+            "estimate, divided by the norm of the displacement"
+        )
+    return part

@@ -10,7 +10,6 @@ import pytest
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz import plot_error
 from fenics_contact.viz.colours import ERROR_MAP
-from fenics_contact.viz.error import error_range
 from tests.viz.plane_states import flat_pad, plane_block
 from tests.viz.states import contains, painted, pixels, touching_blocks
 
@@ -50,15 +49,6 @@ def test_the_label_of_the_colours_fits_beside_a_flat_picture(tmp_path: Path) -> 
     assert image.shape[0] < 0.45 * image.shape[1]
     edges = (image[:3], image[-3:], image[:, :3], image[:, -3:])
     assert [bool((edge > 0.99).all()) for edge in edges] == [True] * 4
-
-
-def test_the_default_range_holds_the_parts_that_matter() -> None:
-    assert error_range({"a": np.array([0.002, 0.02]), "b": np.array([0.0])}) == pytest.approx(
-        (1e-6, 10**-1.5)
-    )
-    assert error_range({"a": np.full(3, 0.02)}) == pytest.approx((1e-3, 10**-1.5))
-    low, high = error_range({"a": np.zeros(3)})
-    assert 0 < low < high
 
 
 def test_a_body_at_rest_is_drawn_too(tmp_path: Path) -> None:
