@@ -29,16 +29,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Requirement:
-    """A library, its oldest supported version, and how to install it.
-
-    Attributes:
-        module: Name by which it is imported.
-        oldest: Oldest supported version.
-        debian: How to install it on Debian.
-        conda: How to install it from conda-forge.
-        distribution: Name of its metadata where that is not ``module``.
-        tested: First two numbers of the tested versions; others cause a warning. Empty: any.
-    """
+    """A library, its oldest supported version, and how to install it."""
 
     module: str
     oldest: str
@@ -117,10 +108,7 @@ def petsc_is_started() -> bool:
 
 
 def load_petsc(world: MPI.Comm | None = None) -> ModuleType:
-    """Return ``petsc4py.PETSc``; starts PETSc unless it runs already.
-
-    Args:
-        world: Communicator on which it is started, which is collective; all ranks of MPI by default.
+    """Return ``petsc4py.PETSc``; starts PETSc on ``world``, by default all ranks, unless it runs. Collective.
 
     Raises:
         MissingRequirementError: petsc4py cannot be loaded, or PETSc was built with complex numbers or
@@ -144,11 +132,6 @@ def _restore_sigpipe() -> None:
 
 def require_extra(use: str, extra: str, *modules: str) -> None:
     """Check libraries that only a part of the package needs, without loading them.
-
-    Args:
-        use: What needs them, in the plural.
-        extra: The extra of the package that installs them.
-        *modules: Names by which they are imported.
 
     Raises:
         MissingRequirementError: One of them is not installed.

@@ -47,13 +47,7 @@ def displayed(cls: Class) -> Class:
 
 
 def in_lines(shown: Any, most: int = LINES, columns: int = COLUMNS) -> str:
-    """Return an object's name and facts, one per line.
-
-    Args:
-        shown: An object of a `displayed` class.
-        most: Largest number of lines; facts beyond it are only named.
-        columns: Largest number of characters in a line.
-    """
+    """Return an object's name and facts, one per line."""
     facts = _facts(shown)
     names, more = list(facts), []
     if len(names) >= most:
@@ -81,13 +75,7 @@ def _facts(shown: Any) -> Mapping[str, Any]:
 
 
 def in_short(value: Any, width: int = INSIDE, *, inside: bool = False) -> str:
-    """Return a value in one line: texts as they are, arrays by shape and range, long lists by their length.
-
-    Args:
-        value: Any value.
-        width: Largest number of characters.
-        inside: Whether it is a part of an object in the same line; objects in it are only named.
-    """
+    """Return a value in one line: arrays by shape and range, long lists by their length."""
     return _cut(" ".join(_words(value, inside).split()), width)
 
 

@@ -77,8 +77,6 @@ class Ending:
 
     Attributes:
         status: Its exit status, None if it did not end in time.
-        output: Its output on stdout.
-        errors: Its output on stderr.
     """
 
     status: int | None
@@ -93,14 +91,7 @@ def finished(
     environment: Mapping[str, str] | None = None,
     folder: Path | None = None,
 ) -> Ending:
-    """Run a command in a session of its own, free of the traces of MPI, and wait for its end.
-
-    Args:
-        command: The command.
-        limit: Seconds after which it is ended with all its children.
-        environment: Its environment, by default that of this process.
-        folder: Its working folder, by default that of this process.
-    """
+    """Run a command in a session of its own, free of the traces of MPI, and wait for its end."""
     process = subprocess.Popen(
         command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         errors="replace", env=clean_environment(environment), cwd=folder, start_new_session=True,
@@ -127,13 +118,7 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 
 def last_words(command: Sequence[str], output: str, most: int = 2000) -> str:
-    """Return the end of a failed process's output, or advice if there is none.
-
-    Args:
-        command: Its command.
-        output: Its output.
-        most: Largest number of characters.
-    """
+    """Return the end of a failed process's output, or advice if there is none."""
     words = output.strip()[-most:]
     if words:
         return words

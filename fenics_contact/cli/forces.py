@@ -14,12 +14,7 @@ from fenics_contact.linalg import ROUNDING
 
 
 def forces_table(forces: Mapping[str, Any], units: Mapping[str, str] | None = None) -> Table:
-    """Return forces and moments as they stand in a result file, one row each.
-
-    Args:
-        forces: The entry ``forces`` of a result.
-        units: Names of the units of ``force`` and ``length``, if known.
-    """
+    """Return forces and moments as they stand in a result file, one row each."""
     balance, names = forces["balance"], units or {}
     force, length = names.get("force", "force"), names.get("length", "length")
     plane = np.ndim(balance["loads"]["moment"]) == 0

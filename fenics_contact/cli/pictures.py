@@ -18,12 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class Gallery:
-    """The pictures of a run: those that were drawn, and those that could not be.
-
-    Attributes:
-        drawn: The files.
-        missing: Names of the others.
-    """
+    """The pictures of a run: those that were drawn, and those that could not be."""
 
     drawn: list[Path] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
@@ -43,13 +38,7 @@ class Gallery:
 
 
 def can_draw(console: Console, file: SceneFile, gallery: Gallery) -> bool:
-    """Return whether pictures can be drawn; if not, say what is missing for them. Collective.
-
-    Args:
-        console: Output for the message.
-        file: The scene file.
-        gallery: Receives the names of the pictures, if the file requests any itself.
-    """
+    """Return whether pictures can be drawn; if not, say what is missing for them. Collective."""
     error: Exception | None = None
     try:
         from fenics_contact.viz import check_renderer
@@ -79,15 +68,7 @@ def units_of(file: SceneFile) -> Units:
 def draw_state(
     console: Console, file: SceneFile, states: Mapping[str, State], gallery: Gallery, suffix: str = ""
 ) -> None:
-    """Draw the pictures that a file requests. Collective.
-
-    Args:
-        console: Output for messages about omitted pictures.
-        file: The scene file.
-        states: Name -> state; the last one is drawn, all of them in maps of the status.
-        gallery: Receives the names of the pictures.
-        suffix: End of the files' names, before ".png".
-    """
+    """Draw the pictures that a file requests. Collective."""
     state = list(states.values())[-1]
     for kind in file.document.output.pictures:
         path = file.folder / f"{kind}{suffix}.png"

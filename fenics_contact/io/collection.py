@@ -17,8 +17,6 @@ class Member:
     """One state of a series.
 
     Attributes:
-        value: Time, load factor or number of the design; unique among members.
-        number: Number in the names of its files.
         label: Description; ParaView stores it as the field datum "Name".
     """
 

@@ -17,11 +17,6 @@ readable = partial(plain, lenient=True)
 def described_scene(scene: Scene, subdomains: Mapping[str, int], time: float = 0.0) -> dict[str, Any]:
     """Return bodies, supports, loads and pairs of a scene as plain data.
 
-    Args:
-        scene: The scene.
-        subdomains: Body name -> number of its subdomains.
-        time: When obstacles that move are told.
-
     Returns:
         See `fenics_contact.io.write_result`. Functions are given by their names, numbers by their values.
     """

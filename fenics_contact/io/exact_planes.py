@@ -34,11 +34,6 @@ def corners_in_planes(points: np.ndarray, sides: Sequence[FlatSide]) -> dict[int
 def rims_in_planes(fits: Sequence[SplineFit], sides: Sequence[FlatSide], tolerance: float) -> list[SplineFit]:
     """Return surfaces whose rims lie in the planes of the flat sides that they border on.
 
-    Args:
-        fits: The surfaces.
-        sides: All flat sides.
-        tolerance: Largest distance of a rim from its plane, relative to the extent of the surface.
-
     Raises:
         CadError: If a rim is farther off.
     """

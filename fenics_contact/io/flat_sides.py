@@ -21,8 +21,6 @@ class Edge:
     Attributes:
         nodes: Its nodes in the order of the loop, the body's side on the left, (n,).
         surface: Number of the designed surface that it borders on, None for a straight line.
-        side: Number of the side of this surface, as in `SplineFit.sides`.
-        reversed: Whether it runs against the parameter of this side.
     """
 
     nodes: np.ndarray
@@ -42,7 +40,6 @@ class FlatSide:
     """A flat side: its edges in closed loops, that around it first, and its plane.
 
     Attributes:
-        loops: The loops.
         off: Largest distance of the moved nodes from it, in the plane from its straight edges, [length].
         normal: Unit normal out of the body, (3,); None in the plane.
         level: Distance of its plane from the origin along the normal, [length].
@@ -66,13 +63,6 @@ def flat_sides(
 
     Sides are flat where they are so in the reference shape; the nodes of the mesh near a designed surface
     follow it a little.
-
-    Args:
-        mesh: The body in its reference shape.
-        moved: Coordinates of its nodes in the shape of a design, shape (n_nodes, dim), [length].
-        surfaces: The designed surfaces.
-        angle: Largest angle between facets of one flat side.
-        most: Largest number of sides.
 
     Raises:
         CadError: If the other sides are not flat, or a rim of a surface is not one edge of a flat side.

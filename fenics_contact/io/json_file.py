@@ -63,13 +63,6 @@ def json_text(data: Any) -> str:
 def plain(data: Any, place: str = "data", *, lenient: bool = False) -> Any:
     """Convert data to JSON's types.
 
-    Args:
-        data: The data.
-        place: Its name in error messages.
-        lenient: Whether to replace what JSON lacks: dataclasses with their type, functions by their name,
-            other objects by their type, keys by text, and NaN and infinity by None; and long arrays by their
-            shape and range.
-
     Raises:
         InvalidInputError: If some part cannot be converted; states which.
     """

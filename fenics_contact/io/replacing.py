@@ -28,9 +28,6 @@ def replacing(*targets: Path) -> Iterator[tuple[Path, ...]]:
     If the block raises, the targets are unchanged. Each file is replaced atomically. Of several the last must
     be one that refers to the others: it exists only while all the others do.
 
-    Args:
-        *targets: Files (or folders) to write, all in one folder, which is created.
-
     Yields:
         For every target a path of the same name in a hidden folder beside it.
 
@@ -61,14 +58,6 @@ def replacing_together(
     repair: Callable[[Path], None] | None = None,
 ) -> None:
     """Let all ranks write the same files, and move them to their targets when all are done. Collective.
-
-    Args:
-        comm: Communicator.
-        targets: Files to write, all in one folder, which is created; in the order in which they are replaced.
-        write: Writes files of the targets' names into the hidden folder it is given. Collective.
-        size: Approximate number of bytes: less free space is rejected beforehand, as libraries that write in
-            parallel end the whole run on a full disk.
-        repair: Called with the hidden folder on rank 0 before the files are moved.
 
     Raises:
         OutputError: On all ranks, if the disk is full or the folder cannot be written to.

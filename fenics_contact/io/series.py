@@ -16,16 +16,13 @@ from fenics_contact.checkpoint import remove_abandoned
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.io.collection import Member, collection, read_collection, stem_of
-from fenics_contact.io.names import checked_name, file_of_each
+from fenics_contact.io.names import checked_name
 from fenics_contact.io.replacing import write_text
-from fenics_contact.io.temporal_xdmf import grid_of, temporal
 from fenics_contact.io.vtu import write_vtu
 from fenics_contact.io.vtx import require_vtx, write_vtx
 from fenics_contact.io.xdmf import write_xdmf
 
 if TYPE_CHECKING:
-    import xml.etree.ElementTree as ET
-
     from fenics_contact.optimize import Record
     from fenics_contact.shape import LoadPath, ShapeProblem
 
@@ -38,11 +35,11 @@ class ResultSeries:
     | written | what to open |
     |---|---|
     | ``NAME.pvd``, with VTU files in the folder ``NAME/`` | always; all bodies, all fields of `write_vtu` |
-    | ``NAME_BODY.xdmf``, with HDF5 files in ``NAME/`` | with "xdmf": displacement and von Mises stress |
+    | ``NAME/NAME_0000_BODY.xdmf``, with HDF5 files | with "xdmf": displacement and von Mises stress |
     | ``NAME/NAME_0000_BODY_FIELD.bp`` | with "vtx" (ADIOS2): one folder per state, body and field |
 
     Every member has its own mesh, so that designs may differ in shape. After each `add` all files are
-    complete, and the PVD and XDMF files refer to complete members only, also if a run is killed at any
+    complete, and the PVD file refers to complete members only, also if a run is killed at any
     moment.
 
     A run that continues, for example from a checkpoint, continues the series: members are identified by their
@@ -82,7 +79,6 @@ class ResultSeries:
         self._name, self._comm, self._formats = name, comm, tuple(formats)
         self._inherited: list[Member] = comm.bcast(inherited)
         self._added: list[Member] = []
-        self._grids: dict[tuple[str, Member], ET.Element] = {}
 
     path: Path
 
@@ -115,7 +111,7 @@ class ResultSeries:
             OutputError: If a file cannot be written; earlier members are unchanged.
         """
         value = _checked(value, label)
-        number = self._make_room(value, state.scene.body_names)
+        number = self._make_room(value)
         stem, folder = stem_of(self._name, number), self.path.with_suffix("")
         write_vtu(state, folder, stem, cell_fields=cell_fields)
         if "xdmf" in self._formats:
@@ -125,7 +121,7 @@ class ResultSeries:
         self._added.append(Member(value, number, label))
         with together(self._comm):
             if self._comm.rank == 0:
-                self._write_indices(state.scene.body_names)
+                self._write_index()
         return self.path
 
     def follow(self, problem: ShapeProblem | LoadPath) -> Callable[[Record, np.ndarray], None]:
@@ -147,7 +143,7 @@ class ResultSeries:
 
         return add
 
-    def _make_room(self, value: float, bodies: Sequence[str]) -> int:
+    def _make_room(self, value: float) -> int:
         """Remove the members that a value replaces and return the number of the new one. Collective."""
         before = self.members
         later = [] if self._added else [member for member in self._inherited if member.value >= value]
@@ -155,40 +151,23 @@ class ResultSeries:
         gone = {*later, *equal}
         self._inherited = [member for member in self._inherited if member not in gone]
         self._added = [member for member in self._added if member not in gone]
-        self._grids = {key: grid for key, grid in self._grids.items() if key[1] not in gone}
         with together(self._comm):
             if self._comm.rank == 0 and self.path.parent.is_dir():
                 remove_abandoned(self.path.parent)
-                if gone:  # first the index files, then the files
-                    self._write_indices(bodies)
+                if gone:  # first the index file, then the files
+                    self._write_index()
                 if not self._added:
                     self._remove_unnamed()
         if equal:
             return equal[0].number
         return 1 + max((member.number for member in self.members), default=-1)
 
-    def _write_indices(self, bodies: Sequence[str]) -> None:
-        """Write the files that refer to those of all members, the PVD file last."""
-        for body, target in file_of_each(bodies, self.path.parent, self._name, ".xdmf").items():
-            if "xdmf" in self._formats or target.exists():
-                self._write_temporal(body, target, bodies)
+    def _write_index(self) -> None:
+        """Write the PVD file, which refers to the files of all members."""
         if not self.members:  # readers reject a series without members
             self.path.unlink(missing_ok=True)
             return
         write_text(self.path, collection(self._name, self.members))
-
-    def _write_temporal(self, body: str, target: Path, bodies: Sequence[str]) -> None:
-        folder, grids = self.path.with_suffix(""), []
-        for member in self.members:
-            part = file_of_each(bodies, folder, stem_of(self._name, member.number), ".xdmf")[body]
-            if (body, member) not in self._grids and part.exists():
-                self._grids[body, member] = grid_of(part, f"{folder.name}/", member.value)
-            if (body, member) in self._grids:
-                grids.append(self._grids[body, member])
-        if grids:
-            write_text(target, temporal(body, grids))
-        else:
-            target.unlink(missing_ok=True)
 
     def _remove_unnamed(self) -> None:
         """Remove the files of removed members, and of those that a killed run did not complete."""

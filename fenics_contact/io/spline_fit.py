@@ -46,11 +46,6 @@ class SplineFit:
 def fitted(surface: MovedSurface, tolerance: float, most: int = 129) -> SplineFit:
     """Interpolate a moved surface by a B-spline, with more points until it is close enough.
 
-    Args:
-        surface: The surface.
-        tolerance: Largest deviation relative to the extent of the surface.
-        most: Largest number of points along a parameter.
-
     Raises:
         CadError: If the surface folds, or that many points are not enough.
     """

@@ -17,11 +17,6 @@ if TYPE_CHECKING:
 def body_entry(name: str, grid: pyvista.UnstructuredGrid, arrays: Arrays) -> dict[str, Any]:
     """Return the geometry and the fields of a body as numbers of arrays.
 
-    Args:
-        name: Name of the body.
-        grid: Its undeformed mesh in space with fields, cells of one type.
-        arrays: Receives the arrays.
-
     Returns:
         ``points``, (n, 3); ``triangles``, (t, 3) nodes of the skin, and the cell ``owner`` of each, (t,);
         ``edges`` and ``outline``, (e, 2) nodes of the lines of the mesh on the skin and of its sharp edges;

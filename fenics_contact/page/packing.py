@@ -10,11 +10,7 @@ import numpy as np
 
 
 class Arrays:
-    """Collects arrays; equal ones are kept once, such as the mesh of all load steps.
-
-    Attributes:
-        index: Type, first byte, length and columns of each array, by its number.
-    """
+    """Collects arrays; equal ones are kept once, such as the mesh of all load steps."""
 
     def __init__(self) -> None:
         self.index: list[dict[str, int | str]] = []

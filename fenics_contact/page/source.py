@@ -30,9 +30,6 @@ class Source:
     """The content of a page.
 
     Attributes:
-        steps: Name of each step and its bodies.
-        record: What `read_result` returns, empty if there is none.
-        name: Title where the record has none.
         comm: Ranks that know it, None if only the calling one does.
     """
 

@@ -14,12 +14,7 @@ Record = Mapping[str, Any]
 
 
 def sections(record: Record, units: Units) -> str:
-    """Return the tables of a result as HTML, each under its heading; nothing for what the record lacks.
-
-    Args:
-        record: What `fenics_contact.io.read_result` returns; may be empty.
-        units: Names of the units.
-    """
+    """Return the tables of a result as HTML, each under its heading; nothing for what the record lacks."""
     parts = {
         "Summary": _rows(_summary(record, units)),
         "Contact": _contact(record, units),

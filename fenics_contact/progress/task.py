@@ -204,10 +204,8 @@ class Work:
     """A piece of work under way: its last event, completed from earlier ones.
 
     Attributes:
-        event: That event.
         begun: Time of its start, [s].
         stepped: Time of its last event, [s].
-        first: Its first measure.
     """
 
     event: Event

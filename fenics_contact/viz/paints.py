@@ -22,15 +22,7 @@ class Paints:
     """The content of a picture of a field, apart from the bodies.
 
     Attributes:
-        values: Body name -> values on its nodes or its cells.
-        colours: Colour map.
-        norm: From values to colours.
-        label: Label of the colour bar, with the unit.
-        headline: The title.
-        scale: Factor of the displacement in the main picture.
         reach: Extent of details to each side of the contact's centre, [length], or None.
-        units: Names of the units.
-        width: Width of the picture in pixels.
     """
 
     values: Mapping[str, np.ndarray]

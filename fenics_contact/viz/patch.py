@@ -20,19 +20,10 @@ class ContactPatch:
     """The slave surface projected to a plane or unrolled, and its contact points.
 
     Attributes:
-        view: The direction of view of the plane.
         unrolling: How the surface is unrolled instead, or None.
-        name: Body and surface.
         places: All nodes of the surface in the picture, (n, 2).
-        facets: Rows of positions in ``places``.
         pressure: On all nodes of the surface, interpolated at the corners of quadratic triangles, (n,).
-        points: Positions of the contact points in ``places``.
-        status: Of the contact points.
         slip: Of the contact points in the picture, (n_points, 2).
-        force: Normal force of the pair.
-        rubs: Whether the pair has friction.
-        hidden: Number of points that carry force and are not shown, as they face away.
-        frame: The visible frame.
     """
 
     view: View
@@ -80,11 +71,6 @@ def contact_patches(states: Sequence[State], pair: int, reach: float | None) -> 
 
     It is projected to a plane. If facets that face away carry force it is unrolled, provided that it runs
     around an axis.
-
-    Args:
-        states: The states.
-        pair: Number of the contact pair.
-        reach: Extent around the contact's centre, [length], or None.
     """
     patches = [_patch(state, pair, reach, None) for state in states]
     behind = next((state for state, patch in zip(states, patches, strict=True) if patch.hidden), None)

@@ -14,14 +14,7 @@ from fenics_contact.viz.view import View, axis_label
 
 
 def label_axes(axes: Axes, view: View, units: Units, *, mirror: bool = False) -> None:
-    """Name the axes of a view; one that runs backwards counts backwards, and says from where it is seen so.
-
-    Args:
-        axes: What to label.
-        view: Direction of view.
-        units: Names of the units.
-        mirror: Let x run forwards, as seen from the other side.
-    """
+    """Label the axes of a view, a reversed one with decreasing numbers and the viewing side, or mirrored."""
     for axis, direction, word, back in (
         (axes.xaxis, view.right, "right", "to the left"),
         (axes.yaxis, view.up, "up", "down"),

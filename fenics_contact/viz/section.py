@@ -49,7 +49,6 @@ class Section:
     """A plane through bodies.
 
     Attributes:
-        view: View onto it, along its normal.
         origin: A point of it, (3,).
         inside: Side to which it is shifted slightly, (3,).
     """
@@ -159,13 +158,7 @@ def cut(bodies: Mapping[str, pv.DataSet], section: Section) -> dict[str, pv.Poly
 
 
 def section_layers(bodies: Bodies, section: Section, look: Mapping[str, Any]) -> list[Layer]:
-    """Cut all bodies and draw the cut in colours.
-
-    Args:
-        bodies: The bodies, deformed, by name.
-        section: The plane.
-        look: Keywords of ``add_mesh`` that turn values into colours.
-    """
+    """Cut all bodies and draw the cut in colours."""
     layers = []
     for face in cut(bodies, section).values():
         if face.n_points:

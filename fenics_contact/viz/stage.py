@@ -22,12 +22,7 @@ AXES = 0.3
 
 @dataclass(frozen=True)
 class Layer:
-    """A mesh and how to draw it.
-
-    Attributes:
-        mesh: What to draw.
-        options: Keywords of ``pyvista.Plotter.add_mesh``.
-    """
+    """A mesh and how to draw it."""
 
     mesh: pv.DataSet
     options: Mapping[str, Any] = field(default_factory=dict)

@@ -20,11 +20,7 @@ CLOSED = {**SYMBOLS[Status.STICK], "marker": "D", "s": 70}
 
 
 def symbols_of(rubs: bool) -> dict[Status, tuple[str, dict[str, Any]]]:
-    """Return name and keywords of ``Axes.scatter`` of the statuses that points of a pair can have.
-
-    Args:
-        rubs: Whether the pair has friction.
-    """
+    """Return name and keywords of ``Axes.scatter`` of the statuses that points of a pair can have."""
     if rubs:
         return {status: (status.name.lower(), look) for status, look in SYMBOLS.items()}
     return {Status.OPEN: ("open", SYMBOLS[Status.OPEN]), Status.SLIP: ("closed", CLOSED)}

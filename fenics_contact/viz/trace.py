@@ -21,20 +21,13 @@ class ContactTrace:
     """Contact quantities along the slave surface of a pair in the plane.
 
     Attributes:
-        name: Body and surface.
         axis: Label of the positions: "x", "−y", or "along the surface".
         places: Positions of all nodes of the surface, ascending, (n,), [length].
-        breaks: Numbers of nodes after which the surface is interrupted.
         pressure: On all nodes, zero where there is no contact point, (n,), [force / length²].
         traction: Tangential traction on the slave in the direction of increasing positions, (n,).
         bound: Friction bound of the traction, (n,).
-        points: Numbers of the nodes that are contact points.
-        status: Status of the contact points.
         slip: Slip of the contact points on the master in the last load step, in the direction of increasing
             positions, [length].
-        force: Normal force of the pair, per unit of thickness.
-        shear: Sum of the tangential forces on the slave, per unit of thickness.
-        rubs: Whether the pair has friction.
     """
 
     name: str

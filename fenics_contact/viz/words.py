@@ -18,12 +18,7 @@ def checked_range(clim: tuple[float, float]) -> tuple[float, float]:
 
 
 def written(value: float, digits: int = 4) -> str:
-    """Format a number for readers: 79 713, −0.138, 1.2e−05; with separated thousands and a true minus sign.
-
-    Args:
-        value: The number.
-        digits: Significant digits of non-integers.
-    """
+    """Format a number: 79 713, −0.138, 1.2e−05, with separated thousands and a true minus sign."""
     size = abs(value)
     if isinstance(value, int | np.integer):
         text = f"{value:,}"
