@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from benchmarks.cases.measuring import nodal_forces, state_record
 from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, PAPER_BOXES, PAPER_CELLS, Counts
-from fenics_contact.contact import State, solve_scene
+from fenics_contact.contact import AnyState, solve_scene
 from fenics_contact.errors import FenicsContactError
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.partition import bisection_partition, box_partition
@@ -30,7 +30,7 @@ def cold_state(
     default_partition: bool = False,
     friction_coefficient: float = FRICTION_COEFFICIENT,
     tolerance: float = 1e-6,
-) -> tuple[State, float]:
+) -> tuple[AnyState, float]:
     """Mesh, decompose and solve the chain, with nothing prepared. Collective.
 
     Args:

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from benchmarks.cases.chain import cold_state
 from benchmarks.cases.measuring import state_record
-from fenics_contact.contact import State
+from fenics_contact.contact import LinearState, as_linear
 from fenics_contact.qp import CountedOperator, FaceSystems, Stop, classify, contact_step, projected_cg
 from fenics_contact.qp.forcing import residual_weights
 
@@ -32,7 +32,7 @@ class LinearSolve:
     measure: float
 
 
-def solve_face(state: State, tolerance: float = 1e-6) -> LinearSolve:
+def solve_face(state: LinearState, tolerance: float = 1e-6) -> LinearSolve:
     """Solve the face of a state from the shortest multiplier in equilibrium. Collective.
 
     Operator, preconditioner, weights of the residual and tolerance are those of the state.
@@ -59,7 +59,7 @@ def solve_face(state: State, tolerance: float = 1e-6) -> LinearSolve:
 
 def measure(comm: MPI.Comm) -> dict[str, Any]:
     """Return the products of the chain's state and of its final face. Collective."""
-    state, _ = cold_state(comm)
+    state = as_linear(cold_state(comm)[0], "linear faces")
     linear = solve_face(state)
     return {
         "counts": {**state_record(state)["counts"], "linear_products": linear.products},

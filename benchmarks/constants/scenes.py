@@ -12,10 +12,11 @@ from mpi4py import MPI
 
 from fenics_contact.accuracy import BalancedTolerance
 from fenics_contact.contact import (
+    AnyState,
     ContactProblem,
     ContactResult,
     FixedPoint,
-    State,
+    as_linear,
     contact_area,
     solve_scene,
     solve_steps,
@@ -62,7 +63,7 @@ SOFT, STIFF = IsotropicElasticity(100.0, 0.3), IsotropicElasticity(300.0, 0.2)
 FLOOR = RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 
 
-def _figures(*states: State, **more: Any) -> Figures:
+def _figures(*states: AnyState, **more: Any) -> Figures:
     """Return potential energy and contact forces of some states, and what they cost."""
     return {
         "energy": [state.energies.total_potential for state in states],
@@ -73,9 +74,13 @@ def _figures(*states: State, **more: Any) -> Figures:
     }
 
 
-def _balanced_figures(state: State) -> Figures:
+def _discretisation(state: AnyState) -> float:
+    return as_linear(state, "errors").estimate_errors(geometry=False).discretisation
+
+
+def _balanced_figures(state: AnyState) -> Figures:
     """Return the figures of a balanced state, which is as good as its mesh deserves, and its errors."""
-    errors, wanted = state.estimate_errors(), state.tolerance
+    errors, wanted = as_linear(state, "errors").estimate_errors(), state.tolerance
     solver = [errors.algebraic, errors.friction]
     found = _figures(state, estimate=[errors.discretisation, errors.geometry], certificate=solver)
     assert isinstance(wanted, BalancedTolerance)
@@ -227,7 +232,7 @@ def without_contact() -> Figures:
     cut = {name: bisection_partition(body.mesh, 3) for name, body in parts.items()}
     alone = Scene({"lower": parts["lower"]}, [held], [Traction("lower", "z1", load)])
     states = solve_scene(tied, COMM, partitions=cut, tolerance=TOLERANCE), solve_scene(alone, COMM)
-    return _figures(*states, estimate=[state.estimate_errors().discretisation for state in states])
+    return _figures(*states, estimate=[_discretisation(state) for state in states])
 
 
 def heated_stack() -> Figures:

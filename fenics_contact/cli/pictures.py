@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fenics_contact.cli.desk import Console
-from fenics_contact.contact import State
+from fenics_contact.contact import State, as_linear
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, agree
 from fenics_contact.scene_file import SceneFile
 
@@ -108,7 +108,7 @@ def _decomposition(file: SceneFile, states: Mapping[str, State], state: State, p
 def _error(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
     from fenics_contact.viz import plot_error
 
-    errors = state.estimate_errors(geometry=False)
+    errors = as_linear(state, "errors").estimate_errors(geometry=False)
     parts = {body: errors.by_cell(body) for body in state.scene.bodies}
     plot_error(state, path, parts, title=file.title, units=units_of(file))
 

@@ -4,16 +4,17 @@ from fenics_contact.contact.area import contact_area
 from fenics_contact.contact.balance import Balance
 from fenics_contact.contact.cell_stress import STRESS_COMPONENTS
 from fenics_contact.contact.coulomb import FixedPoint
-from fenics_contact.contact.deformed_state import DeformedState
+from fenics_contact.contact.deformed_state import AnyState, DeformedState
 from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.equilibrium import default_solver
 from fenics_contact.contact.fields import body_mesh
 from fenics_contact.contact.gathered import GatheredFields, in_space
+from fenics_contact.contact.linear_state import LinearState, as_linear
 from fenics_contact.contact.multi_block import body_grid
 from fenics_contact.contact.newton_steps import NewtonSteps
 from fenics_contact.contact.pair_resultants import PairResultants
 from fenics_contact.contact.problem import ContactProblem, solve_scene
-from fenics_contact.contact.result import ContactResult, Status
+from fenics_contact.contact.result import ContactResult, RowValues, Status
 from fenics_contact.contact.resultant import Resultant, Resultants
 from fenics_contact.contact.rigid_motion import RigidMotion
 from fenics_contact.contact.slip_bounds import Damping
@@ -27,6 +28,7 @@ from fenics_contact.contact.unheld import UnheldMotion
 
 __all__ = [
     "STRESS_COMPONENTS",
+    "AnyState",
     "Balance",
     "ContactProblem",
     "ContactResult",
@@ -35,16 +37,19 @@ __all__ = [
     "Energies",
     "FixedPoint",
     "GatheredFields",
+    "LinearState",
     "LoadSequence",
     "NewtonSteps",
     "PairResultants",
     "Resultant",
     "Resultants",
     "RigidMotion",
+    "RowValues",
     "State",
     "Status",
     "Tolerance",
     "UnheldMotion",
+    "as_linear",
     "body_grid",
     "body_mesh",
     "check_held",

@@ -137,8 +137,8 @@ def _words_of_sliding(pair: ContactPair, slid: float, reach: float) -> str:
 
 def _indentation(state: State) -> np.ndarray:
     """Return how far the force of each point presses its own node in, shape (n,), [length]. Collective."""
-    flexibility = state.torn.numbering.gather(state.dual.problem.diagonal, state.torn.normal_rows)
-    return np.asarray(flexibility * state.contact.normal_force)
+    stiffness = state.torn.numbering.gather(state.rows.step, state.torn.normal_rows)
+    return np.asarray(state.contact.normal_force / stiffness)
 
 
 def _largest_motion(closing: np.ndarray, pressed_in: np.ndarray, touching: np.ndarray) -> float:

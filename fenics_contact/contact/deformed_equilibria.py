@@ -11,7 +11,7 @@ import numpy as np
 from fenics_contact._libraries import MPI
 from fenics_contact.contact.advice import advice
 from fenics_contact.contact.contact_doubts import ContactWarnings
-from fenics_contact.contact.deformed_state import DeformedState
+from fenics_contact.contact.deformed_state import DeformedState, row_values_at
 from fenics_contact.contact.dual_solve import contact_result
 from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.result import ContactResult
@@ -42,7 +42,7 @@ from fenics_contact.nonlinear import (
     StillContact,
     TurnedSurface,
 )
-from fenics_contact.qp import DualSolution
+from fenics_contact.qp import Solution
 from fenics_contact.scene import HistoryMaterial, LoadStep, RigidSurface, Scene
 from fenics_contact.timing import PhaseTimer
 
@@ -241,20 +241,11 @@ def _state_after(
         timer: Collects the wall time.
         known: The slip of its contact and that before, if the path has none.
     """
-    end = path.end
-    evaluation, at = end.evaluation, end.evaluation.at
-    law, diagonal = evaluation.torn.law, at.diagonal
-    assert diagonal is not None
+    end, evaluation = path.end, path.end.evaluation
     ended = f", at {path.fractions[-1]:.3g} of the load step" if path.fractions[-1] < 1.0 else ""
-    open_ = evaluation.constraint_residual
-    system = end.linearisation.system.on_rows_of(evaluation.loaded, law, diagonal, -open_)
-    solution = DualSolution(
-        problem=system.problem,
-        multiplier=at.multiplier,
-        residual=open_,
-        product=np.zeros_like(at.multiplier),
-        alpha=np.zeros(system.kernel.shape[1]),
-        slip_bound=law.bound(at.multiplier),
+    values, torn, moved = row_values_at(end), evaluation.loaded, evaluation.at.displacement
+    solution = Solution(
+        multiplier=values.multiplier,
         residuals=evaluation.residuals,
         iterations=len(path.effort.history),
         products=path.effort.products,
@@ -264,15 +255,16 @@ def _state_after(
         else "read from a checkpoint",
     )
     with timer.phase("state"):
-        contact = contact_result(system, solution, at.displacement)
+        contact = contact_result(torn, values, moved)
         if evaluation.contact.points is not None and path.start is not None:
             contact = _of_moved(contact, evaluation.contact, path.start, origin)
         if known is not None:
             contact = replace(contact, slip=known[0], slip_before=known[1])
         energies = _energies(evaluation, path.rubbed)
     return DeformedState(
-        system, solution, at.displacement, contact, energies, dict(timer.seconds), equilibrium=end,
-        load=path.load, begun=path.begun, fractions=path.fractions, since=path.since, snaps=path.snaps,
+        torn=torn, solution=solution, torn_displacement=moved, contact=contact, energies=energies,
+        seconds=dict(timer.seconds), equilibrium=end, load=path.load, begun=path.begun,
+        fractions=path.fractions, since=path.since, snaps=path.snaps,
         factorisations=path.effort.factorisations,
     )  # fmt: skip
 
@@ -303,4 +295,4 @@ def _energies(evaluation: ResidualState, rubbed: float) -> Energies:
     strain = float(evaluation.torn.numbering.comm.allreduce(float(np.sum(stored))))
     dead = evaluation.softening is None
     work = evaluation.torn.load_work(evaluation.at.displacement) if dead else np.nan
-    return Energies(strain, work, rubbed + evaluation.rubbing, np.nan)
+    return Energies(strain, work, rubbed + evaluation.rubbing)

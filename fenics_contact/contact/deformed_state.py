@@ -3,37 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from fenics_contact.contact.cell_stress import von_mises_of
 from fenics_contact.contact.history_stress import put_history_stress
+from fenics_contact.contact.linear_state import LinearState
 from fenics_contact.contact.nodal_forces import NodalForces, nodal_forces
-from fenics_contact.contact.state import State
+from fenics_contact.contact.result import RowValues
+from fenics_contact.contact.state import State, comm_of
 from fenics_contact.display import displayed
-from fenics_contact.errors import InvalidInputError, collectively
+from fenics_contact.errors import collectively
 from fenics_contact.fem import History
+from fenics_contact.qp import Solution, contact_step
 from fenics_contact.scene import HistoryMaterial
 
 if TYPE_CHECKING:
     import dolfinx
 
-    from fenics_contact.accuracy import StateErrors
     from fenics_contact.nonlinear import ContactConfiguration, Loading, NonlinearEquilibrium, Snap
 
 
 @displayed
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class DeformedState(State):
     """An equilibrium of large deformations or nonlinear materials.
 
     Forces, gaps and stresses (Cauchy's) are those of the deformed bodies, where no material is made for that
     those of the undeformed ones, as in linear elasticity. Moments are those of the deformed places of bodies
-    that deform much, and of the undeformed places of all others. `energies` has the stored energy, NaN
-    where materials dissipate, and no dual value.
+    that deform much, and of the undeformed places of all others. Errors are not estimated: compare states on
+    two meshes.
 
     Attributes:
         equilibrium: Displacement, forces and history of the materials.
@@ -46,26 +48,41 @@ class DeformedState(State):
         factorisations: Factored tangents of the last load step, counting all subdomains as one.
     """
 
-    equilibrium: NonlinearEquilibrium = field(kw_only=True)
-    load: Loading = field(kw_only=True)
-    begun: ContactConfiguration | None = field(kw_only=True)
-    fractions: tuple[float, ...] = field(kw_only=True)
-    since: float = field(kw_only=True)
-    snaps: tuple[Snap, ...] = field(kw_only=True)
-    factorisations: int = field(kw_only=True)
+    solution: Solution
+    equilibrium: NonlinearEquilibrium
+    load: Loading
+    begun: ContactConfiguration | None
+    fractions: tuple[float, ...]
+    since: float
+    snaps: tuple[Snap, ...]
+    factorisations: int
 
     def _facts(self) -> dict[str, str]:
         facts = super()._facts()
-        residuals = self.dual_solution.residuals
+        residuals = self.solution.residuals
         up_to = "" if self.reached == 1.0 else f", up to {self.reached:.3g}"
         anew = "" if self.since == 0.0 else f"; slip and histories begin anew at {self.since:.3g}"
         further = {
             "parts": f"{len(self.fractions)}{up_to} of the load step{anew}",
             "residuals": f"{facts['residuals']}, out of balance {residuals.coarse:.1e}",
             "snaps": "; ".join(map(str, self.snaps)) or "nan",
-            "errors": "not estimated where materials are nonlinear: compare two meshes",
         }
         return {name: words for name, words in (facts | further).items() if words != "nan"}
+
+    @cached_property
+    def rows(self) -> RowValues:
+        """Multipliers, residuals and steps of the natural map by row."""
+        return row_values_at(self.equilibrium)
+
+    def _errors_in_words(self) -> dict[str, str]:
+        return {"errors": "not estimated where materials are nonlinear: compare two meshes"}
+
+    @cached_property
+    @collectively("DeformedState.conforming_displacement", comm_of)
+    def conforming_displacement(self) -> np.ndarray:
+        """See `State.conforming_displacement`; without iteration. Collective on first use."""
+        system = self.equilibrium.linearisation.system
+        return system.conforming_on(self.torn, self.torn_displacement)
 
     @property
     def time(self) -> float:
@@ -110,9 +127,7 @@ class DeformedState(State):
         return fields
 
     @cached_property
-    @collectively(
-        "DeformedState.contact_nominal_pressure", lambda state, *_, **__: state.torn.decomposition.comm
-    )
+    @collectively("DeformedState.contact_nominal_pressure", comm_of)
     def contact_nominal_pressure(self) -> dict[str, dolfinx.fem.Function]:
         """Contact force by area of the undeformed slave as a Function, [force / length²].
 
@@ -121,25 +136,14 @@ class DeformedState(State):
         """
         return self._contact_functions("contact_nominal_pressure")
 
-    def estimate_errors(self, *, geometry: bool = True) -> StateErrors:
-        """Refused: the bounds and estimates of `accuracy` are those of linear elasticity.
-
-        Raises:
-            InvalidInputError: Always.
-        """
-        raise InvalidInputError(
-            "errors are bounded and estimated for small strains and linear materials alone, this state has "
-            "nonlinear materials: compare states on two meshes instead"
-        )
-
     @cached_property
     def _nodal_forces(self) -> NodalForces:
-        forces = nodal_forces(self.system, self.solution.multiplier, self.torn_displacement)
+        forces = nodal_forces(self.torn, self.solution.multiplier, self.torn_displacement)
         return replace(forces, places=self._moment_arms, bed=np.zeros_like(forces.bed))
 
-    @cached_property
+    @property
     def _least_force(self) -> float:
-        return self.dual_solution.residuals.force_scale
+        return self.solution.residuals.force_scale
 
     @cached_property
     def _moment_arms(self) -> np.ndarray:
@@ -153,3 +157,17 @@ class DeformedState(State):
                 for name, body in self.scene.bodies.items()
             ]
         )
+
+
+#: What solving a scene returns; annotations that need more than a `State` has narrow it by `isinstance`.
+AnyState: TypeAlias = LinearState | DeformedState
+
+
+def row_values_at(end: NonlinearEquilibrium) -> RowValues:
+    """Return what the laws of rows depend on at an equilibrium."""
+    evaluation, at = end.evaluation, end.evaluation.at
+    torn, lacking, diagonal = evaluation.torn, evaluation.constraint_residual, at.diagonal
+    assert diagonal is not None
+    bound, step = torn.law.bound(at.multiplier), contact_step(torn.layout, diagonal)
+    free = np.zeros(len(at.multiplier), dtype=bool)
+    return RowValues(at.multiplier, lacking, bound, step, -lacking, free, evaluation.residuals)

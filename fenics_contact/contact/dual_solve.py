@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.contact.coulomb import FixedPoint
-from fenics_contact.contact.result import ContactResult, Status
+from fenics_contact.contact.result import ContactResult, RowValues, Status
 from fenics_contact.contact.unheld import motion_in_words, rigid_motions
-from fenics_contact.feti import (
-    DualSystem,
-)
+from fenics_contact.feti import DualSystem, TornSystem
 from fenics_contact.qp import DualSolution, DualSolver, SlidingError, Smalse, contact_step, solve
 
 
@@ -40,12 +38,20 @@ def solve_dual(
         raise error.named(f"the load makes slide {words}") from error.__cause__
 
 
-def contact_result(system: DualSystem, solution: DualSolution, displacement: np.ndarray) -> ContactResult:
+def row_values(system: DualSystem, solution: DualSolution) -> RowValues:
+    """Return what the laws of rows depend on at a solution."""
+    problem = system.problem
+    return RowValues(
+        solution.multiplier, solution.residual, solution.slip_bound,
+        contact_step(problem.layout, problem.diagonal), problem.rhs, problem.between_supports,
+        solution.residuals,
+    )  # fmt: skip
+
+
+def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray) -> ContactResult:
     """Gather forces, gaps and status of all contact points on every rank. Collective."""
-    torn, problem = system.torn, system.problem
     rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])
-    step = contact_step(problem.layout, problem.diagonal)
-    gathered = [torn.numbering.gather(x, rows) for x in (solution.multiplier, solution.residual, step)]
+    gathered = [torn.numbering.gather(x, rows) for x in (values.multiplier, values.residual, values.step)]
     count, frictional = torn.points.count, torn.frictional
     normal, gap, normal_step = (x[:count] for x in gathered)
     tau, minus_slip, tangential_step = (x[count:].reshape(-1, torn.dim - 1) for x in gathered)

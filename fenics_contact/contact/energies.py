@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.feti import DirectSystem, DualSystem
+from fenics_contact.feti import TornSystem
 
 
 @dataclass(frozen=True)
@@ -14,18 +14,18 @@ class Energies:
     """Energies of all bodies, [force · length].
 
     Attributes:
-        strain: ½ uᵀK u.
-        load: Work of the loads, fᵀu.
+        strain: Stored energy, of linear materials ½ uᵀK u; NaN where materials dissipate.
+        load: Work of the loads, of dead ones fᵀu; NaN where pressures follow their surfaces.
         friction: Σ Ψ ‖slip‖, the dissipation by friction if the whole load step acts at once: what slips to
             and fro within it counts by where it ends, take more load steps and add up. Where parts of a step
             have histories of their own (`AutomaticSteps.finer_history`), the sum over these.
-        dual: Value of the dual functional, −½ (f − Bᵀλ)ᵀK⁺(f − Bᵀλ) − λᵀc.
+        dual: Value of the dual functional, −½ (f − Bᵀλ)ᵀK⁺(f − Bᵀλ) − λᵀc; None for nonlinear materials.
     """
 
     strain: float
     load: float
     friction: float
-    dual: float
+    dual: float | None = None
 
     @property
     def norm(self) -> float:
@@ -34,7 +34,7 @@ class Energies:
 
     @property
     def total_potential(self) -> float:
-        """½ uᵀK u − fᵀu."""
+        """The stored energy less the work of the loads."""
         return self.strain - self.load
 
     @property
@@ -45,11 +45,12 @@ class Energies:
     def __str__(self) -> str:
         """List the energies, one per line."""
         names = ("strain", "load", "friction", "total_potential", "primal", "dual")
-        return "\n".join(f"{name.replace('_', ' '):16s}{getattr(self, name):14.6e}" for name in names)
+        known = [(name, getattr(self, name)) for name in names if getattr(self, name) is not None]
+        return "\n".join(f"{name.replace('_', ' '):16s}{value:14.6e}" for name, value in known)
 
 
 def compute_energies(
-    system: DualSystem | DirectSystem,
+    torn: TornSystem,
     displacement: np.ndarray,
     multiplier: np.ndarray,
     friction: float,
@@ -58,15 +59,14 @@ def compute_energies(
     """Compute all energies. Collective.
 
     Args:
-        system: The solved system.
+        torn: The torn system.
         displacement: Torn displacement of this rank, [length].
         multiplier: λ, owned, [force].
         friction: Σ Ψ ‖slip‖ of all ranks.
         rigid: Rigid motions R α in the displacement: they cause no strain, but forces that are slightly out
             of balance do work on them.
     """
-    torn = system.torn
-    internal = torn.load - system.force(multiplier)  # = K u
+    internal = torn.load - torn.force(multiplier)  # = K u
     strained = 0.5 * internal @ (displacement - rigid)
     mine = np.array([strained, multiplier @ torn.right])
     strain, prescribed = (float(total) for total in torn.numbering.comm.allreduce(mine))

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fenics_contact.contact.dual_solve import contact_result, solve_dual
+from fenics_contact.contact.dual_solve import contact_result, row_values, solve_dual
 from fenics_contact.contact.energies import compute_energies
 from fenics_contact.contact.followed_loads import FollowedLoads
+from fenics_contact.contact.linear_state import LinearState
 from fenics_contact.contact.result import no_contact
 from fenics_contact.contact.state import State
 from fenics_contact.contact.warm_start import carried_over
@@ -37,13 +38,13 @@ def dual_state(
     solver: DualSolver,
     tolerance: float | BalancedTolerance | None,
     timer: PhaseTimer,
-) -> State:
+) -> LinearState:
     """Compute a state by its multipliers. Collective.
 
     Args:
         torn: The torn system.
-        previous: State of a neighbouring geometry or load to start from, or None.
-        known: State of which unchanged parts are reused, or None.
+        previous: LinearState of a neighbouring geometry or load to start from, or None.
+        known: LinearState of which unchanged parts are reused, or None.
         solver: The dual solver.
         tolerance: Its tolerance, or its share of the discretisation error; None: `BalancedTolerance()`.
         timer: Collects the wall time.
@@ -68,12 +69,13 @@ def _dual_system(
 
 def known_system(state: State | None) -> DualSystem | None:
     """Return the dual system of a state, whose unchanged parts the next one reuses."""
-    return state.system if state is not None and isinstance(state.system, DualSystem) else None
+    system = state.system if isinstance(state, LinearState) else None
+    return system if isinstance(system, DualSystem) else None
 
 
 def _to_tolerance(
     system: DualSystem, solve: Solve, solver: DualSolver, start: np.ndarray | None, timer: PhaseTimer
-) -> State:
+) -> LinearState:
     """Compute the state to the tolerance of a solver. Collective."""
     with timer.phase("solve"):
         solution = solve(system, solver, start)
@@ -89,7 +91,7 @@ def _balanced(
     balanced: BalancedTolerance | None,
     start: np.ndarray | None,
     timer: PhaseTimer,
-) -> State:
+) -> LinearState:
     """Compute the state as accurately as the mesh deserves. Collective."""
     # A fixed tolerance needs no estimates and should not import them.
     from fenics_contact.accuracy import BalancedTolerance
@@ -103,25 +105,31 @@ def _balanced(
 
 def state_of(
     system: DualSystem, solution: DualSolution, displacement: np.ndarray, timer: PhaseTimer
-) -> State:
+) -> LinearState:
     """Return the state of a solution with its torn displacement. Collective."""
     with timer.phase("state"):
-        contact = contact_result(system, solution, displacement)
+        contact = contact_result(system.torn, row_values(system, solution), displacement)
         friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))
         rigid = system.kernel @ solution.alpha
-        energies = compute_energies(system, displacement, solution.multiplier, friction, rigid)
-    return State(system, solution, displacement, contact, energies, dict(timer.seconds))
+        energies = compute_energies(system.torn, displacement, solution.multiplier, friction, rigid)
+    return LinearState(
+        torn=system.torn, system=system, solution=solution, torn_displacement=displacement, contact=contact,
+        energies=energies, seconds=dict(timer.seconds),
+    )  # fmt: skip
 
 
-def direct_state(torn: TornSystem, previous: State | None, timer: PhaseTimer) -> State:
+def direct_state(torn: TornSystem, previous: State | None, timer: PhaseTimer) -> LinearState:
     """Compute the state of one body without multipliers. Collective."""
-    known = previous.system if previous is not None and isinstance(previous.system, DirectSystem) else None
+    system = previous.system if isinstance(previous, LinearState) else None
+    known = system if isinstance(system, DirectSystem) else None
     system = DirectSystem(torn, timer, previous=known)
     with timer.phase("solve"):
         solution = system.solve()
-    energies = compute_energies(system, solution.displacement, solution.multiplier, 0.0)
-    contact = no_contact(torn.points)
-    return State(system, solution, solution.displacement, contact, energies, dict(timer.seconds))
+    return LinearState(
+        torn=torn, system=system, solution=solution, torn_displacement=solution.displacement,
+        contact=no_contact(torn.points), seconds=dict(timer.seconds),
+        energies=compute_energies(torn, solution.displacement, solution.multiplier, 0.0),
+    )  # fmt: skip
 
 
 def default_solver(kind: SolverKind) -> DualSolver:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.contact.dual_solve import contact_result, solve_dual
+from fenics_contact.contact.dual_solve import contact_result, row_values, solve_dual
 from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem
 from fenics_contact.qp import DualSolution, FaceNewton
 
@@ -62,4 +62,4 @@ def geometry_error(
 
 def _peak(system: DualSystem, solution: DualSolution) -> float:
     displacement = system.displacement(solution.multiplier, solution.alpha)
-    return float(contact_result(system, solution, displacement).pressure.max())
+    return float(contact_result(system.torn, row_values(system, solution), displacement).pressure.max())

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.feti import DirectSystem, DualSystem, TornSystem, nodal_sum
+from fenics_contact.feti import TornSystem, nodal_sum
 from fenics_contact.pairing import ContactPoints
 
 
@@ -37,19 +37,19 @@ class NodalForces:
 
 
 def nodal_forces(
-    system: DualSystem | DirectSystem, multiplier: np.ndarray, displacement: np.ndarray
+    torn: TornSystem, multiplier: np.ndarray, displacement: np.ndarray
 ) -> NodalForces:
     """Return the forces on all nodes. Collective.
 
     Args:
-        system: The solved system.
+        torn: The torn system.
         multiplier: λ, owned, [force].
         displacement: Torn displacement of this rank as the solver returned it, shape (torn_size,), [length].
     """
-    torn, decomposition = system.torn, system.torn.decomposition
+    decomposition = torn.decomposition
     contact, tie = _contact_forces(torn, multiplier), _tie_forces(torn, multiplier)
     joined = torn.points.jump.T @ contact + torn.ties.jump.T @ tie
-    connecting = -nodal_sum(decomposition, system.force(multiplier))
+    connecting = -nodal_sum(decomposition, torn.force(multiplier))
     return NodalForces(
         torn.scene.points,
         nodal_sum(decomposition, torn.load),

@@ -9,6 +9,7 @@ import numpy as np
 
 from fenics_contact._libraries import MPI, check_not_forked
 from fenics_contact.contact.contact_doubts import ContactWarnings
+from fenics_contact.contact.deformed_state import AnyState
 from fenics_contact.contact.equilibrium import (
     default_solver,
     direct_state,
@@ -92,7 +93,7 @@ class ContactProblem:
         self._contact_doubts, self._turned = ContactWarnings(), TurnedBodies()
         self._passing_bodies = PassingBodies()
 
-    state: State | None
+    state: AnyState | None
     _decomposition: Decomposition | None
     _deformed_equilibria: DeformedEquilibria | None = None
 
@@ -129,7 +130,7 @@ class ContactProblem:
     @classmethod
     def following(
         cls,
-        state: State,
+        state: AnyState,
         *,
         solver: DualSolver | None = None,
         tolerance: Tolerance = None,
@@ -206,7 +207,7 @@ class ContactProblem:
         sensitivity: bool = False,
         time: float = 1.0,
         step: LoadStep | None = None,
-    ) -> State:
+    ) -> AnyState:
         """Compute an equilibrium. Collective.
 
         Args:
@@ -289,7 +290,7 @@ class ContactProblem:
         return equilibria
 
     @collectively("ContactProblem.restore", lambda self, *_, **__: self.comm)
-    def restore(self, stored: Stored, scene: Scene | None = None) -> State:
+    def restore(self, stored: Stored, scene: Scene | None = None) -> AnyState:
         """Build a state from what `stored_state` returned: one product instead of a solve. Collective.
 
         Of nonlinear materials one factorisation.
@@ -343,7 +344,7 @@ def solve_scene(
     solver: DualSolver | None = None,
     tolerance: Tolerance = None,
     steps: AutomaticSteps | None = None,
-) -> State:
+) -> AnyState:
     """Compute the equilibrium of a scene. Collective on ``comm``.
 
     Args:

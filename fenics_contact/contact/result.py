@@ -10,6 +10,7 @@ import numpy as np
 
 from fenics_contact.display import displayed
 from fenics_contact.pairing import ContactPoints
+from fenics_contact.qp import Residuals
 
 
 class Status(IntEnum):
@@ -21,6 +22,29 @@ class Status(IntEnum):
     STICK = 1
     #: Closed and slipping: ‖τ‖ = Ψ against the slip, or there is no friction.
     SLIP = 2
+
+
+@dataclass(frozen=True, eq=False)
+class RowValues:
+    """What the law of each row of B depends on at a state, owned by rows.
+
+    Attributes:
+        multiplier: λ, shape (n_owned,), [force].
+        residual: c − B u, shape (n_owned,), [length]: gaps, minus the slip, and openings of glued rows.
+        slip_bound: Ψ, shape (n_friction,), [force].
+        step: ρ of the natural map, zero on equality rows, shape (n_owned,), [force / length].
+        opening: By how much the loads alone, or the next increment, open the rows, (n_owned,), [length].
+        between_supports: Marks of the rows that supports alone determine, shape (n_owned,).
+        residuals: Sizes of all residuals.
+    """
+
+    multiplier: np.ndarray
+    residual: np.ndarray
+    slip_bound: np.ndarray
+    step: np.ndarray
+    opening: np.ndarray
+    between_supports: np.ndarray
+    residuals: Residuals
 
 
 @displayed

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fenics_contact._libraries import MPI
 from fenics_contact.checks import GivenVector
-from fenics_contact.contact.balance import Balance, force_balance, rounding_force
+from fenics_contact.contact.balance import Balance, force_balance
 from fenics_contact.contact.cell_stress import principal_stress, stress, von_mises
 from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.fields import body_mesh, cell_values, displacement_function, nodal_function
@@ -19,18 +20,17 @@ from fenics_contact.contact.gathered import GatheredFields, contact_fields, most
 from fenics_contact.contact.nodal_forces import NodalForces, nodal_forces
 from fenics_contact.contact.pair_resultants import PairResultants, pair_resultants
 from fenics_contact.contact.reactions import support_reactions
-from fenics_contact.contact.result import ContactResult
+from fenics_contact.contact.result import ContactResult, RowValues
 from fenics_contact.contact.resultant import Resultants
 from fenics_contact.contact.rigid_motion import RigidMotion, rigid_motion
-from fenics_contact.contact.state_in_words import answer_in_words, errors_in_words, first_pairs
+from fenics_contact.contact.state_in_words import answer_in_words, first_pairs
 from fenics_contact.contact.tolerance import Tolerance
-from fenics_contact.contact.unheld import UnheldMotion, unheld_motions
+from fenics_contact.contact.unheld import UnheldMotion
 from fenics_contact.display import displayed, in_lines
-from fenics_contact.errors import InvalidInputError, collectively
+from fenics_contact.errors import collectively
 from fenics_contact.fem import temperature_of
-from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem, TornSystem, nodal_mean
-from fenics_contact.progress import Task
-from fenics_contact.qp import DualSolution
+from fenics_contact.feti import DirectSolution, TornSystem, nodal_mean
+from fenics_contact.qp import Solution
 from fenics_contact.scene import RigidSurface, Scene
 
 if TYPE_CHECKING:
@@ -40,44 +40,46 @@ if TYPE_CHECKING:
     from fenics_contact.accuracy import StateErrors
 
 
-def _comm(state: State, *_: Any, **__: Any) -> MPI.Comm:
+def comm_of(state: State, *_: Any, **__: Any) -> MPI.Comm:
+    """Return the communicator of a state."""
     return state.torn.decomposition.comm
 
 
 @displayed
-@dataclass(frozen=True, eq=False)
-class State:
-    """Displacements, contact forces and how they were computed.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class State(ABC):
+    """Displacements, contact forces and how they were computed: a `LinearState` or a `DeformedState`.
 
-    Fields on the bodies' own meshes are built on first access, by all ranks together.
+    No attribute solves anything. Fields on the bodies' own meshes are built on first access, by all ranks
+    together.
 
     Attributes:
-        system: The system that was solved: a dual one, or that of a single body that needs none.
+        torn: The torn system: subdomains, rows and contact points, with the loads on it.
         solution: Multiplier, residuals and history of the solver.
         torn_displacement: This rank's torn displacement as the solver returned it, shape (torn_size,),
             [length]; that of whole bodies is `conforming_displacement`.
         contact: Result on the contact surfaces, replicated.
         energies: Energies of all bodies.
         seconds: Wall time of this rank by phase, of all work up to this state that shares its timer.
-        known_errors: Errors estimated so far, by a balanced solve or by `estimate_errors`; None before.
         tolerance: Tolerance of the solution, a relative residual or `BalancedTolerance`; None where no solver
             iterated.
+        known_errors: Errors estimated so far, by a balanced solve or by `LinearState.estimate_errors`; None
+            before, and where materials are nonlinear.
 
     Example:
         >>> state = solve_scene(scene, comm)  # doctest: +SKIP
         >>> state.displacement["block"]  # a dolfinx Function on the block's own mesh  # doctest: +SKIP
         >>> state.contact.count(Status.SLIP)  # doctest: +SKIP
-        >>> print(state.estimate_errors())  # doctest: +SKIP
     """
 
-    system: DualSystem | DirectSystem
-    solution: DualSolution | DirectSolution
+    torn: TornSystem
+    solution: Solution | DirectSolution
     torn_displacement: np.ndarray
     contact: ContactResult
     energies: Energies
     seconds: Mapping[str, float]
-    known_errors: StateErrors | None = field(default=None, repr=False)
     tolerance: Tolerance = None
+    known_errors: StateErrors | None = field(default=None, repr=False)
 
     def __str__(self) -> str:
         """List what was found and what it cost, without communication: any rank may print alone."""
@@ -87,37 +89,32 @@ class State:
         return {
             **answer_in_words(self.contact, self.solution, self.energies, self.counts),
             "seconds": ", ".join(f"{name} {spent:.2f}" for name, spent in self.seconds.items()),
-            **errors_in_words(self.known_errors),
+            **self._errors_in_words(),
             **first_pairs(self.scene, self.contact),
         }
 
-    @property
-    def torn(self) -> TornSystem:
-        """The torn system: subdomains, rows and contact points."""
-        return self.system.torn
+    @abstractmethod
+    def _errors_in_words(self) -> dict[str, str]:
+        """Return what is known of errors, by name."""
 
     @property
-    def dual(self) -> DualSystem:
-        """The dual system.
+    @abstractmethod
+    def rows(self) -> RowValues:
+        """Multipliers, residuals and steps of the natural map by row."""
 
-        Raises:
-            InvalidInputError: If the state was computed without one.
+    @property
+    @abstractmethod
+    def conforming_displacement(self) -> np.ndarray:
+        """Displacement, continuous across subdomains, used by all fields, shape (torn_size,), [length].
+
+        Copies of a node agree, being their mean weighted by stiffness, and prescribed values are met exactly;
+        distances and slips of contact points are those of `torn_displacement`. Collective on first use.
         """
-        self._require_multipliers()
-        return cast(DualSystem, self.system)
 
     @property
-    def dual_solution(self) -> DualSolution:
-        """The result of the dual solver; raises as `dual` does."""
-        self._require_multipliers()
-        return cast(DualSolution, self.solution)
-
-    def _require_multipliers(self) -> None:
-        if isinstance(self.system, DirectSystem):
-            raise InvalidInputError(
-                "this needs multipliers, but the state of one body that supports hold was solved directly: "
-                "solve with sensitivity=True"
-            )
+    def unheld(self) -> tuple[UnheldMotion, ...]:
+        """Rigid motions that nothing resists and nothing loads; the bodies stay. Collective on first use."""
+        return ()
 
     @property
     def scene(self) -> Scene:
@@ -129,57 +126,13 @@ class State:
         """The time at which obstacles that move are where they are: with small displacements zero."""
         return 0.0
 
-    @collectively("State.estimate_errors", _comm)
-    def estimate_errors(self, *, geometry: bool = True) -> StateErrors:
-        """Bound or estimate the errors by solver, friction law, mesh and geometry, in energy norm.
-
-        Collective. Costs at most one product and recovery of the stress, which a balanced solve has done
-        already; the error by the geometry up to two solutions of the contact problem with the same factors,
-        unless surfaces are flat or their shapes known and used. Estimates are kept in `known_errors`.
-
-        Args:
-            geometry: Whether to estimate that, too; else it is NaN unless it is known.
-
-        Raises:
-            ConvergenceError: If the solver fails on the better geometry.
-        """
-        from fenics_contact.accuracy import discretisation_error, solver_errors, state_errors
-        from fenics_contact.contact.geometry_error import geometry_error
-
-        with Task("errors"):
-            errors = self.known_errors
-            if errors is None:
-                solver = solver_errors(self.system, self.solution)
-                estimate = discretisation_error(self.torn, self.conforming_displacement)
-                errors = state_errors(solver, estimate, self.energies.norm)
-            if geometry and np.isnan(errors.geometry):
-                better = geometry_error(self.system, self.solution)
-                errors = errors.with_geometry(better.energy, better.peak_pressure)
-        object.__setattr__(self, "known_errors", errors)
-        return errors
-
-    @cached_property
-    def unheld(self) -> tuple[UnheldMotion, ...]:
-        """Rigid motions that nothing resists and nothing loads; the bodies stay. Collective on first use."""
-        return unheld_motions(self.system) if isinstance(self.system, DualSystem) else ()
-
     @cached_property
     def contact_places(self) -> np.ndarray:
         """Positions of the contact points' slave nodes before deformation, shape (n, dim), [length]."""
         return np.asarray(self.scene.points[self.contact.points.slave])
 
     @cached_property
-    @collectively("State.conforming_displacement", _comm)
-    def conforming_displacement(self) -> np.ndarray:
-        """Displacement, continuous across subdomains, used by all fields, shape (torn_size,), [length].
-
-        Copies of a node agree, being their mean weighted by stiffness, and prescribed values are met exactly;
-        distances and slips of contact points are those of `torn_displacement`. Collective on first use.
-        """
-        return self.system.conforming(self.torn_displacement)
-
-    @cached_property
-    @collectively("State.displacement", _comm)
+    @collectively("State.displacement", comm_of)
     def displacement(self) -> dict[str, dolfinx.fem.Function]:
         """Displacement of each body as a Function on its own mesh, [length]. Collective on first use."""
         decomposition = self.torn.decomposition
@@ -189,30 +142,30 @@ class State:
         }
 
     @cached_property
-    @collectively("State.von_mises", _comm)
+    @collectively("State.von_mises", comm_of)
     def von_mises(self) -> dict[str, dolfinx.fem.Function]:
         """Von Mises stress of each body, constant on cells, [force / length²]. Collective on first use."""
         return {
             name: von_mises(
-                self.displacement[name], body, _comm(self), temperature_of(self.scene.loads, name)
+                self.displacement[name], body, comm_of(self), temperature_of(self.scene.loads, name)
             )
             for name, body in self.scene.bodies.items()
         }
 
     @cached_property
-    @collectively("State.stress", _comm)
+    @collectively("State.stress", comm_of)
     def stress(self) -> dict[str, dolfinx.fem.Function]:
         """Stress tensor of each body, its mean on each cell, shape (3, 3), [force / length²].
 
         Plane bodies have the component normal to the plane, too. Collective on first use.
         """
         return {
-            name: stress(self.displacement[name], body, _comm(self), temperature_of(self.scene.loads, name))
+            name: stress(self.displacement[name], body, comm_of(self), temperature_of(self.scene.loads, name))
             for name, body in self.scene.bodies.items()
         }
 
     @cached_property
-    @collectively("State.principal_stress", _comm)
+    @collectively("State.principal_stress", comm_of)
     def principal_stress(self) -> dict[str, dolfinx.fem.Function]:
         """Principal values σ₁ ≥ σ₂ ≥ σ₃ of `stress`, shape (3,), [force / length²].
 
@@ -224,7 +177,7 @@ class State:
         }
 
     @cached_property
-    @collectively("State.contact_pressure", _comm)
+    @collectively("State.contact_pressure", comm_of)
     def contact_pressure(self) -> dict[str, dolfinx.fem.Function]:
         """Contact pressure of each body as a Function on its own mesh, [force / length²].
 
@@ -239,7 +192,7 @@ class State:
             for name, u in self.displacement.items()
         }
 
-    @collectively("State.gather_displacement", _comm)
+    @collectively("State.gather_displacement", comm_of)
     def gather_displacement(self, body: str) -> np.ndarray:
         """Return the displacement of a body's nodes on every rank, (n_nodes, dim), [length]. Collective."""
         comm, mine = self.torn.decomposition.comm, self._at_nodes(body)
@@ -258,17 +211,17 @@ class State:
     def _nodal_displacement(self) -> np.ndarray:
         return nodal_mean(self.torn.decomposition, self.conforming_displacement)
 
-    @collectively("State.gather_von_mises", _comm)
+    @collectively("State.gather_von_mises", comm_of)
     def gather_von_mises(self, body: str) -> np.ndarray:
         """Return the von Mises stress of a body's cells on every rank, shape (n_cells,). Collective."""
         return cell_values(self.von_mises[body], self.scene.bodies[body].mesh.cells)
 
-    @collectively("State.gather_stress", _comm)
+    @collectively("State.gather_stress", comm_of)
     def gather_stress(self, body: str) -> np.ndarray:
         """Return the mean stress of a body's cells on every rank, shape (n_cells, 3, 3). Collective."""
         return cell_values(self.stress[body], self.scene.bodies[body].mesh.cells)
 
-    @collectively("State.gather_nodal_stress", _comm)
+    @collectively("State.gather_nodal_stress", comm_of)
     def gather_nodal_stress(self, body: str) -> np.ndarray:
         """Return the stress of a body at its nodes, averaged within one material, on every rank. Collective.
 
@@ -289,7 +242,7 @@ class State:
         on_cells = self.stress if self.scene.is_nonlinear else {}
         return nodal_stress(self.torn, self._nodal_displacement, meshes, on_cells)
 
-    @collectively("State.gather_fields", _comm)
+    @collectively("State.gather_fields", comm_of)
     def gather_fields(self, body: str) -> GatheredFields:
         """Return all fields of a body on every rank. Collective."""
         decomposition = self.torn.decomposition
@@ -305,7 +258,7 @@ class State:
     def _contact_fields(self, body: str) -> dict[str, np.ndarray]:
         return contact_fields(self.contact, self.scene, self.torn.decomposition.tearing, body)
 
-    @collectively("State.reactions", _comm)
+    @collectively("State.reactions", comm_of)
     def reactions(self, about: GivenVector | np.ndarray | None = None) -> Resultants:
         """Return force and moment that every support exerts on its body, in the scene's order. Collective.
 
@@ -322,7 +275,7 @@ class State:
         """
         return support_reactions(self.scene, self._nodal_forces, about)
 
-    @collectively("State.rigid_motions", _comm)
+    @collectively("State.rigid_motions", comm_of)
     def rigid_motions(self) -> tuple[RigidMotion, ...]:
         """Return displacement and rotation of the points of all rigid surfaces, in the scene's order.
 
@@ -331,7 +284,7 @@ class State:
         rigid = [support for support in self.scene.supports if isinstance(support, RigidSurface)]
         return tuple(rigid_motion(self.scene, each, self.gather_displacement(each.body)) for each in rigid)
 
-    @collectively("State.resultants", _comm)
+    @collectively("State.resultants", comm_of)
     def resultants(self, about: GivenVector | np.ndarray | None = None) -> PairResultants:
         """Return force and moment on the slave of every contact pair and tie. Collective.
 
@@ -341,7 +294,7 @@ class State:
         """
         return pair_resultants(self.torn, self._nodal_forces, about)
 
-    @collectively("State.balance", _comm)
+    @collectively("State.balance", comm_of)
     def balance(self, about: GivenVector | np.ndarray | None = None) -> Balance:
         """Return loads, reactions and forces of rigid obstacles and what is missing between them. Collective.
 
@@ -350,15 +303,16 @@ class State:
         """
         return force_balance(self.torn, self._nodal_forces, about, self._least_force)
 
-    @cached_property
+    @property
+    @abstractmethod
     def _least_force(self) -> float:
-        return rounding_force(self.torn, self.torn_displacement)
+        """A force below which bodies count as free of forces, [force]. Collective."""
 
     @cached_property
     def _nodal_forces(self) -> NodalForces:
-        return nodal_forces(self.system, self.solution.multiplier, self.torn_displacement)
+        return nodal_forces(self.torn, self.solution.multiplier, self.torn_displacement)
 
-    @collectively("State.to_pyvista", _comm)
+    @collectively("State.to_pyvista", comm_of)
     def to_pyvista(self, deformed: float = 0.0, *, linear: bool = False) -> pyvista.MultiBlock:
         """Return all bodies with their fields for pyvista, the same on every rank. Collective.
 
@@ -383,7 +337,7 @@ class State:
         from fenics_contact.contact.multi_block import multi_block
 
         meshes = {name: body.mesh for name, body in self.scene.bodies.items()}
-        return multi_block(_comm(self), meshes, self.gather_fields, deformed, linear=linear)
+        return multi_block(comm_of(self), meshes, self.gather_fields, deformed, linear=linear)
 
     @property
     def counts(self) -> dict[str, int]:

@@ -11,7 +11,7 @@ from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.result import ContactResult, Status
 from fenics_contact.display import counted
 from fenics_contact.feti import DirectSolution
-from fenics_contact.qp import DualSolution
+from fenics_contact.qp import Solution
 from fenics_contact.scene import ContactPair, Scene
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def answer_in_words(
     contact: ContactResult,
-    solution: DualSolution | DirectSolution,
+    solution: Solution | DirectSolution,
     energies: Energies,
     counts: Mapping[str, int],
 ) -> dict[str, str]:

@@ -8,8 +8,8 @@ from contextlib import suppress
 import numpy as np
 
 from fenics_contact.checkpoint import Checkpoint, CheckpointError, without_checkpoint
+from fenics_contact.contact.deformed_state import AnyState
 from fenics_contact.contact.problem import ContactProblem
-from fenics_contact.contact.state import State
 from fenics_contact.contact.stored import stored_state
 from fenics_contact.display import counted
 from fenics_contact.errors import InvalidInputError, together
@@ -56,7 +56,7 @@ class StepCheckpoint:
         step: LoadStep,
         scene: Scene,
         problem: ContactProblem,
-    ) -> State | None:
+    ) -> AnyState | None:
         """Return the state after the next step if it is stored, else None. Collective.
 
         Args:
@@ -82,7 +82,7 @@ class StepCheckpoint:
         problem.state = problem.restore(stored, scene)
         return problem.state
 
-    def keep(self, step: LoadStep, state: State) -> None:
+    def keep(self, step: LoadStep, state: AnyState) -> None:
         """Add the state after a step and write it if that is due. Collective.
 
         Raises:

@@ -7,8 +7,8 @@ from typing import Any
 
 from fenics_contact.checkpoint import Checkpoint, reporting_what_is_stored, safe_point
 from fenics_contact.checks import brief
+from fenics_contact.contact.deformed_state import AnyState
 from fenics_contact.contact.problem import ContactProblem
-from fenics_contact.contact.state import State
 from fenics_contact.contact.step_checkpoint import StepCheckpoint
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, collectively, together
@@ -72,12 +72,12 @@ class LoadSequence:
         return {"steps": f"{self._number}{total} done", "problem": self.problem}
 
     @property
-    def state(self) -> State | None:
+    def state(self) -> AnyState | None:
         """State after the last step, None before the first."""
         return self.problem.state if self._number else None
 
     @collectively("LoadSequence.advance", lambda self, *_, **__: self._comm)
-    def advance(self, step: LoadStep) -> State:
+    def advance(self, step: LoadStep) -> AnyState:
         """Compute the state at the end of the next step. Collective.
 
         Raises:
@@ -114,7 +114,7 @@ class LoadSequence:
         self._done.write_rest()
         return self._done.summary(self._number, self._count)
 
-    def _advanced(self, step: LoadStep) -> State:
+    def _advanced(self, step: LoadStep) -> AnyState:
         with together(self._comm):
             scene = step.applied_to(self.scene)
         state = self._done.recalled(step, scene, self.problem)
@@ -135,7 +135,7 @@ class LoadSequence:
 
 def solve_steps(
     problem: ContactProblem, steps: Sequence[LoadStep], *, checkpoint: Checkpoint | None = None
-) -> tuple[State, ...]:
+) -> tuple[AnyState, ...]:
     """Compute the states at the end of every load step, see `LoadSequence`. Collective.
 
     Args:

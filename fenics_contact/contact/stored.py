@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fenics_contact.contact.linear_state import as_linear
 from fenics_contact.contact.state import State
 from fenics_contact.contact.stored_rows import Stored
-from fenics_contact.feti import DirectSystem, DualSystem
+from fenics_contact.feti import DirectSolution, DualSystem
 from fenics_contact.qp import CountedOperator, DualSolution, iterate_at
 
 
@@ -19,7 +20,7 @@ def stored_state(state: State) -> dict[str, np.ndarray]:
         rigid motions; all replicated. Empty for a state that was computed without multipliers. Of bodies with
         nonlinear materials what `stored_deformed` returns.
     """
-    if isinstance(state.system, DirectSystem):
+    if isinstance(state.solution, DirectSolution):
         return {}
     if state.scene.is_nonlinear:
         from fenics_contact.contact.deformed_state import DeformedState
@@ -27,7 +28,7 @@ def stored_state(state: State) -> dict[str, np.ndarray]:
 
         assert isinstance(state, DeformedState)
         return stored_deformed(state)
-    torn, solution = state.torn, state.dual_solution
+    torn, solution = state.torn, as_linear(state, "multipliers of rigid motions").dual_solution
     rows = np.arange(torn.numbering.total)
     return {
         "multiplier": torn.numbering.gather(solution.multiplier, rows),

@@ -89,6 +89,10 @@ class TornSystem:
         """Return B u for a torn displacement of this rank, owned, [length]. Collective."""
         return self.numbering.to_owned(self.B @ displacement)
 
+    def force(self, multiplier: np.ndarray) -> np.ndarray:
+        """Return Bᵀλ of owned multipliers on this rank's torn dofs, (torn_size,), [force]. Collective."""
+        return np.asarray(self.B.T @ self.numbering.to_local(multiplier))
+
     def relative(self, displacement: np.ndarray) -> np.ndarray:
         """Return B u with the contribution of supports, owned, [length]. Collective."""
         jump = self.jump(displacement)

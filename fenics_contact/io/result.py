@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fenics_contact.contact import State, Status, UnheldMotion, contact_area
+from fenics_contact.contact import State, Status, UnheldMotion, as_linear, contact_area
 from fenics_contact.errors import InvalidInputError, collectively, together
-from fenics_contact.feti import DirectSystem
+from fenics_contact.feti import DirectSolution
 from fenics_contact.io.described_scene import described_scene, readable
 from fenics_contact.io.forces_record import forces_record, motions_record
 from fenics_contact.io.json_file import write_json
@@ -84,9 +84,8 @@ point ``about`` |
         folder: Output folder; created.
         name: Name of the file without ".json". A file of that name is replaced when the new one is complete.
         more: Further results: numbers, text, arrays, by name.
-        errors: Whether to estimate the state's errors first, see `State.estimate_errors` for the cost; else
-            those known already are written, as a state that was solved without a fixed tolerance has but for
-            that of the geometry.
+        errors: Whether to estimate the state's errors, see `LinearState.estimate_errors` for the cost; else
+            those known already are written: a balanced solve has all but that of the geometry.
 
     Returns:
         The file; `read_result` reads it.
@@ -111,7 +110,7 @@ def result_record(
     comm, unheld, read_off = state.torn.decomposition.comm, state.unheld, _read_off(state)
     with together(comm):
         record = {**_head("state", comm), **_state_record(state, unheld), **read_off}
-    found = state.estimate_errors() if errors else state.known_errors
+    found = as_linear(state, "errors").estimate_errors() if errors else state.known_errors
     record["errors"] = None if found is None else _errors(found)
     return {**record, "more": dict(more or {})}
 
@@ -206,7 +205,7 @@ def _state_record(state: State, unheld: Sequence[UnheldMotion]) -> dict[str, Any
     decomposition, solution = state.torn.decomposition, state.solution
     parts = decomposition.partitions
     plan = state.scene.plan(parts)
-    direct = isinstance(state.system, DirectSystem)
+    direct = isinstance(solution, DirectSolution)
     methods = list(dict.fromkeys(step.method for step in solution.history))
     return {
         "scene": described_scene(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from copy import copy
 from dataclasses import replace
 from functools import partial
 
@@ -24,7 +23,7 @@ from fenics_contact.feti import (
     kernel_matrix,
 )
 from fenics_contact.nonlinear.tangent_operator import TangentOperator
-from fenics_contact.qp import CoarseSpace, SlipLaw
+from fenics_contact.qp import CoarseSpace
 from fenics_contact.scene import rigid_body_modes
 from fenics_contact.timing import PhaseTimer
 
@@ -119,29 +118,13 @@ class TangentSystem(DualSystem):
         self._unheld_points = self.points[:, :0]
         return coarse
 
-    def on_rows_of(
-        self, torn: TornSystem, law: SlipLaw, diagonal: np.ndarray, open_: np.ndarray
-    ) -> TangentSystem:
-        """Return the factored tangents with the rows of a system at a neighbouring configuration. Collective.
-
-        Args:
-            torn: The system.
-            law: Its law of friction.
-            diagonal: That of F on its contact rows, owned.
-            open_: B u − c there, owned, [length].
-        """
-        other = copy(self)
-        other.torn, other._B, other._Bt = torn, torn.B, torn.B.T.tocsr()
-        other._B_interface = torn.B[:, self.inverse.interface].tocsr()
-        other._Bt_interface = other._B_interface.T.tocsr()
-        preconditioner = DirichletPreconditioner(
-            self.inverse, other._B_interface, other._compliance(), torn.numbering, torn.n_gluing
-        )
-        other.problem = replace(
-            self.problem, rhs=open_, layout=torn.layout, preconditioner=preconditioner, diagonal=diagonal,
-            friction=law, scaling=None, supported=None,
-        )  # fmt: skip
-        return other
+    def conforming_on(self, torn: TornSystem, displacement: np.ndarray) -> np.ndarray:
+        """Return a displacement on the rows of a neighbouring configuration made continuous. Collective."""
+        rows, numbering = torn.B[:, self.inverse.interface].tocsr(), torn.numbering
+        sewing = DirichletPreconditioner(self.inverse, rows, self._compliance(), numbering, torn.n_gluing)
+        nothing = sp.csr_matrix((len(torn.right), 0))
+        sewn = sewing.lifting(nothing).jump(torn.right - torn.jump(displacement))
+        return displacement + self.inverse.extend(sewn)
 
     def _diagonal(self) -> tuple[np.ndarray, np.ndarray]:
         if self._known_diagonal is not None:

@@ -216,39 +216,25 @@ class SmalseMemory:
 
 
 @displayed
-@dataclass(frozen=True, eq=False)
-class DualSolution:
-    """A multiplier that satisfies every residual to the solver's tolerance.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Solution:
+    """A multiplier that satisfies every residual to the tolerance, and how it was found.
 
     Attributes:
-        problem: The solved problem.
         multiplier: λ, owned.
-        residual: r = F λ − d − Gᵀα, owned: minus the violation B u − c of every row.
-        product: F λ, owned.
-        alpha: Coefficients α of the rigid motions, shape (m,), replicated.
-        slip_bound: Ψ at the solution, shape (n_friction,), owned.
-        residuals: The residuals, recomputed from `product`.
+        residuals: The residuals.
         iterations: Outer steps of the solver.
         products: F-products of this solve, for all purposes.
         history: One record per step, oldest first.
         reason: Why the solver stopped, in words.
-        memory: Estimates of SMALSE, None if it did not run.
-        released: Whether all forces are zero because no load acts and friction cannot grip without one.
     """
 
-    problem: DualProblem
     multiplier: Vector
-    residual: Vector
-    product: Vector
-    alpha: Vector
-    slip_bound: Vector
     residuals: Residuals
     iterations: int
     products: int
     history: tuple[SolverStep, ...]
     reason: str
-    memory: SmalseMemory | None = None
-    released: bool = False
 
     @property
     def natural_residual(self) -> float:
@@ -264,3 +250,27 @@ class DualSolution:
     def coarse_residual(self) -> float:
         """Distance of λ from equilibrium relative to ‖λ‖."""
         return self.residuals.coarse
+
+
+@displayed
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DualSolution(Solution):
+    """The solution of a dual problem; its residuals are recomputed from `product`.
+
+    Attributes:
+        problem: The solved problem.
+        residual: r = F λ − d − Gᵀα, owned: minus the violation B u − c of every row.
+        product: F λ, owned.
+        alpha: Coefficients α of the rigid motions, shape (m,), replicated.
+        slip_bound: Ψ at the solution, shape (n_friction,), owned.
+        memory: Estimates of SMALSE, None if it did not run.
+        released: Whether all forces are zero because no load acts and friction cannot grip without one.
+    """
+
+    problem: DualProblem
+    residual: Vector
+    product: Vector
+    alpha: Vector
+    slip_bound: Vector
+    memory: SmalseMemory | None = None
+    released: bool = False

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact.contact import State
+from fenics_contact.contact import LinearState
 from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti import DualSystem
@@ -54,7 +54,7 @@ class Adjoint:
 
 
 def solve_adjoint(
-    state: State,
+    state: LinearState,
     partials: Partials,
     linearised: LinearisedFace,
     *,

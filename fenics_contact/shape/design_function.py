@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.contact import State
+from fenics_contact.contact import AnyState
 from fenics_contact.display import displayed
 from fenics_contact.errors import collectively
 from fenics_contact.fingerprint import described
@@ -176,11 +176,11 @@ class SingleProblem(DesignProblem[DesignPoint]):
     objective: Objective
 
     @abstractmethod
-    def state_of(self, alpha: np.ndarray) -> State:
+    def state_of(self, alpha: np.ndarray) -> AnyState:
         """Return the equilibrium of a design; raises as `evaluate` does. Collective."""
 
     @abstractmethod
-    def differentiate(self, state: State) -> DesignPoint:
+    def differentiate(self, state: AnyState) -> DesignPoint:
         """Return value and subgradient at a known state, for one adjoint. Collective."""
 
     def function(self, objective: Objective, name: str | None = None) -> DesignFunction:
@@ -275,7 +275,7 @@ class DesignFunction:
     def _solved_anew(self, alpha: np.ndarray) -> DesignPoint:
         return self._differentiated(alpha, self._problem.state_of(alpha))
 
-    def _differentiated(self, alpha: np.ndarray, state: State) -> DesignPoint:
+    def _differentiated(self, alpha: np.ndarray, state: AnyState) -> DesignPoint:
         point = replace(self._own.differentiate(state), alpha=np.array(alpha, dtype=float))
         self._last = point
         return point

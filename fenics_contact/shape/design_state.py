@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from functools import partial
 
-from fenics_contact.contact import ContactProblem, State
+from fenics_contact.contact import AnyState, ContactProblem
 from fenics_contact.errors import (
     ConvergenceError,
     InfeasibleError,
@@ -21,11 +21,11 @@ logger = logging.getLogger(__name__)
 def design_state(
     contact: ContactProblem,
     scene: Scene,
-    start: State | None,
+    start: AnyState | None,
     tolerance: float,
     *,
-    slip_from: State | None = None,
-) -> State:
+    slip_from: AnyState | None = None,
+) -> AnyState:
     """Compute the equilibrium of a design, whose surfaces may overlap before they are loaded. Collective.
 
     Args:

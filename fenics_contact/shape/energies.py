@@ -24,14 +24,14 @@ class TotalPotential(Weighable):
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
         """∂J/∂u = K u − f, ∂J/∂q = −g, ∂J/∂X from UFL: half of a(u, u), all of L(u)."""
-        system, u = state.dual, state.torn_displacement
-        by_shape = work_by_shape(forms, system.torn, 0.5 * u, u)
+        torn, u = state.torn, state.torn_displacement
+        by_shape = work_by_shape(forms, torn, 0.5 * u, u)
         # In equilibrium K u − f = −Bᵀλ.
         return Partials.of(
             state,
             self.value(state, forms),
-            by_displacement=-system.force(state.solution.multiplier),
-            by_motion=-system.torn.free.load,
+            by_displacement=-torn.force(state.solution.multiplier),
+            by_motion=-torn.free.load,
             by_shape=by_shape,
         )
 
@@ -65,8 +65,8 @@ class StrainEnergy(Weighable):
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
         """∂J/∂u = K u, ∂J/∂X half of that of a(u, u)."""
-        value, system, u = self.value(state, forms), state.dual, state.torn_displacement
+        value, torn, u = self.value(state, forms), state.torn, state.torn_displacement
         # In equilibrium K u = f − Bᵀλ.
-        by_displacement = system.torn.load - system.force(state.solution.multiplier)
-        by_shape = strain_work_by_shape(forms, system.torn, 0.5 * u, u)
+        by_displacement = torn.load - torn.force(state.solution.multiplier)
+        by_shape = strain_work_by_shape(forms, torn, 0.5 * u, u)
         return Partials.of(state, value, by_displacement=by_displacement, by_shape=by_shape)

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.feti import DualSystem, TornSystem
+from fenics_contact.feti import TornSystem
 from fenics_contact.scene import Tresca, gradients_of
 from fenics_contact.shape.linearised_face import LinearisedFace
 
 
 def bound_sensitivity(
-    system: DualSystem, by_multiplier: np.ndarray, w: np.ndarray, linearised: LinearisedFace
+    torn: TornSystem, by_multiplier: np.ndarray, w: np.ndarray, linearised: LinearisedFace
 ) -> np.ndarray:
     """Return dJ by each slip bound at fixed geometry, d·(∂J/∂τ − B_T w), replicated. Collective."""
-    force = by_multiplier - system.jump(w)
-    mine = np.einsum("na,na->n", linearised.slip_direction, force[system.problem.layout.tangential])
-    result = np.zeros(len(system.torn.frictional))
-    result[system.torn.owned_discs] = mine
-    return np.asarray(system.problem.comm.allreduce(result))
+    force = by_multiplier - torn.jump(w)
+    mine = np.einsum("na,na->n", linearised.slip_direction, force[torn.layout.tangential])
+    result = np.zeros(len(torn.frictional))
+    result[torn.owned_discs] = mine
+    return np.asarray(torn.decomposition.comm.allreduce(result))
 
 
 def bounds_by_area(torn: TornSystem, by_bound: np.ndarray) -> np.ndarray:

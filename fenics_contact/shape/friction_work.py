@@ -49,7 +49,7 @@ class FrictionWork(Weighable):
         return Partials.of(
             state,
             float((force * slip).sum()),
-            by_displacement=state.dual.force(by_slip),
+            by_displacement=state.torn.force(by_slip),
             by_multiplier=on_rows(state, None, slip),
             by_motion=by_motion,
             by_jump=by_slip,

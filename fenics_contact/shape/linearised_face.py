@@ -9,10 +9,11 @@ from enum import Enum
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.contact import State
+from fenics_contact._libraries import MPI
+from fenics_contact.contact import RowValues, State
 from fenics_contact.display import displayed
 from fenics_contact.linalg import ROUNDING
-from fenics_contact.qp import ContactLayout, DualProblem, DualSolution, Face, classify, contact_step
+from fenics_contact.qp import ContactLayout, Face, classify, global_sum
 from fenics_contact.scene import Surface
 from fenics_contact.surfaces import edge_distance
 
@@ -107,18 +108,17 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
         coupling: If False, the growth of friction with the normal force is omitted; the derivative is then
             that of Tresca friction.
     """
-    system, solution = state.dual, state.dual_solution
-    layout, bound = system.problem.layout, solution.slip_bound
-    step = contact_step(layout, system.problem.diagonal)
-    trial = solution.multiplier - step * solution.residual
-    coefficient = system.torn.friction_coefficient[system.torn.owned_discs]
+    torn, rows = state.torn, state.rows
+    layout, bound, step = torn.layout, rows.slip_bound, rows.step
+    trial = rows.multiplier - step * rows.residual
+    coefficient = torn.friction_coefficient[torn.owned_discs]
     length = np.linalg.norm(trial[layout.tangential], axis=1)
     # Two slacks: every point that may be weak is counted, but only one that leans to no side is reassigned.
-    uncertainty, closest = _uncertainty(system.problem, solution, step)
+    uncertainty, closest = _uncertainty(torn.decomposition.comm, rows)
     counted = _on_switch(layout, trial, bound, coefficient, uncertainty)
     weak = _on_switch(layout, trial, bound, coefficient, closest)
 
-    known = classify(layout, bound, solution.multiplier, solution.residual, step)
+    known = classify(layout, bound, rows.multiplier, rows.residual, step)
     direction = _directions(known.direction, trial[layout.tangential], length, weak.disc | weak.vanishing)
     held, at_rest = choice is WeakChoice.HELD, length <= closest[layout.tangential[:, 0]]
     face = replace(
@@ -133,7 +133,7 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
     tested, growing = face.restriction, face.slip | starting
     moving = tested + growth_of(face, growing, coefficient) if coupling else tested
     slip_direction = np.where(face.slip[:, None], direction, 0.0)
-    contacts, discs = system.problem.comm.allreduce(counted.counts)
+    contacts, discs = torn.decomposition.comm.allreduce(counted.counts)
     points = WeakPoints(int(contacts), int(discs), _points_on_edges(state), choice)
     return LinearisedFace(face, tested, moving.tocsr(), slip_direction, growing, points)
 
@@ -170,22 +170,23 @@ def _on_switch(
 
 
 def _uncertainty(
-    problem: DualProblem, solution: DualSolution, step: np.ndarray
+    comm: MPI.Comm, rows: RowValues
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the distance from a switch beyond which a point's side is certain, owned, [force]. Collective.
 
-    It is the uncertainty of λ − ρ r due to the residuals of the state, with ρ the ``step``: those of the
+    It is the uncertainty of λ − ρ r due to the residuals of the state, with ρ the step: those of the
     contact law are forces already, jumps between subdomains become forces as slips and gaps do.
 
     Returns:
         The distance, and that below which a point of an inaccurate state is assigned to no side, shapes
         (size,).
     """
-    residuals = solution.residuals
+    residuals = rows.residuals
     forces, jumps = residuals.natural * residuals.force_scale, residuals.gluing * residuals.gluing_scale
-    moved = np.where(problem.between_supports, 0.0, step * problem.rhs)  # no multiplier changes the others
-    rounding = ROUNDING * max(problem.norm(solution.multiplier), problem.norm(moved))
-    uncertainty = np.asarray(UNCERTAINTY * (forces + step * jumps) + rounding)
+    moved = np.where(rows.between_supports, 0.0, rows.step * rows.opening)  # none changes the others
+    squares = [float(global_sum(comm, x @ x)[0]) for x in (rows.multiplier, moved)]
+    rounding = ROUNDING * float(np.sqrt(max(squares)))
+    uncertainty = np.asarray(UNCERTAINTY * (forces + rows.step * jumps) + rounding)
     return uncertainty, np.minimum(uncertainty, LEANING * residuals.force_scale + rounding)
 
 

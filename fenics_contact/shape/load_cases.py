@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.contact import State
+from fenics_contact.contact import AnyState
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.scene import Scene
@@ -144,7 +144,7 @@ class LoadCases(JointProblem):
         """Return J_k(α) of every case. Collective."""
         return {name: problem.value_of(alpha) for name, problem in self.problems.items()}
 
-    def states_of(self, alpha: np.ndarray) -> dict[str, State]:
+    def states_of(self, alpha: np.ndarray) -> dict[str, AnyState]:
         """Return the equilibrium of every case. Collective."""
         return {name: problem.state_of(alpha) for name, problem in self.problems.items()}
 

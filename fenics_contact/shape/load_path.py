@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.contact import State
+from fenics_contact.contact import AnyState
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.fingerprint import described
@@ -121,7 +121,7 @@ class LoadPath(JointProblem):
         return self._parts[-1].scene_of(alpha)
 
     @collectively("LoadPath.states_of", comm_of)
-    def states_of(self, alpha: np.ndarray) -> dict[str, State]:
+    def states_of(self, alpha: np.ndarray) -> dict[str, AnyState]:
         """Return the equilibrium after every step. Collective."""
         return dict(self._states.of(alpha))
 
@@ -194,13 +194,13 @@ class _States:
     def __init__(self, problems: Mapping[str, ShapeProblem]) -> None:
         self._problems = problems
         self._alpha: np.ndarray | None = None
-        self._known: dict[str, State] = {}
+        self._known: dict[str, AnyState] = {}
 
-    def of(self, alpha: np.ndarray) -> Mapping[str, State]:
+    def of(self, alpha: np.ndarray) -> Mapping[str, AnyState]:
         """Return the states of a design. Collective."""
         if self._alpha is not None and np.array_equal(self._alpha, alpha):
             return self._known
-        states: dict[str, State] = {}
+        states: dict[str, AnyState] = {}
         last = None
         for name, problem in self._problems.items():
             states[name] = last = problem.state_of(alpha, last)

@@ -8,7 +8,7 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
-from fenics_contact.contact import State, stored_state
+from fenics_contact.contact import AnyState, stored_state
 from fenics_contact.display import displayed
 from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints
 
@@ -42,7 +42,7 @@ class DesignPoint:
     alpha: np.ndarray
     value: float
     gradient: np.ndarray
-    state: State
+    state: AnyState
     weak: WeakPoints
     adjoint_iterations: int
     tolerance: float
@@ -74,7 +74,7 @@ class JointPoint:
     error: float = 0.0
 
     @property
-    def state(self) -> State:
+    def state(self) -> AnyState:
         """Equilibrium of the last part."""
         return list(self.parts.values())[-1].state
 
@@ -176,15 +176,15 @@ class DesignMemory(DesignRecord[DesignPoint]):
         products: F-products of states and adjoints so far.
     """
 
-    def __init__(self, restore: Callable[[np.ndarray, Stored], State]) -> None:
+    def __init__(self, restore: Callable[[np.ndarray, Stored], AnyState]) -> None:
         """Start empty; ``restore`` builds the state of a design from `stored_state` (collective)."""
         super().__init__(self._built, _stored_point)
         self._restore = restore
         self._alpha: np.ndarray = np.zeros(0)
-        self.state: State | None = None
+        self.state: AnyState | None = None
         self.error_by_tolerance, self.products = 0.0, 0
 
-    def record_state(self, alpha: np.ndarray, state: State) -> None:
+    def record_state(self, alpha: np.ndarray, state: AnyState) -> None:
         """Store the last state."""
         self._alpha, self.state = np.array(alpha, dtype=float), state
 

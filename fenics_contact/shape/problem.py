@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.contact import ContactProblem, State
+from fenics_contact.contact import AnyState, ContactProblem
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, collectively, safe_log
 from fenics_contact.fingerprint import described
@@ -156,7 +156,7 @@ class ShapeProblem(SingleProblem):
         return self.geometry.scene_of(self.scene, alpha)
 
     @collectively("ShapeProblem.state_of", comm_of)
-    def state_of(self, alpha: np.ndarray, after: State | None = None) -> State:
+    def state_of(self, alpha: np.ndarray, after: AnyState | None = None) -> AnyState:
         """Return the equilibrium of a design, started from the one before. Collective.
 
         Args:
@@ -189,7 +189,7 @@ class ShapeProblem(SingleProblem):
         return self._recorded(self._point_at(alpha, state, self._tightest, known))
 
     @collectively("ShapeProblem.differentiate", comm_of)
-    def differentiate(self, state: State, partials: Partials | None = None) -> DesignPoint:
+    def differentiate(self, state: AnyState, partials: Partials | None = None) -> DesignPoint:
         """Return value and subgradient at a known state of the reference shape, for one adjoint. Collective.
 
         Args:
@@ -203,7 +203,7 @@ class ShapeProblem(SingleProblem):
             require_from_rest(state)
         return self._point_at(np.zeros(self.size), state, self._tightest, None, partials)
 
-    def partials_of(self, objective: Objective, state: State) -> Partials:
+    def partials_of(self, objective: Objective, state: AnyState) -> Partials:
         """Return an objective and its partial derivatives at a state, checked. Collective."""
         with self._timer.phase("objective"), asking(self.comm):
             return finite_partials(objective.partials(state, self.geometry.forms))
@@ -268,8 +268,8 @@ class ShapeProblem(SingleProblem):
         alpha: np.ndarray,
         tolerance: float,
         known: DesignPoint | None = None,
-        after: State | None = None,
-    ) -> State:
+        after: AnyState | None = None,
+    ) -> AnyState:
         """Compute an equilibrium, from a less accurate one of the same design if known. Collective."""
         previous = self._memory.state if known is None else known.state
         if previous is None and self._neighbour is not None:  # the first state of a load case
@@ -287,7 +287,7 @@ class ShapeProblem(SingleProblem):
     def _point_at(
         self,
         alpha: np.ndarray,
-        state: State,
+        state: AnyState,
         tolerance: float,
         known: DesignPoint | None,
         partials: Partials | None = None,
@@ -346,7 +346,7 @@ class ShapeProblem(SingleProblem):
         """Return the volume of the designed bodies, in the plane the area, and its gradient. Collective."""
         return self.geometry.volume(self.scene_of(alpha))
 
-    def _restored(self, alpha: np.ndarray, stored: Stored) -> State:
+    def _restored(self, alpha: np.ndarray, stored: Stored) -> AnyState:
         state = self.contact.restore(stored, self.scene_of(alpha))
-        self._memory.products += state.system.products
+        self._memory.products += products_of(state)
         return state

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.contact import State
+from fenics_contact.contact import AnyState
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidDesignError, InvalidInputError, safe_log
 from fenics_contact.mesh import BodyMesh, jacobians
@@ -117,7 +117,7 @@ class Remeshed(SingleProblem):
         self._memory.record(point)
         return point
 
-    def state_of(self, alpha: np.ndarray) -> State:
+    def state_of(self, alpha: np.ndarray) -> AnyState:
         """Return the equilibrium of a design; raises as `evaluate` does. Collective."""
         problem, moved = self._on_mesh(alpha)
         return problem.state_of(moved)
@@ -142,7 +142,7 @@ class Remeshed(SingleProblem):
         problem, moved = self._on_mesh(alpha)
         return self._aimed(problem).gradient_near(moved, moved + (end - alpha))
 
-    def differentiate(self, state: State) -> DesignPoint:
+    def differentiate(self, state: AnyState) -> DesignPoint:
         """Return value and subgradient at a state of one of the meshes. Collective."""
         decomposition = state.torn.decomposition
         problem = next(one for one in self.problems if one.contact.decomposition is decomposition)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.contact import DeformedState, State
+from fenics_contact.contact import DeformedState, LinearState, State, as_linear
 from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
 from fenics_contact.shape.contact_derivative import contact_by_shape
 from fenics_contact.shape.forms import ShapeForms
@@ -19,7 +19,7 @@ from fenics_contact.shape.work_derivative import work_by_shape
 
 def products_of(state: State) -> int:
     """Return the number of F-products of a state so far; those of a deformed state's adjoint do not count."""
-    return state.solution.products if isinstance(state, DeformedState) else state.dual.products
+    return state.system.products if isinstance(state, LinearState) else state.solution.products
 
 
 def adjoint_of(
@@ -41,8 +41,10 @@ def adjoint_of(
         unbalanced = -adjoint.displacement @ state.equilibrium.evaluation.unbalanced
         shares = np.array([state.torn.numbering.comm.allreduce(float(unbalanced))])
         return adjoint, state_error(state, partials, linearised, adjoint, shares)
-    adjoint = solve_adjoint(state, partials, linearised, tolerance=tolerance, start=start)
-    return adjoint, state_error(state, partials, linearised, adjoint)
+    linear = as_linear(state, "the adjoint and its error")
+    adjoint = solve_adjoint(linear, partials, linearised, tolerance=tolerance, start=start)
+    shares = adjoint.motions * linear.dual.problem.coarse.residual(linear.solution.multiplier)
+    return adjoint, state_error(state, partials, linearised, adjoint, shares)
 
 
 def by_nodes(
@@ -56,7 +58,7 @@ def by_nodes(
     torn, u, w = state.torn, state.torn_displacement, adjoint.displacement
     work = work_by_shape(forms, torn, u, w)
     fields = PairedFields((state.solution.multiplier, adjoint.multiplier - partials.by_jump), (w, u))
-    by_bound = bound_sensitivity(state.dual, partials.by_multiplier, w, linearised)
+    by_bound = bound_sensitivity(state.torn, partials.by_multiplier, w, linearised)
     if isinstance(state, DeformedState):
         from fenics_contact.shape.deformed_sensitivity import deformed_contact_by_shape
 

@@ -31,7 +31,7 @@ def with_later_steps(state: State, own: Partials, by_position: np.ndarray) -> Pa
     moved = -np.asarray(state.torn.decomposition.comm.allreduce(columns.T @ by_position))
     return replace(
         own,
-        by_displacement=own.by_displacement + state.dual.force(by_position),
+        by_displacement=own.by_displacement + state.torn.force(by_position),
         by_jump=own.by_jump + by_position,
         by_motion=moved if own.by_motion is None else own.by_motion + moved,
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.contact import State
-from fenics_contact.qp import STEEP, ContactLayout, FeasibleSet, contact_step
+from fenics_contact.qp import STEEP, ContactLayout, FeasibleSet
 from fenics_contact.shape.adjoint import Adjoint
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.objective import Partials
@@ -39,7 +39,7 @@ def state_error(
     partials: Partials,
     linearised: LinearisedFace,
     adjoint: Adjoint,
-    unbalanced: np.ndarray | None = None,
+    unbalanced: np.ndarray,
 ) -> StateError:
     r"""Return the effect of a state's residuals on the objective. Collective; no product.
 
@@ -55,24 +55,21 @@ def state_error(
     right one.
 
     Args:
-        unbalanced: Shares βᵀ(G λ − e) of forces out of balance; None for those of a linear state.
+        unbalanced: Shares βᵀ(G λ − e) of forces out of balance.
 
     References:
         R. Becker, R. Rannacher, An optimal control approach to a posteriori error estimation in finite
         element methods, Acta Numer. 10 (2001) 1-102. M. B. Giles, E. Süli, ibid. 11 (2002) 145-236.
     """
-    system, solution = state.dual, state.dual_solution
-    problem, layout = system.problem, system.problem.layout
-    trial = solution.multiplier - contact_step(layout, problem.diagonal) * solution.residual
-    miss = solution.multiplier - FeasibleSet(layout, solution.slip_bound).project(trial)
-    slope = partials.by_multiplier - system.jump(adjoint.displacement)
-    tested = solution.residual + _bent(linearised, solution.multiplier)
+    torn, rows, layout = state.torn, state.rows, state.torn.layout
+    trial = rows.multiplier - rows.step * rows.residual
+    miss = rows.multiplier - FeasibleSet(layout, rows.slip_bound).project(trial)
+    slope = partials.by_multiplier - torn.jump(adjoint.displacement)
+    tested = rows.residual + _bent(linearised, rows.multiplier)
     shares = adjoint.multiplier * tested - slope * _off_face(miss, linearised, layout)
     discs = shares[layout.tangential].sum(axis=1)
     single = np.concatenate([shares[layout.equality], shares[layout.normal], discs])
-    total, squares = problem.comm.allreduce(np.array([single.sum(), single @ single]))
-    if unbalanced is None:
-        unbalanced = adjoint.motions * problem.coarse.residual(solution.multiplier)
+    total, squares = torn.decomposition.comm.allreduce(np.array([single.sum(), single @ single]))
     return StateError(float(total - unbalanced.sum()), float(np.sqrt(squares + unbalanced @ unbalanced)))
 
 

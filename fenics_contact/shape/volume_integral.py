@@ -53,7 +53,7 @@ class BodyIntegral:
         for subdomain, functions in subdomain_fields(state.torn, [state.torn_displacement]):
             if subdomain.mesh.body == self.body:
                 total += _dolfinx.assemble_scalar(bind(subdomain, functions, []))
-        return float(state.dual.problem.comm.allreduce(total))
+        return float(state.torn.decomposition.comm.allreduce(total))
 
     def derivatives(self, *numbers: float) -> dict[str, np.ndarray]:
         """Return the derivatives by displacements and shape, by UFL. Collective."""

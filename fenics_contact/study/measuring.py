@@ -10,7 +10,7 @@ import numpy as np
 
 from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI
-from fenics_contact.contact import State, Status
+from fenics_contact.contact import AnyState, Status, as_linear
 from fenics_contact.study.parameters import parameters_from
 from fenics_contact.study.protocol import Outcome, Quantity, Value
 from fenics_contact.study.scenes import find_study
@@ -59,15 +59,15 @@ def measured(
     }
 
 
-def error_parts(state: State) -> dict[str, float | None]:
+def error_parts(state: AnyState) -> dict[str, float | None]:
     """Return the three parts of a state's error, relative to its energy norm. Collective."""
-    errors = state.estimate_errors(geometry=False)
+    errors = as_linear(state, "errors").estimate_errors(geometry=False)
     parts = {name: float(getattr(errors, name)) for name in ("algebraic", "friction", "discretisation")}
     # Without an admissible pair the bound is infinite, which JSON cannot represent.
     return {name: value if np.isfinite(value) else None for name, value in parts.items()}
 
 
-def _counts(states: tuple[State, ...]) -> dict[str, int]:
+def _counts(states: tuple[AnyState, ...]) -> dict[str, int]:
     """Return sizes of the last state and the work of all."""
     counts = dict(states[-1].counts)
     for name in ("f_products", "solver_steps"):

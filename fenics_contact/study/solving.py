@@ -7,7 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.contact import ContactProblem, FixedPoint, State, solve_steps
+from fenics_contact.contact import (
+    AnyState,
+    ContactProblem,
+    FixedPoint,
+    as_linear,
+    solve_steps,
+)
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.partition import default_partition
 from fenics_contact.qp import DualSolver, FaceNewton
@@ -17,7 +23,7 @@ from fenics_contact.study.parameters import Parameters
 from fenics_contact.study.protocol import Problem
 
 
-def solve_problem(problem: Problem, parameters: Parameters, comm: MPI.Comm) -> tuple[State, ...]:
+def solve_problem(problem: Problem, parameters: Parameters, comm: MPI.Comm) -> tuple[AnyState, ...]:
     """Return the states of all load steps. Collective."""
     partitions = cut(problem.scene, parameters.subdomains, comm.size)
     contact = ContactProblem(problem.scene, comm, partitions=partitions, solver=_solver(parameters))
@@ -56,19 +62,20 @@ def _nodes(mesh: BodyMesh, parts: int) -> float:
     return max(2.0**mesh.dim, (side + 1.0) ** mesh.dim)
 
 
-def gradient_of(problem: Problem, state: State) -> tuple[np.ndarray, dict[str, float], int]:
+def gradient_of(problem: Problem, state: AnyState) -> tuple[np.ndarray, dict[str, float], int]:
     """Return the derivative of the total potential by the design, seconds by phase, products. Collective."""
     if problem.design is None:
         return np.zeros(0), {}, 0
-    before = state.dual.products
+    system = as_linear(state, "derivatives in studies").dual
+    before = system.products
     contact = ContactProblem.following(state, tolerance=max(reached(state), 1e-11))
     differentiated = ShapeProblem(contact, problem.design, TotalPotential())
     point = differentiated.differentiate(state)
     seconds = {name: differentiated.seconds.get(name, 0.0) for name in ("objective", "adjoint", "gradient")}
-    return point.gradient, seconds, state.dual.products - before
+    return point.gradient, seconds, system.products - before
 
 
-def reached(state: State) -> float:
+def reached(state: AnyState) -> float:
     """Return the largest relative residual of a state."""
     return float(max(state.solution.natural_residual, state.solution.gluing_residual))
 

@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.accuracy import Certificate, certify, friction_error
-from fenics_contact.contact import ContactProblem, State, solve_scene
+from fenics_contact.contact import AnyState, ContactProblem, solve_scene
 from fenics_contact.contact.dual_solve import solve_dual
 from fenics_contact.gallery import block, hemisphere, rectangle
 from fenics_contact.mesh import quadratic
@@ -138,14 +138,14 @@ def solver_of(scene: Scene, tolerance: float) -> DualSolver:
 
 
 @lru_cache(maxsize=1)
-def first_state(name: str) -> State:
+def first_state(name: str) -> AnyState:
     """The state that the others of a case share their factors with."""
     case = CASES[name]
     scene = case.make()
     return solve_scene(scene, MPI.COMM_SELF, partitions=case.cut(scene), solver=solver_of(scene, 0.1))
 
 
-def energy_norm(state: State, displacement: np.ndarray) -> float:
+def energy_norm(state: AnyState, displacement: np.ndarray) -> float:
     """Return √(vᵀK v) of a torn displacement. Collective."""
     total, start = 0.0, 0
     for subdomain in state.torn.subdomains:
@@ -180,7 +180,7 @@ class Measured:
     shown_whole: float
 
 
-def measured(state: State, finest: float = 1e-11) -> Measured:
+def measured(state: AnyState, finest: float = 1e-11) -> Measured:
     """Compare what is found for a state with solutions of many digits. Collective."""
     system, solution, scene = state.dual, state.dual_solution, state.scene
     certificate = certify(system, solution)
@@ -199,7 +199,7 @@ def measured(state: State, finest: float = 1e-11) -> Measured:
     return Measured(certificate, certificate.bound / norm, friction / norm, *distances)
 
 
-def solved(name: str, tolerance: float | None) -> State:
+def solved(name: str, tolerance: float | None) -> AnyState:
     """Return the state of a case to a tolerance, or to that which users get, from a cold start."""
     first = first_state(name)
     solver = None if tolerance is None else solver_of(first.scene, tolerance)

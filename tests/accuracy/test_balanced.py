@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.accuracy import BalancedTolerance, SolverErrors
-from fenics_contact.contact import ContactProblem, State, solve_scene, solve_steps
+from fenics_contact.contact import AnyState, ContactProblem, solve_scene, solve_steps
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.partition import box_partition
@@ -24,12 +24,12 @@ PAIR = "a body that friction holds"
 MODEST = ["a linear block", "a ball on a plane", "Tresca's law", PAIR, "a mortar pair", "two dimensions"]
 
 
-def solved(name: str, tolerance: float | BalancedTolerance | None = None) -> State:
+def solved(name: str, tolerance: float | BalancedTolerance | None = None) -> AnyState:
     scene = CASES[name].make()
     return solve_scene(scene, MPI.COMM_SELF, partitions=CASES[name].cut(scene), tolerance=tolerance)
 
 
-def remarks(state: State) -> list[str]:
+def remarks(state: AnyState) -> list[str]:
     """Return what was said of each round."""
     return [step.note for step in state.dual_solution.history if "in energy norm" in step.note]
 

@@ -24,7 +24,7 @@ from fenics_contact.accuracy import (
     solver_errors,
     state_errors,
 )
-from fenics_contact.contact import FixedPoint, State, solve_scene
+from fenics_contact.contact import AnyState, FixedPoint, solve_scene
 from fenics_contact.contact.dual_solve import solve_dual
 from fenics_contact.gallery import rectangle
 from fenics_contact.partition import box_partition
@@ -48,7 +48,7 @@ from tests.contact import gallery
 BOUND, PUSH = 0.1, 0.05
 
 
-def lying(push: float, cells: tuple[int, int], friction: Tresca | None = None) -> State:
+def lying(push: float, cells: tuple[int, int], friction: Tresca | None = None) -> AnyState:
     """A block that lies on a floor, in one piece: nothing but contact holds it."""
     mesh = rectangle((0.0, 0.0), (3.0, 1.0), cells)
     scene = Scene(
@@ -60,7 +60,7 @@ def lying(push: float, cells: tuple[int, int], friction: Tresca | None = None) -
     return solve_scene(scene, MPI.COMM_SELF, partitions=whole, solver=FaceNewton(tolerance=1e-11))
 
 
-def made(state: State, multiplier: np.ndarray, way: np.ndarray) -> DualSolution:
+def made(state: AnyState, multiplier: np.ndarray, way: np.ndarray) -> DualSolution:
     """Return the state of a multiplier with the block moved rigidly besides by a vector."""
     problem = state.dual.problem
     product = problem.operator(multiplier)
@@ -74,12 +74,12 @@ def made(state: State, multiplier: np.ndarray, way: np.ndarray) -> DualSolution:
     )
 
 
-def error_of(state: State, solution: DualSolution) -> float:
+def error_of(state: AnyState, solution: DualSolution) -> float:
     found = state.dual.displacement(solution.multiplier, solution.alpha)
     return energy_norm(state, found - state.torn_displacement)
 
 
-def without(part: str, patch: pytest.MonkeyPatch, state: State, solution: DualSolution) -> Certificate:
+def without(part: str, patch: pytest.MonkeyPatch, state: AnyState, solution: DualSolution) -> Certificate:
     with patch.context() as context:
         context.setattr(certificate, part, lambda *_: 0.0)
         return certify(state.dual, solution)
@@ -151,7 +151,7 @@ def test_the_estimate_by_the_law_of_friction_is_needed(scene: Scene, solver: Fac
     assert errors.algebraic + errors.friction == pytest.approx(found.bound + found.friction, rel=0.02)
 
 
-def worst(state: State, sewn: bool) -> np.ndarray:
+def worst(state: AnyState, sewn: bool) -> np.ndarray:
     """Return the error of the multiplier for which a bound of the other displacement alone is least enough.
 
     Every row is closed, so that all is linear: δλ moves by u = −K⁺Bᵀδλ, w closes its rows, a sews them. The

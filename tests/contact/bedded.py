@@ -9,7 +9,7 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
+from fenics_contact.contact import AnyState, solve_scene
 from fenics_contact.gallery import block
 from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
@@ -44,7 +44,7 @@ class Bedded(IsotropicElasticity):
         return rigid_body_modes(points)[:, :, [] if self.sideways else [0, 1, 5]]
 
 
-def pushed(material: Bedded, parts: tuple[int, int, int], *, on_floor: bool = True) -> State:
+def pushed(material: Bedded, parts: tuple[int, int, int], *, on_floor: bool = True) -> AnyState:
     mesh = block((0.0, 0.0, 0.0), (20.0, 20.0, 40.0), (3, 3, 6))
     floor = ContactPair(Surface("block", "z0"), RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
     contacts = [floor] if on_floor else []

@@ -7,18 +7,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.contact import State
+from fenics_contact.contact import AnyState
 from tests.contact.conic_reference import ConicReference
 
 
-def slip_bound(state: State) -> np.ndarray:
+def slip_bound(state: AnyState) -> np.ndarray:
     """Return Ψ = given bound + μ λ_N of every disc, from the scene's data and the answer's normal forces."""
     torn, layout = state.system.torn, state.system.problem.layout
     normal = state.solution.multiplier[layout.normal[layout.friction_of]]
     return torn.tresca_bound + torn.friction_coefficient * np.maximum(normal, 0.0)
 
 
-def residuals(state: State) -> dict[str, float]:
+def residuals(state: AnyState) -> dict[str, float]:
     """Recompute equilibrium, cone violation, gluing and natural residual of the multiplier.
 
     With r = F λ − d − Gᵀα: ‖G λ − e‖ relative to the sum of the forces in it; the largest tension or excess
@@ -51,7 +51,7 @@ def _norm(values: np.ndarray) -> float:
     return float(np.linalg.norm(values))
 
 
-def assert_solved(state: State, tolerance: float) -> None:
+def assert_solved(state: AnyState, tolerance: float) -> None:
     """Require every residual to be small."""
     found = residuals(state)
     assert state.solution.residuals.within(tolerance)
@@ -61,12 +61,12 @@ def assert_solved(state: State, tolerance: float) -> None:
     assert found["gluing"] <= 10 * tolerance
 
 
-def body_displacements(state: State) -> np.ndarray:
+def body_displacements(state: AnyState) -> np.ndarray:
     """Return the displacement of all bodies' nodes, (n_nodes, 3)."""
     return np.concatenate([state.gather_displacement(name) for name in state.scene.bodies])
 
 
-def friction_law(state: State, reference: ConicReference) -> dict[str, float]:
+def friction_law(state: AnyState, reference: ConicReference) -> dict[str, float]:
     """Measure every sentence of the contact and friction law, from displacements, geometry and forces alone.
 
     Rows of the contact geometry come from the reference, displacements from the nodes of the bodies, forces
@@ -91,7 +91,7 @@ def friction_law(state: State, reference: ConicReference) -> dict[str, float]:
     }
 
 
-def balance(state: State, reference: ConicReference, body: str) -> tuple[np.ndarray, np.ndarray]:
+def balance(state: AnyState, reference: ConicReference, body: str) -> tuple[np.ndarray, np.ndarray]:
     """Return resultant and moment about the origin of load and contact forces on a body that is only a slave.
 
     Loads and coordinates come from the reference and the mesh. Both are relative to the sum of all forces.

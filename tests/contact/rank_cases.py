@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact import _dolfinx
-from fenics_contact.contact import State, solve_scene
+from fenics_contact.contact import AnyState, solve_scene
 from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.gallery import block
 from fenics_contact.partition import bisection_partition
@@ -42,7 +42,7 @@ def uniaxial(cell: str) -> Scene:
     return Scene({"bar": Body(mesh, SOFT)}, supports, [Traction("bar", "x1", (TENSION, 0.0, 0.0))])
 
 
-def field_error(state: State) -> float:
+def field_error(state: AnyState) -> float:
     """Return by how much displacement Functions differ from gathered nodal values, on this rank."""
     worst = 0.0
     for name, function in state.displacement.items():
@@ -52,7 +52,7 @@ def field_error(state: State) -> float:
     return worst
 
 
-def position_error(state: State) -> float:
+def position_error(state: AnyState) -> float:
     """Return by how much the points of the fields' meshes differ from the bodies' nodes, on this rank."""
     worst = 0.0
     for name, function in state.displacement.items():
@@ -63,12 +63,12 @@ def position_error(state: State) -> float:
     return worst
 
 
-def own_nodes(state: State, body: str) -> int:
+def own_nodes(state: AnyState, body: str) -> int:
     """Return how many nodes of a body's field this rank owns; it may own none."""
     return int(state.displacement[body].function_space.dofmap.index_map.size_local)
 
 
-def largest_stress(state: State, body: str) -> float:
+def largest_stress(state: AnyState, body: str) -> float:
     """Return the largest von Mises stress on this rank's cells."""
     return float(state.von_mises[body].x.array.max(initial=0.0))
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
+from fenics_contact.contact import AnyState, solve_scene
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import BodyMesh, quadratic
 from fenics_contact.partition import box_partition
@@ -90,7 +90,7 @@ def bridged() -> Scene:
 SCENES = {"loaded": loaded, "pressed": pressed, "tied": tied, "punched": punched, "bridged": bridged}
 
 
-def solved(scene: Scene, comm: MPI.Comm, tolerance: float | None = 1e-10, parts: int = 4) -> State:
+def solved(scene: Scene, comm: MPI.Comm, tolerance: float | None = 1e-10, parts: int = 4) -> AnyState:
     """Return the state with some subdomains a body."""
     cut = {
         name: box_partition(body.mesh, (parts, *[1] * (scene.dim - 1))) for name, body in scene.bodies.items()
@@ -98,7 +98,7 @@ def solved(scene: Scene, comm: MPI.Comm, tolerance: float | None = 1e-10, parts:
     return solve_scene(scene, comm, partitions=cut, tolerance=tolerance)
 
 
-def numbers(state: State) -> dict[str, list[float]]:
+def numbers(state: AnyState) -> dict[str, list[float]]:
     """Return motions, reactions, displacements and balance. Collective."""
     motions = [np.append(each.displacement, each.rotation) for each in state.rigid_motions()]
     reactions = [np.append(each.force, each.moment) for each in state.reactions()]

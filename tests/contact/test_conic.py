@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene
+from fenics_contact.contact import AnyState, Status, solve_scene
 from fenics_contact.qp import DualSolver, FaceNewton, Smalse
 from fenics_contact.scene import Scene, Tresca
 from tests.contact.checks import assert_solved, body_displacements
@@ -35,7 +35,7 @@ def problem(name: str, cell: str) -> tuple[Scene, ConicReference, ConicSolution]
     return scene, reference, reference.solve()
 
 
-def solved(scene: Scene, solver: DualSolver) -> State:
+def solved(scene: Scene, solver: DualSolver) -> AnyState:
     return solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene), solver=solver)
 
 

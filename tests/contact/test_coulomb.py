@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import FixedPoint, State, Status, solve_scene
+from fenics_contact.contact import AnyState, FixedPoint, Status, solve_scene
 from fenics_contact.gallery import block
 from fenics_contact.qp import DualSolver, FaceNewton, Smalse
 from fenics_contact.scene import Body, Coulomb, Scene, Support, Traction, Tresca
@@ -55,11 +55,11 @@ def scene(name: str) -> Scene:
 
 
 @cache
-def solved(name: str, solver: str = "face Newton") -> tuple[State, ConicReference]:
+def solved(name: str, solver: str = "face Newton") -> tuple[AnyState, ConicReference]:
     return solve(scene(name), SOLVERS[solver]), ConicReference(scene(name))
 
 
-def solve(scene: Scene, solver: DualSolver | None = None) -> State:
+def solve(scene: Scene, solver: DualSolver | None = None) -> AnyState:
     return solve_scene(
         scene, MPI.COMM_SELF, partitions=partitions(scene), solver=solver or SOLVERS["face Newton"]
     )

@@ -11,7 +11,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, LoadSequence, State, solve_scene, static_admissibility
+from fenics_contact.contact import (
+    AnyState,
+    ContactProblem,
+    LoadSequence,
+    solve_scene,
+    static_admissibility,
+)
 from fenics_contact.feti import TornSystem, dual, initial_gap
 from fenics_contact.gallery import block
 from fenics_contact.pairing import contact_search, mortar
@@ -164,7 +170,7 @@ def cuts(case: Case) -> dict[str, np.ndarray]:
     return {name: box_partition(body.mesh, case.boxes) for name, body in case.scene.bodies.items()}
 
 
-def solved(case: Case) -> State:
+def solved(case: Case) -> AnyState:
     """Solve to a fixed tolerance: by default a state also estimates the error of its mesh."""
     return solve_scene(case.scene, MPI.COMM_SELF, partitions=cuts(case), tolerance=tolerance_of(case.scene))
 

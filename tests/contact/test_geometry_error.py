@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
+from fenics_contact.contact import AnyState, solve_scene
 from fenics_contact.gallery import LinkShape, block, half_cylinder, half_disc, two_links
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
@@ -81,11 +81,11 @@ def without_shapes(scene: Scene) -> Scene:
     return replace(scene, bodies=bodies)
 
 
-def solved(scene: Scene) -> State:
+def solved(scene: Scene) -> AnyState:
     return solve_scene(scene, MPI.COMM_WORLD, solver=FaceNewton(tolerance=1e-8))
 
 
-def distance(state: State, true: State) -> tuple[float, float]:
+def distance(state: AnyState, true: AnyState) -> tuple[float, float]:
     """Relative distance in energy norm, and the relative error of the peak pressure."""
     way = true.dual_solution.multiplier - state.dual_solution.multiplier
     peaks = [each.contact.pressure.max() for each in (state, true)]

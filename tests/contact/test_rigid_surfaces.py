@@ -12,7 +12,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, RigidMotion, State, check_held, solve_scene, solve_steps
+from fenics_contact.contact import (
+    AnyState,
+    ContactProblem,
+    RigidMotion,
+    check_held,
+    solve_scene,
+    solve_steps,
+)
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.feti import DirectSystem
 from fenics_contact.gallery import block, rectangle
@@ -53,7 +60,7 @@ def field_of(motion: RigidMotion) -> tuple[Any, ...]:
     return tuple(lambda x, k=k: moved(x)[:, k] for k in range(len(motion.about)))
 
 
-def prescribed(scene: Scene, state: State) -> Scene:
+def prescribed(scene: Scene, state: AnyState) -> Scene:
     """The scene with the motions that were found prescribed by supports."""
     found = iter(state.rigid_motions())
     return replace(
@@ -195,7 +202,7 @@ def test_friction_remembers_the_way_of_a_rigid_top() -> None:
     scene = Scene({"block": Body(mesh, SOFT)}, contacts=[floor])
     cut = {"block": box_partition(mesh, (2, 1, 1))}
 
-    def states(steps: list[LoadStep]) -> tuple[State, ...]:
+    def states(steps: list[LoadStep]) -> tuple[AnyState, ...]:
         return solve_steps(ContactProblem(scene, COMM, partitions=cut, tolerance=1e-10), steps)
 
     path = (0.0, 0.02, -0.004, -0.02, 0.01)
@@ -238,7 +245,7 @@ def test_the_bound_of_the_error_holds() -> None:
     state, exact = solved(scene, COMM, 1e-2), solved(scene, COMM, 1e-12)
     whole = Whole(scene)
 
-    def potential(each: State) -> float:
+    def potential(each: AnyState) -> float:
         u = each.gather_displacement("bar").ravel()
         (motion,) = each.rigid_motions()
         work = np.append(motion.displacement, motion.rotation) @ np.append(FORCE, MOMENT)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene
+from fenics_contact.contact import AnyState, Status, solve_scene
 from fenics_contact.contact.dual_solve import contact_result
 from fenics_contact.contact.nodal_forces import nodal_forces
 from fenics_contact.qp import FaceNewton
@@ -20,7 +20,7 @@ from tests.contact.rank_cases import TENSION, uniaxial
 TOLERANCE = 1e-9
 
 
-def solved(scene) -> State:
+def solved(scene) -> AnyState:
     state = solve_scene(
         scene, MPI.COMM_SELF, partitions=partitions(scene), solver=FaceNewton(tolerance=TOLERANCE)
     )
@@ -119,10 +119,10 @@ def test_forces_are_never_below_zero_whatever_the_tolerance_leaves_and_still_bal
     opened = np.sort(np.argsort(-np.where(np.isfinite(ways), ways, -1.0))[:2])
     rows = np.searchsorted(torn.numbering.owned, torn.normal_rows[opened])
     multiplier[rows] = [-7e-4, 1e-6]
-    unclean = replace(state.dual_solution, multiplier=multiplier)
-    contact = contact_result(state.dual, unclean, state.torn_displacement)
+    unclean = replace(state.rows, multiplier=multiplier)
+    contact = contact_result(state.torn, unclean, state.torn_displacement)
     assert contact.normal_force.min() == 0.0
     assert np.array_equal(contact.normal_force > 0.0, contact.status != Status.OPEN)
-    acting = nodal_forces(state.system, multiplier, state.torn_displacement).contact
+    acting = nodal_forces(state.torn, multiplier, state.torn_displacement).contact
     left = np.einsum("nd,nd->n", (acting - contact.force)[opened], contact.points.normal[opened])
     assert left == pytest.approx([-7e-4, 1e-6], rel=1e-9)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, LoadSequence, State, Status, solve_scene, solve_steps
+from fenics_contact.contact import AnyState, ContactProblem, LoadSequence, Status, solve_scene, solve_steps
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.partition import box_partition
@@ -45,7 +45,7 @@ def shears(path: tuple[float, ...]) -> list[LoadStep]:
     return [LoadStep(f"shift {s:g}", supports=[Support("block", "z1", (s, 0.0, -0.01))]) for s in path]
 
 
-def solved(law: Coulomb | Tresca, path: tuple[float, ...] = PATH) -> tuple[State, ...]:
+def solved(law: Coulomb | Tresca, path: tuple[float, ...] = PATH) -> tuple[AnyState, ...]:
     scene = sheared_block(law)
     cut = {"block": box_partition(scene.bodies["block"].mesh, (2, 1, 1))}
     return solve_steps(
@@ -54,7 +54,7 @@ def solved(law: Coulomb | Tresca, path: tuple[float, ...] = PATH) -> tuple[State
     )
 
 
-def shear_force(state: State) -> float:
+def shear_force(state: AnyState) -> float:
     return float(state.contact.force[:, 0].sum())
 
 
@@ -73,11 +73,11 @@ def coulomb_reference(scene: Scene, before: np.ndarray | None) -> tuple[np.ndarr
 
 
 @pytest.fixture(scope="module")
-def loop() -> tuple[State, ...]:
+def loop() -> tuple[AnyState, ...]:
     return solved(Coulomb(FRICTION))
 
 
-def test_the_hysteresis_loop_is_that_of_an_independent_solver(loop: tuple[State, ...]) -> None:
+def test_the_hysteresis_loop_is_that_of_an_independent_solver(loop: tuple[AnyState, ...]) -> None:
     before, scene = None, sheared_block(Coulomb(FRICTION))
     largest = max(abs(shear_force(state)) for state in loop)
     for step, state in zip(shears(PATH), loop, strict=True):
@@ -89,7 +89,7 @@ def test_the_hysteresis_loop_is_that_of_an_independent_solver(loop: tuple[State,
         )
 
 
-def test_the_loop_has_sticking_slipping_and_reversed_steps(loop: tuple[State, ...]) -> None:
+def test_the_loop_has_sticking_slipping_and_reversed_steps(loop: tuple[AnyState, ...]) -> None:
     forces = np.array([shear_force(state) for state in loop])
     assert forces.max() > 0.9 * np.ptp(forces) / 2
     assert forces.min() < -0.9 * np.ptp(forces) / 2
@@ -100,14 +100,14 @@ def test_the_loop_has_sticking_slipping_and_reversed_steps(loop: tuple[State, ..
     np.testing.assert_allclose(np.abs(forces[sliding]), FRICTION * pressed[sliding], rtol=1e-2)
 
 
-def test_unloading_does_not_return_to_the_start(loop: tuple[State, ...]) -> None:
+def test_unloading_does_not_return_to_the_start(loop: tuple[AnyState, ...]) -> None:
     start, back = loop[0], loop[4]
     assert PATH[0] == PATH[4] == 0.0
     assert abs(shear_force(back)) > 0.5 * abs(shear_force(loop[2]))
     assert abs(shear_force(start)) < 1e-6 * abs(shear_force(back))
 
 
-def test_total_slip_adds_up_over_the_steps(loop: tuple[State, ...]) -> None:
+def test_total_slip_adds_up_over_the_steps(loop: tuple[AnyState, ...]) -> None:
     total = sum(state.contact.slip for state in loop)
     np.testing.assert_allclose(loop[-1].contact.total_slip, total, atol=1e-9)
     assert np.abs(total).max() > 0.001
@@ -129,14 +129,14 @@ def test_without_a_reversal_the_number_of_steps_matters_little_with_tresca() -> 
     assert shear_force(many) == pytest.approx(shear_force(once), rel=5e-3)
 
 
-def test_the_energy_balance_of_every_step_closes(loop: tuple[State, ...]) -> None:
+def test_the_energy_balance_of_every_step_closes(loop: tuple[AnyState, ...]) -> None:
     for state in loop:
         assert state.energies.primal == pytest.approx(state.energies.dual, rel=1e-7, abs=1e-9)
         assert state.energies.friction >= 0.0
     assert loop[2].energies.friction > 1e-3
 
 
-def test_later_steps_factor_and_search_nothing_again(loop: tuple[State, ...]) -> None:
+def test_later_steps_factor_and_search_nothing_again(loop: tuple[AnyState, ...]) -> None:
     first, *others = loop
     for state in others:
         assert state.dual.inverse.factored == 0

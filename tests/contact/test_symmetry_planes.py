@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, State, Status, solve_scene, solve_steps
+from fenics_contact.contact import AnyState, ContactProblem, Status, solve_scene, solve_steps
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
 from fenics_contact.gallery import block
@@ -50,7 +50,7 @@ def stack(width: float, cells: int, discretisation: Discretisation = "node") -> 
     )
 
 
-def solved(scene: Scene) -> State:
+def solved(scene: Scene) -> AnyState:
     cut = {name: box_partition(body.mesh, (2, 1, 1)) for name, body in scene.bodies.items()}
     return solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=TOLERANCE))
 

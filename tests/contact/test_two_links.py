@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene
+from fenics_contact.contact import AnyState, Status, solve_scene
 from fenics_contact.gallery import LinkShape, two_links
 from fenics_contact.partition import box_partition
 from fenics_contact.qp import FaceNewton
@@ -31,7 +31,7 @@ STEEL = IsotropicElasticity(2.1e5, 0.3)
 
 
 @pytest.fixture(scope="module")
-def state() -> State:
+def state() -> AnyState:
     links = two_links(LinkShape(n_around=24, n_a=4, n_b=12), comm=MPI.COMM_SELF)
     held, pulled = links.first.mesh, links.second.mesh
     scene = Scene(
@@ -44,7 +44,7 @@ def state() -> State:
     return solve_scene(scene, MPI.COMM_SELF, partitions=parts, solver=FaceNewton(tolerance=TOLERANCE))
 
 
-def own_rows(state: State) -> SimpleNamespace:
+def own_rows(state: AnyState) -> SimpleNamespace:
     """Write down N and T from the contact points, on nodes that are not torn."""
     points = state.contact.points
     spread = sp.kron(points.jump, np.eye(3)).tocsr()
@@ -56,7 +56,7 @@ def own_rows(state: State) -> SimpleNamespace:
     )  # fmt: skip
 
 
-def test_the_whole_law_holds_on_curved_surfaces(state: State) -> None:
+def test_the_whole_law_holds_on_curved_surfaces(state: AnyState) -> None:
     assert_solved(state, TOLERANCE)
     assert state.contact.count(Status.OPEN) > 0
     assert state.contact.count(Status.STICK) > 0
@@ -65,7 +65,7 @@ def test_the_whole_law_holds_on_curved_surfaces(state: State) -> None:
     assert {sentence: value for sentence, value in law.items() if value > 1e-6} == {}
 
 
-def test_contact_and_friction_alone_carry_the_load(state: State) -> None:
+def test_contact_and_friction_alone_carry_the_load(state: AnyState) -> None:
     contact = state.contact
     assert contact.force.sum(axis=0) == pytest.approx(-LOAD, abs=1e-6 * np.abs(LOAD).max())
     points = state.scene.bodies["pulled"].mesh.points
@@ -79,7 +79,7 @@ def test_contact_and_friction_alone_carry_the_load(state: State) -> None:
     assert friction.max() > 100.0
 
 
-def test_the_master_feels_the_opposite_of_the_slave(state: State) -> None:
+def test_the_master_feels_the_opposite_of_the_slave(state: AnyState) -> None:
     points, force = state.contact.points, state.contact.force
     torn = state.system.force(state.solution.multiplier)  # Bᵀλ on torn dofs
     count = sum(body.mesh.n_nodes for body in state.scene.bodies.values())

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
+from fenics_contact.contact import AnyState, solve_scene
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.gallery import rectangle
@@ -68,7 +68,7 @@ SCENES = {
 }
 
 
-def solved(scene: Scene) -> State:
+def solved(scene: Scene) -> AnyState:
     return solve_scene(scene, MPI.COMM_SELF)
 
 

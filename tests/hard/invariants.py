@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from fenics_contact.contact import State
+from fenics_contact.contact import AnyState
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
 from fenics_contact.feti.gluing import prescribed_displacements
 from fenics_contact.feti.initial_gap import gap_with_room
@@ -88,7 +88,7 @@ def assert_holds(found: Violations, tolerance: float, amplification: float) -> N
         assert value <= amplification * tolerance, found
 
 
-def violations(state: State, force_scale: float = 0.0) -> Violations:
+def violations(state: AnyState, force_scale: float = 0.0) -> Violations:
     """Recompute everything. On one rank.
 
     Args:
@@ -130,13 +130,13 @@ def violations(state: State, force_scale: float = 0.0) -> Violations:
     )
 
 
-def _reaction(state: State, whole: Whole, lacking: np.ndarray, scale: float) -> float:
+def _reaction(state: AnyState, whole: Whole, lacking: np.ndarray, scale: float) -> float:
     """Return how far the reactions at nodes are from what is lacking there, relative to a force."""
     held = np.where(whole.fixed, lacking, 0.0)
     return float(np.abs(state._nodal_forces.reaction - held).max(initial=0.0)) / (scale or 1.0)
 
 
-def _forces(state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _forces(state: AnyState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return normal forces, friction forces and their bounds from the scene's data, point by point."""
     torn, contact = state.torn, state.contact
     bound = np.zeros(torn.points.count)
@@ -145,7 +145,7 @@ def _forces(state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return contact.normal_force, contact.friction_force, bound
 
 
-def _size(state: State) -> float:
+def _size(state: AnyState) -> float:
     """Return the largest normal force, at least a part of 1e-10 of all forces: less than that is none.
 
     No force closes a gap between two supports.

@@ -17,12 +17,12 @@ from mpi4py import MPI
 
 from fenics_contact.accuracy import BalancedTolerance, certify, find_sites, solver_errors
 from fenics_contact.contact import (
+    AnyState,
     ContactProblem,
     FixedPoint,
     LoadSequence,
     NewtonSteps,
     RigidMotion,
-    State,
     Status,
     UnheldMotion,
     solve_scene,
@@ -222,7 +222,7 @@ def test_everything_inside_a_state_shows_a_few_lines() -> None:
 
 
 def test_a_printed_state_says_what_was_found_and_what_it_cost() -> None:
-    state: State = objects()["State"]
+    state: AnyState = objects()["LinearState"]
     lines = {line[2:].split("  ")[0].strip(): line for line in str(state).splitlines()}
     counts = [state.contact.count(status) for status in Status]
     assert "{} open, {} stick, {} slip".format(*counts) in lines["contact"]
@@ -252,7 +252,7 @@ def test_many_contact_pairs_are_cut_short() -> None:
     assert "13 further contact pairs" in str(state)
 
 
-@pytest.mark.parametrize("name", ["Scene", "BodyMesh", "State", "Result"])
+@pytest.mark.parametrize("name", ["Scene", "BodyMesh", "LinearState", "Result"])
 def test_notebooks_show_a_small_table(name: str) -> None:
     table = ET.fromstring(objects()[name]._repr_html_())
     rows = {row[0].text: row[1].text for row in table.iter("tr")}

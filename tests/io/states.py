@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene
+from fenics_contact.contact import AnyState, Status, solve_scene
 from fenics_contact.scene import Coulomb, Scene
 from tests.contact.gallery import partitions, two_blocks
 
@@ -23,7 +23,7 @@ def blocks(cell: str = "hexahedron") -> Scene:
 
 
 @lru_cache(maxsize=2)
-def touching_blocks(cell: str = "hexahedron") -> State:
+def touching_blocks(cell: str = "hexahedron") -> AnyState:
     """Open, sticking and slipping points are all there."""
     scene = blocks(cell)
     state = solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene), tolerance=1e-6)

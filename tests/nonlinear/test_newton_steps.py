@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, LoadSequence, NewtonSteps, State, solve_scene
+from fenics_contact.contact import AnyState, ContactProblem, LoadSequence, NewtonSteps, solve_scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.fem.hyperelastic import HyperelasticMechanics
 from fenics_contact.gallery import block
@@ -29,7 +29,7 @@ def of(material: NeoHooke, scene: Scene) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def dragged() -> list[list[State]]:
+def dragged() -> list[list[AnyState]]:
     """A block pressed and dragged: of ordinary rubber and of such that hardly changes its volume."""
     mesh = rounded(4)
     found = []
@@ -62,7 +62,7 @@ def test_settings_of_load_steps_are_checked() -> None:
 
 
 def test_nearly_incompressible_bodies_take_hardly_more_steps_than_others(
-    dragged: list[list[State]],
+    dragged: list[list[AnyState]],
 ) -> None:
     """Tangents have the pressures that a step foresaw: those of its end would grow with its square."""
     counts = [[len(state.solution.history) for state in states] for states in dragged]
@@ -74,7 +74,7 @@ def test_nearly_incompressible_bodies_take_hardly_more_steps_than_others(
 
 
 def test_preconditioners_leave_the_stiffness_of_modes_to_multipliers(
-    dragged: list[list[State]],
+    dragged: list[list[AnyState]],
 ) -> None:
     """With that stiffness they took 75 and 548 products."""
     ordinary, incompressible = (sum(state.solution.products for state in states) for states in dragged)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from fenics_contact.contact import State
+from fenics_contact.contact import AnyState
 from fenics_contact.pairing import ContactPoints
 from fenics_contact.scene import Coulomb, Tresca, rigid_body_modes
 from tests.random_scenes.generator import Sample
@@ -48,7 +48,7 @@ class Violations:
     energy: float = 0.0
 
 
-def complaints(state: State, made: Sample) -> list[str]:
+def complaints(state: AnyState, made: Sample) -> list[str]:
     """Say everything that is wrong with an answer; nothing if it is right."""
     whole = Whole(state.scene)
     found = list(misplaced(whole, state.contact.points, list(state.scene.contacts)))
@@ -59,7 +59,7 @@ def complaints(state: State, made: Sample) -> list[str]:
     return [f"{name} {value:.1e}" for name, value in broken.items() if not value <= limit]
 
 
-def allowed(state: State, tolerance: float | None) -> float:
+def allowed(state: AnyState, tolerance: float | None) -> float:
     """Return what figures may be: what tolerance and errors that the state tells explain, 5 % at most.
 
     The tolerance holds for torn bodies. That whole ones are less exact where they are thin, nearly
@@ -71,7 +71,7 @@ def allowed(state: State, tolerance: float | None) -> float:
     return min(MOST, 1e3 * max(tolerance, told if np.isfinite(told) else 0.0))
 
 
-def violations(state: State, whole: Whole, tolerance: float | None) -> Violations:
+def violations(state: AnyState, whole: Whole, tolerance: float | None) -> Violations:
     """Recompute everything."""
     contact, points = state.contact, state.contact.points
     u = np.concatenate([state.gather_displacement(name) for name in state.scene.bodies])
@@ -117,7 +117,7 @@ def _ratio(value: float, scale: float) -> float:
     return float(value / scale) if scale > 0.0 else float(np.inf)
 
 
-def _bounds(state: State) -> np.ndarray:
+def _bounds(state: AnyState) -> np.ndarray:
     """Return Ψ point by point from the scene's laws."""
     points, bound = state.contact.points, np.zeros(state.contact.points.count)
     for index, pair in enumerate(state.scene.contacts):
@@ -167,7 +167,7 @@ def _yielding(whole: Whole) -> np.ndarray:
     return np.abs(whole.load) / whole.K.diagonal().reshape(whole.load.shape)
 
 
-def _tie_jumps(state: State, u: np.ndarray, whole: Whole) -> float:
+def _tie_jumps(state: AnyState, u: np.ndarray, whole: Whole) -> float:
     """Return the largest jump between tied surfaces where supports leave it open."""
     ties = state.torn.ties
     if ties.count == 0:
@@ -179,7 +179,7 @@ def _tie_jumps(state: State, u: np.ndarray, whole: Whole) -> float:
 
 
 def _equilibrium(
-    state: State, whole: Whole, u: np.ndarray, on_nodes: np.ndarray, tolerance: float | None
+    state: AnyState, whole: Whole, u: np.ndarray, on_nodes: np.ndarray, tolerance: float | None
 ) -> tuple[float, float, float]:
     """Return the wrench that is left, the energy of the error that single nodes tell, and that of all."""
     dim = whole.dim
@@ -214,7 +214,7 @@ def _equilibrium(
     return balance, 0.5 * error, 0.5 * energy
 
 
-def _tie_forces(state: State, whole: Whole, wanted: np.ndarray) -> np.ndarray:
+def _tie_forces(state: AnyState, whole: Whole, wanted: np.ndarray) -> np.ndarray:
     """Return the forces between tied surfaces that come nearest to what single nodes lack."""
     ties = state.torn.ties
     if ties.count == 0:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
+from fenics_contact.contact import AnyState, solve_scene
 from fenics_contact.feti import DirectSystem, DualSystem
 from fenics_contact.gallery import block, half_cylinder, half_disc, hemisphere, rectangle
 from fenics_contact.partition import box_partition
@@ -59,7 +59,7 @@ def pair(friction: Friction = None) -> list[ContactPair]:
     return [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), friction)]
 
 
-def solved(scene: Scene) -> State:
+def solved(scene: Scene) -> AnyState:
     return solve_scene(scene, MPI.COMM_SELF, partitions=cuts(scene), tolerance=1e-6)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, State, Status
+from fenics_contact.contact import AnyState, ContactProblem, Status
 from fenics_contact.shape import DesignPoint, Objective, ShapeProblem
 
 Problem = TypeVar("Problem")
@@ -22,10 +22,10 @@ class Remembering(ShapeProblem):
 
     def __init__(self, *arguments: Any, **more: Any) -> None:
         super().__init__(*arguments, **more)
-        self._known: dict[bytes, State] = {}
+        self._known: dict[bytes, AnyState] = {}
         self._judged: dict[tuple[bytes, Objective], DesignPoint] = {}
 
-    def state_of(self, alpha: np.ndarray, after: State | None = None) -> State:
+    def state_of(self, alpha: np.ndarray, after: AnyState | None = None) -> AnyState:
         if after is not None:
             return super().state_of(alpha, after)
         key = np.asarray(alpha, dtype=float).tobytes()
@@ -80,7 +80,7 @@ class Way(Generic[Problem]):
 class Line(Way[Remembering]):
     """Designs of one problem, judged by several objectives."""
 
-    def state(self, multiple: float = 0.0) -> State:
+    def state(self, multiple: float = 0.0) -> AnyState:
         return self.problem.state_of(self.at(multiple))
 
     def value(self, objective: Objective, multiple: float = 0.0) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, ContactResult, State
+from fenics_contact.contact import AnyState, ContactProblem, ContactResult
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
 from fenics_contact.scene import Coulomb, Scene
 from fenics_contact.shape import (
@@ -192,10 +192,10 @@ class Broken:
     def __init__(self, place: str, number: float) -> None:
         self.place, self.number = place, number
 
-    def value(self, state: State, forms: ShapeForms) -> float:
+    def value(self, state: AnyState, forms: ShapeForms) -> float:
         return self.number if self.place == "value" else state.energies.total_potential
 
-    def partials(self, state: State, forms: ShapeForms) -> Partials:
+    def partials(self, state: AnyState, forms: ShapeForms) -> Partials:
         partials = TotalPotential().partials(state, forms)
         if self.place == "value":
             return replace(partials, value=self.number)
@@ -225,10 +225,10 @@ def test_an_objective_that_is_no_number_is_refused(place: str, told: str, number
 
 def test_a_gradient_that_is_no_number_is_refused() -> None:
     class Steep:
-        def value(self, state: State, forms: ShapeForms) -> float:
+        def value(self, state: AnyState, forms: ShapeForms) -> float:
             return 0.0
 
-        def partials(self, state: State, forms: ShapeForms) -> Partials:
+        def partials(self, state: AnyState, forms: ShapeForms) -> Partials:
             partials = TotalPotential().partials(state, forms)
             return replace(partials, by_shape=np.full_like(partials.by_shape, np.nan))
 
@@ -269,10 +269,10 @@ def test_a_design_by_name_says_what_its_surface_needs() -> None:
 class Settled:
     """An objective that is the same for all designs."""
 
-    def value(self, state: State, forms: ShapeForms) -> float:
+    def value(self, state: AnyState, forms: ShapeForms) -> float:
         return 2.0
 
-    def partials(self, state: State, forms: ShapeForms) -> Partials:
+    def partials(self, state: AnyState, forms: ShapeForms) -> Partials:
         return Partials.of(state, 2.0)
 
     def __repr__(self) -> str:

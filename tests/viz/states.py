@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.image import imread
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene
+from fenics_contact.contact import AnyState, Status, solve_scene
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import quadratic
 from fenics_contact.scene import Body, Coulomb, IsotropicElasticity, PlaneStrain, Scene, Support, Traction
@@ -19,7 +19,7 @@ from tests.contact.gallery import partitions, two_blocks
 
 
 @lru_cache(maxsize=2)
-def touching_blocks(cell: str = "hexahedron") -> State:
+def touching_blocks(cell: str = "hexahedron") -> AnyState:
     """Two blocks in frictional contact, with open, sticking and slipping points."""
     scene = two_blocks(Coulomb(0.4), cell)
     state = solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene), tolerance=1e-6)
@@ -44,7 +44,7 @@ def contains(image: np.ndarray, colour: str, tolerance: float = 0.02) -> bool:
     return int(np.sum(np.all(np.abs(image - wanted) < tolerance, axis=-1))) > 10
 
 
-def pulled(cell: str) -> State:
+def pulled(cell: str) -> AnyState:
     """A bar of quadratic cells pulled along x."""
     if cell in ("hexahedron27", "tetrahedron10"):
         solid = "hexahedron" if cell == "hexahedron27" else "tetrahedron"
