@@ -13,7 +13,7 @@ from fenics_contact.gallery import DesignSurface, block
 from fenics_contact.partition import box_partition
 from fenics_contact.scene import Body, IsotropicElasticity, Scene
 from fenics_contact.viz import plot_control_net, plot_convergence, plot_decomposition
-from fenics_contact.viz.curved_net import PIECES, curved_net
+from fenics_contact.viz.control_net import PIECES, _bars
 from tests.viz.states import contains, painted, pixels
 
 SMALL = 320
@@ -142,10 +142,13 @@ def test_bars_of_a_net_end_at_its_points_and_lie_on_a_surface_that_holds_them(
         for size, count in zip((9, 5), counts, strict=True)
     )
     net = grid[np.ix_(rows, columns)]
-    curve, pairs = curved_net(grid, net)
-    for place in net.reshape(-1, 3):
+    bars = _bars(grid, net)
+    assert sum(len(bar) - 1 for bar in bars) == PIECES * (
+        counts[0] * (counts[1] - 1) + (counts[0] - 1) * counts[1]
+    )
+    curve = np.concatenate([*bars, np.zeros((0, 3))])
+    for place in net.reshape(-1, 3) if bars else ():
         assert np.linalg.norm(curve - place, axis=1).min() < 1e-14
-    assert len(pairs) == PIECES * (counts[0] * (counts[1] - 1) + (counts[0] - 1) * counts[1])
     height = np.interp(curve[:, 0], grid[:, 0, 0], grid[:, 0, 2])
     np.testing.assert_allclose(curve[:, 2], height, atol=1e-14)
 
