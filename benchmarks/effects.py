@@ -11,9 +11,9 @@ from typing import Any
 from benchmarks.cases.scene_data import LEVELS
 from benchmarks.plan import run
 from benchmarks.study import ROOT, Records, Study
-from fenics_contact.io import write_json, write_text
+from fenics_contact.output import write_json, write_text
+from fenics_contact.study.report import table
 from fenics_contact.study.runner import Job
-from fenics_contact.study.tables import table
 
 HOME, REPEATS = ROOT / "benchmarks", 5
 

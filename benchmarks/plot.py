@@ -13,7 +13,7 @@ from matplotlib import pyplot as plt
 from benchmarks.plan import BLOCKS
 from benchmarks.report import chain_sizes
 from benchmarks.targets import Summaries, newton_names, unknowns
-from fenics_contact.study.figures.phases import draw_stacked
+from fenics_contact.study.figures import draw_stacked
 
 #: Where seconds stand beside a marker, so that those of lines close to each other do not meet.
 ABOVE = {"xytext": (0, 8), "ha": "center"}

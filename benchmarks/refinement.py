@@ -8,9 +8,9 @@ from pathlib import Path
 from benchmarks.cases.refinement import MESHES
 from benchmarks.plan import run
 from benchmarks.study import ROOT, Records, Study
-from fenics_contact.io import write_json, write_text
+from fenics_contact.output import write_json, write_text
+from fenics_contact.study.report import table
 from fenics_contact.study.runner import Job
-from fenics_contact.study.tables import table
 
 HOME = ROOT / "benchmarks"
 #: Name of a job -> its scene and mesh.

@@ -9,7 +9,7 @@ from benchmarks.comparing import Record, force_difference
 from benchmarks.held import HELD
 from benchmarks.plan import BLOCKS, LINEAR
 from benchmarks.targets import ROWS, Row, Summaries, newton_names, unknowns
-from fenics_contact.study.tables import table
+from fenics_contact.study.report import table
 
 #: What the steps of a solver are called in its counts.
 STEPS = ("newton_steps", "solver_steps", "iterations")

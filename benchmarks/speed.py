@@ -10,8 +10,7 @@ from benchmarks.plot import plot_results
 from benchmarks.report import broken, page, results, work
 from benchmarks.study import ROOT, Records, Study
 from benchmarks.targets import Summaries
-from fenics_contact.io import json_text
-from fenics_contact.io.replacing import replacing
+from fenics_contact.output.files import json_text, replacing
 from fenics_contact.study.runner import Record, summarised
 
 #: Runs whose names begin so do not take the same number of iterations every time: PETSc's multigrid adds what

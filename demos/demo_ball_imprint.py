@@ -25,22 +25,27 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState, NewtonSteps, contact_area, solve_steps
-from fenics_contact.gallery import box_lattice, growing_ticks
-from fenics_contact.io import ResultSeries, write_result
-from fenics_contact.progress import show_progress
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
-    FinitePlasticity,
+    ContactProblem,
+    DeformedState,
     LoadStep,
     MovingObstacle,
+    NewtonSteps,
     RigidSphere,
     Scene,
     Support,
     Surface,
+    contact_area,
+    gallery,
+    materials,
+    pictures,
+    show_progress,
+    solve_steps,
+    write_result,
 )
-from fenics_contact.viz import plot_curves, plot_stress
+from fenics_contact.output import ResultSeries
 
 comm = MPI.COMM_WORLD
 output = Path("output/ball_imprint")
@@ -52,10 +57,10 @@ output = Path("output/ball_imprint")
 
 radius, depth, cell, reach, size = 5.0, 0.1, 0.15, 1.2, 8.0  # mm
 modulus, ratio, first, growth = 2.1e5, 0.3, 300.0, 300.0  # N/mm², −, N/mm², N/mm²
-metal = FinitePlasticity(modulus, ratio, yield_stress=first, isotropic_hardening=growth)
+metal = materials.FinitePlasticity(modulus, ratio, yield_stress=first, isotropic_hardening=growth)
 fine = np.linspace(0.0, reach, round(reach / cell) + 1)
-along = np.append(fine, reach + growing_ticks(size - reach, 1.5 * cell, 1.7)[1:])
-plate = box_lattice([along, along, -growing_ticks(size, cell, 1.45)[::-1]])
+along = np.append(fine, reach + gallery.growing_ticks(size - reach, 1.5 * cell, 1.7)[1:])
+plate = gallery.box_lattice([along, along, -gallery.growing_ticks(size, cell, 1.45)[::-1]])
 
 # ## Scene
 #
@@ -129,7 +134,7 @@ def profile(number: int) -> tuple[np.ndarray, np.ndarray]:
     return across + moved[:, 0], 1e3 * moved[:, 2]
 
 
-plot_curves(
+pictures.plot_curves(
     {"in": (way[: IN + 2], pushed[: IN + 2]), "out": (way[IN + 1 :], pushed[IN + 1 :])},
     output / "force.png",
     xlabel="depth (mm)",
@@ -138,7 +143,7 @@ plot_curves(
     title="A ball into metal and out",
     comm=comm,
 )
-plot_curves(
+pictures.plot_curves(
     {"under the ball": profile(IN), "without it": profile(-1)},
     output / "profile.png",
     xlabel="distance from the axis (mm)",
@@ -147,8 +152,8 @@ plot_curves(
     title="The imprint and its rim",
     comm=comm,
 )
-plot_stress(states[IN], output / "stress_under_load.png", title="Under the ball", scale=1.0)
-plot_stress(states[-1], output / "stress.png", title="Stress that stays", scale=1.0)
+pictures.plot_stress(states[IN], output / "stress_under_load.png", title="Under the ball", scale=1.0)
+pictures.plot_stress(states[-1], output / "stress.png", title="Stress that stays", scale=1.0)
 series = ResultSeries(output, "history", comm)
 for number, state in enumerate(states):
     series.add(state, times[number], steps[number].name)

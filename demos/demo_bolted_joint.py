@@ -19,24 +19,27 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, LoadSequence, Status
-from fenics_contact.gallery import block, bolt, drilled_plate
-from fenics_contact.io import ResultSeries, write_result
-from fenics_contact.progress import show_progress
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
+    LoadSequence,
     LoadStep,
     Scene,
+    Status,
     Support,
     Surface,
     ThermalStrain,
     Tie,
+    gallery,
+    materials,
+    pictures,
+    qp,
+    show_progress,
+    write_result,
 )
-from fenics_contact.viz import plot_contact_pressure, plot_curves, plot_stress
+from fenics_contact.output import ResultSeries
 
 comm = MPI.COMM_WORLD
 output = Path("output/bolted_joint")
@@ -47,20 +50,20 @@ output = Path("output/bolted_joint")
 # same mesh where they overlap. A spacer fills the gap between the straps where they are held.
 
 hole, half_width = 5.5, 20.0
-plate = drilled_plate(hole, half_width, (-20, 80), np.linspace(-5, 5, 3), n=4)
-upper = drilled_plate(hole, half_width, (-100, 20), np.linspace(5, 11, 3), n=4)
-lower = drilled_plate(hole, half_width, (-100, 20), np.linspace(-11, -5, 3), n=4)
-spacer = block((-100, 0, -5), (-70, half_width, 5), (5, 4, 2))
-screw = bolt(shank=5.0, head=10.0, grip=(-11, 11), head_height=6.0, n=4, n_radial=2)
+plate = gallery.drilled_plate(hole, half_width, (-20, 80), np.linspace(-5, 5, 3), n=4)
+upper = gallery.drilled_plate(hole, half_width, (-100, 20), np.linspace(5, 11, 3), n=4)
+lower = gallery.drilled_plate(hole, half_width, (-100, 20), np.linspace(-11, -5, 3), n=4)
+spacer = gallery.block((-100, 0, -5), (-70, half_width, 5), (5, 4, 2))
+screw = gallery.bolt(shank=5.0, head=10.0, grip=(-11, 11), head_height=6.0, n=4, n_radial=2)
 
 # ## Scene
 #
 # Tightening is cooling here: the middle of the shank shrinks by 300 degrees, which gives the preload of a
 # real M10 bolt. Only the bolt needs a thermal expansion.
 
-steel = IsotropicElasticity(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
-bolt_steel = IsotropicElasticity(young_modulus=2.1e5, poisson_ratio=0.3, thermal_expansion=1.2e-5)
-aluminium = IsotropicElasticity(young_modulus=7e4, poisson_ratio=0.33)
+steel = materials.IsotropicElasticity(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
+bolt_steel = materials.IsotropicElasticity(young_modulus=2.1e5, poisson_ratio=0.3, thermal_expansion=1.2e-5)
+aluminium = materials.IsotropicElasticity(young_modulus=7e4, poisson_ratio=0.33)
 bodies = {
     "plate": Body(plate, aluminium),
     "upper strap": Body(upper, steel),
@@ -115,7 +118,7 @@ if comm.rank == 0:
 
 moved, pulled, clamped, counts = [0.0, 0.02, 0.04, 0.06, 0.08, 0.11], [], [], []
 imbalance = 0.0
-steps = LoadSequence(ContactProblem(scene, comm, solver=FaceNewton(tolerance=1e-5)), count=len(moved))
+steps = LoadSequence(ContactProblem(scene, comm, solver=qp.FaceNewton(tolerance=1e-5)), count=len(moved))
 series = ResultSeries(output, "pulling", comm)
 with show_progress(comm):
     for displacement in moved:
@@ -128,7 +131,7 @@ with show_progress(comm):
         imbalance = max(imbalance, state.balance().imbalance)
         counts.append([int(np.sum(contact.status[between] == kind)) for kind in (Status.STICK, Status.SLIP)])
         if displacement == 0.0:
-            plot_contact_pressure(
+            pictures.plot_contact_pressure(
                 state, output / "pressure_tightened.png", title="Plate under the upper strap"
             )
 
@@ -154,10 +157,10 @@ if comm.rank == 0:
 #
 # ParaView opens `pulling.pvd`: all steps, with the displacements of the end as times.
 
-plot_stress(state, output / "stress.png", clim=(0, 400), scale=50, reach=19.0, title="Sliding joint")
-plot_contact_pressure(state, output / "pressure_sliding.png", title="Plate under the upper strap")
+pictures.plot_stress(state, output / "stress.png", clim=(0, 400), scale=50, reach=19.0, title="Sliding joint")
+pictures.plot_contact_pressure(state, output / "pressure_sliding.png", title="Plate under the upper strap")
 limit = 2 * friction.friction_coefficient * np.array(clamped)
-plot_curves(
+pictures.plot_curves(
     {"pull": (moved, np.array(pulled) / 1e3)},
     output / "curve.png",
     xlabel="displacement of the plate's end (mm)",

@@ -18,22 +18,25 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, Status, solve_steps
-from fenics_contact.gallery import rectangle_lattice
-from fenics_contact.io import ResultSeries, write_result
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.progress import show_progress
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
+    ContactProblem,
     Coulomb,
     LoadStep,
-    PlaneStrain,
     Scene,
+    Status,
     Support,
     Surface,
+    gallery,
+    materials,
+    pictures,
+    show_progress,
+    solve_steps,
+    write_result,
 )
-from fenics_contact.viz import plot_contact_pressure, plot_curves, plot_stress
+from fenics_contact.output import ResultSeries
 
 comm = MPI.COMM_WORLD
 output = Path("output/cattaneo_mindlin")
@@ -58,7 +61,7 @@ def half(side: float) -> BodyMesh:
     """Mesh the upper body (side 1) or the lower one (side −1), round where they face each other."""
     across, down = ticks(1.25, 1 / 24), ticks(1 / 12, 1 / 24)
     lines = np.concatenate([-across[:0:-1], across]), down if side > 0 else -down[::-1]
-    mesh = rectangle_lattice(lines)
+    mesh = gallery.rectangle_lattice(lines)
     x, y = mesh.points.T
     return mesh.moved(np.column_stack([x, y + side * x**2 / (2 * radius) * (1 - np.abs(y) / size)]))
 
@@ -68,7 +71,7 @@ def half(side: float) -> BodyMesh:
 # Steel would do the same at other forces: only $\mu$ and the ratio $Q/P$ matter for the shape of $q$.
 
 friction_coefficient = 0.4
-material = PlaneStrain(young_modulus=1000.0, poisson_ratio=0.3)  # N/mm²
+material = materials.PlaneStrain(young_modulus=1000.0, poisson_ratio=0.3)  # N/mm²
 scene = Scene(
     bodies={"upper": Body(half(1.0), material), "lower": Body(half(-1.0), material)},
     contacts=[ContactPair(Surface("upper", "y0"), Surface("lower", "y1"), Coulomb(friction_coefficient))],
@@ -148,7 +151,7 @@ for name, (ratio, _, _) in found.items():
 #
 # ![Pressure, traction and slip](../docs/pictures/cattaneo_mindlin_contact.png)
 
-plot_curves(
+pictures.plot_curves(
     curves,
     output / "traction.png",
     xlabel="x (mm)",
@@ -158,8 +161,8 @@ plot_curves(
     comm=comm,
 )
 last = states["sheared"]
-plot_contact_pressure(last, output / "contact.png", title="Sheared cylinders")
-plot_stress(last, output / "stress.png", scale=1.0, title="Sheared cylinders")
+pictures.plot_contact_pressure(last, output / "contact.png", title="Sheared cylinders")
+pictures.plot_stress(last, output / "stress.png", scale=1.0, title="Sheared cylinders")
 
 # ## Files for ParaView
 #

@@ -27,47 +27,45 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, Status, contact_area
-from fenics_contact.gallery import LinkShape, two_links
-from fenics_contact.io import (
+from fenics_contact import (
+    Body,
+    ContactPair,
+    ContactProblem,
+    Coulomb,
+    PhaseTimer,
+    Scene,
+    ShapeProblem,
+    Status,
+    Support,
+    Surface,
+    SurfaceDesign,
+    TotalForce,
+    box_partition,
+    contact_area,
+    gallery,
+    materials,
+    minimize,
+    pictures,
+    show_progress,
+    theory,
+    write_vtu,
+)
+from fenics_contact.design import (
+    BundleTrust,
+    LargestPressure,
+    LinearConstraints,
+    NonlinearConstraint,
+    StrainEnergy,
+    TotalPotential,
+    fixed_rim,
+)
+from fenics_contact.output import (
     ResultSeries,
     write_design_table,
     write_optimisation_result,
     write_step,
     write_stl,
-    write_vtu,
     write_xdmf,
-)
-from fenics_contact.optimize import BundleTrust, LinearConstraints, NonlinearConstraint, fixed_rim, minimize
-from fenics_contact.partition import box_partition
-from fenics_contact.progress import show_progress
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    IsotropicElasticity,
-    Scene,
-    Support,
-    Surface,
-    TotalForce,
-)
-from fenics_contact.shape import (
-    LargestPressure,
-    ShapeProblem,
-    StrainEnergy,
-    SurfaceDesign,
-    TotalPotential,
-)
-from fenics_contact.theory import contact_modulus, hertz_point, relative_curvatures
-from fenics_contact.timing import PhaseTimer
-from fenics_contact.viz import (
-    plot_before_after,
-    plot_contact_pressure,
-    plot_control_net,
-    plot_convergence,
-    plot_curves,
-    plot_decomposition,
-    plot_stress,
 )
 
 comm = MPI.COMM_WORLD
@@ -79,8 +77,8 @@ comm = MPI.COMM_WORLD
 # the tori that they stand for, which `two_links` hands over: facets are off by more than the bodies approach.
 
 SIZES = {
-    "small": LinkShape(n_around=36, n_a=6, n_b=14, grading=2.5),
-    "paper": LinkShape(n_around=48, n_a=8, n_b=20, grading=2.5),
+    "small": gallery.LinkShape(n_around=36, n_a=6, n_b=14, grading=2.5),
+    "paper": gallery.LinkShape(n_around=48, n_a=8, n_b=20, grading=2.5),
 }
 OBJECTIVES = {
     "potential": (TotalPotential(), "total potential (N mm)"),
@@ -109,9 +107,9 @@ output = Path("output") / ("chain_links" if published else f"chain_links_{aim}")
 force = 80e3  # N
 timer = PhaseTimer()
 with timer.phase("mesh"):
-    links = two_links(SIZES[size], comm=comm)
+    links = gallery.two_links(SIZES[size], comm=comm)
 
-steel = IsotropicElasticity(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
+steel = materials.IsotropicElasticity(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
 friction_coefficient = 0.3
 scene = Scene(
     bodies={"link 1": Body(links.first.mesh, steel), "link 2": Body(links.second.mesh, steel)},
@@ -131,8 +129,8 @@ scene = Scene(
 # half spaces without friction, which links of 16 mm wire under a spot of 6 mm are not quite.
 
 crown = (1.0 / SIZES[size].section.crown_radius, -1.0 / SIZES[size].inner_radius)  # 1/mm
-modulus = contact_modulus(2.1e5, 0.3, 2.1e5, 0.3)  # N/mm²
-hertz = hertz_point(force, relative_curvatures(crown, crown, np.pi / 2), modulus)
+modulus = theory.contact_modulus(2.1e5, 0.3, 2.1e5, 0.3)  # N/mm²
+hertz = theory.hertz_point(force, theory.relative_curvatures(crown, crown, np.pi / 2), modulus)
 
 # Each link is cut into 8 × 1 × 2 boxes. Every box floats; multipliers glue it to its neighbours.
 
@@ -187,11 +185,15 @@ assert np.array_equal(after.alpha, result.x)
 points = {"before": before, "after": after}
 peak = max(float(point.state.contact.pressure.max()) for point in points.values())
 with show_progress(comm), timer.phase("pictures"):
-    plot_decomposition(scene, partitions, output / "decomposition.png", comm=comm)
+    pictures.plot_decomposition(scene, partitions, output / "decomposition.png", comm=comm)
     for name, point in points.items():
         title = name.capitalize()
-        plot_stress(point.state, output / f"stress_{name}.png", clim=(0, 1500), reach=12.0, title=title)
-        plot_contact_pressure(point.state, output / f"pressure_{name}.png", clim=(0, peak), title=title)
+        pictures.plot_stress(
+            point.state, output / f"stress_{name}.png", clim=(0, 1500), reach=12.0, title=title
+        )
+        pictures.plot_contact_pressure(
+            point.state, output / f"pressure_{name}.png", clim=(0, peak), title=title
+        )
 
 # The control points and the surface that they move, how the first state was found, and what the new shape
 # does to contact and outlines.
@@ -208,11 +210,13 @@ nets = tuple(design.control_points(mesh.points, alpha) for alpha in (start, resu
 values = [record.value for record in result.history]
 kinds = [record.kind.value for record in result.history]
 with show_progress(comm), timer.phase("pictures"):
-    plot_control_net(links.first.crown, (mesh.points, moved), nets, output / "control_net.png", comm=comm)
-    plot_convergence(values, kinds, output / "convergence.png", label=label, comm=comm)
+    pictures.plot_control_net(
+        links.first.crown, (mesh.points, moved), nets, output / "control_net.png", comm=comm
+    )
+    pictures.plot_convergence(values, kinds, output / "convergence.png", label=label, comm=comm)
     steps = before.state.solution.history
     products, natural = zip(*((step.products, step.residuals.natural) for step in steps), strict=True)
-    plot_curves(
+    pictures.plot_curves(
         {"natural residual": (products, natural)},
         output / "residuals.png",
         xlabel="products with F",
@@ -223,7 +227,7 @@ with show_progress(comm), timer.phase("pictures"):
         comm=comm,
     )
     ends = (before.state, after.state) if aim == "pressure" else (before, after)  # named in any case
-    plot_before_after(*ends, output / "before_after.png", label=label)
+    pictures.plot_before_after(*ends, output / "before_after.png", label=label)
 
 # ## Files for ParaView, CAD and printers
 #
@@ -336,12 +340,12 @@ assert imbalance < 1e-9
 #
 # - `Coulomb(0.1)`: most of the contact slips.
 # - Another objective, for example `LargestStress("link 1")` or a sum of several, from
-#   `fenics_contact.shape`.
-# - `checkpoint=Checkpoint(output / "run.npz")` in `minimize` (from `fenics_contact.optimize`): a run that is
+#   `fenics_contact.design`.
+# - `checkpoint=Checkpoint(output / "run.npz")` in `minimize` (from `fenics_contact.design`): a run that is
 #   interrupted goes on from there when it is started again. Within `with interruptible(comm):` (from
-#   `fenics_contact.checkpoint`) Ctrl-C lets the evaluation under way come to its end first.
-# - `tolerance=AdaptiveTolerance()` in `ShapeProblem` (from `fenics_contact.shape`): states are solved no more
+#   `fenics_contact`) Ctrl-C lets the evaluation under way come to its end first.
+# - `tolerance=AdaptiveTolerance()` in `ShapeProblem` (from `fenics_contact.design`): states are solved no more
 #   accurately than the optimiser needs, which saves a third of the products.
 # - A finer net, or `LinkShape(cell="tetrahedron")`.
-# - `result_page(after.state, output / "links.html")` (from `fenics_contact.page`): a page on which the mouse
+# - `result_page(after.state, output / "links.html")` (from `fenics_contact._page`): a page on which the mouse
 #   turns the links; `after.state.to_pyvista()` for pictures of your own.

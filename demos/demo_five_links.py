@@ -19,21 +19,23 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import Status, solve_scene
-from fenics_contact.gallery import LinkShape, chain
-from fenics_contact.io import write_result, write_vtu
-from fenics_contact.progress import show_progress
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
     Scene,
+    Status,
     Support,
     Surface,
     TotalForce,
+    gallery,
+    materials,
+    pictures,
+    show_progress,
+    solve_scene,
+    write_result,
+    write_vtu,
 )
-from fenics_contact.viz import plot_contact_pressure, plot_decomposition, plot_stress
 
 comm = MPI.COMM_WORLD
 output = Path("output/five_links")
@@ -43,7 +45,7 @@ output = Path("output/five_links")
 # Wire of 16 mm, pitch 48 mm. `chain` turns the links and moves each along the axis until its crown touches
 # the one before. Links need not be alike.
 
-links = chain([LinkShape(n_around=36, n_a=5, n_b=14)] * 5, comm=comm)
+links = gallery.chain([gallery.LinkShape(n_around=36, n_a=5, n_b=14)] * 5, comm=comm)
 names = [f"link {number}" for number in range(1, len(links.links) + 1)]
 
 # ## Scene
@@ -51,7 +53,7 @@ names = [f"link {number}" for number in range(1, len(links.links) + 1)]
 # The inner sides of a link's crowns are called "contact" (towards the next link) and "grip". The meshes of
 # two surfaces that touch do not match: the mortar method keeps weighted means of the gap positive.
 
-steel = IsotropicElasticity(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
+steel = materials.IsotropicElasticity(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
 pull = 40e3  # N
 scene = Scene(
     bodies={name: Body(link.mesh, steel) for name, link in zip(names, links.links, strict=True)},
@@ -108,9 +110,9 @@ if comm.rank == 0:
 # of the pressure.
 
 write_vtu(state, output, "chain")
-plot_decomposition(scene, partitions, output / "decomposition.png", comm=comm)
-plot_stress(state, output / "stress.png", clim=(0, 1000), reach=14.0, title="Five links")
-plot_contact_pressure(state, output / "pressure.png", pair=1, title="Link 3 on link 2")
+pictures.plot_decomposition(scene, partitions, output / "decomposition.png", comm=comm)
+pictures.plot_stress(state, output / "stress.png", clim=(0, 1000), reach=14.0, title="Five links")
+pictures.plot_contact_pressure(state, output / "pressure.png", pair=1, title="Link 3 on link 2")
 
 if comm.rank == 0:
     print(f"pictures and files in {output}/")

@@ -20,20 +20,21 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.gallery import box_lattice, hemisphere
-from fenics_contact.io import write_result, write_vtu
-from fenics_contact.progress import show_progress
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
-    IsotropicElasticity,
     Scene,
     Support,
     Surface,
     TotalForce,
+    gallery,
+    materials,
+    pictures,
+    show_progress,
+    solve_scene,
+    write_result,
+    write_vtu,
 )
-from fenics_contact.viz import plot_contact_pressure, plot_curves, plot_error, plot_stress
 
 comm = MPI.COMM_WORLD
 output = Path("output/hertz_sphere")
@@ -56,15 +57,15 @@ def hertz(r):
 # Both bodies are cut at their planes of symmetry: a quarter is computed, and both cuts are to be seen in the
 # pictures. Cells grow geometrically from the spot of contact.
 
-ball = hemisphere(radius, 9, grading=3.0)
+ball = gallery.hemisphere(radius, 9, grading=3.0)
 ticks = radius * np.expm1(3 * np.linspace(0, 1, 13)) / np.expm1(3)
-block = box_lattice([1.05 * ticks, ticks, -ticks[::-1]])
+block = gallery.box_lattice([1.05 * ticks, ticks, -ticks[::-1]])
 
 # ## Scene
 #
 # The ball is held by nothing but contact (and the planes of symmetry) against the force on its flat top.
 
-steel = IsotropicElasticity(young_modulus, poisson_ratio)
+steel = materials.IsotropicElasticity(young_modulus, poisson_ratio)
 
 
 def scene(discretisation):
@@ -118,9 +119,7 @@ if comm.rank == 0:
     print(f"  Hertz          {p0:10.1f}                {a:10.4f}")
     for name, got in found.items():
         off = got["peak"] / p0 - 1, got["a"] / a - 1
-        print(
-            f"  {name:12s}   {got['peak']:10.1f} ({off[0]:+7.2%})     {got['a']:10.4f} ({off[1]:+7.2%})"
-        )
+        print(f"  {name:12s}   {got['peak']:10.1f} ({off[0]:+7.2%})     {got['a']:10.4f} ({off[1]:+7.2%})")
     print(f"  loads, reactions and contact forces balance to {imbalance:.1e}")
 
 # ## How far off it says it is
@@ -143,15 +142,15 @@ if comm.rank == 0:
 
 state = states["mortar"]
 write_vtu(state, output, "hertz")
-plot_stress(state, output / "stress.png", scale=1, clim=(0, 5000), reach=2.5, title="Ball on block")
-plot_contact_pressure(state, output / "pressure.png", clim=(0, 1.02 * p0), title="Ball on block")
+pictures.plot_stress(state, output / "stress.png", scale=1, clim=(0, 5000), reach=2.5, title="Ball on block")
+pictures.plot_contact_pressure(state, output / "pressure.png", clim=(0, 1.02 * p0), title="Ball on block")
 parts = {body: errors.by_cell(body) for body in state.scene.bodies}
-plot_error(state, output / "error.png", parts, reach=2.5, title="Ball on block")
+pictures.plot_error(state, output / "error.png", parts, reach=2.5, title="Ball on block")
 
 # Pressure over radius: every contact point is a dot.
 
 line = np.linspace(0, a, 400)
-plot_curves(
+pictures.plot_curves(
     {
         name: (got["r"][got["r"] < 1.5 * a] / a, got["pressure"][got["r"] < 1.5 * a] / p0)
         for name, got in found.items()

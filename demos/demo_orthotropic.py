@@ -24,22 +24,21 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.gallery import box_lattice
-from fenics_contact.io import write_result, write_vtu
-from fenics_contact.progress import show_progress
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
-    EnergyModel,
-    OrthotropicElasticity,
     RigidSphere,
     Scene,
     Support,
     Surface,
-    material_axes,
+    gallery,
+    materials,
+    pictures,
+    show_progress,
+    solve_scene,
+    write_result,
+    write_vtu,
 )
-from fenics_contact.viz import plot_contact_pressure, plot_stress
 
 comm = MPI.COMM_WORLD
 output = Path("output/orthotropic")
@@ -52,7 +51,7 @@ output = Path("output/orthotropic")
 
 
 @dataclass(frozen=True)
-class Wood(EnergyModel):
+class Wood(materials.EnergyModel):
     E_L: float  # Young's moduli [N/mm²]
     E_T: float
     nu_LT: float  # Poisson's ratios
@@ -86,11 +85,11 @@ class Wood(EnergyModel):
 angle = np.radians(30)
 fibre = (float(np.cos(angle)), float(np.sin(angle)), 0.0)
 wood = Wood(E_L=12000, E_T=800, nu_LT=0.4, nu_TT=0.3, G_LT=700, fibre=fibre)
-reference = OrthotropicElasticity(
+reference = materials.OrthotropicElasticity(
     young_moduli=(12000, 800, 800),
     poisson_ratios=(0.4, 0.4, 0.3),
     shear_moduli=(700, 700, 800 / 2 / (1 + 0.3)),
-    orientation=material_axes(fibre, (0.0, 0.0, 1.0)),
+    orientation=materials.material_axes(fibre, (0.0, 0.0, 1.0)),
 )
 
 # The block, 30 × 30 × 15 mm, has small cells where the ball bears. It rests on the plane z = −15 mm, which is
@@ -99,7 +98,7 @@ reference = OrthotropicElasticity(
 half = np.concatenate([np.linspace(0, 4, 9), [5, 6.6, 9, 12, 15]])
 across = np.concatenate([-half[:0:-1], half])
 depth = 15 * np.expm1(2.5 * np.linspace(0, 1, 11)) / np.expm1(2.5)
-mesh = box_lattice([across, across, -depth[::-1]])
+mesh = gallery.box_lattice([across, across, -depth[::-1]])
 ball = RigidSphere(centre=(0.0, 0.0, 20.0), radius=20.0)
 
 
@@ -156,8 +155,8 @@ if comm.rank == 0:
 # The thin arc is the outline of the ball.
 
 write_vtu(state, output, "wood")
-plot_stress(state, output / "stress.png", scale=1, reach=6.0, title="Wood under a ball")
-plot_contact_pressure(state, output / "pressure.png", title="Wood under a ball")
+pictures.plot_stress(state, output / "stress.png", scale=1, reach=6.0, title="Wood under a ball")
+pictures.plot_contact_pressure(state, output / "pressure.png", title="Wood under a ball")
 
 if comm.rank == 0:
     print(f"pictures and files in {output}/")

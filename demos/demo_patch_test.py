@@ -19,12 +19,21 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.gallery import block
-from fenics_contact.io import write_result, write_vtu
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, Scene, Support, Surface, Traction
-from fenics_contact.viz import plot_contact_pressure
+from fenics_contact import (
+    Body,
+    ContactPair,
+    Scene,
+    Support,
+    Surface,
+    Traction,
+    gallery,
+    materials,
+    pictures,
+    qp,
+    solve_scene,
+    write_result,
+    write_vtu,
+)
 
 comm = MPI.COMM_WORLD
 output = Path("output/patch_test")
@@ -37,9 +46,9 @@ pressure = 100.0  # N/mm²
 
 def pressed(slave: str, master: str, discretisation: str) -> Scene:
     """Return the upper block (slave) on the lower one (master), of given cells."""
-    lower = block((0, 0, 0), (10, 10, 10), (3, 4, 2), master)  # mm
-    upper = block((0, 0, 10), (10, 10, 20), (5, 3, 2), slave)
-    steel = IsotropicElasticity(2.1e5, 0.3)
+    lower = gallery.block((0, 0, 0), (10, 10, 10), (3, 4, 2), master)  # mm
+    upper = gallery.block((0, 0, 10), (10, 10, 20), (5, 3, 2), slave)
+    steel = materials.IsotropicElasticity(2.1e5, 0.3)
     rollers = {"x0": (0.0, None, None), "y0": (None, 0.0, None)}
     supports = [Support(body, side, value) for body in ("lower", "upper") for side, value in rollers.items()]
     return Scene(
@@ -59,13 +68,13 @@ errors, imbalance = {}, 0.0
 for slave, master in CELLS:
     for discretisation in ("node", "mortar"):
         scene = pressed(slave, master, discretisation)
-        state = solve_scene(scene, comm, solver=FaceNewton(tolerance=1e-12))
+        state = solve_scene(scene, comm, solver=qp.FaceNewton(tolerance=1e-12))
         imbalance = max(imbalance, state.balance().imbalance)
         stress = np.concatenate([state.gather_von_mises(name) for name in scene.bodies])
         errors[slave, master, discretisation] = float(np.abs(stress - pressure).max() / pressure)
         if slave == master == "hexahedron":
             title = {"node": "Node to surface", "mortar": "Mortar"}[discretisation]
-            plot_contact_pressure(
+            pictures.plot_contact_pressure(
                 state, output / f"{discretisation}.png", clim=(0, 1.5 * pressure), title=title
             )
             write_vtu(state, output, discretisation)

@@ -27,14 +27,31 @@ import numpy as np
 from mpi4py import MPI
 from scipy.optimize import brentq
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.gallery import DesignSurface, growing_ticks, rectangle_lattice
-from fenics_contact.io import write_design_table, write_optimisation_result, write_vtu
-from fenics_contact.optimize import BundleTrust, NonlinearConstraint, convex, minimize, monotone
-from fenics_contact.progress import show_progress
-from fenics_contact.scene import Body, ContactPair, PlaneStrain, Scene, Support, Surface
-from fenics_contact.shape import ContactForces, LargestPressure, ShapeProblem, SurfaceDesign
-from fenics_contact.viz import plot_curves, plot_stress
+from fenics_contact import (
+    Body,
+    ContactPair,
+    ContactProblem,
+    Scene,
+    ShapeProblem,
+    Support,
+    Surface,
+    SurfaceDesign,
+    gallery,
+    materials,
+    minimize,
+    pictures,
+    show_progress,
+    write_vtu,
+)
+from fenics_contact.design import (
+    BundleTrust,
+    ContactForces,
+    LargestPressure,
+    NonlinearConstraint,
+    convex,
+    monotone,
+)
+from fenics_contact.output import write_design_table, write_optimisation_result
 
 comm = MPI.COMM_WORLD
 output = Path("output/press_fit_edge")
@@ -47,11 +64,11 @@ cell = 0.25  # mm, at the edge
 
 wall, seat, beyond, lip = 20.0, 40.0, 30.0, 10.0  # mm: both walls, half of the seat, bare shaft, relief
 overlap = 0.02  # mm
-steel = PlaneStrain(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
+steel = materials.PlaneStrain(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
 
 
 def spaced(first, length):
-    return growing_ticks(length, first, 1.25)
+    return gallery.growing_ticks(length, first, 1.25)
 
 
 def along_seat(cell):
@@ -62,8 +79,8 @@ def along_seat(cell):
 def bodies_of(cell):
     own = 0.8 * cell  # the shaft's cells
     ticks = np.append(along_seat(own), seat + spaced(own, beyond)[1:])
-    hub = rectangle_lattice([along_seat(cell), wall - overlap + spaced(cell, wall)])
-    shaft = rectangle_lattice([ticks, wall - spaced(own, wall)[::-1]])
+    hub = gallery.rectangle_lattice([along_seat(cell), wall - overlap + spaced(cell, wall)])
+    shaft = gallery.rectangle_lattice([ticks, wall - spaced(own, wall)[::-1]])
     return {"hub": Body(hub, steel), "shaft": Body(shaft, steel)}
 
 
@@ -94,7 +111,7 @@ def posed(cell):
     place = (points[bore, 0] - (seat - lip)) / lip
     nodes, place = bore[place > -1e-9], np.maximum(place[place > -1e-9], 0.0)
     inwards = np.tile([0.0, -1.0], (len(nodes), 1))
-    curve = DesignSurface(nodes, place[:, None], inwards, (len(nodes),))
+    curve = gallery.DesignSurface(nodes, place[:, None], inwards, (len(nodes),))
     contact = ContactProblem(Scene(bodies, supports, contacts=[pair]), comm, tolerance=1e-8)
     design = SurfaceDesign("hub", curve, net=6, transition=0.1)
     return ShapeProblem(contact, design, LargestPressure())
@@ -157,7 +174,7 @@ for name, point in (("straight bore", straight), ("relieved bore", relieved)):
     place, pressure = point.state.contact_places[:, 0], point.state.contact.pressure
     order = np.argsort(place)
     pressures[name] = (place[order], pressure[order])
-plot_curves(
+pictures.plot_curves(
     pressures,
     output / "pressure.png",
     xlabel="from the middle of the seat (mm)",
@@ -167,8 +184,8 @@ plot_curves(
     title="Pressure on the bore",
     comm=comm,
 )
-plot_stress(straight.state, output / "stress_straight.png", title="Straight bore", scale=1.0)
-plot_stress(relieved.state, output / "stress_relieved.png", title="Relieved bore", scale=1.0)
+pictures.plot_stress(straight.state, output / "stress_straight.png", title="Straight bore", scale=1.0)
+pictures.plot_stress(relieved.state, output / "stress_relieved.png", title="Relieved bore", scale=1.0)
 write_vtu(relieved.state, output, "relieved")
 write_design_table(problem, result.x, output / "relief.csv", lines=(41,))
 

@@ -17,12 +17,21 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.gallery import half_disc, rectangle_lattice
-from fenics_contact.io import write_result, write_vtu, write_xdmf
-from fenics_contact.progress import show_progress
-from fenics_contact.scene import Body, ContactPair, PlaneStrain, Scene, Support, Surface
-from fenics_contact.viz import plot_contact_pressure, plot_curves, plot_decomposition, plot_stress
+from fenics_contact import (
+    Body,
+    ContactPair,
+    Scene,
+    Support,
+    Surface,
+    gallery,
+    materials,
+    pictures,
+    show_progress,
+    solve_scene,
+    write_result,
+    write_vtu,
+)
+from fenics_contact.output import write_xdmf
 
 comm = MPI.COMM_WORLD
 output = Path("output/punch_2d")
@@ -33,14 +42,14 @@ output = Path("output/punch_2d")
 # nodes do not match: the mortar discretisation takes that without a ripple in the pressure.
 
 radius, width, height = 50.0, 60.0, 50.0  # mm
-punch = half_disc(radius, 28, symmetry="", grading=4.0)
+punch = gallery.half_disc(radius, 28, symmetry="", grading=4.0)
 away = np.geomspace(3.0, width, 22)
 across = np.concatenate([-away[::-1], np.linspace(-3.0, 3.0, 41)[1:-1], away])
 down = np.concatenate([[0.0], np.geomspace(0.15, height, 30)])
-block = rectangle_lattice([across, -down[::-1]])
+block = gallery.rectangle_lattice([across, -down[::-1]])
 
-steel = PlaneStrain(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
-aluminium = PlaneStrain(young_modulus=7.0e4, poisson_ratio=0.33)
+steel = materials.PlaneStrain(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
+aluminium = materials.PlaneStrain(young_modulus=7.0e4, poisson_ratio=0.33)
 
 # ## Scene
 #
@@ -77,7 +86,7 @@ found_peak = contact.pressure.max()
 x = np.linspace(-half_width, half_width, 401)
 near = np.abs(place) < 1.6 * half_width
 order = np.argsort(place[near])
-plot_curves(
+pictures.plot_curves(
     {"computed": (place[near][order], contact.pressure[near][order])},
     output / "hertz.png",
     xlabel="x (mm)",
@@ -86,9 +95,9 @@ plot_curves(
     title=f"Pressure under a round punch, F = {force:.0f} N/mm",
     comm=comm,
 )
-plot_stress(state, output / "stress.png", scale=1.0, title="Punch on a block")
-plot_contact_pressure(state, output / "pressure.png", title="Punch on a block")
-plot_decomposition(scene, partitions, output / "decomposition.png", comm=comm)
+pictures.plot_stress(state, output / "stress.png", scale=1.0, title="Punch on a block")
+pictures.plot_contact_pressure(state, output / "pressure.png", title="Punch on a block")
+pictures.plot_decomposition(scene, partitions, output / "decomposition.png", comm=comm)
 
 # ## Files for ParaView
 

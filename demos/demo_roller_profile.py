@@ -21,25 +21,28 @@ import numpy as np
 from mpi4py import MPI
 from scipy.interpolate import BPoly
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.gallery import box_lattice, growing_ticks, side_of
-from fenics_contact.io import write_optimisation_result, write_vtu
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.optimize import BundleTrust, minimize
-from fenics_contact.progress import show_progress
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
-    IsotropicElasticity,
+    ContactProblem,
     RigidPlane,
     RigidSurface,
     Scene,
+    ShapeProblem,
     Support,
     Surface,
+    SurfaceDesign,
+    gallery,
+    materials,
+    minimize,
+    pictures,
+    show_progress,
+    theory,
+    write_vtu,
 )
-from fenics_contact.shape import LargestPressure, LoadCases, ShapeProblem, SurfaceDesign
-from fenics_contact.theory import contact_modulus, hertz_line, roller_relief
-from fenics_contact.viz import plot_curves
+from fenics_contact.design import BundleTrust, LargestPressure, LoadCases
+from fenics_contact.output import write_optimisation_result
 
 comm = MPI.COMM_WORLD
 output = Path("output/roller_profile")
@@ -52,12 +55,12 @@ small = size == "small"
 #
 # Hertz's half width is a hundredth of the length, as in a bearing.
 
-steel = IsotropicElasticity(young_modulus=2.06e5, poisson_ratio=0.3)  # N/mm²
+steel = materials.IsotropicElasticity(young_modulus=2.06e5, poisson_ratio=0.3)  # N/mm²
 radius, half_width = 10.0, 0.1  # mm
 length = 100 * half_width
-modulus = contact_modulus(2.06e5, 0.3, np.inf, 0.3)
+modulus = theory.contact_modulus(2.06e5, 0.3, np.inf, 0.3)
 line_load = np.pi * modulus * half_width**2 / (4 * radius)  # N/mm
-hertz = hertz_line(line_load, 1 / radius, modulus)
+hertz = theory.hertz_line(line_load, 1 / radius, modulus)
 unit = line_load / (np.pi * modulus)  # A, a quarter of a micrometre
 assert np.isclose(hertz.half_width, half_width)
 
@@ -74,11 +77,11 @@ def crowned(sides: int) -> BodyMesh:
     """Mesh a quarter (one side, y ≥ 0) or a half (two sides) of the block; "track" is what may touch."""
     cell = half_width / CELLS
     strip = half_width * np.append(np.linspace(0, 1.5, 3 * CELLS // 2 + 1), [2.0, 2.75, 3.75])
-    x = np.append(strip, strip[-1] + growing_ticks(FAR, half_width, GROWTH)[1:])
-    y = length / 2 - growing_ticks(length / 2, 1.5 * half_width, 2.0 if small else 1.4)[::-1]
-    y = np.append(y, length / 2 + growing_ticks(FAR, 2.5 * half_width, GROWTH)[1:])
+    x = np.append(strip, strip[-1] + gallery.growing_ticks(FAR, half_width, GROWTH)[1:])
+    y = length / 2 - gallery.growing_ticks(length / 2, 1.5 * half_width, 2.0 if small else 1.4)[::-1]
+    y = np.append(y, length / 2 + gallery.growing_ticks(FAR, 2.5 * half_width, GROWTH)[1:])
     y = np.append(-y[:0:-1], y) if sides == 2 else y
-    mesh = box_lattice([x, y, -growing_ticks(FAR, cell * GROWTH, GROWTH)[::-1]])
+    mesh = gallery.box_lattice([x, y, -gallery.growing_ticks(FAR, cell * GROWTH, GROWTH)[::-1]])
     points, top = mesh.points.copy(), mesh.surfaces["z1"]
     on = np.unique(top)[points[np.unique(top), 0] <= strip[-1] + 1e-9]
     points[on, 2] -= points[on, 0] ** 2 / (2 * radius)
@@ -117,7 +120,7 @@ def parameter(y: np.ndarray) -> np.ndarray:
 def posed(sides: int) -> ShapeProblem:
     """Return the largest pressure as a function of the profile."""
     mesh = crowned(sides)
-    track = side_of(mesh, "track")
+    track = gallery.side_of(mesh, "track")
     places = np.column_stack([track.parameters[:, 0], parameter(mesh.points[track.nodes, 1])])
     design = SurfaceDesign("roller", replace(track, parameters=places), net=(1, VARIABLES))
     return ShapeProblem(ContactProblem(on_rail(mesh, sides), comm), design, LargestPressure())
@@ -154,7 +157,7 @@ peaks = {name: result.value / hertz.peak_pressure for name, result in found.item
 rows = single.scene.bodies["roller"].mesh.points
 lundberg = rows.copy()
 track = single.designs[0].lattice.nodes
-lundberg[track, 2] -= unit * roller_relief(rows[track, 1], length, half_width)
+lundberg[track, 2] -= unit * theory.roller_relief(rows[track, 1], length, half_width)
 table = single.contact.solve(single.scene.reshaped({"roller": lundberg}))
 
 # ## Two loads
@@ -186,7 +189,7 @@ def along(state) -> tuple[np.ndarray, np.ndarray]:
 
 y = np.linspace(0, length / 2, 101)
 nodes = np.unique(np.abs(rows[track, 1]))
-plot_curves(
+pictures.plot_curves(
     {
         "straight": along(single.state_of(starts["straight"])),
         "Lundberg's profile": along(table),
@@ -198,7 +201,7 @@ plot_curves(
     connected=True,
     comm=comm,
 )
-plot_curves(
+pictures.plot_curves(
     {
         "one load": (2 * nodes / length, 1e3 * unit * relief(even.x, nodes)),
         "two loads": (2 * nodes / length, 1e3 * unit * relief(robust.x, nodes)),
@@ -206,7 +209,7 @@ plot_curves(
     output / "profile.png",
     xlabel="2y/L",
     ylabel="relief (µm)",
-    reference={"Lundberg": (2 * y / length, 1e3 * unit * roller_relief(y, length, half_width))},
+    reference={"Lundberg": (2 * y / length, 1e3 * unit * theory.roller_relief(y, length, half_width))},
     connected=True,
     title="Profile of the roller",
     comm=comm,
@@ -215,7 +218,7 @@ plot_curves(
 # Under the tilt, along both halves.
 
 states = {"one load": tilted.state_of(even.x), "two loads": tilted.state_of(robust.x)}
-plot_curves(
+pictures.plot_curves(
     {name: along(state) for name, state in states.items()},
     output / "tilted.png",
     xlabel="2y/L",
@@ -231,7 +234,7 @@ write_vtu(states["two loads"], output, "tilted")
 # The relief at half and nine tenths of the way to the end.
 
 checked = np.array([0.5, 0.9])
-expected = roller_relief(checked * length / 2, length, half_width)
+expected = theory.roller_relief(checked * length / 2, length, half_width)
 reliefs = {name: relief(result.x, checked * length / 2) for name, result in found.items()}
 errors = {name: values / expected - 1 for name, values in reliefs.items()}
 record = {
@@ -272,4 +275,4 @@ assert max(cases["two loads"].values()) < (0.67 if small else 0.5) * cases["one 
 # - `length = 20 * half_width`, with cells of `growing_ticks(length / 2, 0.75 * half_width, 1.15)`: from
 #   the straight roller the optimum leaves Lundberg's profile by 12 % and some 15 %, for a reason. His
 #   strip is as wide at the ends as in the middle; the true one narrows there, and its middle is pressed more.
-# - `monotone` or `smallest_radius` (from `fenics_contact.optimize`): rules of the grinding wheel.
+# - `monotone` or `smallest_radius` (from `fenics_contact.design`): rules of the grinding wheel.

@@ -23,23 +23,26 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, NewtonSteps, solve_steps
-from fenics_contact.gallery import rectangle
-from fenics_contact.io import ResultSeries, write_result
-from fenics_contact.progress import show_progress
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
     LoadStep,
     MovingObstacle,
-    NeoHooke,
+    NewtonSteps,
     RigidPlane,
     Scene,
     Support,
     Surface,
+    gallery,
+    materials,
+    pictures,
+    show_progress,
+    solve_steps,
+    write_result,
 )
-from fenics_contact.viz import plot_curves, plot_stress
+from fenics_contact.output import ResultSeries
 
 comm = MPI.COMM_WORLD
 output = Path("output/rubber_seal")
@@ -50,7 +53,7 @@ output = Path("output/rubber_seal")
 # floor, the lid and the wall.
 
 outer, inner, gap = 4.0, 2.6, 0.6  # mm: radii, and how far the wall is away
-flat = rectangle((inner, -np.pi / 2), (outer, np.pi / 2), (5, 48))
+flat = gallery.rectangle((inner, -np.pi / 2), (outer, np.pi / 2), (5, 48))
 radius, angle = flat.points.T
 points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
 points[abs(points) < 1e-12] = 0.0
@@ -78,7 +81,7 @@ seal = replace(
 # Floor and wall stand still, the lid comes down as time goes by. The bore folds: its surface is slave and
 # master at once.
 
-rubber = NeoHooke(young_modulus=6.0, poisson_ratio=0.45)  # N/mm²
+rubber = materials.NeoHooke(young_modulus=6.0, poisson_ratio=0.45)  # N/mm²
 greased = Coulomb(0.2)
 bore = Surface("seal", "x0")
 lid = MovingObstacle(RigidPlane((0.0, outer), (0.0, -1.0)), lambda time: (None, (0.0, -time)))
@@ -112,7 +115,7 @@ spring = 6.0 / (1 - 0.45**2) * (thickness / middle) ** 3 / 12 / (np.pi / 4 - 2 /
 
 # ## Pictures
 
-plot_curves(
+pictures.plot_curves(
     {name: (closure, values) for name, values in forces.items()},
     output / "force.png",
     xlabel="closure (mm)",
@@ -122,7 +125,7 @@ plot_curves(
     title="Force of the seal",
     comm=comm,
 )
-plot_curves(
+pictures.plot_curves(
     {name: (closure, values) for name, values in pressures.items()},
     output / "pressure.png",
     xlabel="closure (mm)",
@@ -132,7 +135,7 @@ plot_curves(
     comm=comm,
 )
 for name, number in (("free", 7), ("stress", -1)):
-    plot_stress(
+    pictures.plot_stress(
         states[number], output / f"{name}.png", title=f"Closed by {closure[number]:.1f} mm", scale=1.0
     )
 series = ResultSeries(output, "history", comm)

@@ -28,21 +28,24 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, NewtonSteps, solve_steps
-from fenics_contact.gallery import growing_ticks, rectangle, rectangle_lattice
-from fenics_contact.io import ResultSeries, write_result
-from fenics_contact.progress import show_progress
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
     LoadStep,
-    NeoHooke,
+    NewtonSteps,
     Scene,
     Support,
     Surface,
+    gallery,
+    materials,
+    pictures,
+    show_progress,
+    solve_steps,
+    write_result,
 )
-from fenics_contact.viz import plot_curves, plot_stress
+from fenics_contact.output import ResultSeries
 
 comm = MPI.COMM_WORLD
 output = Path("output/shallow_ironing")
@@ -53,12 +56,12 @@ output = Path("output/shallow_ironing")
 # the bed as well.
 
 columns, friction = 48, 0.3
-down = growing_ticks(4.0, 12.0 / columns, 1.3)  # mm
-bed = rectangle_lattice([np.linspace(0.0, 12.0, columns + 1), 4.0 - down[::-1]])
+down = gallery.growing_ticks(4.0, 12.0 / columns, 1.3)  # mm
+bed = gallery.rectangle_lattice([np.linspace(0.0, 12.0, columns + 1), 4.0 - down[::-1]])
 
 arc = 0.3  # its height, mm
 radius = (0.6**2 + arc**2) / (2 * arc)
-die = rectangle((0.2, 4.2), (1.4, 5.4), (8, 8))
+die = gallery.rectangle((0.2, 4.2), (1.4, 5.4), (8, 8))
 x, y = die.points.T
 under = 4.2 + radius - np.sqrt(radius**2 - (x - 0.8) ** 2)
 skin = np.concatenate([die.surfaces[side] for side in ("x0", "y0", "x1")])
@@ -75,8 +78,8 @@ def held(across: float, down: float) -> list[Support]:
 
 scene = Scene(
     {
-        "bed": Body(bed, NeoHooke(young_modulus=689.6, poisson_ratio=0.32)),  # N/mm²
-        "die": Body(die, NeoHooke(young_modulus=6896.0, poisson_ratio=0.32)),
+        "bed": Body(bed, materials.NeoHooke(young_modulus=689.6, poisson_ratio=0.32)),  # N/mm²
+        "die": Body(die, materials.NeoHooke(young_modulus=6896.0, poisson_ratio=0.32)),
     },
     held(0.0, 0.0),
     contacts=[ContactPair(Surface("die", "skin"), Surface("bed", "y1"), Coulomb(friction), "mortar")],
@@ -109,7 +112,7 @@ published = {  # at these times: vertical and horizontal, N/mm
 
 # ## Pictures
 
-plot_curves(
+pictures.plot_curves(
     {"vertical": (time, -force[:, 1]), "horizontal": (time, force[:, 0])},
     output / "forces.png",
     xlabel="time: down until 1, along until 2",
@@ -122,8 +125,8 @@ plot_curves(
     title="Forces on the die",
     comm=comm,
 )
-plot_stress(states[half_way], output / "stress.png", title="Half way", scale=1.0)
-plot_stress(states[-1], output / "stress_at_the_end.png", title="At the end", scale=1.0)
+pictures.plot_stress(states[half_way], output / "stress.png", title="Half way", scale=1.0)
+pictures.plot_stress(states[-1], output / "stress_at_the_end.png", title="At the end", scale=1.0)
 series = ResultSeries(output, "history", comm)
 for number, state in enumerate(states):
     series.add(state, time[number], steps[number].name)

@@ -20,22 +20,25 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, Status, solve_steps
-from fenics_contact.gallery import block
-from fenics_contact.io import ResultSeries, write_result
-from fenics_contact.progress import show_progress
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
     LoadStep,
     RigidPlane,
     Scene,
+    Status,
     Support,
     Surface,
+    gallery,
+    materials,
+    pictures,
+    show_progress,
+    solve_steps,
+    write_result,
 )
-from fenics_contact.viz import plot_contact_status, plot_curves, plot_stress
+from fenics_contact.output import ResultSeries
 
 comm = MPI.COMM_WORLD
 output = Path("output/sheared_block")
@@ -45,8 +48,8 @@ output = Path("output/sheared_block")
 # 40 × 20 × 15 mm of rubber. Only the floor and what is prescribed on the top hold it.
 
 friction_coefficient = 0.5
-rubber = IsotropicElasticity(young_modulus=5.0, poisson_ratio=0.45)  # N/mm²
-mesh = block((0.0, 0.0, 0.0), (40.0, 20.0, 15.0), (16, 8, 6))
+rubber = materials.IsotropicElasticity(young_modulus=5.0, poisson_ratio=0.45)  # N/mm²
+mesh = gallery.block((0.0, 0.0, 0.0), (40.0, 20.0, 15.0), (16, 8, 6))
 floor = RigidPlane(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
 scene = Scene(
     bodies={"block": Body(mesh, rubber)},
@@ -87,7 +90,7 @@ work = float(
 # way: a block that bulges freely presses back less.
 
 bound = friction_coefficient * pressed
-plot_curves(
+pictures.plot_curves(
     {"shear force": (path, shear)},
     output / "loop.png",
     xlabel="shift of the top (mm)",
@@ -105,8 +108,8 @@ names = ["pressed", "forth", "forth", "all slides", "back", "back"]
 maps = {
     f"{name}, {steps[k].name.replace('-', '−')}": states[k] for name, k in zip(names, chosen, strict=True)
 }
-plot_contact_status(maps, output / "status.png", title="Stick and slip on the floor")
-plot_stress(states[6], output / "stress.png", title="Sheared block")
+pictures.plot_contact_status(maps, output / "status.png", title="Stick and slip on the floor")
+pictures.plot_stress(states[6], output / "stress.png", title="Sheared block")
 
 # ## Files for ParaView
 #

@@ -21,23 +21,25 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, solve_steps
-from fenics_contact.io import ResultSeries, write_result
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.progress import show_progress
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
+    ContactProblem,
     Coulomb,
     LoadStep,
-    PlaneStress,
     Scene,
     Support,
     Surface,
     ThermalStrain,
     Tie,
+    materials,
+    pictures,
+    show_progress,
+    solve_steps,
+    write_result,
 )
-from fenics_contact.viz import plot_contact_pressure, plot_curves, plot_decomposition, plot_stress
+from fenics_contact.output import ResultSeries
 
 comm = MPI.COMM_WORLD
 output = Path("output/shrink_fit")
@@ -71,8 +73,8 @@ def ring(inner: float, outer: float, through: int) -> BodyMesh:
 # face each other.
 
 friction_coefficient = 0.1
-steel = PlaneStress(young_modulus=2.1e5, poisson_ratio=0.3, thermal_expansion=1.2e-5)  # N/mm², 1/K
-rubber = PlaneStress(young_modulus=60.0, poisson_ratio=0.45)
+steel = materials.PlaneStress(young_modulus=2.1e5, poisson_ratio=0.3, thermal_expansion=1.2e-5)  # N/mm², 1/K
+rubber = materials.PlaneStress(young_modulus=60.0, poisson_ratio=0.45)
 scene = Scene(
     bodies={
         "shaft": Body(ring(arbor, seat, 10), steel),
@@ -123,7 +125,7 @@ torques = np.array([np.sum(around * state.contact.force) for state in states])
 
 turned = int(np.argmax(angles))
 bound = 1e-3 * np.array([limit, limit])
-plot_curves(
+pictures.plot_curves(
     {"computed": (1e3 * angles, 1e-3 * torques)},
     output / "torque.png",
     xlabel="angle of the arbor (mrad)",
@@ -139,10 +141,10 @@ plot_curves(
 
 # Stress when fitted and when turned, and pressure and friction along the seat.
 
-plot_stress(states[0], output / "stress_fitted.png", title="Fitted")
-plot_stress(states[turned], output / "stress_turned.png", title="Turned until it slips", scale=1.0)
-plot_contact_pressure(states[turned], output / "contact.png", title="All of the seat slips")
-plot_decomposition(scene, scene.partition(comm.size), output / "decomposition.png", comm=comm)
+pictures.plot_stress(states[0], output / "stress_fitted.png", title="Fitted")
+pictures.plot_stress(states[turned], output / "stress_turned.png", title="Turned until it slips", scale=1.0)
+pictures.plot_contact_pressure(states[turned], output / "contact.png", title="All of the seat slips")
+pictures.plot_decomposition(scene, scene.partition(comm.size), output / "decomposition.png", comm=comm)
 
 # ## Files for ParaView
 #

@@ -24,22 +24,25 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, NewtonSteps, solve_steps
-from fenics_contact.gallery import rectangle_lattice
-from fenics_contact.io import ResultSeries, write_result
-from fenics_contact.progress import show_progress
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
     DistanceObstacle,
     LoadStep,
-    NeoHooke,
+    NewtonSteps,
     Scene,
     Support,
     Surface,
+    gallery,
+    materials,
+    pictures,
+    show_progress,
+    solve_steps,
+    write_result,
 )
-from fenics_contact.viz import plot_curves, plot_stress
+from fenics_contact.output import ResultSeries
 
 comm = MPI.COMM_WORLD
 output = Path("output/snap_fit")
@@ -53,7 +56,7 @@ back, ramp = np.deg2rad(60), np.deg2rad(30)
 ends = length + np.cumsum([0.0, nose / np.tan(back), tip, nose / np.tan(ramp)])
 along = [np.linspace(0.0, length, 31)]
 along += [np.linspace(a, b, round((b - a) / 0.12) + 1)[1:] for a, b in pairwise(ends)]
-straight = rectangle_lattice([np.concatenate(along), np.linspace(0.0, 1.0, 7)])
+straight = gallery.rectangle_lattice([np.concatenate(along), np.linspace(0.0, 1.0, 7)])
 x, part = straight.points.T
 lower = np.interp(x, ends, [0.0, -nose, -nose, 0.0])
 hook = straight.moved(np.column_stack([x, lower + (height - lower) * part]))
@@ -72,7 +75,7 @@ def from_ledge(points: np.ndarray) -> np.ndarray:
     return np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0) - edge
 
 
-polymer = NeoHooke(young_modulus=2800.0, poisson_ratio=0.35)  # N/mm², POM
+polymer = materials.NeoHooke(young_modulus=2800.0, poisson_ratio=0.35)  # N/mm², POM
 friction = 0.2
 scene = Scene(
     {"hook": Body(hook, polymer)},
@@ -117,7 +120,7 @@ half_way = int(np.argmax(push[:IN, 0]))
 
 # ## Pictures
 
-plot_curves(
+pictures.plot_curves(
     {"in": (way[:IN], push[:IN, 0]), "out": (way[IN - 1 :], push[IN - 1 :, 0])},
     output / "force.png",
     xlabel="way of the root (mm)",
@@ -130,8 +133,8 @@ plot_curves(
     title="In, with the snap, and out",
     comm=comm,
 )
-plot_stress(states[half_way], output / "stress.png", title="Half way over the ledge", scale=1.0)
-plot_stress(states[on_top], output / "stress_on_top.png", title="On the ledge", scale=1.0)
+pictures.plot_stress(states[half_way], output / "stress.png", title="Half way over the ledge", scale=1.0)
+pictures.plot_stress(states[on_top], output / "stress_on_top.png", title="On the ledge", scale=1.0)
 series = ResultSeries(output, "history", comm)
 for number, state in enumerate(states):
     series.add(state, number, steps[number].name)

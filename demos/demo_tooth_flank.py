@@ -23,17 +23,29 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, solve_scene
-from fenics_contact.gallery import growing_ticks, rectangle_lattice
-from fenics_contact.io import write_design_table, write_optimisation_result, write_step, write_vtu
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.optimize import BundleTrust, convex, minimize, monotone
-from fenics_contact.progress import show_progress
-from fenics_contact.scene import Body, ContactPair, PlaneStrain, RigidSurface, Scene, Support, Surface
-from fenics_contact.shape import LargestPressure, LoadCases, ShapeProblem, SurfaceDesign
-from fenics_contact.surface_shapes import Parametric
-from fenics_contact.theory import contact_modulus, hertz_line
-from fenics_contact.viz import plot_before_after, plot_stress
+from fenics_contact import (
+    Body,
+    BodyMesh,
+    ContactPair,
+    ContactProblem,
+    RigidSurface,
+    Scene,
+    ShapeProblem,
+    Support,
+    Surface,
+    SurfaceDesign,
+    gallery,
+    materials,
+    minimize,
+    pictures,
+    shapes,
+    show_progress,
+    solve_scene,
+    theory,
+    write_vtu,
+)
+from fenics_contact.design import BundleTrust, LargestPressure, LoadCases, convex, monotone
+from fenics_contact.output import write_design_table, write_optimisation_result, write_step
 
 comm = MPI.COMM_WORLD
 output = Path("output/tooth_flank")
@@ -48,8 +60,8 @@ pitch = module * teeth / 2  # mm, radii of the pitch, base, tip and root circles
 base, tip, root = pitch * np.cos(pressure_angle), pitch + module, pitch - 1.25 * module
 action = 2 * base * np.tan(pressure_angle)  # mm, the sum of the radii of curvature
 force = 200.0  # N/mm
-steel = PlaneStrain(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
-modulus = contact_modulus(2.1e5, 0.3, 2.1e5, 0.3)
+steel = materials.PlaneStrain(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
+modulus = theory.contact_modulus(2.1e5, 0.3, 2.1e5, 0.3)
 
 
 def involute(roll):
@@ -71,7 +83,7 @@ middle = np.pi / (2 * teeth) + angle_at(np.array(pitch))  # from the start of th
 
 
 def spaced(first, length):
-    return growing_ticks(length, first, 1.2)[1:]
+    return gallery.growing_ticks(length, first, 1.2)[1:]
 
 
 def lattice_of(curvature, cell):
@@ -80,7 +92,7 @@ def lattice_of(curvature, cell):
     fine = np.linspace(low, high, round((high - low) / cell) + 1)
     above = high + spaced(cell, tip - high) if tip > high else []
     radii = np.concatenate([low - spaced(cell, low - root)[::-1], fine, above])
-    return rectangle_lattice([radii, np.append(0.0, spaced(cell / 6, 1.0))])
+    return gallery.rectangle_lattice([radii, np.append(0.0, spaced(cell / 6, 1.0))])
 
 
 # The tooth is turned to where its flank touches the line of action at the given radius of curvature. The
@@ -96,7 +108,7 @@ def tooth(curvature, centre, turn, cell):
     flank, upper = ((radius[side] > least).all(axis=1) for least in (1.005 * base, tip - 2.0))
     c, s = np.cos(turn - curvature / base), np.sin(turn - curvature / base)
     placed = np.array([[c, s], [-s, c]])
-    shape = Parametric(lambda roll: involute(roll) @ placed + centre, (0.05,), (0.6,))
+    shape = shapes.Parametric(lambda roll: involute(roll) @ placed + centre, (0.05,), (0.6,))
     surfaces = {"foot": foot, "flank": side[flank], "upper": side[upper]}
     return BodyMesh(points, lattice.cells, surfaces, shapes={"flank": shape})
 
@@ -123,7 +135,7 @@ def scene_of(curvature, cell):
 
 with show_progress(comm):
     at_pitch = solve_scene(scene_of(action / 2, cell), comm, tolerance=1e-7)
-hertz = hertz_line(force, 4 / action, modulus)
+hertz = theory.hertz_line(force, 4 / action, modulus)
 pitch_peak = float(at_pitch.contact.pressure.max())
 
 # ## Design
@@ -170,8 +182,10 @@ with show_progress(comm):
 #
 # The pressure on the flank, and the outline in true scale and magnified.
 
-plot_before_after(before, after, output / "before_after.png", reach=1.2, label="largest pressure (MPa)")
-plot_stress(after.state, output / "stress.png", scale=1.0, title="Relieved tip, full torque")
+pictures.plot_before_after(
+    before, after, output / "before_after.png", reach=1.2, label="largest pressure (MPa)"
+)
+pictures.plot_stress(after.state, output / "stress.png", scale=1.0, title="Relieved tip, full torque")
 write_vtu(after.state, output, "relieved")
 write_design_table(problem, result.x, output / "relief.csv", lines=(41,))
 write_step(problem, result.x, output / "wheel_tooth.step")

@@ -21,22 +21,24 @@ import numpy as np
 from mpi4py import MPI
 from scipy.stats import norm, qmc
 
-from fenics_contact.contact import Status
-from fenics_contact.gallery import rectangle_lattice
-from fenics_contact.io import write_result, write_vtu
-from fenics_contact.outer import SceneResponse, served
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
     ContactPair,
     Coulomb,
-    PlaneStrain,
     RigidPlane,
     Scene,
+    SceneResponse,
+    Status,
     Surface,
     TotalForce,
+    gallery,
+    materials,
+    pictures,
+    served,
+    write_result,
+    write_vtu,
 )
-from fenics_contact.viz import plot_curves, plot_stress
 
 comm = MPI.COMM_WORLD
 output = Path("output/uncertain_friction")
@@ -51,7 +53,7 @@ half, height = 4.0, 4.0  # mm; the contact will be about 0.45 mm wide on either 
 growing = np.cumsum(1.15 ** np.arange(1, 17))
 out = np.concatenate([np.arange(0.0, 1.2, 0.04), 1.2 + (half - 1.2) * growing / growing[-1]])
 up = np.concatenate([[0.0, 0.04], 0.04 + (height - 0.04) * growing / growing[-1]])
-lattice = rectangle_lattice((np.concatenate([-out[:0:-1], out]), up))
+lattice = gallery.rectangle_lattice((np.concatenate([-out[:0:-1], out]), up))
 x, y = lattice.points.T
 mesh = lattice.moved(np.column_stack([x, y + (1 - y / height) * x**2 / (2 * radius)]))
 area = mesh.volume  # mm²; the push acts on the whole shoe, as inertia does
@@ -61,7 +63,7 @@ floor = RigidPlane((0.0, 0.0), (0.0, 1.0))
 def shoe(friction: float, load: float) -> Scene:
     """Return the shoe with a coefficient of friction under a load, [N/mm]."""
     return Scene(
-        bodies={"shoe": Body(mesh, PlaneStrain(young_modulus, poisson_ratio))},
+        bodies={"shoe": Body(mesh, materials.PlaneStrain(young_modulus, poisson_ratio))},
         loads=[TotalForce("shoe", "y1", (0.0, -load)), BodyForce("shoe", (push / area, 0.0))],
         contacts=[ContactPair(Surface("shoe", "y0"), floor, Coulomb(friction))],
     )
@@ -109,7 +111,7 @@ probability = norm.cdf(np.log(push / (median["friction"] * median["load"])) / np
 # ## Pictures
 
 curve = np.linspace(load.min(), load.max(), 100)
-plot_curves(
+pictures.plot_curves(
     {"holds": (load[~slides], friction[~slides]), "slides": (load[slides], friction[slides])},
     output / "samples.png",
     xlabel="load P (N/mm)",
@@ -124,7 +126,7 @@ plot_curves(
 stiffness = young_modulus / (1 - poisson_ratio**2)
 hertz = np.sqrt(load * stiffness / (np.pi * radius))
 rank = (np.arange(np.count_nonzero(~slides)) + 0.5) / np.count_nonzero(~slides)
-plot_curves(
+pictures.plot_curves(
     {"computed": (np.sort(pressure[~slides]), rank)},
     output / "distribution.png",
     xlabel="largest pressure (MPa)",
@@ -136,7 +138,7 @@ plot_curves(
 
 # The state of the last sample that held is still there, for pictures and files.
 
-plot_stress(response.state, output / "stress.png", title="The last sample that holds")
+pictures.plot_stress(response.state, output / "stress.png", title="The last sample that holds")
 write_vtu(response.state, output, "last_held")
 
 # ## Result
@@ -175,5 +177,5 @@ assert imbalance < 1e-9  # in every sample that holds
 # ## What to try next
 #
 # - More samples, or uncertain stiffness: parameters of `shoe` are whatever its scene depends on.
-# - Designs instead of loads: `fenics_contact.outer.DesignResponse` gives a subgradient with every answer.
+# - Designs instead of loads: `fenics_contact.DesignResponse` gives a subgradient with every answer.
 # - Another tool in the place of SciPy: whatever calls a Python function can drive.

@@ -1,28 +1,165 @@
 """Contact mechanics with friction, and contact shape optimisation, on FEniCSx by Total FETI.
 
-The floors of the package, from the ground up; each imports only those before it:
+What a script needs is here; nothing is loaded before it is used.
 
-* `fenics_contact.progress`: progress of long work, * `fenics_contact.checkpoint`: files from which
-interrupted runs continue, * `fenics_contact.theory`: analytical contact solutions, *
-`fenics_contact.surface_shapes`: spheres, tori, profiles: true shapes of surfaces, * `fenics_contact.mesh`:
-meshes of bodies, * `fenics_contact.mesh_io`: meshes from gmsh, CAD, dolfinx and files, *
-`fenics_contact.gallery`: chain links, blocks, Hertz bodies, * `fenics_contact.partition`: bodies cut into
-subdomains, * `fenics_contact.scene`: bodies, materials, supports, loads, contact pairs, *
-`fenics_contact.qp`: dual solvers for bounds and friction discs, * `fenics_contact.fem`: forms of elasticity
-and loads, * `fenics_contact.pairing`: contact search and mortar coupling, * `fenics_contact.feti`:
-subdomains, gluing, contact rows, the dual problem, * `fenics_contact.accuracy`: errors of states, *
-`fenics_contact.nonlinear`: Newton's method on deformed bodies, *
-`fenics_contact.contact`: scene → state, * `fenics_contact.shape`: design → value and subgradient, *
-`fenics_contact.optimize`: the bundle trust method; `fenics_contact.outer`: plain functions for other tools.
+Scenes: Scene, Body, BodyMesh, Surface, Support, RigidSurface, ContactPair, Tie, AutomaticContact, LoadStep, box_partition
 
-Beside them: `fenics_contact.viz` (pictures), `fenics_contact.io` (files) and `fenics_contact.scene_file`
-(scenes as TOML files). On top: `fenics_contact.study` (cost of accuracy) and `fenics_contact.cli` (the
-command line).
+Friction laws: Coulomb, Tresca
+
+Rigid obstacles: RigidPlane, RigidSphere, RigidCylinder, DistanceObstacle, MovingObstacle
+
+Loads: Traction, Pressure, TotalForce, BodyForce, gravity, ThermalStrain
+
+Values of loads: SampledField, read_field, Ufl
+
+Equilibrium: solve_scene, solve_steps, ContactProblem, LoadSequence, AutomaticSteps, TangentNewton, FixedPoint, Tolerance
+
+Results: State, DeformedState, NewtonSteps, Status, contact_area
+
+Shape optimisation: ShapeProblem, SurfaceDesign, minimize
+
+Functions for other tools: SceneResponse, DesignResponse, served
+
+Files: read_mesh, read_cad, read_scene_file, write_result, write_vtu, result_page
+
+Long runs: show_progress, Checkpoint, interruptible, Interrupted, PhaseTimer, clean_environment
+
+Tests of material models: check_hyperelastic, check_history_material
+
+Rooms with more: `materials`, `gallery` (meshes of simple bodies), `readers` (gmsh, CAD, dolfinx, meshio), `mesh`,
+`shapes` (true surfaces), `design` (objectives, constraints, optimisers), `results` (what states consist of),
+`pictures`, `output` (files), `study` (what accuracy costs), `errors`, `theory` (contacts known by formula),
+`qp` (dual solvers) and `feti` (subdomains).
 """
 
-from fenics_contact import _requirements
+from __future__ import annotations
 
-_requirements.check()  # checks that they exist; nothing is loaded or started before it is used
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from fenics_contact._base import requirements
+
+if TYPE_CHECKING:
+    from fenics_contact._base.checkpoint import Interrupted as Interrupted
+    from fenics_contact._base.checkpoint import interruptible as interruptible
+    from fenics_contact._base.launching import clean_environment as clean_environment
+    from fenics_contact._base.progress import PhaseTimer as PhaseTimer
+    from fenics_contact._base.progress import show_progress as show_progress
+    from fenics_contact._equilibrium.problem import ContactProblem as ContactProblem
+    from fenics_contact._equilibrium.problem import solve_scene as solve_scene
+    from fenics_contact._equilibrium.steps import LoadSequence as LoadSequence
+    from fenics_contact._equilibrium.steps import solve_steps as solve_steps
+    from fenics_contact._fem.model_checks import check_history_material as check_history_material
+    from fenics_contact._fem.model_checks import check_hyperelastic as check_hyperelastic
+    from fenics_contact._large_deformations.load_steps import AutomaticSteps as AutomaticSteps
+    from fenics_contact._large_deformations.newton import TangentNewton as TangentNewton
+    from fenics_contact._optimize.bundle_trust import minimize as minimize
+    from fenics_contact._page.page import result_page as result_page
+    from fenics_contact._scene.automatic import AutomaticContact as AutomaticContact
+    from fenics_contact._scene.body import Body as Body
+    from fenics_contact._scene.fields import SampledField as SampledField
+    from fenics_contact._scene.fields import Ufl as Ufl
+    from fenics_contact._scene.fields import read_field as read_field
+    from fenics_contact._scene.loads import BodyForce as BodyForce
+    from fenics_contact._scene.loads import Pressure as Pressure
+    from fenics_contact._scene.loads import ThermalStrain as ThermalStrain
+    from fenics_contact._scene.loads import TotalForce as TotalForce
+    from fenics_contact._scene.loads import Traction as Traction
+    from fenics_contact._scene.loads import gravity as gravity
+    from fenics_contact._scene.obstacles import DistanceObstacle as DistanceObstacle
+    from fenics_contact._scene.obstacles import MovingObstacle as MovingObstacle
+    from fenics_contact._scene.obstacles import RigidCylinder as RigidCylinder
+    from fenics_contact._scene.obstacles import RigidPlane as RigidPlane
+    from fenics_contact._scene.obstacles import RigidSphere as RigidSphere
+    from fenics_contact._scene.pairs import ContactPair as ContactPair
+    from fenics_contact._scene.pairs import Coulomb as Coulomb
+    from fenics_contact._scene.pairs import Surface as Surface
+    from fenics_contact._scene.pairs import Tie as Tie
+    from fenics_contact._scene.pairs import Tresca as Tresca
+    from fenics_contact._scene.scene import LoadStep as LoadStep
+    from fenics_contact._scene.scene import Scene as Scene
+    from fenics_contact._scene.supports import RigidSurface as RigidSurface
+    from fenics_contact._scene.supports import Support as Support
+    from fenics_contact._scene_file.reading import read_scene_file as read_scene_file
+    from fenics_contact.design.design import SurfaceDesign as SurfaceDesign
+    from fenics_contact.design.problem import ShapeProblem as ShapeProblem
+    from fenics_contact.mesh.body_mesh import BodyMesh as BodyMesh
+    from fenics_contact.mesh.partition import box_partition as box_partition
+    from fenics_contact.output.paraview import write_vtu as write_vtu
+    from fenics_contact.output.result import write_result as write_result
+    from fenics_contact.qp.fixed_point import FixedPoint as FixedPoint
+    from fenics_contact.readers.cad import read_cad as read_cad
+    from fenics_contact.readers.meshio import read_mesh as read_mesh
+    from fenics_contact.responses import DesignResponse as DesignResponse
+    from fenics_contact.responses import SceneResponse as SceneResponse
+    from fenics_contact.responses import served as served
+    from fenics_contact.results.area import contact_area as contact_area
+    from fenics_contact.results.contact import Status as Status
+    from fenics_contact.results.deformed_state import DeformedState as DeformedState
+    from fenics_contact.results.deformed_state import NewtonSteps as NewtonSteps
+    from fenics_contact.results.state import State as State
+    from fenics_contact.results.state import Tolerance as Tolerance
+
+requirements.check()  # checks that they exist; nothing is loaded or started before it is used
 
 __version__ = "0.2.0.dev0"
-__all__ = ["__version__"]
+
+#: Where the public names are defined.
+_HOMES = {
+    "_base.checkpoint": "Interrupted interruptible",
+    "_base.launching": "clean_environment",
+    "_base.progress": "PhaseTimer show_progress",
+    "_equilibrium.problem": "ContactProblem solve_scene",
+    "_equilibrium.steps": "LoadSequence solve_steps",
+    "_fem.model_checks": "check_history_material check_hyperelastic",
+    "_large_deformations.load_steps": "AutomaticSteps",
+    "_large_deformations.newton": "TangentNewton",
+    "_optimize.bundle_trust": "minimize",
+    "_page.page": "result_page",
+    "_scene.automatic": "AutomaticContact",
+    "_scene.body": "Body",
+    "_scene.fields": "SampledField Ufl read_field",
+    "_scene.loads": "BodyForce Pressure ThermalStrain TotalForce Traction gravity",
+    "_scene.obstacles": "DistanceObstacle MovingObstacle RigidCylinder RigidPlane RigidSphere",
+    "_scene.pairs": "ContactPair Coulomb Surface Tie Tresca",
+    "_scene.scene": "LoadStep Scene",
+    "_scene.supports": "RigidSurface Support",
+    "_scene_file.reading": "read_scene_file",
+    "design.design": "SurfaceDesign",
+    "design.problem": "ShapeProblem",
+    "mesh.body_mesh": "BodyMesh",
+    "mesh.partition": "box_partition",
+    "output.paraview": "write_vtu",
+    "output.result": "write_result",
+    "qp.fixed_point": "FixedPoint",
+    "readers.cad": "read_cad",
+    "readers.meshio": "read_mesh",
+    "responses": "DesignResponse SceneResponse served",
+    "results.area": "contact_area",
+    "results.contact": "Status",
+    "results.deformed_state": "DeformedState NewtonSteps",
+    "results.state": "State Tolerance",
+}
+#: Public modules.
+_ROOMS = (
+    "design errors feti gallery materials mesh output pictures qp readers results shapes study theory".split()
+)
+_HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
+
+__all__ = [*_HOME, *_ROOMS, "__version__"]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name, or a public module, on first use."""
+    if name in _HOME:
+        value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    elif name in _ROOMS:
+        return import_module(f"{__name__}.{name}")
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-#: `fenics_contact.cli.ExitCode.MISSING`, which cannot be imported where something is missing.
+#: `fenics_contact._cli.console.ExitCode.MISSING`, which cannot be imported where something is missing.
 MISSING = 5
 
 for _name in ("stdout", "stderr"):
@@ -16,8 +16,8 @@ for _name in ("stdout", "stderr"):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command given by the arguments on all ranks; return the exit status."""
-    from fenics_contact._libraries import MPI
-    from fenics_contact._requirements import require_extra
+    from fenics_contact._base.libraries import MPI
+    from fenics_contact._base.requirements import require_extra
     from fenics_contact.errors import MissingRequirementError
 
     try:
@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MissingRequirementError as error:
         sys.stderr.write(f"error: {error}\n")
         return MISSING
-    from fenics_contact import cli
+    from fenics_contact import _cli as cli
 
     return cli.main(MPI.COMM_WORLD, arguments)
 

@@ -54,17 +54,20 @@
 # %%
 from mpi4py import MPI
 
-from fenics_contact.contact import Status, solve_scene
-from fenics_contact.gallery import block
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
     Scene,
+    Status,
     Support,
     Surface,
     TotalForce,
+    gallery,
+    materials,
+    pictures,
+    solve_scene,
+    write_vtu,
 )
 
 # %% [markdown]
@@ -74,9 +77,9 @@ from fenics_contact.scene import (
 # the smaller or finer one as slave.
 
 # %%
-steel = IsotropicElasticity(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
-table = block((-10, -5, -15), (30, 25, 0), (20, 15, 8))  # corners in mm, cells
-tower = block((0, 0, 0), (20, 20, 30), (12, 12, 12))
+steel = materials.IsotropicElasticity(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
+table = gallery.block((-10, -5, -15), (30, 25, 0), (20, 15, 8))  # corners in mm, cells
+tower = gallery.block((0, 0, 0), (20, 20, 30), (12, 12, 12))
 scene = Scene(
     bodies={"table": Body(table, steel), "tower": Body(tower, steel)},
     supports=[Support("table", "z0")],
@@ -108,9 +111,8 @@ state = solve_scene(scene, MPI.COMM_WORLD)
 # the notebook shows it.
 
 # %% tags=["cover"]
-from fenics_contact.viz import plot_stress
 
-plot_stress(state, title="A pushed tower", scale=200, width=1200)
+pictures.plot_stress(state, title="A pushed tower", scale=200, width=1200)
 
 # %% [markdown]
 # *The displacement is exaggerated in the upper picture, true in the sections. The tower presses with its
@@ -129,9 +131,8 @@ print(f"widest gap       {contact.gap.max():8.4f} mm")
 # The next picture shows the surface of contact from below, as the table sees it: x runs to the left.
 
 # %%
-from fenics_contact.viz import plot_contact_pressure
 
-plot_contact_pressure(state, title="Under the tower", width=1200)
+pictures.plot_contact_pressure(state, title="Under the tower", width=1200)
 
 # %% [markdown]
 # *Left the pressure: nothing on the side that lifts, most at the far edge. Right the status: open (no
@@ -185,7 +186,6 @@ print(state.estimate_errors())
 # the `.vtm`, it names the others.
 
 # %%
-from fenics_contact.io import write_vtu
 
 print(write_vtu(state, "output/notebooks/first_contact", "tower"))
 

@@ -46,9 +46,25 @@
 # nodes does best where the facets on both sides are of one size.
 
 # %%
-from fenics_contact.gallery import LinkShape, two_links
+from fenics_contact import (
+    Body,
+    ContactPair,
+    ContactProblem,
+    Coulomb,
+    LoadStep,
+    Scene,
+    Status,
+    Support,
+    Surface,
+    gallery,
+    materials,
+    pictures,
+    result_page,
+    solve_scene,
+    solve_steps,
+)
 
-links = two_links(LinkShape(inner_radius=9.6, n_around=72, n_a=3, n_b=10))
+links = gallery.two_links(gallery.LinkShape(inner_radius=9.6, n_around=72, n_a=3, n_b=10))
 print(f"{links.first.mesh.n_cells} hexahedra a link")
 print("surfaces by name:", ", ".join(links.first.mesh.surfaces))
 
@@ -57,9 +73,8 @@ print("surfaces by name:", ", ".join(links.first.mesh.surfaces))
 # by a given displacement [mm]; it could not get away even without friction.
 
 # %%
-from fenics_contact.scene import Body, ContactPair, Coulomb, IsotropicElasticity, Scene, Support, Surface
 
-steel = IsotropicElasticity(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
+steel = materials.IsotropicElasticity(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
 
 
 def chain(friction_coefficient, pull=(0.25, 0.0, 0.0)):
@@ -81,8 +96,6 @@ def chain(friction_coefficient, pull=(0.25, 0.0, 0.0)):
 # %%
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, Status, solve_scene
-
 mu = 0.3
 state = solve_scene(chain(mu), MPI.COMM_WORLD, tolerance=1e-8)
 contact = state.contact
@@ -93,9 +106,8 @@ print(", ".join(f"{contact.count(status)} points {status.name.lower()}" for stat
 # The stress in both links, and two sections through the spot where they touch:
 
 # %% tags=["cover"]
-from fenics_contact.viz import plot_stress
 
-plot_stress(state, title="Two chain links", width=1000)
+pictures.plot_stress(state, title="Two chain links", width=1000)
 
 # %% [markdown]
 # *The stress is largest where the links touch; the sections show how deep it reaches. The dark spots at the
@@ -104,9 +116,8 @@ plot_stress(state, title="Two chain links", width=1000)
 # Now the contact itself: pressure and status, with the direction in which points slip.
 
 # %%
-from fenics_contact.viz import plot_contact_pressure
 
-plot_contact_pressure(state, title=f"μ = {mu:g}", width=1200)
+pictures.plot_contact_pressure(state, title=f"μ = {mu:g}", width=1200)
 
 # %% [markdown]
 # *Left the pressure, largest in the middle. Right the status: the middle sticks, the rim slips, because the
@@ -151,9 +162,8 @@ assert states["μ = 0.6"].contact.count(Status.STICK) >= states["μ = 0.3"].cont
 # The same as maps:
 
 # %%
-from fenics_contact.viz import plot_contact_status
 
-plot_contact_status(states, title="Pulled with less and with more friction", width=1200)
+pictures.plot_contact_status(states, title="Pulled with less and with more friction", width=1200)
 
 # %% [markdown]
 # *Without friction every point that touches may slide (diamonds). With friction the middle sticks, the more
@@ -167,8 +177,6 @@ plot_contact_status(states, title="Pulled with less and with more friction", wid
 # from. (Displacements are small against the links: points keep their partners.)
 
 # %%
-from fenics_contact.contact import solve_steps
-from fenics_contact.scene import LoadStep
 
 forth, back = np.linspace(0.0, 0.8, 5), np.linspace(0.8, -0.8, 9)
 path = np.concatenate([forth, back[1:], -back[1:]])  # mm
@@ -186,11 +194,10 @@ history = solve_steps(ContactProblem(chain(0.3), MPI.COMM_WORLD, tolerance=1e-8)
 # forces $N$ allow:
 
 # %%
-from fenics_contact.viz import plot_curves
 
 sideways = np.array([-found.contact.force[:, 2].sum() for found in history]) / 1e3  # kN
 bound = np.array([found.contact.slip_bound.sum() for found in history]) / 1e3
-plot_curves(
+pictures.plot_curves(
     {"force on link 2": (path, sideways)},
     reference={"μN": (path[4:13], bound[4:13]), "−μN": (path[4:13], -bound[4:13])},
     xlabel="shift of the far crown (mm)", ylabel="sideways force (kN)",
@@ -224,7 +231,7 @@ assert abs(memory) > 1.0
 # %%
 chosen = {"pulled": 0, "forth": 2, "far": 4, "a step back": 5, "back": 8, "far back": 12}
 maps = {f"{name}, {steps[k].name}": history[k] for name, k in chosen.items()}
-plot_contact_status(maps, title="Stick and slip while the chain swings", width=1200)
+pictures.plot_contact_status(maps, title="Stick and slip while the chain swings", width=1200)
 
 # %% [markdown]
 # *Slip begins at the rim and eats its way to the middle, until everything slides along z. One step back,
@@ -237,7 +244,6 @@ plot_contact_status(maps, title="Stick and slip while the chain swings", width=1
 # page that any browser opens, without a server or a network.
 
 # %%
-from fenics_contact.page import result_page
 
 page = result_page(history[4], "output/notebooks/chain_links/swung.html", field="contact_pressure")
 print("to open in a browser:", page)

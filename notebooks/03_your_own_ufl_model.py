@@ -54,10 +54,24 @@
 # %%
 import ufl
 
-from fenics_contact.scene import EnergyModel
+from fenics_contact import (
+    Body,
+    ContactPair,
+    Pressure,
+    RigidPlane,
+    Scene,
+    Surface,
+    Ufl,
+    gallery,
+    materials,
+    pictures,
+    solve_scene,
+)
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials import strain
 
 
-class FibreEnergy(EnergyModel):
+class FibreEnergy(materials.EnergyModel):
     def energy(self, strain, parameters):
         lame, mu_T, mu_L, alpha, beta, *fibre = parameters
         a = ufl.as_vector(fibre)
@@ -105,10 +119,8 @@ class Wood(FibreEnergy):
 #    + \Big(\frac1{G_{LT}} - \frac{2\nu_{LT}}{E_L}\Big) \sin^2\theta \cos^2\theta \quad [\mathrm{mm^2/N}]. $$
 
 # %%
-from fenics_contact.gallery import block
-from fenics_contact.scene import Body, ContactPair, Pressure, RigidPlane, Scene, Surface
 
-mesh = block((0, 0, 0), (20, 20, 40), (4, 4, 8))  # mm
+mesh = gallery.block((0, 0, 0), (20, 20, 40), (4, 4, 8))  # mm
 
 
 def on_floor(material, load):
@@ -123,8 +135,6 @@ def on_floor(material, load):
 
 # %%
 from mpi4py import MPI
-
-from fenics_contact.contact import solve_scene
 
 
 def shortening(angle):
@@ -152,12 +162,11 @@ assert worst < 1e-7
 # The same as a picture, with the formula on a finer scale behind the computed points.
 
 # %% tags=["cover"]
-from fenics_contact.viz import plot_curves
 
 fine = np.radians(np.linspace(0, 90, 91))
 c, s = np.cos(fine), np.sin(fine)
 compliance = c**4 / 12000 + s**4 / 800 + (1 / 700 - 2 * 0.4 / 12000) * s**2 * c**2
-plot_curves(
+pictures.plot_curves(
     {"computed with contact": (angles, found)},
     reference={"p L / E(θ)": (np.degrees(fine), 8.0 * 40 * compliance)},
     xlabel="angle between fibres and load (°)", ylabel="shortening (mm)",
@@ -172,10 +181,9 @@ plot_curves(
 # the directions.
 
 # %%
-from fenics_contact.viz import plot_stress
 
 _, state = shortening(30)
-plot_stress(state, title="Fibres at 30°", scale=40, clim=(0.0, 16.0), sections=False, width=800)
+pictures.plot_stress(state, title="Fibres at 30°", scale=40, clim=(0.0, 16.0), sections=False, width=800)
 
 # %% [markdown]
 # *The stress is the same in every cell. The block leans over because its fibres do.*
@@ -188,22 +196,22 @@ plot_stress(state, title="Fibres at 30°", scale=40, clim=(0.0, 16.0), sections=
 # rotations, and one that takes a stretch for a rigid motion:
 
 # %%
-from fenics_contact.scene import rigid_body_modes
 
 
 class NoRotations(Wood):
     def kernel(self, points):
-        return rigid_body_modes(points)[:, :, :3]
+        return materials.rigid_body_modes(points)[:, :, :3]
 
 
 class Stretched(Wood):
     def kernel(self, points):
-        return np.concatenate([rigid_body_modes(points), points[:, :, None]], axis=2)
+        return np.concatenate([materials.rigid_body_modes(points), points[:, :, None]], axis=2)
 
 
 # %% [markdown]
 # Third, an energy that is not quadratic. Fourth, numbers with which the energy can become negative, a usual
 # slip of the pen: $\nu_{LT}$ = 4.
+
 
 # %%
 class Stiffening(Wood):
@@ -219,8 +227,6 @@ wrong = NoRotations(*spruce), Stretched(*spruce), Stiffening(*spruce), Wood(spru
 
 # %%
 from textwrap import fill
-
-from fenics_contact.errors import InvalidInputError
 
 refused = []
 for model in wrong:
@@ -240,7 +246,6 @@ assert len(refused) == 4
 # square exactly. A function of position is interpolated first and gives a little more.
 
 # %%
-from fenics_contact.scene import Ufl
 
 by_form = Pressure("block", "z1", Ufl(lambda x: 2 * (1 + x[0] / 20) ** 2))
 by_nodes = Pressure("block", "z1", lambda x: 2 * (1 + x[:, 0] / 20) ** 2)
@@ -261,11 +266,9 @@ assert abs(forces[0] - 5600 / 3) < 1e-8
 # %%
 from ufl.domain import extract_unique_domain
 
-from fenics_contact.scene import Elasticity, strain
-
 
 @dataclass(frozen=True)
-class Graded(Elasticity):
+class Graded(materials.Elasticity):
     low: float  # Young's modulus at z = 0 and at z = height [N/mm²]
     high: float
     height: float  # mm
@@ -287,7 +290,7 @@ class Graded(Elasticity):
 # %%
 errors = []
 for n in (4, 8, 16):
-    mesh = block((0, 0, 0), (20, 20, 40), (2, 2, n))
+    mesh = gallery.block((0, 0, 0), (20, 20, 40), (2, 2, n))
     scene = on_floor(Graded(1000.0, 3000.0, 40.0), Pressure("block", "z1", 8.0))
     state = solve_scene(scene, MPI.COMM_WORLD, tolerance=1e-10)
     exact = 8.0 * 40 / 2000 * np.log(3)
@@ -304,9 +307,10 @@ assert np.all(np.abs(rates - 2) < 0.1)
 # $\sigma(u) : \varepsilon(v) + k\, u \cdot v$. On such a bed nothing moves for free. The kernel is empty,
 # and a model that inherits the rigid motions is refused:
 
+
 # %%
 @dataclass(frozen=True)
-class Bedded(Elasticity):
+class Bedded(materials.Elasticity):
     young: float  # N/mm²
     bed: float  # N/mm⁴
 
@@ -343,7 +347,7 @@ class Pile(Bedded):
 # contact makes the difference. Nothing but the bed holds it then.
 
 # %%
-mesh, m = block((0, 0, 0), (20, 20, 40), (2, 2, 32)), np.sqrt(1.0 / 1000.0)
+mesh, m = gallery.block((0, 0, 0), (20, 20, 40), (2, 2, 32)), np.sqrt(1.0 / 1000.0)
 for p in (8.0, -8.0):
     scene = on_floor(Pile(1000.0, 1.0), Pressure("block", "z1", p))
     state = solve_scene(scene, MPI.COMM_WORLD, tolerance=1e-9)

@@ -40,25 +40,30 @@
 # The links of notebook 02; link 2 now is pulled by a force of 60 kN and held by contact and friction alone.
 
 # %%
-from fenics_contact.contact import ContactProblem
-from fenics_contact.gallery import LinkShape, two_links
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
     Scene,
+    ShapeProblem,
     Support,
     Surface,
+    SurfaceDesign,
     TotalForce,
+    gallery,
+    materials,
+    minimize,
+    pictures,
 )
+from fenics_contact.design import BundleTrust, ContactForces, LinearConstraints
 
 # %% [markdown]
 # The crowns may touch; the far crown of link 1 is held, that of link 2 pulled.
 
 # %%
-links = two_links(LinkShape(inner_radius=9.6, n_around=72, n_a=3, n_b=10))
-steel = IsotropicElasticity(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
+links = gallery.two_links(gallery.LinkShape(inner_radius=9.6, n_around=72, n_a=3, n_b=10))
+steel = materials.IsotropicElasticity(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
 crowns = Surface("link 2", "contact"), Surface("link 1", "contact")
 scene = Scene(
     bodies={"link 1": Body(links.first.mesh, steel), "link 2": Body(links.second.mesh, steel)},
@@ -75,8 +80,6 @@ scene = Scene(
 
 # %%
 import numpy as np
-
-from fenics_contact.shape import ContactForces
 
 
 def largest_force(contact):
@@ -99,8 +102,6 @@ objective = ContactForces(largest_force)
 # %%
 from mpi4py import MPI
 
-from fenics_contact.shape import ShapeProblem, SurfaceDesign
-
 design = SurfaceDesign("link 1", links.first.crown, net=(5, 3))
 problem = ShapeProblem(ContactProblem(scene, MPI.COMM_WORLD, tolerance=1e-8), design, objective)
 print(f"{problem.size} design variables; the B_k sum up to one: {np.ptp(design.basis.sum(axis=1)):.1e} off")
@@ -109,13 +110,12 @@ print(f"{problem.size} design variables; the B_k sum up to one: {np.ptp(design.b
 # What does a single control point do? Number 4 of 15 moves outwards by 0.3 mm:
 
 # %%
-from fenics_contact.viz import plot_control_net
 
 
 def show(alpha, title):
     before, after = problem.points_of(np.zeros(15))["link 1"], problem.points_of(alpha)["link 1"]
     nets = [design.control_points(before, a) for a in (np.zeros(15), alpha)]
-    return plot_control_net(links.first.crown, (before, after), tuple(nets), title=title, width=1000)
+    return pictures.plot_control_net(links.first.crown, (before, after), tuple(nets), title=title, width=1000)
 
 
 show(0.3 * np.eye(15)[4], "One control point")
@@ -209,7 +209,6 @@ assert abs(forwards - backwards) > 10.0
 # from the start:
 
 # %%
-from fenics_contact.viz import plot_curves
 
 e = -first / np.linalg.norm(first)
 steps = np.linspace(0.0, 0.6, 13)
@@ -219,7 +218,7 @@ for t in (0.0, 0.2, 0.4):
     value, gradient = J(t * e)
     reach = np.array([max(0.0, t - 0.2), t + 0.2])
     tangents[f"plane from {t:g} mm"] = (reach, value + (gradient @ e) * (reach - t))
-plot_curves(
+pictures.plot_curves(
     {"J": (steps, along)}, reference=tangents, connected=True, width=1000,
     xlabel="distance along −g (mm)", ylabel="largest contact force (N)", title="A walk downhill",
 )  # fmt: skip
@@ -236,7 +235,6 @@ plot_curves(
 # model better.
 
 # %%
-from fenics_contact.optimize import BundleTrust, LinearConstraints, minimize
 
 volume, by_alpha = problem.volume(np.zeros(15))
 keep_volume = LinearConstraints(-(S.T @ by_alpha)[None], [0.0])
@@ -267,11 +265,10 @@ assert change > -1e-4
 # The same as a picture:
 
 # %%
-from fenics_contact.viz import plot_convergence
 
 values, kinds = zip(*[(record.value, record.kind.value) for record in result.history], strict=True)
 words = {"label": "largest contact force (N)", "title": "Bundle method"}
-plot_convergence(values, kinds, **words, logarithmic=True, width=1000)
+pictures.plot_convergence(values, kinds, **words, logarithmic=True, width=1000)
 
 # %% [markdown]
 # *Serious steps on the line, null steps beside it. The first null step, too long, is far off (the scale is
@@ -282,10 +279,9 @@ plot_convergence(values, kinds, **words, logarithmic=True, width=1000)
 # The pressure in the same colours:
 
 # %%
-from fenics_contact.viz import plot_contact_pressure
 
 peak = float(state.contact.pressure.max())
-plot_contact_pressure(state, clim=(0.0, peak), reach=6.5, title="Before", width=1000)
+pictures.plot_contact_pressure(state, clim=(0.0, peak), reach=6.5, title="Before", width=1000)
 
 # %% [markdown]
 # *Before: most of the load in the middle.*
@@ -295,7 +291,7 @@ after = problem.state_of(S @ result.x)
 lower = 1 - after.contact.pressure.max() / peak
 print(f"largest pressure {100 * lower:.0f} % lower")
 assert lower > 0.25
-plot_contact_pressure(after, clim=(0.0, peak), reach=6.5, title="After", width=1000)
+pictures.plot_contact_pressure(after, clim=(0.0, peak), reach=6.5, title="After", width=1000)
 
 # %% [markdown]
 # *After: the same load on a larger area, of a more even pressure. And the shape that does it:*

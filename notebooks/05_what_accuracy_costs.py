@@ -32,12 +32,14 @@
 # %%
 from pathlib import Path
 
-from fenics_contact.study import Errors, read_study
+from fenics_contact import (
+    study,
+)
 
 above = (Path.cwd(), *Path.cwd().parents)
 folder = next(path / "docs" / "studies" for path in above if (path / "docs" / "studies").is_dir())
-hertz = read_study(folder / "hertz")
-errors = Errors(hertz)
+hertz = study.read_study(folder / "hertz")
+errors = study.Errors(hertz)
 print(f"{hertz.scene.title}: {len(hertz.good)} runs on {hertz.ranks} rank(s)")
 
 # %% [markdown]
@@ -46,9 +48,8 @@ print(f"{hertz.scene.title}: {len(hertz.good)} runs on {hertz.ranks} rank(s)")
 # The figures need nothing but the stored numbers:
 
 # %% tags=["cover"]
-from fenics_contact.study import figures
 
-figures.plot_accuracy(errors)
+study.figures.plot_accuracy(errors)
 
 # %% [markdown]
 # *Each symbol is a run: further left is faster, further down is better. Along a line only the mesh becomes
@@ -80,7 +81,7 @@ for parameters in (errors.strictest(base), base):
 # smaller, and the studies say so.
 
 # %%
-figures.plot_convergence(errors)
+study.figures.plot_convergence(errors)
 
 # %% [markdown]
 # *The errors over the size of the cells, with measured slopes. The peak pressure is one number at one point
@@ -106,7 +107,7 @@ for quantity in hertz.scene.quantities:
 # mesh. A case with friction, the cylinders of Cattaneo and Mindlin:
 
 # %%
-figures.plot_parts(Errors(read_study(folder / "cattaneo_mindlin")))
+study.figures.plot_parts(study.Errors(study.read_study(folder / "cattaneo_mindlin")))
 
 # %% [markdown]
 # *Above the parts, below their shares; left over the mesh with the balanced tolerance, right over the
@@ -131,16 +132,15 @@ assert min(ratios) >= 1.0 - 1e-2  # the exact solution is known to some digits o
 # stricter reach the accuracy, too: an error that passes through zero is no merit.
 
 # %%
-from fenics_contact.study import accuracy_table, cost_table
 
-print(accuracy_table(errors, targets=(0.05, 0.01)))
+print(study.accuracy_table(errors, targets=(0.05, 0.01)))
 
 # %% [markdown]
 # What a setting costs, beside a run that differs from it in this setting alone, on the finest mesh that both
 # have. Ratios above one are dearer:
 
 # %%
-for line in cost_table(errors).splitlines():
+for line in study.cost_table(errors).splitlines():
     print("|".join(line.split("|")[:9]))
 
 # %% [markdown]
@@ -153,9 +153,6 @@ for line in cost_table(errors).splitlines():
 
 # %%
 BUILD = """
-from fenics_contact.gallery import rectangle
-from fenics_contact.scene import Body, ContactPair, PlaneStress, RigidPlane, Scene, Support, Surface, Traction
-from fenics_contact.study import BALANCED, Parameters, Problem, Quantity, StudyScene, Sweep
 
 def build(parameters, comm):
     mesh = rectangle((0.0, 0.0), (1.0, 1.0), (parameters.size, parameters.size), parameters.cell)
@@ -184,19 +181,20 @@ study = StudyScene(
 # Six runs in six processes, each once:
 
 # %%
-from fenics_contact.study import Settings, run_study, write_report
 
 output = Path("output/notebooks/plate")
 output.mkdir(parents=True, exist_ok=True)
 (output / "plate.py").write_text(BUILD + STUDY)
-plate = run_study(str(output / "plate.py"), output / "runs", settings=Settings(repeats=1))
-print(write_report(output, plate).split("\n\n")[1])
+plate = study.run_study(str(output / "plate.py"), output / "runs", settings=study.Settings(repeats=1))
+print(study.write_report(output, plate).split("\n\n")[1])
 
 # %% [markdown]
 # The mesh represents this solution exactly: only the tolerance is left to err.
 
 # %%
-worst = max(Errors(plate).of(run, "shortening") for run in plate.good if run.parameters.tolerance == 1e-8)
+worst = max(
+    study.Errors(plate).of(run, "shortening") for run in plate.good if run.parameters.tolerance == 1e-8
+)
 print(f"largest error at a tolerance of 1e-8: {worst:.1e}")
 assert len(plate.good) == len(plate.runs) == 6
 assert worst < 1e-6

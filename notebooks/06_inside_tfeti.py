@@ -31,23 +31,29 @@
 # into three subdomains, the upper one into two times two.
 
 # %%
-from fenics_contact.gallery import rectangle
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    PlaneStrain,
     Scene,
+    Status,
     Support,
     Surface,
     TotalForce,
+    Traction,
+    box_partition,
+    feti,
+    gallery,
+    materials,
+    pictures,
+    qp,
+    solve_scene,
 )
 
 # %%
-steel = PlaneStrain(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
-lower = rectangle((0, 0), (60, 20), (24, 8))  # mm, cells
-upper = rectangle((10, 20), (50, 40), (20, 10))
+steel = materials.PlaneStrain(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
+lower = gallery.rectangle((0, 0), (60, 20), (24, 8))  # mm, cells
+upper = gallery.rectangle((10, 20), (50, 40), (20, 10))
 scene = Scene(
     bodies={"lower": Body(lower, steel), "upper": Body(upper, steel)},
     supports=[Support("lower", "y0", (0.0, 0.0))],
@@ -60,9 +66,8 @@ partitions = {"lower": box_partition(lower, (3, 1)), "upper": box_partition(uppe
 # The picture shrinks the subdomains a little, to show where they are torn.
 
 # %%
-from fenics_contact.viz import plot_decomposition
 
-plot_decomposition(scene, partitions, explode=0.12, width=800)
+pictures.plot_decomposition(scene, partitions, explode=0.12, width=800)
 
 # %% [markdown]
 # *Seven subdomains. A node on a cut has a copy in each of its subdomains.*
@@ -75,10 +80,8 @@ plot_decomposition(scene, partitions, explode=0.12, width=800)
 # %%
 from mpi4py import MPI
 
-from fenics_contact.feti import DualSystem, build_torn_system, decompose
-
-decomposition = decompose(scene, partitions, MPI.COMM_WORLD)
-torn = build_torn_system(scene, decomposition)
+decomposition = feti.decompose(scene, partitions, MPI.COMM_WORLD)
+torn = feti.build_torn_system(scene, decomposition)
 whole = sum(body.mesh.points.size for body in scene.bodies.values())
 print(f"{whole} displacements before tearing, {decomposition.torn_unknowns} after")
 print(f"rows of B: {torn.n_equality} for gluing and supports, {torn.points.count} normal, as many tangential")
@@ -157,7 +160,7 @@ assert np.allclose((B_E @ B_E.T).toarray(), np.eye(torn.n_gluing), atol=1e-12)
 # %%
 import scipy.sparse as sp
 
-dual = DualSystem(torn)
+dual = feti.DualSystem(torn)
 K = sp.block_diag([part.stiffness for part in torn.subdomains], format="csr")
 R, G = dual.kernel, dual.problem.coarse.matrix.toarray()
 force = K @ np.random.default_rng(1).standard_normal(K.shape[0])  # some force in equilibrium, K v
@@ -212,7 +215,6 @@ assert np.linalg.eigvalsh(F)[0] > -1e-12 * np.abs(F).max()
 # shows at its boundary. Here are the eigenvalues on the range of $P$, where the iteration lives:
 
 # %%
-from fenics_contact.viz import plot_curves
 
 
 def spectrum(A):
@@ -226,7 +228,7 @@ for name, values in spectra.items():
 curves = {name: (np.arange(1, len(values) + 1), values) for name, values in spectra.items()}
 labels = {"xlabel": "number of the eigenvalue", "ylabel": "eigenvalue / smallest"}
 assert spectra["P M P F P"][-1] < 0.3 * spectra["P F P"][-1]
-plot_curves(curves, **labels, logarithmic=True, title="What conjugate gradients see", width=900)
+pictures.plot_curves(curves, **labels, logarithmic=True, title="What conjugate gradients see", width=900)
 
 # %% [markdown]
 # *With the preconditioner nearly all eigenvalues are one.*
@@ -240,18 +242,17 @@ plot_curves(curves, **labels, logarithmic=True, title="What conjugate gradients 
 # %%
 from dataclasses import replace
 
-from fenics_contact.qp import ProjectedCG, solve
-from fenics_contact.scene import Traction
-
 
 def products(material, n, cells=4, preconditioned=True):
-    mesh = rectangle((0, 0), (10.0 * n, 10.0 * n), (cells * n, cells * n))
+    mesh = gallery.rectangle((0, 0), (10.0 * n, 10.0 * n), (cells * n, cells * n))
     supports, loads = [Support("plate", "x0", (0.0, 0.0))], [Traction("plate", "x1", (0.0, -1.0))]
     plate = Scene({"plate": Body(mesh, material)}, supports, loads)
     cut = {"plate": box_partition(mesh, (n, n))}
-    problem = DualSystem(build_torn_system(plate, decompose(plate, cut, MPI.COMM_WORLD))).problem
+    problem = feti.DualSystem(
+        feti.build_torn_system(plate, feti.decompose(plate, cut, MPI.COMM_WORLD))
+    ).problem
     problem = problem if preconditioned else replace(problem, preconditioner=None)
-    return solve(problem, None, ProjectedCG(tolerance=1e-8)).products
+    return qp.solve(problem, None, qp.ProjectedCG(tolerance=1e-8)).products
 
 
 # %% [markdown]
@@ -263,7 +264,7 @@ def products(material, n, cells=4, preconditioned=True):
 import ufl
 
 
-class Bedded(PlaneStrain):
+class Bedded(materials.PlaneStrain):
     def stiffness(self, u, v, parameters):
         return super().stiffness(u, v, parameters) + 1e-3 * ufl.inner(u, v)  # N/mm⁴
 
@@ -287,7 +288,7 @@ assert max(needed["coarse space and preconditioner"]) < 20
 assert needed["preconditioner only"][-1] > 5 * needed["coarse space and preconditioner"][-1]
 labels = {"xlabel": "subdomains", "ylabel": "products with F", "title": "More subdomains of one size"}
 curves = {name: (counts**2, found) for name, found in needed.items()}
-plot_curves(curves, **labels, connected=True, logarithmic=True, width=1000)
+pictures.plot_curves(curves, **labels, connected=True, logarithmic=True, width=1000)
 
 # %% [markdown]
 # *With the coarse space the number of products is bounded, whatever the number of subdomains is: this is
@@ -311,7 +312,7 @@ assert larger["preconditioned"][-1] < 2.5 * larger["preconditioned"][0]
 assert larger["not preconditioned"][-1] > 2.5 * larger["preconditioned"][-1]
 curves = {name: (cells, found) for name, found in larger.items()}
 labels = {"xlabel": "cells along a subdomain, H/h", "ylabel": "products with F", "title": "Larger subdomains"}
-plot_curves(curves, **labels, connected=True, width=900)
+pictures.plot_curves(curves, **labels, connected=True, width=900)
 
 # %% [markdown]
 # *From 2 to 32 cells a side the preconditioned iteration needs twice as many products, on a mesh with 256
@@ -325,7 +326,6 @@ plot_curves(curves, **labels, connected=True, width=900)
 # with the guess.
 
 # %%
-from fenics_contact.contact import Status, solve_scene
 
 state = solve_scene(scene, MPI.COMM_WORLD, partitions=partitions, tolerance=1e-10)
 print("step  products  closed  stick  slip  residual")
@@ -341,9 +341,8 @@ assert state.contact.count(Status.OPEN) > 0
 # answer as a picture:
 
 # %%
-from fenics_contact.viz import plot_contact_pressure
 
-plot_contact_pressure(state, width=900)
+pictures.plot_contact_pressure(state, width=900)
 
 # %% [markdown]
 # *Above the pressure, zero where the block has lifted; below the friction traction between its bounds ± μ

@@ -36,11 +36,28 @@ from dataclasses import dataclass
 
 import ufl
 
-from fenics_contact.scene import Hyperelasticity
+from fenics_contact import (
+    Body,
+    ContactPair,
+    ContactProblem,
+    Coulomb,
+    LoadStep,
+    MovingObstacle,
+    NewtonSteps,
+    RigidSphere,
+    Scene,
+    Support,
+    Surface,
+    gallery,
+    materials,
+    pictures,
+    solve_scene,
+    solve_steps,
+)
 
 
 @dataclass(frozen=True)
-class Yeoh(Hyperelasticity):
+class Yeoh(materials.Hyperelasticity):
     constants: tuple[float, float, float]  # c₁, c₃, κ [N/mm²]
 
     @property
@@ -61,12 +78,8 @@ class Yeoh(Hyperelasticity):
 # %%
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.gallery import rectangle
-from fenics_contact.scene import Body, Scene, Support
-
 rubber = Yeoh((0.5, 0.02, 5.0))
-square = rectangle((0.0, 0.0), (1.0, 1.0), (4, 4))
+square = gallery.rectangle((0.0, 0.0), (1.0, 1.0), (4, 4))
 held = [Support("square", "x0", (0.0, None)), Support("square", "y0", (None, 0.0))]
 pressed = Support("square", "y1", (None, -1 / 3))
 state = solve_scene(Scene({"square": Body(square, rubber)}, [*held, pressed]), MPI.COMM_WORLD)
@@ -100,10 +113,8 @@ assert abs(force / exact - 1) < 1e-5
 # %%
 from dataclasses import replace
 
-from fenics_contact.scene import ContactPair, Coulomb, LoadStep, Surface
-
-bed = rectangle((0.0, 0.0), (6.0, 3.0), (24, 12))
-slider = rectangle((1.0, 3.0), (2.2, 4.0), (8, 6))
+bed = gallery.rectangle((0.0, 0.0), (6.0, 3.0), (24, 12))
+slider = gallery.rectangle((1.0, 3.0), (2.2, 4.0), (8, 6))
 x, y = slider.points.T
 rim = 3.0 + 0.3 * (x - 1.6) ** 2
 slider = replace(slider, points=np.column_stack([x, rim + (4.0 - rim) * (y - 3.0)]))
@@ -119,7 +130,6 @@ def moved(right, down):
 # A tenth of the bed's height down, a millimetre to the right: over several facets.
 
 # %%
-from fenics_contact.contact import ContactProblem, solve_steps
 
 way = [(0.0, 0.15), (0.0, 0.3), *((right, 0.3) for right in (0.25, 0.5, 0.75, 1.0))]
 steps = [LoadStep(f"{right} mm right, {down} mm down", supports=moved(right, down)) for right, down in way]
@@ -135,9 +145,8 @@ assert abs(pull / push + 0.3) < 0.02
 # surface, which is not level.
 
 # %% tags=["cover"]
-from fenics_contact.viz import plot_stress
 
-plot_stress(states[-1], title="Drawn by 1 mm", scale=1.0, width=1000)
+pictures.plot_stress(states[-1], title="Drawn by 1 mm", scale=1.0, width=1000)
 
 # %% [markdown]
 # *The slider on its way, in true scale: the bed gives way below it, and rises behind and before it.*
@@ -148,7 +157,6 @@ plot_stress(states[-1], title="Drawn by 1 mm", scale=1.0, width=1000)
 # step: near the end each is much smaller than the one before.
 
 # %%
-from fenics_contact.contact import NewtonSteps
 
 newton = NewtonSteps.of(states)
 for step, residuals in zip(steps, newton.residuals, strict=True):
@@ -175,12 +183,10 @@ assert abs(work - stored - after.energies.friction) < 0.05 * work
 # `MovingObstacle` moves the disc by a function of time.
 
 # %%
-from fenics_contact.gallery import growing_ticks, rectangle_lattice
-from fenics_contact.scene import FinitePlasticity, MovingObstacle, RigidSphere
 
-along = np.append(np.linspace(0.0, 1.0, 11), 1.0 + growing_ticks(11.0, 0.14, 1.3)[1:])
-plate = rectangle_lattice([along, -growing_ticks(12.0, 0.1, 1.25)[::-1]])
-metal = FinitePlasticity(2.1e5, 0.3, yield_stress=300.0, isotropic_hardening=1000.0)
+along = np.append(np.linspace(0.0, 1.0, 11), 1.0 + gallery.growing_ticks(11.0, 0.14, 1.3)[1:])
+plate = gallery.rectangle_lattice([along, -gallery.growing_ticks(12.0, 0.1, 1.25)[::-1]])
+metal = materials.FinitePlasticity(2.1e5, 0.3, yield_stress=300.0, isotropic_hardening=1000.0)
 disc = RigidSphere((0.0, 5.0), 5.0)
 held = [Support("plate", "x0", (0.0, None)), Support("plate", "y0", (None, 0.0))]
 
@@ -197,14 +203,13 @@ times += [2.6, 2.7, 2.8, 2.85, 2.9, 2.95, 3.0, 3.05, 3.1, 3.15, 3.2, 3.3, 3.4]
 # The force against the depth: on the first way in metal flows, on all others hardly.
 
 # %%
-from fenics_contact.viz import plot_curves
 
 pressing = ContactProblem(Scene({"plate": Body(plate, metal)}, held, contacts=[pair]), MPI.COMM_WORLD)
 cycle = solve_steps(pressing, [LoadStep(f"{time}", time=time) for time in times])
 sunk = np.array([depth(time) for time in times])
 force = np.array([-2 * state.contact.force[:, 1].sum() for state in cycle])
 first, second = slice(0, 11), slice(11, None)
-plot_curves(
+pictures.plot_curves(
     {"first": (sunk[first], force[first]), "second": (sunk[second], force[second])},
     xlabel="depth (mm)", ylabel="force (N/mm)", title="A disc in metal, twice", connected=True, width=1000,
 )  # fmt: skip
@@ -226,7 +231,7 @@ assert abs(peaks[1] / peaks[0] - 1) < 0.02
 # *Under the imprint* there is stress that no load causes:
 
 # %%
-plot_stress(cycle[-1], title="Stress that stays", scale=1.0, width=800)
+pictures.plot_stress(cycle[-1], title="Stress that stays", scale=1.0, width=800)
 
 # %% [markdown]
 # *Metal around the imprint has flowed and no longer fits; the rest holds it.*
@@ -237,10 +242,9 @@ plot_stress(cycle[-1], title="Stress that stays", scale=1.0, width=800)
 # with $F$ is one solve in all subdomains; tangents are factored once a Newton step.
 
 # %%
-from fenics_contact.scene import PlaneStrain
 
 linear = {
-    name: Body(body.mesh, PlaneStrain(9 * k * g / (3 * k + g), (3 * k - 2 * g) / (6 * k + 2 * g)))
+    name: Body(body.mesh, materials.PlaneStrain(9 * k * g / (3 * k + g), (3 * k - 2 * g) / (6 * k + 2 * g)))
     for (name, body), (k, g) in zip(bodies.items(), ((5.0, 1.0), (50.0, 10.0)), strict=True)
 }
 small = solve_scene(Scene(linear, moved(0.0, 0.15), contacts=[rubbing]), MPI.COMM_WORLD, tolerance=1e-8)

@@ -32,7 +32,7 @@ from nbclient.exceptions import CellExecutionError
 from nbconvert import HTMLExporter
 from nbformat import NotebookNode
 
-from fenics_contact.io.replacing import replacing
+from fenics_contact.output.files import replacing
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent

@@ -59,12 +59,11 @@ run 2 ".venv/bin/fenics-contact run $mine/my_blocks.toml"
 say '## A scene of your own in Python' 'The fifteen lines of the front page as `first.py`, with numbers printed at the end:'
 file first.py python <<'PYTHON'
 from mpi4py import MPI
-from fenics_contact.contact import Status, solve_scene
+from fenics_contact import Status, solve_scene
 from fenics_contact.gallery import block
-from fenics_contact.scene import (
-    Body, ContactPair, Coulomb, IsotropicElasticity, RigidPlane, Scene, Support, Surface, Traction,
-)
-from fenics_contact.viz import plot_contact_pressure
+from fenics_contact import Body, ContactPair, Coulomb, RigidPlane, Scene, Support, Surface, Traction
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.pictures import plot_contact_pressure
 
 mesh = block((0, 0, 0), (2, 1, 1), (32, 16, 16))                    # mm
 scene = Scene(

@@ -31,6 +31,6 @@ set +a
 export PYTHONPATH=$root${PYTHONPATH:+:$PYTHONPATH} # so that a Python without the package installed finds it too
 
 # What MPI has left in the environment of the caller would make mpirun fail.
-start=$("$python" -P "$root/fenics_contact/launching.py" "$ranks") || exit 2
+start=$("$python" -P "$root/fenics_contact/_base/launching.py" "$ranks") || exit 2
 mapfile -t start <<<"$start"
 exec "${start[@]}" "$python" "$@"

@@ -11,14 +11,13 @@ from mpi4py import MPI
 
 from benchmarks.cases.measuring import nodal_forces, state_record
 from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, PAPER_BOXES, PAPER_CELLS, Counts
-from fenics_contact.contact import AnyState, solve_scene
+from fenics_contact import BodyMesh, PhaseTimer, box_partition, solve_scene
 from fenics_contact.errors import FenicsContactError
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import bisection_partition, box_partition
+from fenics_contact.mesh import bisection_partition
 from fenics_contact.qp import FaceNewton
+from fenics_contact.results.deformed_state import AnyState
+from fenics_contact.study.measuring import slowest
 from fenics_contact.study.scenes.chain_links import chain, graded_links
-from fenics_contact.study.solving import slowest
-from fenics_contact.timing import PhaseTimer
 
 
 def cold_state(

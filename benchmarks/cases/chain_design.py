@@ -5,10 +5,9 @@ from __future__ import annotations
 from mpi4py import MPI
 
 from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, PAPER_BOXES, PAPER_CELLS, Counts
-from fenics_contact.contact import ContactProblem
+from fenics_contact import ContactProblem, ShapeProblem, SurfaceDesign, box_partition
+from fenics_contact.design import AdaptiveTolerance, Objective, TotalPotential
 from fenics_contact.gallery import TwoLinks
-from fenics_contact.partition import box_partition
-from fenics_contact.shape import AdaptiveTolerance, Objective, ShapeProblem, SurfaceDesign, TotalPotential
 from fenics_contact.study.scenes.chain_links import chain, graded_links
 
 #: Largest displacement of a control point, [mm].

@@ -11,8 +11,8 @@ from mpi4py import MPI
 
 from benchmarks.cases.chain import cold_state
 from benchmarks.cases.chain_design import BOUND, chain_shape_problem
-from fenics_contact.shape import ShapeProblem
-from fenics_contact.study.solving import slowest
+from fenics_contact import ShapeProblem
+from fenics_contact.study.measuring import slowest
 
 #: Largest change of a control point from one design to the next, [mm]: as in the middle of an optimisation.
 STEP = 0.05

@@ -10,25 +10,29 @@ import numpy as np
 from mpi4py import MPI
 
 from benchmarks.cases.measuring import state_record
-from fenics_contact.contact import ContactProblem, State, solve_scene
-from fenics_contact.gallery import DesignSurface, block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
+    BodyMesh,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    Friction,
-    IsotropicElasticity,
     Scene,
+    ShapeProblem,
+    State,
     Support,
     Surface,
+    SurfaceDesign,
     ThermalStrain,
     Tresca,
+    box_partition,
+    solve_scene,
 )
-from fenics_contact.shape import ShapeProblem, SurfaceDesign, TotalPotential
-from fenics_contact.study.solving import slowest
+from fenics_contact._scene.pairs import Friction
+from fenics_contact.design import TotalPotential
+from fenics_contact.gallery import DesignSurface, block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.study.measuring import slowest
 
 CELLS, BOXES = 24, 4
 PRESSED, SHEARED, HEAT, WEIGHT = -0.004, 0.006, 10.0, -50.0

@@ -9,9 +9,8 @@ from mpi4py import MPI
 
 from benchmarks.cases.measuring import state_record
 from benchmarks.cases.scenes import block_mesh, block_on_plane
-from fenics_contact.contact import solve_scene
-from fenics_contact.partition import box_partition
-from fenics_contact.study.solving import slowest
+from fenics_contact import box_partition, solve_scene
+from fenics_contact.study.measuring import slowest
 
 #: Total potential and closed nodes by an independent active-set solver.
 TOTAL_POTENTIAL, CLOSED = -6.69653417522873e-3, 401

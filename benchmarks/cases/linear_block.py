@@ -10,7 +10,7 @@ from mpi4py import MPI
 from benchmarks.cases.monolithic.elasticity import assemble_block
 from benchmarks.cases.monolithic.linear import solve_linear
 from benchmarks.cases.scene_data import Counts
-from fenics_contact.study.solving import slowest
+from fenics_contact.study.measuring import slowest
 
 
 def measure(comm: MPI.Comm, counts: Counts, solver: str) -> dict[str, Any]:

@@ -12,9 +12,14 @@ from mpi4py import MPI
 
 from benchmarks.cases.chain import cold_state
 from benchmarks.cases.measuring import state_record
-from fenics_contact.contact import LinearState, as_linear
-from fenics_contact.qp import CountedOperator, FaceSystems, Stop, classify, contact_step, projected_cg
-from fenics_contact.qp.forcing import residual_weights
+from fenics_contact.qp import Stop
+from fenics_contact.qp.face import classify
+from fenics_contact.qp.face_system import FaceSystems
+from fenics_contact.qp.krylov import projected_cg
+from fenics_contact.qp.newton_steps import residual_weights
+from fenics_contact.qp.problem import CountedOperator
+from fenics_contact.qp.solution import contact_step
+from fenics_contact.results.linear_state import LinearState, as_linear
 
 MAX_ITERATIONS = 2000
 

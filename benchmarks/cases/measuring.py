@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.contact import State, Status
+from fenics_contact import State, Status
 
 
 def state_record(state: State) -> dict[str, Any]:

@@ -11,19 +11,20 @@ import numpy as np
 from mpi4py import MPI
 
 from benchmarks.cases.measuring import state_record
-from fenics_contact.contact import solve_scene
-from fenics_contact.gallery import block, box_lattice, extrude, hemisphere, rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
     Scene,
     Support,
     Surface,
     TotalForce,
+    solve_scene,
 )
+from fenics_contact.gallery import block, box_lattice, hemisphere, rectangle
+from fenics_contact.gallery.blocks import extrude
+from fenics_contact.materials import IsotropicElasticity
 
 #: Cells of both bodies by scene, of each of three meshes.
 MESHES = {

@@ -7,20 +7,22 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.gallery import box_lattice, growing_ticks, side_of
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
-    IsotropicElasticity,
+    ContactProblem,
     RigidPlane,
     RigidSurface,
     Scene,
+    ShapeProblem,
     Support,
     Surface,
+    SurfaceDesign,
 )
-from fenics_contact.shape import AdaptiveTolerance, LargestPressure, ShapeProblem, SurfaceDesign
+from fenics_contact.design import AdaptiveTolerance, LargestPressure
+from fenics_contact.gallery import box_lattice, growing_ticks, side_of
+from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.theory import contact_modulus, hertz_line
 
 #: Radius, Hertz's half width and length of the roller, [mm].

@@ -11,19 +11,9 @@ from benchmarks.cases.scene_data import (
     YOUNG_MODULUS,
     Counts,
 )
+from fenics_contact import Body, BodyMesh, ContactPair, Coulomb, RigidPlane, Scene, Support, Surface, Traction
 from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    IsotropicElasticity,
-    RigidPlane,
-    Scene,
-    Support,
-    Surface,
-    Traction,
-)
+from fenics_contact.materials import IsotropicElasticity
 
 
 def block_mesh(counts: Counts) -> BodyMesh:

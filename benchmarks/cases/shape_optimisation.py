@@ -9,8 +9,9 @@ import numpy as np
 from mpi4py import MPI
 
 from benchmarks.cases.chain_design import BOUND, chain_shape_problem
-from fenics_contact.optimize import BundleTrust, LinearConstraints, minimize
-from fenics_contact.study.solving import slowest
+from fenics_contact import minimize
+from fenics_contact.design import BundleTrust, LinearConstraints
+from fenics_contact.study.measuring import slowest
 
 
 def measure(comm: MPI.Comm) -> dict[str, Any]:

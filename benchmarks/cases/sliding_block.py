@@ -10,10 +10,9 @@ from mpi4py import MPI
 from benchmarks.cases.measuring import nodal_forces, state_record
 from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, Counts
 from benchmarks.cases.scenes import block_mesh, block_on_plane
-from fenics_contact.contact import solve_scene
-from fenics_contact.partition import box_partition
+from fenics_contact import box_partition, solve_scene
 from fenics_contact.qp import FaceNewton
-from fenics_contact.study.solving import slowest
+from fenics_contact.study.measuring import slowest
 
 
 def measure(

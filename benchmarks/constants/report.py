@@ -10,9 +10,9 @@ from typing import Any
 
 from benchmarks.constants.listed import NOT_RUN, Constant, constants
 from benchmarks.study import ROOT, Records, Study, filled, unfilled
-from fenics_contact.io import write_json, write_text
+from fenics_contact.output import write_json, write_text
+from fenics_contact.study.report import table
 from fenics_contact.study.runner import Job
-from fenics_contact.study.tables import table
 
 HOME, NAME = ROOT / "docs" / "studies", "constants"
 #: Differences below this are rounding.

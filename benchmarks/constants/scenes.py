@@ -10,48 +10,51 @@ import numpy as np
 import scipy.optimize
 from mpi4py import MPI
 
-from fenics_contact.accuracy import BalancedTolerance
-from fenics_contact.contact import (
-    AnyState,
-    ContactProblem,
-    ContactResult,
-    FixedPoint,
-    as_linear,
-    contact_area,
-    solve_scene,
-    solve_steps,
-)
-from fenics_contact.gallery import DesignSurface, block, box_lattice, hemisphere, rectangle
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.optimize import BundleTrust, ForScipy, LinearConstraints, minimize
-from fenics_contact.partition import bisection_partition, graph_partition
-from fenics_contact.qp import DualSolver, FaceNewton, Smalse
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
+    ContactProblem,
     Coulomb,
     DistanceObstacle,
-    Friction,
-    IsotropicElasticity,
+    FixedPoint,
     LoadStep,
-    NeoHooke,
-    OrthotropicElasticity,
-    PlaneStrain,
-    RigidObstacle,
     RigidPlane,
     RigidSphere,
     Scene,
+    ShapeProblem,
     Support,
     Surface,
+    SurfaceDesign,
     ThermalStrain,
     Tie,
     TotalForce,
     Traction,
     Tresca,
+    contact_area,
+    minimize,
+    solve_scene,
+    solve_steps,
 )
-from fenics_contact.shape import AdaptiveTolerance, ContactForces, ShapeProblem, SurfaceDesign, TotalPotential
+from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact._scene.pairs import Friction
+from fenics_contact.design import (
+    AdaptiveTolerance,
+    BundleTrust,
+    ContactForces,
+    ForScipy,
+    LinearConstraints,
+    TotalPotential,
+)
+from fenics_contact.gallery import DesignSurface, block, box_lattice, hemisphere, rectangle
+from fenics_contact.materials import IsotropicElasticity, NeoHooke, OrthotropicElasticity, PlaneStrain
+from fenics_contact.mesh import bisection_partition, graph_partition, quadratic
+from fenics_contact.qp import DualSolver, FaceNewton, Smalse
+from fenics_contact.results import BalancedTolerance, ContactResult
+from fenics_contact.results.deformed_state import AnyState
+from fenics_contact.results.linear_state import as_linear
+from fenics_contact.shapes import Parametric, Profile
 from fenics_contact.study.scenes.chain_links import chain, graded_links
-from fenics_contact.surface_shapes import Parametric, Profile
 
 #: Tolerance of states where it is not balanced: the solvers' own.
 TOLERANCE = 1e-6
@@ -109,9 +112,11 @@ def _two_blocks(friction: Friction, cell: str, pair: dict[str, Any]) -> Scene:
         {"lower": Body(lower, STIFF), "upper": Body(upper, SOFT)},
         [Support("lower", "z0")],
         [Traction("upper", "z1", (0.6, 0.12, -2.0))],
-        [ContactPair(
-            Surface("upper", "z0"), Surface("lower", "z1"), friction, **{"discretisation": "node", **pair}
-        )],
+        [
+            ContactPair(
+                Surface("upper", "z0"), Surface("lower", "z1"), friction, **{"discretisation": "node", **pair}
+            )
+        ],
     )
 
 

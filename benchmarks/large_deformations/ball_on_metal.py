@@ -13,11 +13,21 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
+from fenics_contact import (
+    AutomaticSteps,
+    Body,
+    BodyMesh,
+    ContactPair,
+    RigidPlane,
+    Scene,
+    Support,
+    Surface,
+    TangentNewton,
+    solve_scene,
+)
 from fenics_contact.gallery import box_lattice, growing_ticks
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
-from fenics_contact.scene import Body, ContactPair, J2Plasticity, RigidPlane, Scene, Support, Surface
+from fenics_contact.materials import J2Plasticity
+from fenics_contact.mesh import quadratic
 
 #: Edge of the region of equal cells below the ball; the radius of contact is 0.11.
 REACH = 0.1

@@ -9,23 +9,23 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, LoadSequence, solve_scene
-from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
+    LoadSequence,
     LoadStep,
-    Material,
-    NeoHooke,
     RigidPlane,
     Scene,
     Support,
     Surface,
+    box_partition,
+    solve_scene,
 )
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity, Material, NeoHooke
 
 #: Displacements (x, z) of the upper side at the ends of load steps, and the friction below, by what is done.
 WAYS = {

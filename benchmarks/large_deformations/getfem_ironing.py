@@ -25,7 +25,7 @@ from benchmarks.large_deformations.ironing_meshes import (
     die,
     place,
 )
-from fenics_contact.mesh import BodyMesh
+from fenics_contact import BodyMesh
 
 #: Displacement of the die's upper side by time.
 Place: TypeAlias = Callable[[float], tuple[float, float]]

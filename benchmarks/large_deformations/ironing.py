@@ -20,19 +20,20 @@ from benchmarks.large_deformations.ironing_meshes import (
     die,
     place,
 )
-from fenics_contact.contact import ContactProblem, LoadSequence
-from fenics_contact.nonlinear import AutomaticSteps
-from fenics_contact.scene import (
+from fenics_contact import (
+    AutomaticSteps,
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    Discretisation,
+    LoadSequence,
     LoadStep,
-    NeoHooke,
     Scene,
     Support,
     Surface,
 )
+from fenics_contact._scene.pairs import Discretisation
+from fenics_contact.materials import NeoHooke
 
 #: Between two times the die moves by up to two facets in a part, each a step of friction of its own.
 PARTS = AutomaticSteps(finer_history=True)

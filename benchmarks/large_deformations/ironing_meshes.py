@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from fenics_contact import BodyMesh
 from fenics_contact.gallery import growing_ticks, rectangle, rectangle_lattice
-from fenics_contact.mesh import BodyMesh
 
 #: Young's moduli of bed and die, [N/mm²], Poisson's ratio of both, coefficient of friction.
 SOFT, HARD, RATIO, FRICTION = 689.6, 6896.0, 0.32, 0.3

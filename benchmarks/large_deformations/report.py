@@ -13,10 +13,10 @@ from benchmarks.large_deformations.ironing_meshes import TIMES
 from benchmarks.large_deformations.rounded_meshes import DIES
 from benchmarks.large_deformations.twisting import COLUMNS, PUBLISHED
 from benchmarks.study import ROOT, Records, Study, filled, found
-from fenics_contact.io import write_json, write_text
-from fenics_contact.study.richardson import extrapolate
+from fenics_contact.output import write_json, write_text
+from fenics_contact.study.report import table
+from fenics_contact.study.results import extrapolate
 from fenics_contact.study.runner import Job
-from fenics_contact.study.tables import table
 
 HOME, NAME = ROOT / "docs" / "studies", "large_deformations"
 #: Cells along the region of equal cells below the ball, by their order and whether dilatations are means.

@@ -9,18 +9,19 @@ from mpi4py import MPI
 
 from benchmarks.large_deformations.ironing_meshes import FRICTION, RATIO, SOFT, bed
 from benchmarks.large_deformations.rounded_meshes import DIES, place, recorded, round_die, times
-from fenics_contact.contact import ContactProblem, LoadSequence
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    Discretisation,
+    LoadSequence,
     LoadStep,
-    NeoHooke,
     Scene,
     Support,
     Surface,
 )
+from fenics_contact._scene.pairs import Discretisation
+from fenics_contact.materials import NeoHooke
 
 
 def rounded(columns: int, die: str, discretisation: Discretisation) -> Scene:

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.large_deformations.ironing_meshes import HARD, SOFT
+from fenics_contact import BodyMesh
 from fenics_contact.gallery import rectangle
-from fenics_contact.mesh import BodyMesh
 
 #: Radius of the die's underside, its way down and then along.
 RADIUS, DEPTH, ALONG = 1.5, 0.4, 1.0

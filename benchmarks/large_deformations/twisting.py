@@ -13,22 +13,24 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, LoadSequence
-from fenics_contact.gallery import box_lattice, growing_ticks
-from fenics_contact.mesh import BodyMesh, boundary_faces
-from fenics_contact.nonlinear import AutomaticSteps
-from fenics_contact.scene import (
+from fenics_contact import (
+    AutomaticSteps,
     Body,
+    BodyMesh,
     ContactPair,
+    ContactProblem,
     Coulomb,
+    LoadSequence,
     LoadStep,
-    NeoHooke,
     RigidSurface,
     Scene,
     Support,
     Surface,
 )
-from fenics_contact.surface_shapes import Sphere
+from fenics_contact.gallery import box_lattice, growing_ticks
+from fenics_contact.materials import NeoHooke
+from fenics_contact.mesh import boundary_faces
+from fenics_contact.shapes import Sphere
 
 #: Edge of the block, radii of the half sphere, and how deep it is pressed in, [length].
 EDGE, OUTER, INNER, DEPTH = 2.0, 1.0, 2.0 / 3.0, 1.0

@@ -10,8 +10,8 @@ import numpy as np
 from mpi4py import MPI
 
 from benchmarks.cases.chain_design import BOUND, chain_shape_problem
-from fenics_contact.optimize import BundleTrust, LinearConstraints, Result, minimize
-from fenics_contact.shape import AdaptiveTolerance, DesignPoint, ShapeProblem
+from fenics_contact import ShapeProblem, minimize
+from fenics_contact.design import AdaptiveTolerance, BundleTrust, DesignPoint, LinearConstraints, Result
 from fenics_contact.study.scenes.chain_links import GRADING
 
 #: What everything is compared with.

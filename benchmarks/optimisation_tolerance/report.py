@@ -13,9 +13,9 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 from benchmarks.study import ROOT, Records, Study, filled, found, unfilled
-from fenics_contact.io import versions, write_json, write_text
+from fenics_contact.output import versions, write_json, write_text
+from fenics_contact.study.report import table
 from fenics_contact.study.runner import Job
-from fenics_contact.study.tables import table
 
 ORANGE, BLUE, GREEN = "#f58518", "#4c78a8", "#54a24b"
 #: What the adaptive runs are compared with.

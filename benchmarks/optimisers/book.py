@@ -12,10 +12,17 @@ from mpi4py import MPI
 
 from benchmarks.cases.chain_design import chain_shape_problem
 from benchmarks.cases.roller_design import RELIEF, roller_shape_problem
-from fenics_contact.contact import ContactResult, State
+from fenics_contact import ShapeProblem, State
+from fenics_contact.design import (
+    AdaptiveTolerance,
+    ContactForces,
+    LinearConstraints,
+    Objective,
+    TotalPotential,
+    nearest_feasible,
+)
 from fenics_contact.errors import ConvergenceError, InvalidDesignError
-from fenics_contact.optimize import LinearConstraints, nearest_feasible
-from fenics_contact.shape import AdaptiveTolerance, ContactForces, Objective, ShapeProblem, TotalPotential
+from fenics_contact.results import ContactResult
 
 #: Tolerance of all states; looser ones would blur differences that the methods look at.
 STATES = 1e-8

@@ -13,8 +13,9 @@ from mpi4py import MPI
 
 from benchmarks.optimisers.book import STATES, Book, Case, Spent
 from benchmarks.optimisers.rosenbrock import rosenbrock
-from fenics_contact.optimize import BundleTrust, ForScipy, InvalidDesignError, minimize, nearest_feasible
-from fenics_contact.shape import AdaptiveTolerance
+from fenics_contact import minimize
+from fenics_contact.design import AdaptiveTolerance, BundleTrust, ForScipy, nearest_feasible
+from fenics_contact.errors.kinds import InvalidDesignError
 from fenics_contact.study.scenes.chain_links import GRADING
 
 #: Violation of the volume or of a bound that a method may leave, in widths of the box.

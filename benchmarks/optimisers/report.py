@@ -16,9 +16,9 @@ from matplotlib import pyplot as plt
 from benchmarks.cases.roller_design import PEAK
 from benchmarks.optimisers.measuring import ALLOWED, FULL, METHODS, QUICK, budget_of
 from benchmarks.study import ROOT, Records, Study, filled, found, unfilled
-from fenics_contact.io import versions, write_json, write_text
+from fenics_contact.output import versions, write_json, write_text
+from fenics_contact.study.report import table
 from fenics_contact.study.runner import Job
-from fenics_contact.study.tables import table
 
 LOOKS = {
     "bundle": ("#0072b2", "o", "-"),

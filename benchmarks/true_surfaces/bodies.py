@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fenics_contact import BodyMesh
 from fenics_contact.gallery import box_lattice, half_cylinder, half_disc, hemisphere, rectangle_lattice
-from fenics_contact.gallery.block import graded
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.surface_shapes import Sphere
+from fenics_contact.gallery.blocks import graded
+from fenics_contact.shapes import Sphere
 
 
 def stamp(dim: int, facets: int) -> BodyMesh:

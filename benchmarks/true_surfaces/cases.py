@@ -12,19 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.true_surfaces.bodies import bar, pad, ring, seat, stamp
+from fenics_contact import Body, BodyMesh, ContactPair, Scene, Support, Surface, TotalForce
 from fenics_contact.gallery import half_cylinder
-from fenics_contact.gallery.block import graded
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    IsotropicElasticity,
-    PlaneStrain,
-    Scene,
-    Support,
-    Surface,
-    TotalForce,
-)
+from fenics_contact.gallery.blocks import graded
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.theory import contact_modulus, hertz_line, hertz_point, pin_in_hole
 
 POISSON = 0.3

@@ -7,13 +7,12 @@ from typing import Any
 
 from mpi4py import MPI
 
-from fenics_contact.contact import contact_area, solve_scene
+from fenics_contact import box_partition, contact_area, solve_scene
+from fenics_contact._scene.pairs import Discretisation
+from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.gallery import LinkShape, two_links
-from fenics_contact.partition import box_partition
 from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import Discretisation
 from fenics_contact.study.scenes.chain_links import GRADING, chain
-from fenics_contact.surfaces import Geometry
 
 #: Cells at the spot are a quarter as long as those of the same mesh without grading.
 FINEST = 4.0

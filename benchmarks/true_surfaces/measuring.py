@@ -9,10 +9,10 @@ import numpy as np
 from mpi4py import MPI
 
 from benchmarks.true_surfaces.cases import CASES, Model
-from fenics_contact.contact import contact_area, solve_scene
+from fenics_contact import contact_area, solve_scene
+from fenics_contact._scene.pairs import Discretisation
+from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import Discretisation
-from fenics_contact.surfaces import Geometry
 
 WAYS: tuple[Geometry, ...] = ("faceted", "reconstructed", "best")
 #: Facets around a quarter of the circle.

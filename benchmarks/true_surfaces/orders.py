@@ -11,11 +11,12 @@ from scipy.spatial import cKDTree
 
 from benchmarks.true_surfaces.bodies import seat
 from benchmarks.true_surfaces.measuring import WAYS
+from fenics_contact import BodyMesh
+from fenics_contact._surfaces.facets import FacetedSurface
+from fenics_contact._surfaces.projection import project
+from fenics_contact._surfaces.true_surface import true_surface
 from fenics_contact.gallery import LinkShape, chain_link, half_cylinder, half_disc, hemisphere
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.surface_shapes import closest_points
-from fenics_contact.surfaces import FacetedSurface, true_surface
-from fenics_contact.surfaces.projection import project
+from fenics_contact.shapes.simple import closest_points
 
 #: Cells across 45 degrees, of the link around a sixth of the ring.
 CELLS = (4, 8, 16, 32)

@@ -11,9 +11,9 @@ from benchmarks.true_surfaces.cases import CASES
 from benchmarks.true_surfaces.links import RUNS
 from benchmarks.true_surfaces.measuring import BY_MORTAR, WAYS
 from benchmarks.true_surfaces.orders import CELLS, SURFACES
-from fenics_contact.io import write_json, write_text
+from fenics_contact.output import write_json, write_text
+from fenics_contact.study.report import table
 from fenics_contact.study.runner import Job
-from fenics_contact.study.tables import table
 
 NAMES = {"faceted": "facets", "reconstructed": "reconstructed", "best": "true"}
 

@@ -8,12 +8,7 @@ of VTK. Triangles and quadrilaterals lie in the plane: their points have two coo
 components.
 """
 
-from fenics_contact._dolfinx.assembly import (
-    assemble_csr,
-    assemble_matrix,
-    assemble_scalar,
-    assemble_vector,
-)
+from fenics_contact._dolfinx.assembly import assemble_csr, assemble_matrix, assemble_scalar, assemble_vector
 from fenics_contact._dolfinx.cells import CELL_TYPES, degree, dimension, facet_vertices, shape
 from fenics_contact._dolfinx.forms import CompiledForm
 from fenics_contact._dolfinx.loading import fem, mesh, release, version

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fenics_contact._base.libraries import PETSc
 from fenics_contact._dolfinx.loading import dolfinx
-from fenics_contact._libraries import PETSc
 
 
 def assemble_csr(form: dolfinx.fem.Form) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -10,11 +10,11 @@ from ufl.algorithms import expand_derivatives
 from ufl.algorithms.analysis import extract_type
 from ufl.differentiation import CoefficientDerivative
 
+from fenics_contact._base.libraries import MPI
+from fenics_contact._base.progress import Task
 from fenics_contact._dolfinx.cache import compiled_once
 from fenics_contact._dolfinx.loading import cpp, dolfinx, old, side_effects_undone
 from fenics_contact._dolfinx.numbering import cell_count, table
-from fenics_contact._libraries import MPI
-from fenics_contact.progress import Task
 
 #: Cells or facets with one tag: cell numbers, or (cells, local facets).
 Facets = Mapping[int, tuple[np.ndarray, np.ndarray]]

@@ -11,8 +11,8 @@ from functools import cache
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from fenics_contact._libraries import Late
-from fenics_contact._requirements import DOLFINX, load_petsc
+from fenics_contact._base.libraries import Late
+from fenics_contact._base.requirements import DOLFINX, load_petsc
 
 __all__ = ["cpp", "dolfinx", "fem", "mesh", "old", "release", "side_effects_undone", "version"]
 

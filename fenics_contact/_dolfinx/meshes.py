@@ -8,10 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 import ufl
 
+from fenics_contact._base.libraries import MPI
 from fenics_contact._dolfinx.cells import NODE_ORDER, dimension
 from fenics_contact._dolfinx.loading import cpp, dolfinx, old
 from fenics_contact._dolfinx.templates import vector_element
-from fenics_contact._libraries import MPI
 
 
 def _partitioner(destinations: cpp.graph.AdjacencyList_int32) -> Callable[..., cpp.graph.AdjacencyList_int32]:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from fenics_contact._base.libraries import MPI
 from fenics_contact._dolfinx.cells import NODE_ORDER, cell_type_named, facet_vertices
 from fenics_contact._dolfinx.loading import cpp, dolfinx, old
 from fenics_contact._dolfinx.numbering import cell_count, table
-from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError
 
 __all__ = ["MeshArrays", "TagArrays", "mesh_arrays", "read_mesh", "read_tags", "tag_arrays"]

@@ -1,6 +1,5 @@
 """Errors that state what is needed, what was given and what to do, raised by all ranks or by none."""
 
-from fenics_contact.errors.agreement import agree, collective, collectively, together
 from fenics_contact.errors.kinds import (
     ConvergenceError,
     FenicsContactError,
@@ -13,9 +12,11 @@ from fenics_contact.errors.kinds import (
     MissingRequirementError,
     RemoteError,
     UserCodeError,
+    safe_log,
+    scene_file_code,
+    user_code,
 )
-from fenics_contact.errors.telling import safe_log
-from fenics_contact.errors.user_code import scene_file_code, user_code
+from fenics_contact.errors.ranks import agree, collective, collectively, together
 
 __all__ = [
     "ConvergenceError",

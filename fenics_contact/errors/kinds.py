@@ -1,8 +1,16 @@
-"""The classes of errors."""
+"""The classes of errors.
+
+Reports to loggers: a failing handler must not stop a run, least of all on one rank.
+
+Calls of user code, whose errors name their source.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import logging
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 
@@ -57,7 +65,7 @@ class LoadStepError(ConvergenceError):
     """A load that cannot be followed to its end, however small its steps.
 
     Attributes:
-        state: The last equilibrium (`fenics_contact.contact.DeformedState`); None if there was none after the
+        state: The last equilibrium (`fenics_contact.results.deformed_state.DeformedState`); None if there was none after the
             start of the step.
     """
 
@@ -76,3 +84,88 @@ class UserCodeError(FenicsContactError, RuntimeError):
 
 class RemoteError(FenicsContactError, RuntimeError):
     """Another rank of the communicator raised an error; its message is repeated here."""
+
+
+def safe_log(log: Callable[..., None], message: str, *arguments: Any, **named: Any) -> None:
+    """Log a message, whatever handlers raise.
+
+    A user's handler that raises is treated as in the standard library: its traceback goes to stderr if
+    ``logging.raiseExceptions`` is set, and the run continues.
+
+    Args:
+        log: Method of a logger, such as ``logger.info``.
+        message: The message.
+        *arguments: Values that are formatted into it.
+        **named: Keyword arguments of the method.
+
+    Example:
+        >>> safe_log(logging.getLogger("fenics_contact").debug, "%d products", 3)
+    """
+    try:
+        log(message, *arguments, stacklevel=2, **named)
+    except Exception:
+        record = logging.makeLogRecord({"msg": message, "args": arguments})
+        logging.Handler().handleError(record)
+
+
+@contextmanager
+def user_code(what: str) -> Iterator[None]:
+    """Call user code: its exceptions become a `UserCodeError` that names it.
+
+    An exit counts as a failure, too: a load or a material may not end a program, least of all on one rank.
+    Errors of this package, which such code may raise on purpose, and interrupts pass.
+
+    Args:
+        what: Name of the code, for the message: "the function given as Traction on body 'bar'".
+
+    Raises:
+        UserCodeError: If the block raises; the cause is chained.
+
+    Example:
+        >>> with user_code("the stress of material Foam"):
+        ...     1 / 0
+        Traceback (most recent call last):
+        ...
+        fenics_contact.errors.kinds.UserCodeError: the stress of material Foam failed with ZeroDivisionError...
+    """
+    try:
+        yield
+    except FenicsContactError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise failure(what, error) from error
+
+
+def failure(what: str, error: BaseException) -> UserCodeError:
+    """Return the exception for an error of user code."""
+    reason = described_error(error)
+    return UserCodeError(f"{what} failed with {reason}: fix it, or handle the exception inside it")
+
+
+@contextmanager
+def scene_file_code(what: str) -> Iterator[None]:
+    """Run code that a scene file names: any exception, also an exit, is a mistake in the file.
+
+    Raises:
+        InvalidInputError: With the class and the message of the exception.
+    """
+    try:
+        yield
+    except InvalidInputError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise InvalidInputError(
+            f"{what} must run without errors, it raised {type(error).__name__}: {error}"
+        ) from error
+
+
+def described_error(error: BaseException) -> str:
+    """Return class, message and place of an error in one line."""
+    try:
+        message = str(error)
+    except Exception:  # a user's class may fail at that, too
+        message = "a message that cannot be shown"
+    name = type(error).__name__
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f" ({frames[-1].filename}, line {frames[-1].lineno})" if frames else ""
+    return f"{name}: {message}{place}" if message else f"{name}{place}"

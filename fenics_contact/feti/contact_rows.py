@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact.feti.copies import Tearing
-from fenics_contact.feti.rows import Rows
-from fenics_contact.pairing import HELD, ContactPoints, movable
-from fenics_contact.scene import Tie
+from fenics_contact._pairing.points import HELD, ContactPoints, movable
+from fenics_contact._scene.pairs import Tie
+from fenics_contact.feti.decomposition import Rows, Tearing
 
 #: Directions count as parallel if their sine is below this.
 PARALLEL = 1e-6

@@ -1,26 +1,335 @@
-"""The part of a torn scene that does not depend on its geometry: meshes, numbering, compiled forms."""
+"""The part of a torn scene that does not depend on its geometry: meshes, numbering, compiled forms.
+
+Copies of nodes: the torn system has one copy of each node for every subdomain around it.
+
+Rows of B as sparse triplets over copies of nodes, before ranks select their own.
+
+Rows that glue subdomains together and prescribe displacements (Total FETI).
+
+Distributed dual vectors: ownership of multipliers, and the exchange of shared ones.
+
+Sums of contributions that several ranks hold of the same items.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+import scipy.sparse as sp
 
-from fenics_contact._libraries import MPI, start
-from fenics_contact.display import displayed
+from fenics_contact._base.display import counted, displayed
+from fenics_contact._base.libraries import MPI, PETSc, start
+from fenics_contact._base.sparse import LAST_PLACES, dispose_with, expected_seconds, warn_of_threads
+from fenics_contact._fem.forms import FormLibrary, cell_stiffness
+from fenics_contact._pairing.points import NodeNumbers
+from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.fem import FormLibrary, cell_stiffness
-from fenics_contact.feti.condensation import Condensations
-from fenics_contact.feti.copies import Tearing, tear
-from fenics_contact.feti.gluing import GluingRows, gluing_rows, prescribed_displacements
+from fenics_contact.feti.inverse import Condensations
 from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.subdomain import SubdomainMesh, cut_out
-from fenics_contact.linalg import warn_of_threads
-from fenics_contact.partition import check_face_connected
-from fenics_contact.scene import Scene
+from fenics_contact.mesh.partition import check_face_connected
+
+
+@displayed
+@dataclass(frozen=True)
+class Tearing(NodeNumbers):
+    """The subdomains of the bodies of a scene, and the rank that owns each.
+
+    Replicated on all ranks. Subdomains, like nodes, are numbered consecutively, body after body. A *copy* is
+    a pair (node, subdomain); copies are sorted by node, then by subdomain.
+
+    Attributes:
+        dim: Displacement components of a node.
+        subdomain_offset: First subdomain of each body and the total, shape (n_bodies + 1,).
+        subdomain_rank: Owner of each subdomain, shape (n_subdomains,).
+        first_copy: First copy of each node and the total, shape (n_nodes + 1,).
+        copy_subdomain: Subdomain of each copy, shape (n_copies,).
+        copy_stiffness: Typical stiffness at each copy, the largest being one, shape (n_copies,).
+    """
+
+    dim: int
+    subdomain_offset: np.ndarray
+    subdomain_rank: np.ndarray
+    first_copy: np.ndarray
+    copy_subdomain: np.ndarray
+    copy_stiffness: np.ndarray
+
+    @property
+    def multiplicity(self) -> np.ndarray:
+        """Number of copies of each node, shape (n_nodes,)."""
+        return np.diff(self.first_copy)
+
+    @property
+    def copy_node(self) -> np.ndarray:
+        """Node of each copy, shape (n_copies,)."""
+        return np.repeat(np.arange(self.n_nodes), self.multiplicity)
+
+    def copies_of(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return for each copy of each of some nodes the place of that node among them, and the copy."""
+        copies = self.multiplicity[nodes]
+        within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
+        return np.repeat(np.arange(len(nodes)), copies), np.repeat(self.first_copy[nodes], copies) + within
+
+    @cached_property
+    def copy_share(self) -> np.ndarray:
+        """Stiffness of each copy relative to all copies of its node, shape (n_copies,)."""
+        return self.copy_stiffness / np.repeat(
+            np.add.reduceat(self.copy_stiffness, self.first_copy[:-1]), self.multiplicity
+        )
+
+    @cached_property
+    def on_several_ranks(self) -> np.ndarray:
+        """Whether subdomains of different ranks share a node, shape (n_nodes,)."""
+        rank, first = self.subdomain_rank[self.copy_subdomain], self.first_copy[:-1]
+        return np.asarray(np.minimum.reduceat(rank, first) != np.maximum.reduceat(rank, first))
+
+    @property
+    def n_subdomains(self) -> int:
+        """Number of subdomains of all bodies."""
+        return int(self.subdomain_offset[-1])
+
+
+def tear(
+    scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int, stiffness: Mapping[str, np.ndarray]
+) -> Tearing:
+    """Cut the bodies along a partition of their cells and distribute the subdomains over ranks.
+
+    Args:
+        scene: The scene.
+        partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
+        ranks: Number of ranks; each has about the same work, of every body consecutive subdomains.
+        stiffness: Body name -> typical nodal stiffness of every cell, shape (n_cells,), [force / length].
+    """
+    numbers = NodeNumbers.of(scene)
+    names, node_offset = numbers.body_names, numbers.node_offset
+    counts = [int(partitions[name].max()) + 1 for name in names]
+    subdomain_offset = np.cumsum([0, *counts])
+    total = int(subdomain_offset[-1])
+    keys, sums = [], []
+    for index, name in enumerate(names):
+        cells = scene.bodies[name].mesh.cells
+        subdomain = partitions[name].astype(np.int64) + subdomain_offset[index]
+        # One integer key per node and subdomain: unique keys are the copies, already in their order.
+        every = (cells + node_offset[index]) * total + subdomain[:, None]
+        unique, where = np.unique(every.ravel(), return_inverse=True)
+        weights = np.repeat(stiffness[name], cells.shape[1])
+        keys.append(unique)
+        sums.append(np.bincount(where.ravel(), weights) / np.bincount(where.ravel()))
+    key, stiff = np.concatenate(keys), np.concatenate(sums)
+    multiplicity = np.bincount(key // total, minlength=int(node_offset[-1]))
+    costs = _costs(key % total, multiplicity[key // total] > 1, total, scene.dim)
+    return Tearing(
+        names,
+        node_offset,
+        scene.dim,
+        subdomain_offset,
+        _deal_out(np.split(costs, subdomain_offset[1:-1]), ranks),
+        np.concatenate([[0], np.cumsum(multiplicity)]),
+        key % total,
+        stiff / stiff.max(),
+    )
+
+
+def _costs(copy_subdomain: np.ndarray, shared: np.ndarray, count: int, dim: int) -> np.ndarray:
+    """Return the estimated cost of each subdomain, shape (n_subdomains,), [s].
+
+    Args:
+        copy_subdomain: Subdomain of each copy of a node.
+        shared: Whether other subdomains share that node.
+        count: Number of subdomains.
+        dim: Displacement components of a node.
+    """
+    size = dim * np.bincount(copy_subdomain, minlength=count)
+    interface = dim * np.bincount(copy_subdomain[shared], minlength=count)
+    return np.array([expected_seconds(int(n), int(b)) for n, b in zip(size, interface, strict=True)])
+
+
+def _deal_out(costs: list[np.ndarray], ranks: int) -> np.ndarray:
+    """Return the rank of every subdomain, given the costs body by body.
+
+    Each body is spread over all ranks as far as possible: where one body changes its shape or has all the
+    contacts, no rank waits for another.
+    """
+    place = np.concatenate([(np.cumsum(cost) - 0.5 * cost) / cost.sum() for cost in costs])
+    order = np.argsort(place, kind="stable")
+    owner = np.empty(len(place), dtype=np.int64)
+    owner[order] = _spread_over_ranks(np.concatenate(costs)[order], ranks)
+    return owner
+
+
+def _spread_over_ranks(cost: np.ndarray, ranks: int) -> np.ndarray:
+    """Distribute consecutive items over ranks so that the costs are about equal and no rank is empty."""
+    middle = np.cumsum(cost) - 0.5 * cost
+    owner = np.minimum((middle * ranks / cost.sum()).astype(int), ranks - 1)
+    # Every rank has at least one: no rank is skipped, and enough items remain for the last ones.
+    index = np.arange(len(cost))
+    without_jumps = np.minimum.accumulate(np.minimum(owner, index) - index) + index
+    return np.maximum(without_jumps, ranks - (len(cost) - index))
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Some rows of B; entry k is B[row[k], (copy[k], component[k])] = value[k].
+
+    Attributes:
+        row: Row of each entry, numbered from 0 within these rows, shape (n_entries,).
+        copy: Copy of a node, shape (n_entries,).
+        component: 0, 1 or 2, shape (n_entries,).
+        value: Coefficient, shape (n_entries,).
+        right: Right side c of each row, shape (n_rows,), [length].
+        owner: Rank that owns each row, shape (n_rows,).
+    """
+
+    row: np.ndarray
+    copy: np.ndarray
+    component: np.ndarray
+    value: np.ndarray
+    right: np.ndarray
+    owner: np.ndarray
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return len(self.right)
+
+
+def stack(parts: Sequence[Rows]) -> Rows:
+    """Number the rows of several groups consecutively."""
+    starts = np.cumsum([0] + [part.count for part in parts])
+    row = np.concatenate([part.row + start for part, start in zip(parts, starts, strict=False)])
+    joined = [
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("copy", "component", "value", "right", "owner")
+    ]
+    return Rows(row, *joined)
+
+
+def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
+    """Collect the supports node by node.
+
+    Returns:
+        The value of each prescribed component, NaN where it is free, shape (n_nodes, dim), [length].
+
+    Raises:
+        InvalidInputError: If two supports prescribe different values for one component of a node.
+    """
+    prescribed = np.full((tearing.n_nodes, scene.dim), np.nan)
+    for support in scene.supports:
+        own, given = scene.given(support)
+        nodes = tearing.global_nodes(support.body, own)
+        known = prescribed[nodes]
+        near = LAST_PLACES * np.nanmax(np.abs(given))
+        clash = ~np.isnan(known) & ~np.isnan(given) & (np.abs(known - given) > near)
+        if clash.any():
+            node, component = np.argwhere(clash)[0]
+            raise InvalidInputError(
+                f"supports must agree where they meet: component {component} of "
+                f"{counted(int(clash[:, component].sum()), 'node')} of surface {support.surface!r} of body "
+                f"{support.body!r} already has another value than {given[node, component]:g}: leave the "
+                "component free (None) in one of them"
+            )
+        prescribed[nodes] = np.where(np.isnan(given), known, given)
+    return prescribed
+
+
+def weighted_helmert(stiffness: np.ndarray) -> np.ndarray:
+    """Return rows of unit length that vanish on equal copies and are orthogonal in the inner product D⁻¹.
+
+    Row k is the difference between the stiffness-weighted mean of the first k copies and the next one; with
+    equal stiffnesses these are the rows of a Helmert matrix.
+
+    Args:
+        stiffness: D of the copies of each node, shape (n, m).
+
+    Returns:
+        Shape (n, m − 1, m).
+    """
+    count, copies = stiffness.shape
+    rows = np.zeros((count, copies - 1, copies))
+    for k in range(1, copies):  # a few copies, all nodes at once
+        rows[:, k - 1, :k] = stiffness[:, :k] / stiffness[:, :k].sum(axis=1, keepdims=True)
+        rows[:, k - 1, k] = -1.0
+    return rows / np.linalg.norm(rows, axis=2, keepdims=True)
+
+
+@dataclass(frozen=True)
+class GluingRows:
+    """The equality rows that glue torn bodies together and fix them at their supports.
+
+    Attributes:
+        rows: The rows; their right side is filled from the supports of a load, see `right_side`.
+        dof: Node and component that each row belongs to, as node · dim + component, shape (n_rows,).
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+    """
+
+    rows: Rows
+    dof: np.ndarray
+    fixed: np.ndarray
+
+    def right_side(self, prescribed: np.ndarray) -> np.ndarray:
+        """Return c of the rows for displacements from `prescribed_displacements`.
+
+        Raises:
+            InvalidInputError: If the prescribed components are not those for which the rows were built.
+        """
+        if not np.array_equal(~np.isnan(prescribed), self.fixed):
+            raise InvalidInputError(
+                "the supports of a scene may change their values, not what they hold: "
+                f"{np.count_nonzero(self.fixed)} components were prescribed when the scene was decomposed, "
+                f"now {np.count_nonzero(~np.isnan(prescribed))} or others are: decompose it again"
+            )
+        return np.nan_to_num(prescribed).ravel()[self.dof]
+
+
+def gluing_rows(tearing: Tearing, fixed: np.ndarray) -> GluingRows:
+    """Build the equality rows B_E u = c_E, for which B_E D⁻¹ B_Eᵀ is diagonal, D the stiffness of copies.
+
+    A free component of a node with m copies has m − 1 gluing rows of unit length (see `weighted_helmert`, c =
+    0). A prescribed one has m rows, one for each copy, which glue it as well.
+
+    Args:
+        tearing: Copies of the nodes.
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+    """
+    multiplicity = tearing.multiplicity
+    counts = np.where(fixed, multiplicity[:, None], multiplicity[:, None] - 1)
+    start = np.concatenate([[0], np.cumsum(counts.ravel())])
+    parts = [_prescribed_entries(tearing, fixed, start)]
+    for copies in np.unique(multiplicity[multiplicity > 1]):
+        parts.append(_glued_entries(tearing, fixed, start, int(copies)))
+    row, copy, component, entry = (np.concatenate(column) for column in zip(*parts, strict=True))
+
+    dof = np.repeat(np.arange(fixed.size), counts.ravel())  # (node, component) of each row
+    within = np.arange(len(dof)) - start[dof]
+    is_fixed = fixed.ravel()[dof]
+    # A gluing row belongs to the rank of the node's first copy, a prescribing row to that of its own copy.
+    anchor = tearing.first_copy[dof // tearing.dim] + np.where(is_fixed, within, 0)
+    owner = tearing.subdomain_rank[tearing.copy_subdomain[anchor]]
+    return GluingRows(Rows(row, copy, component, entry, np.zeros(len(dof)), owner), dof, fixed)
+
+
+def _prescribed_entries(tearing: Tearing, fixed: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, ...]:
+    node, component = np.nonzero(fixed)
+    copies = tearing.multiplicity[node]
+    within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
+    row = np.repeat(start[tearing.dim * node + component], copies) + within
+    copy = np.repeat(tearing.first_copy[node], copies) + within
+    return row, copy, np.repeat(component, copies), np.ones(len(row))
+
+
+def _glued_entries(
+    tearing: Tearing, fixed: np.ndarray, start: np.ndarray, copies: int
+) -> tuple[np.ndarray, ...]:
+    node, component = np.nonzero(~fixed & (tearing.multiplicity == copies)[:, None])
+    copy_of = tearing.first_copy[node][:, None] + np.arange(copies)
+    matrix = weighted_helmert(tearing.copy_stiffness[copy_of])
+    k, j = np.nonzero(np.tri(copies - 1, copies, 1))
+    row = start[tearing.dim * node + component][:, None] + k
+    return row.ravel(), copy_of[:, j].ravel(), np.repeat(component, len(k)), matrix[:, k, j].ravel()
 
 
 @displayed
@@ -137,7 +446,7 @@ def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> Non
     if not isinstance(partitions, Mapping):
         raise InvalidInputError(
             f"partitions must give the subdomain of each cell by the names of bodies, got {partitions!r}: "
-            "leave them out, or cut bodies by graph_partition or box_partition of fenics_contact.partition"
+            "leave them out, or cut bodies by graph_partition or box_partition of fenics_contact.mesh"
         )
     for name, body in scene.bodies.items():
         if name not in partitions:
@@ -151,7 +460,7 @@ def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> Non
             raise InvalidInputError(
                 f"the partition of body {name!r} must have shape ({body.mesh.n_cells},), one "
                 f"subdomain per cell, got {given}: graph_partition or box_partition of "
-                "fenics_contact.partition cuts a mesh into a number of subdomains"
+                "fenics_contact.mesh cuts a mesh into a number of subdomains"
             )
         check_face_connected(body.mesh, partition)
 
@@ -171,3 +480,154 @@ def _copy_blocks(tearing: Tearing, meshes: tuple[SubdomainMesh, ...], block_offs
         wanted = tearing.global_nodes(mesh.body, mesh.nodes) * total + mesh.number
         blocks[np.searchsorted(keys, wanted)] = offset + np.arange(len(mesh.nodes))
     return blocks
+
+
+class DualNumbering:
+    """Numbering of multipliers over ranks: each is owned by one rank and shared by those that touch it.
+
+    Rows of B are first numbered in an order that does not depend on the number of ranks (*row numbers*).
+    A rank owns some of them, in ascending order; *local* vectors hold the owned entries followed by the
+    ghosts, the touched entries that other ranks own.
+
+    Attributes:
+        comm: Communicator.
+        owned: Row numbers that this rank owns, ascending, shape (n_owned,).
+        ghosts: Row numbers that it touches but does not own, ascending, shape (n_ghosts,).
+        offset: Position of the first owned entry in the concatenation of all ranks' owned parts.
+        total: Number of rows of all ranks.
+    """
+
+    def __init__(self, comm: MPI.Comm, owner: np.ndarray, touched: np.ndarray) -> None:
+        """Build numbering and exchange. Collective on ``comm``.
+
+        Args:
+            comm: Communicator.
+            owner: Owning rank of every row, shape (n_rows,), replicated.
+            touched: Row numbers that this rank's subdomains enter, ascending.
+        """
+        self.comm = comm
+        self.total = len(owner)
+        self._owner, self._touched = owner, touched
+        order = np.argsort(owner, kind="stable")
+        self._position = np.empty(self.total, dtype=np.int64)
+        self._position[order] = np.arange(self.total)
+        starts = np.searchsorted(owner[order], np.arange(comm.size + 1))
+        self.offset = int(starts[comm.rank])
+        self.owned = order[starts[comm.rank] : starts[comm.rank + 1]]
+        self.ghosts = touched[owner[touched] != comm.rank]
+        self._vector = PETSc.Vec().createGhost(
+            self._position[self.ghosts].astype(PETSc.IntType), (len(self.owned), self.total), comm=comm
+        )
+        dispose_with(self, self._vector, comm=comm)
+
+    def serves(self, owner: np.ndarray, touched: np.ndarray) -> bool:
+        """Return whether this rank's part is that of rows with these owners, touched as given."""
+        return np.array_equal(self._owner, owner) and np.array_equal(self._touched, touched)
+
+    @property
+    def local_rows(self) -> np.ndarray:
+        """Row numbers of a local vector, owned ones first."""
+        return np.concatenate([self.owned, self.ghosts])
+
+    def local_index(self, rows: np.ndarray) -> np.ndarray:
+        """Return the positions of touched or owned rows in a local vector."""
+        lookup = np.full(self.total, -1, dtype=np.int64)
+        lookup[self.local_rows] = np.arange(len(self.owned) + len(self.ghosts))
+        return lookup[rows]
+
+    def position(self, rows: np.ndarray) -> np.ndarray:
+        """Return the positions of rows in the concatenation of all ranks' owned parts."""
+        return self._position[rows]
+
+    def owned_index(self, rows: np.ndarray) -> np.ndarray:
+        """Return the positions of rows in this rank's owned vector, −1 for rows of other ranks."""
+        if len(self.owned) == 0:
+            return np.full(rows.shape, -1)
+        index = np.minimum(np.searchsorted(self.owned, rows), len(self.owned) - 1)
+        return np.where(self.owned[index] == rows, index, -1)
+
+    def to_local(self, owned: np.ndarray) -> np.ndarray:
+        """Return the local vector (owned, then ghosts) of an owned one. Collective."""
+        self._vector.array_w[:] = owned
+        self._vector.ghostUpdate(PETSc.InsertMode.INSERT, PETSc.ScatterMode.FORWARD)
+        with self._vector.localForm() as local:
+            return np.array(local.array_r)
+
+    def to_owned(self, local: np.ndarray) -> np.ndarray:
+        """Add up the shares of all ranks and return the owned part. Collective."""
+        with self._vector.localForm() as form:
+            form.array_w[:] = local
+        self._vector.ghostUpdate(PETSc.InsertMode.ADD_VALUES, PETSc.ScatterMode.REVERSE)
+        return np.array(self._vector.array_r)
+
+    def gather(self, owned: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Return entries of an owned vector for any rows, on every rank. Collective.
+
+        Meant for contact rows, which are few; ``rows`` must be the same on every rank.
+        """
+        mine = np.zeros(len(rows))
+        index = np.full(self.total, -1, dtype=np.int64)
+        index[self.owned] = np.arange(len(self.owned))
+        here = index[rows] >= 0
+        mine[here] = owned[index[rows[here]]]
+        return np.asarray(self.comm.allreduce(mine))
+
+    def sum_rows(self, local: sp.csr_matrix) -> sp.csr_matrix:
+        """Add up the ranks' shares of a sparse matrix with one row for each multiplier. Collective.
+
+        Args:
+            local: This rank's share, shape (n_local, n_columns), rows as in local vectors.
+
+        Returns:
+            The owned rows, shape (n_owned, n_columns).
+        """
+        shares = local.tocoo()
+        rank = self._owner[self.local_rows][shares.row]
+        order = np.argsort(rank, kind="stable")
+        cuts = np.searchsorted(rank[order], np.arange(1, self.comm.size))
+        columns = (self.local_rows[shares.row], shares.col, shares.data)
+        outgoing = zip(*(np.split(column[order], cuts) for column in columns), strict=True)
+        incoming = self.comm.alltoall(list(outgoing))
+        row, column, value = (np.concatenate([part[i] for part in incoming]) for i in range(3))
+        shape = (len(self.owned), local.shape[1])
+        return sp.csr_matrix((value, (np.searchsorted(self.owned, row), column)), shape=shape)
+
+
+class Sharing:
+    """Items of which more than one rank may hold a part, identified by global numbers."""
+
+    def __init__(self, comm: MPI.Comm, keys: np.ndarray, mine: np.ndarray) -> None:
+        """Determine which ranks share which items. Collective on ``comm``.
+
+        Args:
+            comm: Communicator.
+            keys: Number of each item that this rank holds, ascending, shape (n,).
+            mine: Positions in ``keys`` of those that other ranks may hold as well.
+        """
+        self.comm = comm
+        every = comm.allgather(keys[mine]) if comm.size > 1 else [keys[mine]]
+        self._with: list[np.ndarray] = []
+        for rank, other in enumerate(every):
+            common = mine[np.isin(keys[mine], other)] if rank != comm.rank else mine[:0]
+            self._with.append(common)
+        self.shared = np.unique(np.concatenate(self._with))
+
+    def add_up(self, values: np.ndarray) -> np.ndarray:
+        """Return values in which the rows of shared items are the sums over all ranks. Collective.
+
+        The ranks that share an item obtain bitwise equal sums.
+
+        Args:
+            values: This rank's parts, shape (n, ...).
+        """
+        if self.comm.size == 1:
+            return values
+        received = self.comm.alltoall([values[rows] for rows in self._with])
+        total = values.copy()
+        total[self.shared] = 0.0
+        for rank, (rows, part) in enumerate(zip(self._with, received, strict=True)):
+            if rank == self.comm.rank:
+                total[self.shared] += values[self.shared]
+            else:
+                total[rows] += part
+        return total

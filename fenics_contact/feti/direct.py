@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.display import displayed
+from fenics_contact._base.display import displayed
+from fenics_contact._base.progress import PhaseTimer
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.torn import TornSystem
-from fenics_contact.timing import PhaseTimer
 
 #: Largest error of a solution in energy norm, relative to it.
 WRONG = 1e-4

@@ -1,7 +1,11 @@
-"""Sparse Cholesky factors through PETSc, and the generalised inverse of a floating subdomain."""
+"""Sparse Cholesky factors through PETSc, and the generalised inverse of a floating subdomain.
+
+Functions of PETSc's C interface that petsc4py does not wrap.
+"""
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
@@ -9,9 +13,9 @@ from functools import lru_cache
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact._libraries import PETSc, check_not_forked
+from fenics_contact._base.libraries import PETSc, check_not_forked
+from fenics_contact._base.sparse import dispose_with
 from fenics_contact.errors import ConvergenceError
-from fenics_contact.linalg import dispose_with
 
 #: Enough nodes to fix all rigid motions of a body that is not a line, few enough to keep the factor sparse.
 FIXING_NODES = 4
@@ -207,3 +211,21 @@ def held_by(stiffness: sp.csr_matrix, dofs: np.ndarray, motions: np.ndarray, wei
     block = weight * (motions @ motions.T)
     rows, columns = np.repeat(dofs, len(dofs)), np.tile(dofs, len(dofs))
     return (stiffness + sp.coo_matrix((block.ravel(), (rows, columns)), shape=stiffness.shape)).tocsr()
+
+
+def petsc_call(name: str, *arguments: object) -> None:
+    """Call a function by its name; integers are handles of objects.
+
+    Raises:
+        PETSc.Error: If it returns an error.
+    """
+    wrapped = [ctypes.c_void_p(a) if isinstance(a, int) else a for a in arguments]
+    code = getattr(_petsc(), name)(*wrapped)
+    if code:
+        raise PETSc.Error(code)
+
+
+@lru_cache(maxsize=1)
+def _petsc() -> ctypes.CDLL:
+    # The symbols of libpetsc are resolved through the extension module that is linked with it.
+    return ctypes.CDLL(PETSc.__file__)

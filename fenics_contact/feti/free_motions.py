@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.display import counted, displayed
+from fenics_contact._base.display import counted, displayed
+from fenics_contact._base.sparse import LAST_PLACES
+from fenics_contact._scene.pairs import ContactPair, Tie
+from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.supports import AnySupport, RigidSurface
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.contact_rows import Relations
-from fenics_contact.feti.copies import Tearing
-from fenics_contact.linalg import LAST_PLACES
-from fenics_contact.scene import AnySupport, ContactPair, RigidSurface, Scene, Tie
+from fenics_contact.feti.decomposition import Tearing
 
 
 @displayed

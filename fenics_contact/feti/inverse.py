@@ -1,20 +1,344 @@
-"""All factored subdomains of one rank: generalised inverse, interface operators and kernel."""
+"""All factored subdomains of one rank: generalised inverse, interface operators and kernel.
+
+Schur complements of subdomain matrices: one symbolic factorisation for all that share a pattern.
+
+A subdomain stored as two dense matrices on its interface: each application streams one of them once.
+
+A subdomain stored as sparse factors: each application is a forward and a backward substitution.
+"""
 
 from __future__ import annotations
 
+import ctypes
+from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from enum import Enum
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import blas, lapack
 
-from fenics_contact.feti.condensation import Condensations
-from fenics_contact.feti.explicit import ExplicitOperator
-from fenics_contact.feti.implicit import ImplicitOperator
-from fenics_contact.feti.local import LocalOperator, interface_dofs
-from fenics_contact.feti.subdomain import Subdomain
-from fenics_contact.linalg import prefers_explicit
+from fenics_contact._base.libraries import PETSc
+from fenics_contact._base.sparse import dispose_with, prefers_explicit
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.factor import Factor, petsc_call, regularised, symmetric_matrix
+from fenics_contact.feti.subdomain import LocalOperator, Subdomain, interface_dofs
+
+#: Number of cached symbolic factorisations. Each also holds the values of its last matrix: a few MB.
+CACHED = 8
+#: MUMPS control parameter and its value for nested dissection by METIS.
+ORDERING, METIS = 7, 5
+
+
+class Condensation:
+    """S = K_bb − K_bi K_ii⁻¹ K_ib by MUMPS, which factors K_ii and forms S in one pass.
+
+    The ordering and the symbolic factorisation are computed once; each call only refills the values.
+    """
+
+    def __init__(self, pattern: sp.csr_matrix, interface: np.ndarray) -> None:
+        """Prepare for symmetric matrices with the sparsity of ``pattern``.
+
+        Args:
+            pattern: Any matrix with the pattern, shape (n, n).
+            interface: The dofs b, shape (n_b,).
+        """
+        self._size, self._interface = len(interface), interface
+        self._structure = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType))
+        self._matrix = symmetric_matrix(pattern)
+        self._pc = PETSc.PC().create(PETSc.COMM_SELF)
+        self._pc.setOperators(self._matrix)
+        self._pc.setType(PETSc.PC.Type.CHOLESKY)
+        self._pc.setFactorSolverType("mumps")
+        self._pc.setFactorSetUpSolverType()
+        self._factor = self._pc.getFactorMatrix()
+        self._factor.setMumpsIcntl(ORDERING, METIS)
+        self._rows = PETSc.IS().createGeneral(interface.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+        petsc_call("MatFactorSetSchurIS", self._factor.handle, self._rows.handle)
+        dispose_with(self, self._rows, self._factor, self._pc, self._matrix)
+
+    def __call__(self, stiffness: sp.csr_matrix) -> np.ndarray:
+        """Return S of a matrix with the pattern, shape (n_b, n_b), Fortran order."""
+        # MUMPS treats pivots below about 1e-16 as zero here: results would depend on the units of length and
+        # force. Scaling by a power of two is exact.
+        unit = 2.0 ** np.round(np.log2(stiffness.diagonal().max()))
+        self._matrix.setValuesCSR(*self._structure, stiffness.data / unit)
+        self._matrix.assemble()
+        self._pc.setUp()
+        if self._factor.getMumpsInfog(1) < 0:
+            return self._by_factor(stiffness)
+        return unit * self._schur_complement()
+
+    def _by_factor(self, stiffness: sp.csr_matrix) -> np.ndarray:
+        """Return S by factors of K_ii: MUMPS may take too little memory where hardly a dof lies inside."""
+        inside = np.ones(stiffness.shape[0], dtype=bool)
+        inside[self._interface] = False
+        between = stiffness[inside][:, self._interface]
+        bent = Factor(stiffness[inside][:, inside].tocsr()).solve_many(between.toarray(order="F"))
+        own = stiffness[self._interface][:, self._interface].toarray(order="F")
+        return np.asfortranarray(own - between.T @ bent)
+
+    def _schur_complement(self) -> np.ndarray:
+        # petsc4py does not wrap this yet, so PETSc's own library is called.
+        matrix, status = ctypes.c_void_p(), ctypes.c_int()
+        values = ctypes.POINTER(ctypes.c_double)()
+        factor = self._factor.handle
+        petsc_call("MatFactorGetSchurComplement", factor, ctypes.byref(matrix), ctypes.byref(status))
+        petsc_call("MatDenseGetArrayRead", matrix, ctypes.byref(values))
+        schur = np.array(np.ctypeslib.as_array(values, shape=(self._size, self._size))).T
+        petsc_call("MatDenseRestoreArrayRead", matrix, ctypes.byref(values))
+        petsc_call("MatFactorRestoreSchurComplement", factor, ctypes.byref(matrix), status)
+        return schur
+
+
+class Condensations:
+    """Caches the most recent condensations, by pattern and interface.
+
+    Subdomains of a regular partition share one pattern and a handful of interfaces, and a new geometry
+    changes neither.
+
+    Attributes:
+        analysed: Symbolic factorisations made so far.
+    """
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._recent: OrderedDict[tuple[bytes, bytes, bytes], Condensation] = OrderedDict()
+        self.analysed = 0
+
+    def schur_complement(self, stiffness: sp.csr_matrix, interface: np.ndarray) -> np.ndarray:
+        """Return the Schur complement of ``stiffness`` on the dofs ``interface``, shape (n_b, n_b)."""
+        if len(interface) == stiffness.shape[0]:
+            return stiffness[interface][:, interface].toarray(order="F")
+        key = (stiffness.indptr.tobytes(), stiffness.indices.tobytes(), interface.tobytes())
+        if key not in self._recent:
+            self._recent[key] = Condensation(stiffness, interface)
+            self.analysed += 1
+        self._recent.move_to_end(key)
+        if len(self._recent) > CACHED:
+            self._recent.popitem(last=False)
+        return self._recent[key](stiffness)
+
+
+#: Entries of S below this fraction of those of K are rounding.
+ROUNDED = 1e-12
+
+
+class ExplicitOperator:
+    """(K⁺)_bb and S as packed triangles; S, used only for preconditioning, in single precision.
+
+    With the trace Q of the kernel on the interface, orthonormal, S + ρ Q Qᵀ is positive definite, and
+
+        K⁺ = T diag(K_ii⁻¹, (S + ρ Q Qᵀ)⁻¹) Tᵀ,   T = [I, −K_ii⁻¹ K_ib; 0, I],
+
+    is a symmetric generalised inverse of K. The application of a dense triangle is limited by memory
+    bandwidth alone, and reads a half to a third of what substitutions with sparse factors read.
+    """
+
+    def __init__(self, subdomain: Subdomain, interface: np.ndarray, condensations: Condensations) -> None:
+        """Condense a subdomain on its interface.
+
+        Args:
+            subdomain: Its stiffness and kernel.
+            interface: Interface dofs b, shape (n_b,).
+            condensations: Symbolic factorisations to reuse.
+
+        Raises:
+            InvalidInputError: If the stiffness is not positive semidefinite.
+        """
+        stiffness, self._interface = subdomain.stiffness, interface
+        schur = condensations.schur_complement(stiffness, interface)
+        self._unit = float(np.abs(schur).max(initial=0.0)) or 1.0
+        self._stiff, _ = lapack.strttp((schur / self._unit).astype(np.float32, order="F"), uplo="L")
+        self._flexible = _packed_inverse(schur, subdomain.kernel[interface], subdomain.typical_stiffness)
+        self._size = len(interface)
+        self._inside = np.setdiff1d(np.arange(subdomain.mesh.size), interface, assume_unique=True)
+        rows = stiffness[self._inside]
+        self._K_ib, self._K_bb = rows[:, interface].tocsr(), stiffness[interface][:, interface].tocsr()
+        self._inner = Factor(rows[:, self._inside].tocsr()) if len(self._inside) else None
+
+    def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
+        """Write (K⁺)_bb times an interface force into ``displacement``."""
+        blas.dspmv(self._size, 1.0, self._flexible, force, y=displacement, overwrite_y=1, lower=1)
+
+    def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
+        """Write S, rounded to single precision, times an interface displacement into ``force``.
+
+        The range of single precision suffices neither for all units nor for diverging iterates: both factors
+        are scaled.
+        """
+        size = float(np.abs(displacement).max(initial=0.0))
+        if size == 0.0 or not np.isfinite(size):
+            force[:] = size
+            return
+        scaled = (displacement / size).astype(np.float32)
+        force[:] = blas.sspmv(self._size, 1.0, self._stiff, scaled, lower=1)
+        force *= self._unit * size
+
+    def extend(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the displacement of least energy for one of the interface, and S times the latter.
+
+        By the sparse stiffness and the factor of the inside: S itself is stored in single precision only.
+        """
+        whole = np.empty(self._size + len(self._inside))
+        whole[self._interface] = displacement
+        whole[self._inside] = inner = -self._solve_inside(self._K_ib @ displacement)
+        return whole, self._K_bb @ displacement + self._K_ib.T @ inner
+
+    def invert(self, right: np.ndarray) -> np.ndarray:
+        """Return K⁺ times a vector, shape (n,)."""
+        relaxed = self._solve_inside(right[self._inside])
+        self.flex(right[self._interface] - self._K_ib.T @ relaxed, trace := np.empty(self._size))
+        solution = np.empty_like(right)
+        solution[self._interface] = trace
+        solution[self._inside] = relaxed - self._solve_inside(self._K_ib @ trace)
+        return solution
+
+    def row_flexibility(self, rows: sp.csr_matrix) -> np.ndarray:
+        """Return bᵀ (K⁺)_bb b for each row b of a matrix with interface columns, shape (n_rows,)."""
+        counts = np.diff(rows.indptr)
+        # All pairs of entries within each row: rows of B are short.
+        pairs = np.repeat(counts, counts)
+        first = np.repeat(np.arange(len(rows.indices)), pairs)
+        starts = np.repeat(np.repeat(rows.indptr[:-1], counts), pairs)
+        second = starts + np.arange(len(first)) - np.repeat(np.cumsum(pairs) - pairs, pairs)
+        i, j = rows.indices[first].astype(np.int64), rows.indices[second].astype(np.int64)
+        low, high = np.minimum(i, j), np.maximum(i, j)
+        entries = self._flexible[high + low * (2 * self._size - low - 1) // 2]
+        row = np.repeat(np.arange(rows.shape[0]), counts)[first]
+        return np.bincount(row, rows.data[first] * rows.data[second] * entries, minlength=rows.shape[0])
+
+    def _solve_inside(self, right: np.ndarray) -> np.ndarray:
+        """Return K_ii⁻¹ times a vector on the inside."""
+        solution = np.zeros_like(right)
+        if self._inner is not None and right.any():
+            self._inner.solve(right, solution)
+        return solution
+
+
+def _packed_inverse(schur: np.ndarray, kernel: np.ndarray, typical: float) -> np.ndarray:
+    """Return the packed lower triangle of (S + ρ Q Qᵀ)⁻¹, overwriting ``schur``.
+
+    ρ is the largest diagonal entry of S. Where that is rounding compared with the typical stiffness, every
+    displacement of the interface is a rigid motion, as in a statically determinate body.
+    """
+    modes, _ = np.linalg.qr(kernel)
+    largest = schur.diagonal().max()
+    rho = largest if largest > ROUNDED * typical else typical
+    filled = blas.dsyrk(rho, modes, beta=1.0, c=schur, lower=1, overwrite_c=1)
+    factor, failed = lapack.dpotrf(filled, lower=1, overwrite_a=1)
+    if failed:
+        raise InvalidInputError(
+            "the stiffness of every subdomain must be positive definite up to its kernel, but its Schur "
+            f"complement loses definiteness in row {failed}: check the material and the kernel of the model"
+        )
+    inverse, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
+    packed, _ = lapack.dtrttp(inverse, uplo="L")
+    return np.asarray(packed)
+
+
+class Inverse(Protocol):
+    """The inverse of a matrix of order n by its factors."""
+
+    def solve(self, right: np.ndarray, out: np.ndarray) -> None:
+        """Write the solution for one right side, shape (n,), into ``out``."""
+
+    def solve_many(self, right: np.ndarray) -> np.ndarray:
+        """Return the solutions for the columns of ``right``, shape (n, k)."""
+
+
+class FactoredOperator:
+    """The inverse of a stiffness by its factors, and its Schur complement by those of the inside.
+
+    Cheap to set up, and small where the interface is large.
+    """
+
+    def __init__(
+        self, stiffness: sp.csr_matrix, interface: np.ndarray, whole: Inverse, inside: Inverse | None
+    ) -> None:
+        """Keep the factors and the blocks that couple the interface.
+
+        Args:
+            stiffness: Of the subdomain, shape (n, n).
+            interface: Interface dofs b, shape (n_b,).
+            whole: Inverse of the stiffness, or of one that is held.
+            inside: Inverse on all other dofs; None without any.
+        """
+        self._interface, self._factor, self._inside = interface, whole, inside
+        self._rest = dofs_inside(stiffness, interface)
+        rows = stiffness[interface]
+        self._K_bb, self._K_bi = rows[:, interface].tocsr(), rows[:, self._rest].tocsr()
+        self._K_ib = self._K_bi.T  # shares its memory
+        self._right, self._left = np.zeros(stiffness.shape[0]), np.zeros(stiffness.shape[0])
+        self._inner = np.zeros(len(self._rest))
+
+    def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
+        """Write the inverse on the interface times a force there into ``displacement``."""
+        self._right[self._interface] = force
+        self._factor.solve(self._right, self._left)
+        displacement[:] = self._left[self._interface]
+
+    def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
+        """Write the Schur complement times an interface displacement into ``force``."""
+        force[:], pulled = self._forces(displacement)
+        if self._inside is not None:
+            self._inside.solve(pulled, self._inner)
+            force -= self._forces_from_inside(self._inner)
+
+    def _forces(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the forces of an interface displacement, on the interface and inside."""
+        return self._K_bb @ displacement, self._K_ib @ displacement
+
+    def _forces_from_inside(self, displacement: np.ndarray) -> np.ndarray:
+        """Return the forces on the interface of a displacement inside."""
+        return np.asarray(self._K_bi @ displacement)
+
+    def extend(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the displacement in equilibrium inside for one of the interface, and its force there."""
+        self.stiffen(displacement, force := np.empty_like(displacement))
+        whole = np.empty(len(self._right))
+        whole[self._interface] = displacement
+        whole[self._rest] = -self._inner
+        return whole, force
+
+    def invert(self, right: np.ndarray) -> np.ndarray:
+        """Return the inverse times a vector, shape (n,)."""
+        solution = np.empty_like(right)
+        self._factor.solve(right, solution)
+        return solution
+
+    def row_flexibility(self, rows: sp.csr_matrix) -> np.ndarray:
+        """Return bᵀ K⁻¹ b for each row b of a matrix with interface columns, shape (n_rows,)."""
+        right = np.zeros((len(self._right), rows.shape[0]))
+        right[self._interface] = rows.toarray().T
+        return np.asarray(np.einsum("nk,nk->k", right, self._factor.solve_many(right)))
+
+
+class ImplicitOperator(FactoredOperator):
+    """K⁺ by a sparse Cholesky factor of the regularised stiffness, S by one of the inside."""
+
+    def __init__(self, subdomain: Subdomain, interface: np.ndarray) -> None:
+        """Factor a subdomain.
+
+        Args:
+            subdomain: Its stiffness and kernel.
+            interface: Interface dofs b, shape (n_b,).
+        """
+        stiffness = subdomain.stiffness
+        inside = dofs_inside(stiffness, interface)
+        super().__init__(
+            stiffness,
+            interface,
+            Factor(regularised(stiffness, subdomain.kernel, subdomain.points)),
+            Factor(stiffness[inside][:, inside].tocsr()) if len(inside) else None,
+        )
+
+
+def dofs_inside(stiffness: sp.csr_matrix, interface: np.ndarray) -> np.ndarray:
+    """Return the dofs that are not on the interface, ascending."""
+    return np.setdiff1d(np.arange(stiffness.shape[0]), interface, assume_unique=True)
 
 
 class LocalKind(Enum):

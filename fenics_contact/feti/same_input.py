@@ -6,11 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact._libraries import MPI
+from fenics_contact._base.fingerprint import described, require_alike
+from fenics_contact._base.libraries import MPI
+from fenics_contact._fem.load_forms import is_scalar
+from fenics_contact._scene.fields import Ufl, evaluate
+from fenics_contact._scene.loads import SurfaceLoad
+from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.supports import Support
 from fenics_contact.errors import together, user_code
-from fenics_contact.fem import is_scalar
-from fenics_contact.fingerprint import described, require_alike
-from fenics_contact.scene import Scene, Support, SurfaceLoad, Ufl, evaluate
 
 #: Number of nodes at which functions are compared: different functions differ nearly everywhere.
 COMPARED = 8

@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fenics_contact.checks import MOST, check_count, check_numbers, check_row
+from fenics_contact._base.checks import MOST, check_count, check_numbers, check_row
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery.extrusion import extrude
-from fenics_contact.gallery.memory import require_room
-from fenics_contact.gallery.rectangle import rectangle_lattice
-from fenics_contact.gallery.structured import structured_cells
-from fenics_contact.mesh import BodyMesh, boundary_faces, merge_duplicate_nodes
-from fenics_contact.surface_shapes import Cylinder
+from fenics_contact.gallery.blocks import extrude, rectangle_lattice, require_room, structured_cells
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.faces import boundary_faces, merge_duplicate_nodes
+from fenics_contact.shapes.simple import Cylinder
 
 CORE = 0.5
 """Half the width of the square in the middle of a round bar over the bar's radius."""

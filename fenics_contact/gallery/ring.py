@@ -4,20 +4,210 @@ The ring lies in the x-z plane. Its contact crown is the half circle on the +x s
 inner surface (the pole) at the origin; the far crown lies on the -x side. Lattice directions: around the ring
 (in the contact crown from -z to +z), a from the inner to the outer side of the section, b along +y. They are
 right-handed.
+
+Spacing of the nodes of a ring along its three directions: finer where links touch.
+
+The nodes along a direction are concentrated by the map
+
+    x -> sinh(κ x) / sinh(κ)
+
+of [-1, 1] with the contact at 0, which is smooth there: cells near the contact are almost equal, and those at
+the ends cosh κ times as large. The strength κ of the crowns comes from `LinkShape.grading`; across the wire
+and through its thickness it is chosen such that the cell at the contact is as small as along the ring.
+
+The cross-section of a link's wire: a rounded square bounded by four circular arcs.
+
+In the section's own coordinates (a, b), a points away from the ring's inside and b along the ring's axis. The
+four arcs turn by the same angle, ``roundness`` times 90 degrees: 0 would be a rectangle, 1 an ellipse-like
+oval (a disc for equal sizes) whose corner cells are flat. With the half angle φ and τ = tan(φ/2) the corners
+(±c_a, ±c_b) satisfy
+
+    c_a + τ c_b = r_a,    c_b + τ c_a = r_b,
+
+where r_a and r_b are half the thickness and half the width: an arc over a chord of length 2c rises by τ c.
+
+The ring of a chain link in gmsh: a transfinite section swept through six pieces.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import ModuleType
 
 import numpy as np
+from scipy.optimize import brentq
 
-from fenics_contact.checks import check_count, check_grading, check_numbers
+from fenics_contact._base.checks import check_count, check_grading, check_numbers
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery.ring_spacing import Spacing, drawn_together, strength_for
-from fenics_contact.gallery.section import WireSection
-from fenics_contact.gallery.structured import check_cell_type
-from fenics_contact.surface_shapes import Torus
+from fenics_contact.gallery.blocks import check_cell_type
+from fenics_contact.readers.gmsh_session import gmsh_model
+from fenics_contact.shapes.simple import Torus
+
+
+@dataclass(frozen=True)
+class Spacing:
+    """Cells and strengths of a ring.
+
+    Attributes:
+        quarter: Cells on a quarter turn of a crown.
+        leg: Cells on a leg, all of one length.
+        along: Strength κ on the crowns, 0 for equal cells.
+        across: Strength across the wire.
+        through: Strength through its thickness, towards its inner side.
+    """
+
+    quarter: int
+    leg: int
+    along: float = 0.0
+    across: float = 0.0
+    through: float = 0.0
+
+    @property
+    def uniform(self) -> Spacing:
+        """The same numbers of cells, but uniform."""
+        return Spacing(self.quarter, self.leg)
+
+
+def drawn_together(places: np.ndarray, spot: float, strength: float) -> np.ndarray:
+    """Concentrate points of an interval towards its middle or its start.
+
+    Args:
+        places: Ascending points, (n,), from the start of the interval, or symmetric about its middle, to its
+            end.
+        spot: Point of concentration.
+        strength: κ; 0 returns the points unchanged.
+
+    Returns:
+        Points, (n,), with the same ends.
+    """
+    if strength == 0.0:
+        return places
+    reach = places[-1] - spot
+    return np.asarray(spot + reach * np.sinh(strength * (places - spot) / reach) / np.sinh(strength))
+
+
+def strength_for(smallest: float) -> float:
+    """Find κ with κ / sinh κ = ``smallest``, the smallest cell over the mean; 0 if that is not below 1."""
+    if smallest >= 1.0:
+        return 0.0
+    # x / sinh x falls from 1 and is about 2 x exp(-x), which lies below at the end of the interval.
+    most = 10.0 - 2.0 * float(np.log(smallest))
+    return float(brentq(lambda x: x / np.sinh(x) - smallest, 1e-9, most))
+
+
+@dataclass(frozen=True)
+class WireSection:
+    """A rounded square.
+
+    Attributes:
+        thickness: Size along a (radially in the ring).
+        width: Size along b (across the ring).
+        roundness: Turning angle of every arc over 90 degrees, above 0 and below 1.
+    """
+
+    thickness: float
+    width: float
+    roundness: float
+
+    def __post_init__(self) -> None:
+        """Reject sizes that have no such shape."""
+        check_numbers(thickness=self.thickness, width=self.width, roundness=self.roundness)
+        if not (0.0 < self.thickness and 0.0 < self.width):
+            raise InvalidInputError(
+                f"thickness and width must be positive, got {self.thickness} and {self.width}: give the size "
+                "of the wire in both directions"
+            )
+        if not 0.0 < self.roundness < 1.0:
+            raise InvalidInputError(
+                "roundness must lie between 0 (square) and 1 (disc, whose corner cells are flat), got "
+                f"{self.roundness}: take for example 0.9"
+            )
+        if min(self.corner) <= 0.0:
+            raise InvalidInputError(
+                f"a section {self.thickness} thick and {self.width} wide is too slender for roundness "
+                f"{self.roundness}: lower the roundness or bring thickness and width closer together"
+            )
+
+    @property
+    def half_angle(self) -> float:
+        """Half the angle that each arc turns, φ, in radians."""
+        return float(self.roundness * np.pi / 4.0)
+
+    @property
+    def corner(self) -> tuple[float, float]:
+        """The corner (c_a, c_b), both positive."""
+        tau = np.tan(self.half_angle / 2.0)
+        r_a, r_b = self.thickness / 2.0, self.width / 2.0
+        return float((r_a - tau * r_b) / (1.0 - tau**2)), float((r_b - tau * r_a) / (1.0 - tau**2))
+
+    @property
+    def crown_radius(self) -> float:
+        """Radius of the arcs that cross the section on its inner and outer side."""
+        return float(self.corner[1] / np.sin(self.half_angle))
+
+    @property
+    def flank_radius(self) -> float:
+        """Radius of the arcs on the two flanks."""
+        return float(self.corner[0] / np.sin(self.half_angle))
+
+    @property
+    def area(self) -> float:
+        """Area: the rectangle between the corners and four circular segments."""
+        c_a, c_b = self.corner
+        segment = self.half_angle - np.sin(2.0 * self.half_angle) / 2.0
+        return float(4.0 * c_a * c_b + 2.0 * segment * (self.crown_radius**2 + self.flank_radius**2))
+
+    def inner_arc(self, n: int, strength: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Divide the arc on the ring's inside.
+
+        Args:
+            n: Number of pieces.
+            strength: Concentration towards the middle, see `drawn_together`; 0 for equal pieces.
+
+        Returns:
+            Points (a, b), from negative to positive b, and unit normals out of the section, both (n + 1, 2).
+        """
+        angle = drawn_together(np.linspace(-self.half_angle, self.half_angle, n + 1), 0.0, strength)
+        normals = np.column_stack([-np.cos(angle), np.sin(angle)])
+        centre = np.array([self.crown_radius - self.thickness / 2.0, 0.0])
+        return centre + self.crown_radius * normals, normals
+
+    def flank_arc(self, n: int, strength: float = 0.0) -> np.ndarray:
+        """Divide the arc at positive b, from the inner to the outer side; (n + 1, 2).
+
+        Args:
+            n: Number of pieces.
+            strength: Concentration towards the inner side; 0 for equal pieces.
+        """
+        start = -self.half_angle
+        angle = drawn_together(np.linspace(start, self.half_angle, n + 1), start, strength)
+        outward = np.column_stack([np.sin(angle), np.cos(angle)])
+        return np.array([0.0, self.width / 2.0 - self.flank_radius]) + self.flank_radius * outward
+
+    def lattice(self, n_a: int, n_b: int, through: float = 0.0, across: float = 0.0) -> np.ndarray:
+        """Fill the section by transfinite interpolation between its four arcs.
+
+        Args:
+            n_a: Number of cells along a.
+            n_b: Number of cells along b.
+            through: Concentration of cells towards the inner side, see `drawn_together`.
+            across: Concentration of cells towards b = 0.
+
+        Returns:
+            Points (a, b), (n_a + 1, n_b + 1, 2).
+
+        References:
+            Gordon and Hall, Construction of curvilinear co-ordinate systems and applications to mesh
+            generation, Int. J. Numer. Meth. Engng 7 (1973), 461-477.
+        """
+        inner, _ = self.inner_arc(n_b, across)
+        right = self.flank_arc(n_a, through)
+        outer, left = inner * [-1.0, 1.0], right * [1.0, -1.0]
+        u = drawn_together(np.linspace(0.0, 1.0, n_a + 1), 0.0, through)[:, None, None]
+        v = drawn_together(np.linspace(0.0, 1.0, n_b + 1), 0.5, across)[None, :, None]
+        corners = (1 - u) * ((1 - v) * inner[0] + v * inner[-1]) + u * ((1 - v) * outer[0] + v * outer[-1])
+        return (1 - u) * inner + u * outer + (1 - v) * left[:, None] + v * right[:, None] - corners
+
 
 #: Largest ratio of two sizes of a link: gmsh does not mesh others.
 ALIKE = 1000
@@ -219,3 +409,98 @@ def crown_shapes(shape: LinkShape) -> dict[str, Torus]:
         name: Torus((middle, 0.0, 0.0), (0.0, 1.0, 0.0), shape.inner_radius + tube, tube)
         for name, middle in middles.items()
     }
+
+
+_HEXAHEDRON, _QUADRILATERAL = 5, 3
+
+
+def mesh_ring(shape: LinkShape) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+    """Mesh the ring with hexahedra that are uniform on each piece.
+
+    The geometry has six volumes with the physical name "volume"; the inner side of the crown at the origin is
+    named "contact", that of the far crown "grip". Surfaces are read back by these names.
+
+    Args:
+        shape: The link.
+
+    Returns:
+        Coordinates, (n_nodes, 3); cells, (n_cells, 8); facets by name, (n_facets, 4); all in gmsh's order.
+    """
+    with gmsh_model("fenics_contact chain link") as gmsh:
+        _build_ring(gmsh, shape)
+        gmsh.model.mesh.generate(3)
+        tags, coordinates, _ = gmsh.model.mesh.getNodes()
+        row = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
+        row[tags.astype(np.int64)] = np.arange(tags.size)
+        groups = {
+            gmsh.model.getPhysicalName(dim, tag): (dim, tag) for dim, tag in gmsh.model.getPhysicalGroups()
+        }
+        cells = row[_elements(gmsh, *groups.pop("volume"), _HEXAHEDRON)]
+        facets = {name: row[_elements(gmsh, *group, _QUADRILATERAL)] for name, group in groups.items()}
+    return coordinates.reshape(-1, 3), cells, facets
+
+
+def _elements(gmsh: ModuleType, dim: int, tag: int, kind: int) -> np.ndarray:
+    """Node tags of the elements of one kind in a physical group, (n, 8 | 4)."""
+    per_element = 8 if kind == _HEXAHEDRON else 4
+    entities = gmsh.model.getEntitiesForPhysicalGroup(dim, tag)
+    nodes = [gmsh.model.mesh.getElementsByType(kind, int(entity))[1] for entity in entities]
+    return np.concatenate(nodes).astype(np.int64).reshape(-1, per_element)
+
+
+def _build_ring(gmsh: ModuleType, shape: LinkShape) -> None:
+    """Sweep the section from the foot of the contact crown once around and name the volume and surfaces."""
+    geo, spacing = gmsh.model.geo, shape.spacing
+    near, far = -shape.inner_radius, -shape.inner_radius - shape.straight
+
+    def turn(face: int, centre: float) -> list[tuple[int, int]]:
+        return list(
+            geo.revolve(
+                [(2, face)], centre, 0, 0, 0, -1, 0, np.pi / 2, numElements=[spacing.quarter], recombine=True
+            )
+        )
+
+    def leg(face: int, length: float) -> list[tuple[int, int]]:
+        return list(geo.extrude([(2, face)], length, 0, 0, numElements=[spacing.leg], recombine=True))
+
+    face = _build_section(gmsh, shape)
+    volumes, inner = [], []
+    for sweep, argument in (
+        (turn, near),
+        (turn, near),
+        (leg, -shape.straight),
+        (turn, far),
+        (turn, far),
+        (leg, shape.straight),
+    ):
+        (_, face), (_, volume), (_, side), *_ = sweep(face, argument)
+        volumes.append(volume)
+        inner.append(side)
+    geo.removeAllDuplicates()  # closes the ring: the last face is the first one
+    geo.synchronize()
+    for dim, tags, name in ((3, volumes, "volume"), (2, inner[:2], "contact"), (2, inner[3:5], "grip")):
+        gmsh.model.setPhysicalName(dim, gmsh.model.addPhysicalGroup(dim, tags), name)
+
+
+def _build_section(gmsh: ModuleType, shape: LinkShape) -> int:
+    """Build the section at the foot of the contact crown (direction a is -z there) and return its tag.
+
+    The first curve is the one on the ring's inside.
+    """
+    geo, section = gmsh.model.geo, shape.section
+    c_a, c_b = section.corner
+    beyond_a = section.crown_radius - section.thickness / 2.0
+    beyond_b = section.flank_radius - section.width / 2.0
+
+    def point(a: float, b: float) -> int:
+        return int(geo.addPoint(-shape.inner_radius, b, -shape.centre_radius - a))
+
+    corners = [point(-c_a, -c_b), point(-c_a, c_b), point(c_a, c_b), point(c_a, -c_b)]
+    centres = [point(beyond_a, 0.0), point(0.0, -beyond_b), point(-beyond_a, 0.0), point(0.0, beyond_b)]
+    arcs = [geo.addCircleArc(corners[k], centres[k], corners[(k + 1) % 4]) for k in range(4)]
+    for k, arc in enumerate(arcs):
+        geo.mesh.setTransfiniteCurve(arc, (shape.n_a if k % 2 else shape.n_b) + 1)
+    face = geo.addPlaneSurface([geo.addCurveLoop(arcs)])
+    geo.mesh.setTransfiniteSurface(face)
+    geo.mesh.setRecombine(2, face)
+    return int(face)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery.link import DesignSurface
-from fenics_contact.mesh import BodyMesh, vector_areas
+from fenics_contact.gallery.links import DesignSurface
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.faces import vector_areas
 
 #: Smallest cosine of the angle between a facet's normal and the axis along which the side is seen as a grid.
 STEEP = 0.5

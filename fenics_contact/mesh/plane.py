@@ -6,9 +6,15 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cell_types import cell_type_of
-from fenics_contact.mesh.faces import cell_faces, corners_of, number_faces, start_at_smallest
+from fenics_contact.mesh.faces import (
+    NOTHING,
+    cell_faces,
+    coordinate_rounding,
+    corners_of,
+    number_faces,
+    start_at_smallest,
+)
 from fenics_contact.mesh.quality import jacobians
-from fenics_contact.mesh.rounding import NOTHING, coordinate_rounding
 
 _MIRRORED = {
     "triangle": [0, 2, 1],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.body_mesh import BodyMesh, check_jacobians
 from fenics_contact.mesh.cell_types import (
     HEXAHEDRON27,
     QUADRILATERAL9,
@@ -13,11 +13,10 @@ from fenics_contact.mesh.cell_types import (
     TRIANGLE6,
     CellType,
     cell_type_of,
+    shape_values,
 )
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
-from fenics_contact.mesh.shape_functions import shape_values
-from fenics_contact.mesh.validation import check_jacobians
-from fenics_contact.surface_shapes import closest_points
+from fenics_contact.shapes.simple import closest_points
 
 _QUADRATIC = {cell.vertices.shape: cell for cell in (TRIANGLE6, QUADRILATERAL9, TETRAHEDRON10, HEXAHEDRON27)}
 

@@ -20,9 +20,9 @@ from fenics_contact.mesh.cell_types import (
     TRIANGLE,
     TRIANGLE6,
     CellType,
+    shape_values,
 )
 from fenics_contact.mesh.faces import number_faces
-from fenics_contact.mesh.shape_functions import shape_values
 
 QUADRATIC = {
     6: TRIANGLE6, 8: QUADRILATERAL9, 9: QUADRILATERAL9,

@@ -1,18 +1,131 @@
-"""The equilibrium constraint G lambda = e of the floating subdomains and the projector it defines."""
+"""The equilibrium constraint G lambda = e of the floating subdomains and the projector it defines.
+
+Generalised inverses of symmetric positive semidefinite matrices, dense or sparse.
+
+Inverse of the unsymmetric matrix of a coarse space, dense while small, else sparse on a few ranks.
+"""
 
 from __future__ import annotations
 
 from copy import copy
 from functools import cached_property
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
+import scipy.linalg
 import scipy.sparse as sp
+from scipy.linalg import lapack
 
-from fenics_contact._libraries import MPI
+from fenics_contact._base.libraries import MPI
+from fenics_contact._base.sparse import SharedFactor
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.qp.gram import GramInverse, SparseGramInverse
 from fenics_contact.qp.reductions import Vector, global_sum
+
+RANK_TOLERANCE = 1e-12
+
+
+class GramInverse:
+    """Generalised inverse of S = G G^T, which may be rank deficient.
+
+    S is scaled to unit diagonal first, because its rows mix translations and rotations. A well conditioned
+    S is factored by Cholesky; otherwise its eigenvectors separate the null space, and the inverse acts on the
+    complement. For any generalised inverse G^T S^- G is the same projector.
+
+    Attributes:
+        rank: Number of independent rows.
+        null_space: Columns z with S z = 0, shape (m, m - rank): motions that no multiplier resists.
+    """
+
+    def __init__(self, matrix: Vector) -> None:
+        """Factor ``matrix`` of shape (m, m); only its values on this rank are used, no communication."""
+        diagonal = np.diagonal(matrix)
+        floor = RANK_TOLERANCE**2 * max(diagonal.max(initial=0.0), np.finfo(float).tiny)
+        self._scale = 1.0 / np.sqrt(np.where(diagonal > floor, diagonal, 1.0))
+        scaled = self._scale[:, None] * matrix * self._scale
+        self.rank = len(matrix)
+        self.null_space = np.zeros((len(matrix), 0))
+        self._cholesky = _trusted_cholesky(scaled)
+        if self._cholesky is None:
+            values, vectors = scipy.linalg.eigh(scaled)
+            keep = values > RANK_TOLERANCE * values.max(initial=0.0)
+            self.rank = int(keep.sum())
+            self.null_space = self._scale[:, None] * vectors[:, ~keep]
+            self._root = vectors[:, keep] / np.sqrt(values[keep])
+
+    def solve(self, right_side: Vector) -> Vector:
+        """Apply the generalised inverse to an array of shape (m,) or (m, k)."""
+        if right_side.size == 0:
+            return np.zeros_like(right_side)
+        scale = self._scale if right_side.ndim == 1 else self._scale[:, None]
+        if self._cholesky is None:
+            return scale * (self._root @ (self._root.T @ (scale * right_side)))
+        return scale * scipy.linalg.cho_solve((self._cholesky, True), scale * right_side, check_finite=False)
+
+
+def _trusted_cholesky(matrix: Vector) -> Vector | None:
+    """Return the lower Cholesky factor, or None if the matrix is singular or close to it."""
+    if len(matrix) == 0:
+        return np.zeros((0, 0))
+    factor, info = lapack.dpotrf(matrix, lower=1)
+    if info != 0:
+        return None
+    reciprocal_condition, _ = lapack.dpocon(factor, np.abs(matrix).sum(axis=0).max(), uplo="L")
+    return factor if reciprocal_condition > RANK_TOLERANCE else None
+
+
+#: Vectors in the first search for null vectors: a floating body has six.
+FIRST_BLOCK = 8
+
+
+class SparseGramInverse:
+    """Generalised inverse of S = Σ S_rank, which may be rank deficient; see `GramInverse`.
+
+    Null vectors are computed by inverse iteration with a few vectors, which converges at once for a matrix
+    that is singular to rounding.
+
+    Attributes:
+        rank: Number of independent rows.
+        null_space: Columns z with S z = 0, shape (m, m - rank): motions that no multiplier resists.
+    """
+
+    def __init__(self, comm: MPI.Comm, share: sp.csr_matrix) -> None:
+        """Factor the sum of the ranks' shares, each of shape (m, m). Collective on ``comm``."""
+        diagonal = global_sum(comm, share.diagonal())
+        floor = RANK_TOLERANCE**2 * max(diagonal.max(initial=0.0), np.finfo(float).tiny)
+        scale = 1.0 / np.sqrt(np.where(diagonal > floor, diagonal, 1.0))
+        self._factor = SharedFactor(comm, share, scale)
+        self._scale = scale
+        self._null = self._null_vectors()
+        self.rank = len(diagonal) - self._null.shape[1]
+        self.null_space = scale[:, None] * self._null
+
+    def solve(self, right_side: Vector) -> Vector:
+        """Apply the generalised inverse to a replicated array of shape (m,). Collective."""
+        if self._null.shape[1] == 0:
+            return self._factor.solve(right_side)
+        scaled = self._scale * right_side
+        scaled = scaled - self._null @ (self._null.T @ scaled)
+        solved = self._factor.solve(scaled / self._scale) / self._scale
+        return self._scale * (solved - self._null @ (self._null.T @ solved))
+
+    def _null_vectors(self) -> Vector:
+        """Return orthonormal null vectors of the scaled matrix. Collective."""
+        m = len(self._scale)
+        count = min(FIRST_BLOCK, m)
+        while True:
+            start = np.random.default_rng(0).standard_normal((m, count))
+            basis, _ = np.linalg.qr(self._invert_scaled(start))
+            inverse = basis.T @ self._invert_scaled(basis)
+            largest, turn = np.linalg.eigh(0.5 * (inverse + inverse.T))
+            null = largest > 1.0 / RANK_TOLERANCE
+            if not null.all() or count == m:
+                return np.asarray(basis @ turn[:, null])
+            count = min(2 * count, m)
+
+    def _invert_scaled(self, columns: Vector) -> Vector:
+        solved = [self._factor.solve(column / self._scale, refine=False) for column in columns.T]
+        return np.column_stack(solved) / self._scale[:, None]
+
 
 #: Up to this number of rigid motions the coarse matrices are dense and factored on every rank.
 DENSE_LIMIT = 600
@@ -150,3 +263,71 @@ def summed_if_small(comm: MPI.Comm, share: sp.csr_matrix) -> Gram:
     """Return the sum over the ranks, dense, up to `DENSE_LIMIT`; beyond it the share. Collective."""
     m = share.shape[0]
     return global_sum(comm, share.toarray()).reshape(m, m) if m <= DENSE_LIMIT else share
+
+
+#: Reciprocal condition number below which a matrix counts as singular.
+INVERSE_TOLERANCE = 1e-10
+#: Number of random vectors in the search for a null vector.
+PROBES = 4
+
+
+class SquareInverse(Protocol):
+    """The inverse of a square matrix."""
+
+    def solve(self, right_side: Vector) -> Vector:
+        """Return the inverse times a replicated array of shape (m,). Collective."""
+
+
+def invert_square(comm: MPI.Comm, share: sp.csr_matrix, scale: Vector) -> SquareInverse | None:
+    """Factor the sum of the ranks' shares; None if it is singular. Collective.
+
+    Args:
+        comm: Communicator of the ranks.
+        share: This rank's summand, shape (m, m).
+        scale: Factors for rows and columns that bring the entries to order one, shape (m,), replicated.
+    """
+    matrix = summed_if_small(comm, share)
+    if isinstance(matrix, np.ndarray):
+        dense = DenseSquareInverse(matrix, scale)
+        return dense if dense.condition > INVERSE_TOLERANCE else None
+    factor = SharedFactor(comm, share, scale)
+    return factor if _largest_growth(factor, scale) < 1.0 / INVERSE_TOLERANCE else None
+
+
+class DenseSquareInverse:
+    """LU factors of a small matrix, scaled.
+
+    Attributes:
+        condition: Reciprocal condition number; zero where the matrix is singular.
+    """
+
+    def __init__(self, matrix: Vector, scale: Vector) -> None:
+        """Factor a replicated matrix, shape (m, m)."""
+        self._scale, self.condition = scale, 1.0
+        if len(matrix) == 0:
+            return
+        scaled = scale[:, None] * matrix * scale
+        lu, pivots, failed = lapack.dgetrf(scaled)
+        norm = np.abs(scaled).sum(axis=0).max()
+        self.condition = 0.0 if failed or norm == 0.0 else float(lapack.dgecon(lu, norm)[0])
+        self._factor = (lu, pivots)
+
+    def solve(self, right_side: Vector) -> Vector:
+        """Return the inverse times a replicated array of shape (m,)."""
+        if right_side.size == 0:
+            return right_side
+        solved = scipy.linalg.lu_solve(self._factor, self._scale * right_side, check_finite=False)
+        return np.asarray(self._scale * solved)
+
+
+def _largest_growth(factor: SharedFactor, scale: Vector) -> float:
+    """Return a lower estimate of the scaled inverse's norm by inverse iteration. Collective."""
+    largest = 0.0
+    for start in np.random.default_rng(0).standard_normal((PROBES, factor.size)):
+        x = start / np.linalg.norm(start)
+        for _ in range(2):
+            x = factor.solve(x / scale, refine=False) / scale
+            growth = float(np.linalg.norm(x))
+            x /= growth
+        largest = max(largest, growth)
+    return largest

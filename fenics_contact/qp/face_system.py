@@ -8,12 +8,11 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact._libraries import MPI
-from fenics_contact.qp.coarse import CoarseSpace, gram_matrix
+from fenics_contact._base.libraries import MPI
+from fenics_contact.qp.coarse import CoarseSpace, SquareInverse, gram_matrix, invert_square
 from fenics_contact.qp.face import Face
 from fenics_contact.qp.problem import DualProblem, FacePreconditioner, Operator
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
-from fenics_contact.qp.square_inverse import SquareInverse, invert_square
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from fenics_contact._libraries import MPI
-from fenics_contact.linalg import LAST_PLACES
+from fenics_contact._base.libraries import MPI
+from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact.qp.face_system import CoupledSystem, FaceSystem
 from fenics_contact.qp.reductions import Vector, global_sum
 

@@ -1,23 +1,256 @@
-"""Newton steps on faces: classify, solve the linear face, equilibrate floating bodies, damp the step."""
+"""Newton steps on faces: classify, solve the linear face, equilibrate floating bodies, damp the step.
+
+Rows of a face that contradict each other: forces on them deform nothing, and one of them must give way.
+
+What Newton's methods on faces share: named steps on frozen states, forcing terms and damping.
+
+Two methods are built on it: `FaceNewton` on a dual problem, whose operator is constant, and `TangentNewton`
+of large deformations, whose tangents change. Only operators and rules for a failed step differ.
+
+References:
+    S. C. Eisenstat, H. F. Walker, Choosing the forcing terms in an inexact Newton method, SIAM J. Sci.
+    Comput. 17 (1996). Z. Dostál, Optimal Quadratic Programming Algorithms, Springer (2009).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
-from fenics_contact._libraries import MPI
-from fenics_contact.qp.contradiction import Contradiction, contradiction
+from fenics_contact._base.libraries import MPI
+from fenics_contact._base.sparse import ROUNDING
 from fenics_contact.qp.face import Face, classify
 from fenics_contact.qp.face_system import CoupledFace, FaceSystem, FaceSystems, couple
-from fenics_contact.qp.forcing import FRACTIONS, Damped, Forcing, damp, residual_weights
-from fenics_contact.qp.iterate import Iterate, apply_unless_zero, iterate_at, iterate_between
 from fenics_contact.qp.krylov import FaceStep, Stop, projected_cg, projected_gmres
-from fenics_contact.qp.problem import CountedOperator, DualProblem, ShiftedOperator
-from fenics_contact.qp.reductions import Vector, global_sum
-from fenics_contact.qp.rigid_motions import RigidMotionCorrection, keep_free_motions
-from fenics_contact.qp.solution import Residuals, SolverStep, contact_step
+from fenics_contact.qp.problem import CountedOperator, DualProblem, RowsOfFace, ShiftedOperator
+from fenics_contact.qp.reductions import Vector, global_least, global_sum
+from fenics_contact.qp.rigid_motions import NEARLY, RigidMotionCorrection, keep_free_motions
+from fenics_contact.qp.solution import (
+    Iterate,
+    Residuals,
+    SolverStep,
+    apply_unless_zero,
+    contact_step,
+    iterate_at,
+    iterate_between,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Contradiction:
+    """What rows demand of each other where B_Fᵀ N = 0: a node that sticks to a floor and meets a wall.
+
+    There Nᵀr is the same for all multipliers of the face, and zero only where the rows agree. The dual
+    objective falls without end along −N Nᵀr: forces grow until a disc slips or a contact opens.
+
+    Attributes:
+        excess: The part of the residual on the face that no multiplier changes, shape (n_face,), owned.
+        direction: Change of the multiplier that lowers the objective and deforms nothing, owned.
+        group: Rows with the same number ≥ 0 are coupled, others are not; shape (n_owned,).
+        n_groups: Number of groups on all ranks.
+    """
+
+    excess: Vector
+    direction: Vector
+    group: npt.NDArray[np.int64]
+    n_groups: int
+
+    def relieved(self, problem: DualProblem, face: Face, multiplier: Vector, trial: Vector) -> Vector:
+        """Return the multiplier with each group moved until the first of its contacts changes. Collective.
+
+        Args:
+            problem: The dual problem.
+            face: The face.
+            multiplier: λ, owned.
+            trial: w = λ − ρ r, owned, by which contacts are classified.
+        """
+        layout, moved, law = problem.layout, self.direction, problem.law
+        longest = np.full(self.n_groups, np.inf)
+        closed, discs = layout.normal[face.closed], layout.tangential[face.stick]
+        pressing = law.growth[face.stick] * moved[layout.tangential_frictional[face.stick]]
+        slipping = _until_slip(trial[discs], moved[discs], law.bound(multiplier)[face.stick], pressing)
+        opening = _until_open(trial[closed], moved[closed])
+        for rows, length in ((closed, opening), *((component, slipping) for component in discs.T)):
+            coupled = self.group[rows] >= 0
+            np.minimum.at(longest, self.group[rows[coupled]], length[coupled])
+        longest = global_least(problem.comm, longest)
+        part = np.append(np.where(np.isfinite(longest), longest * (1.0 + ROUNDING), 0.0), 0.0)
+        return np.asarray(multiplier + part[self.group] * moved)
+
+
+def contradiction(problem: DualProblem, system: FaceSystem, gradient: Vector) -> Contradiction | None:
+    """Return what no multiplier of a face changes in a residual; None where that is nothing. Collective.
+
+    Args:
+        problem: The dual problem.
+        system: The system of the face.
+        gradient: The residual on the face, shape (n_face,), owned.
+    """
+    face, rows = system.face, system.preconditioner
+    if not isinstance(rows, RowsOfFace):
+        return None
+    found = rows.contradiction(face.prolong(gradient))
+    if found is None:
+        return None
+    excess, direction, group, count = found
+    if problem.coarse.norm(problem.coarse.apply(direction)) > NEARLY * problem.norm(direction):
+        return None  # forces that deform nothing may still push rigid surfaces that move freely
+    return Contradiction(face.restrict(excess), direction, group, count)
+
+
+def _until_open(trial: Vector, moved: Vector) -> Vector:
+    """Return t ≥ 0 with w + t v = 0 for normal forces, infinite where they grow."""
+    falls = moved < 0.0
+    return np.where(falls, np.maximum(trial, 0.0) / np.where(falls, -moved, 1.0), np.inf)
+
+
+def _until_slip(trial: Vector, moved: Vector, bound: Vector, pressing: Vector) -> Vector:
+    """Return the least t ≥ 0 with ‖w + t v‖ = Ψ + t ψ for discs, infinite where there is none.
+
+    Args:
+        trial: w, shape (n, t).
+        moved: v, shape (n, t).
+        bound: Ψ, shape (n,).
+        pressing: ψ, by which the bound grows, shape (n,).
+    """
+    a = np.einsum("ia,ia->i", moved, moved) - pressing**2
+    b = np.einsum("ia,ia->i", trial, moved) - bound * pressing
+    c = np.minimum(np.einsum("ia,ia->i", trial, trial) - bound**2, 0.0)
+    root = b * b - a * c
+    divisor = b + np.sqrt(np.maximum(root, 0.0))
+    meets = (root >= 0.0) & (divisor > 0.0)
+    return np.where(meets, -c / np.where(meets, divisor, 1.0), np.inf)
+
+
+#: Fractions of a step that are tried where its end is worse than its start and the point before that.
+FRACTIONS = (0.5, 0.25, 0.1)
+
+State = TypeVar("State")
+Answer = TypeVar("Answer", covariant=True)
+Point = TypeVar("Point")
+
+
+class NewtonMethod(Protocol[State, Answer]):
+    """An inexact semismooth Newton method whose data pass from step to step in a frozen state.
+
+    1. `terminate`: the answer where all residuals are small; an error where steps are used up.
+    2. `step`: (a) the forcing term η, from how residuals fell, (b) the face that the natural map selects,
+       (c) the linear system of the face, solved to η, (d) the step, damped where its end is worse,
+       (e) progress, and what to do without.
+    """
+
+    def terminate(self, state: State) -> Answer | None:
+        """Return the answer, None if a further step is needed. Collective."""
+
+    def step(self, state: State) -> State:
+        """Take one step. Collective."""
+
+
+def run_newton(method: NewtonMethod[State, Answer], state: State) -> Answer:
+    """Take steps until the method terminates. Collective."""
+    while (answer := method.terminate(state)) is None:
+        state = method.step(state)
+    return answer
+
+
+@dataclass(frozen=True)
+class Forcing:
+    """Forcing terms η, by choice 1 or 2 of Eisenstat and Walker.
+
+    Attributes:
+        largest: Largest tolerance relative to the residual.
+        loosest: Largest absolute tolerance.
+        tolerance: That of the whole solve: no face is solved much more accurately.
+    """
+
+    largest: float
+    loosest: float
+    tolerance: float
+
+    def at_most(self, largest: float, loosest: float) -> Forcing:
+        """Return forcing terms that are no larger than these."""
+        return replace(self, largest=min(self.largest, largest), loosest=min(self.loosest, loosest))
+
+    def by_prediction(self, residuals: Residuals, mismatch: float | None, care: float) -> float:
+        """Return the weighted residual at which a face is solved, by choice 1.
+
+        Args:
+            residuals: Those of the iterate.
+            mismatch: Difference of the last residual from the one that its face predicted, relative to the
+                residual before; None if the face has changed.
+            care: Factor on the relative tolerance, at most one.
+        """
+        term = self.largest if mismatch is None else min(self.largest, mismatch)
+        wanted = min(self.loosest, care * term * residuals.worst)
+        return max(wanted, 0.3 * self.tolerance)
+
+    def by_reduction(self, worst: float, before: float | None, last: float, care: float) -> float:
+        """Return the residual of a linear system relative to its start, by choice 2 with γ = 0.9.
+
+        Args:
+            worst: The residual.
+            before: That before the last step, None before the first.
+            last: The last forcing term.
+            care: Factor on all of them, at most one.
+        """
+        term = self.largest
+        if before and before < 1.0:
+            safeguard = 0.9 * last**2
+            term = min(term, max(0.9 * (worst / before) ** 2, safeguard if safeguard > 0.1 else 0.0))
+        return care * max(term, 0.3 * self.tolerance / max(worst, self.tolerance))
+
+
+@dataclass(frozen=True, eq=False)
+class Damped(Generic[Point]):
+    """The point that is taken and the fraction of the step that led to it."""
+
+    point: Point
+    fraction: float
+
+
+def damp(
+    full: Point,
+    at: Callable[[float], Point],
+    measured: Callable[[Point], Residuals],
+    earlier: Iterable[Residuals | None],
+    fractions: tuple[float, ...] = FRACTIONS,
+) -> Damped[Point]:
+    """Return the end of a step, or the best of a few points on it if that is worse. Collective.
+
+    Where the active set alternates between two faces the solution lies between them. The way to the right
+    face may lead over a worse one: a full step is taken if it improves on either of the last two points.
+
+    Args:
+        full: The end of the step.
+        at: Returns the point at a fraction of it.
+        measured: Returns the residuals by which points are compared.
+        earlier: Those of the last two points, None without.
+        fractions: Those that are tried.
+    """
+    end = measured(full)
+    if any(old is not None and not end.is_worse_than(old) for old in earlier):
+        return Damped(full, 1.0)
+    tried = [Damped(full, 1.0), *(Damped(at(part), part) for part in fractions)]
+    return min(tried, key=lambda each: measured(each.point).worst_beside(end))
+
+
+def residual_weights(face: Face, residuals: Residuals, step: Vector) -> Vector:
+    """Return the weights that turn a residual on a face into the natural and the gluing residual.
+
+    Args:
+        face: The face.
+        residuals: The last residuals, for their scales.
+        step: ρ of the natural map, 0 on equality rows, owned.
+    """
+    gluing = residuals.gluing_scale or 1.0
+    weights = np.sqrt(face.restriction.power(2).T @ step**2) * face.damping**2
+    weights /= residuals.force_scale or np.inf
+    return np.where(weights > 0.0, weights, 1.0 / gluing)
+
 
 #: The longest cycle of active sets that is recognised.
 LONGEST_CYCLE = 6

@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from fenics_contact._libraries import MPI
+from fenics_contact._base.libraries import MPI
 from fenics_contact.errors import InfeasibleError, InvalidInputError, together
 from fenics_contact.qp.coarse import CoarseSpace
+from fenics_contact.qp.cones import SlipLaw, TrescaLaw
 from fenics_contact.qp.face import Marks
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector, global_sum
-from fenics_contact.qp.slip_law import SlipLaw, TrescaLaw
 
 Operator = Callable[[Vector], Vector]
 #: Called with the number of F-products so far and, after a step of a solver, with its residual.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fenics_contact._libraries import MPI
+from fenics_contact._base.libraries import MPI
 
 #: One number for each row, (n,).
 Vector = npt.NDArray[np.float64]

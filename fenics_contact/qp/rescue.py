@@ -7,14 +7,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact.qp.forcing import Damped, Forcing
-from fenics_contact.qp.iterate import Iterate, Start, certify, iterate_at, iterate_between
-from fenics_contact.qp.newton_steps import FaceState, FaceSteps, Safeguards
+from fenics_contact.qp.cones import TrescaLaw
+from fenics_contact.qp.newton_steps import Damped, FaceState, FaceSteps, Forcing, Safeguards
 from fenics_contact.qp.problem import CountedOperator, DualProblem, ShiftedOperator
 from fenics_contact.qp.reductions import Vector, global_sum
-from fenics_contact.qp.slip_law import TrescaLaw
 from fenics_contact.qp.smalse import Smalse, outer_iterations
-from fenics_contact.qp.solution import Residuals, SmalseMemory, SolverStep, contact_step
+from fenics_contact.qp.solution import (
+    Iterate,
+    Residuals,
+    SmalseMemory,
+    SolverStep,
+    Start,
+    certify,
+    contact_step,
+    iterate_at,
+    iterate_between,
+)
 
 #: A rescue aims at a residual smaller by this factor.
 REDUCTION = 0.1

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.linalg import LAST_PLACES, ROUNDING
+from fenics_contact._base.sparse import LAST_PLACES, ROUNDING
 from fenics_contact.qp.coarse import CoarseSpace
-from fenics_contact.qp.feasible import FeasibleSet
+from fenics_contact.qp.cones import FeasibleSet
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 

@@ -1,17 +1,27 @@
-"""The results of a study, as stored in `study.json`."""
+"""The results of a study, as stored in `study.json`.
+
+Check that the certificate is never below the true error, and not far above it.
+
+The limit of a sequence of meshes, if it converges.
+
+Errors of every run in every quantity: relative to an exact value, an extrapolation, or the finest mesh.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from scipy.optimize import brentq
+
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.io import write_json
-from fenics_contact.study.parameters import Parameters, parameters_from
-from fenics_contact.study.protocol import QuantityFacts, SceneFacts
+from fenics_contact.output.files import write_json
+from fenics_contact.study.study import Parameters, QuantityFacts, SceneFacts, parameters_from
 
 
 @dataclass(frozen=True)
@@ -137,3 +147,235 @@ def _scene(data: Mapping[str, Any]) -> SceneFacts:
 
 def _run(data: Mapping[str, Any]) -> Run:
     return Run(**{**data, "parameters": parameters_from(data["parameters"]), "spread": tuple(data["spread"])})
+
+
+#: Largest accepted ratio of a certificate to the true error.
+LARGEST_FACTOR = 10.0
+
+
+@dataclass(frozen=True)
+class CertificateCheck:
+    """The certificates of all runs compared with the true errors.
+
+    Attributes:
+        checked: Number of runs of which both are known.
+        unknown: Number of runs without one of them.
+        smallest_factor: Smallest ratio of the certificate to the true error, 1 or more if it is a bound.
+        largest_factor: Largest ratio.
+        broken: Descriptions of violations.
+    """
+
+    checked: int
+    unknown: int
+    smallest_factor: float | None
+    largest_factor: float | None
+    broken: tuple[str, ...]
+
+
+def check_certificates(results: Results) -> CertificateCheck:
+    """Compare the certificate of every run with its true algebraic error.
+
+    The reference solution has a certificate of its own, which is the uncertainty of the comparison.
+    """
+    factors, broken, unknown = [], [], 0
+    for run in results.good:
+        bound = (run.parts or {}).get("algebraic")
+        if bound is None or run.true_errors is None:
+            unknown += 1
+            continue
+        true, doubt = run.true_errors["algebraic"], run.true_errors["uncertainty"]
+        if bound + doubt < true:
+            broken.append(f"{run.parameters}: {bound:.3e} is below the true error {true:.3e}")
+        if bound > LARGEST_FACTOR * (true + doubt):
+            times = f"more than {LARGEST_FACTOR:g} times the true error"
+            broken.append(f"{run.parameters}: {bound:.3e} is {times} {true:.3e}")
+        if true > doubt:
+            factors.append(bound / true)
+    return CertificateCheck(
+        len(results.good) - unknown,
+        unknown,
+        min(factors, default=None),
+        max(factors, default=None),
+        tuple(broken),
+    )
+
+
+#: Rates between which a sequence counts as converging: beyond them an extrapolated value is meaningless.
+RATES = (0.45, 6.0)
+#: Relative changes below this are rounding.
+ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class Extrapolation:
+    """The limit of f(h) = f₀ + C hᵖ through the three finest meshes.
+
+    Attributes:
+        value: f₀; that of the finest mesh where it could not be extrapolated.
+        rate: p, None if there is none.
+        refused: Why nothing was extrapolated; empty if it was.
+    """
+
+    value: float
+    rate: float | None
+    refused: str = ""
+
+
+def extrapolate(spacing: Sequence[float], values: Sequence[float]) -> Extrapolation:
+    """Extrapolate to h = 0 by Richardson's rule with the measured rate.
+
+    Args:
+        spacing: Mesh sizes, falling, (n,).
+        values: Values on them, (n,).
+
+    References:
+        P. J. Roache, Quantification of uncertainty in computational fluid dynamics, Annu. Rev. Fluid Mech.
+        29 (1997), section on unequal refinement.
+    """
+    h, f = np.asarray(spacing, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    finest = float(f[-1])
+    if len(h) < 3:
+        return Extrapolation(finest, None, f"three meshes are needed, there are {len(h)}")
+    (h1, h2, h3), (f1, f2, f3) = h[-3:], f[-3:]
+    before, after = f1 - f2, f2 - f3
+    if max(abs(before), abs(after)) <= ROUNDING * abs(finest):
+        return Extrapolation(finest, None, "the meshes give the same")
+    if before * after <= 0.0:
+        return Extrapolation(finest, None, "it does not converge monotonically on the three finest meshes")
+
+    def excess(p: float) -> float:
+        return float((h1**p - h2**p) / (h2**p - h3**p) - before / after)
+
+    if excess(RATES[0]) > 0.0:
+        return Extrapolation(finest, None, "the changes from mesh to mesh do not fall")
+    if excess(RATES[1]) < 0.0:
+        return Extrapolation(finest, None, "the changes fall too fast to be a power of the mesh size yet")
+    rate = float(brentq(excess, *RATES))
+    return Extrapolation(float(f3 - after * h3**rate / (h2**rate - h3**rate)), rate)
+
+
+def measured_rate(spacing: Sequence[float], errors: Sequence[float]) -> float | None:
+    """Return the slope of errors over mesh sizes in logarithms, fitted to the three finest meshes.
+
+    Args:
+        spacing: Mesh sizes, falling, (n,).
+        errors: Errors on them, positive, (n,).
+    """
+    h, e = np.asarray(spacing, dtype=np.float64)[-3:], np.asarray(errors, dtype=np.float64)[-3:]
+    if len(h) < 2 or not np.all(e > 0.0):
+        return None
+    return float(np.polyfit(np.log(h), np.log(e), 1)[0])
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The reference value of a quantity.
+
+    Attributes:
+        kind: "extrapolated", "finest mesh", or the source of the true value, such as "theory".
+        value: Its value; None for an exact one, which may differ from run to run.
+        rate: Rate of the extrapolation, None without one.
+        note: Why nothing was extrapolated.
+        true: Whether it is an exact value, which every run stores with its own.
+    """
+
+    kind: str
+    value: float | Sequence[float] | None = None
+    rate: float | None = None
+    note: str = ""
+    true: bool = False
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Relative errors of all runs of a study.
+
+    Attributes:
+        results: The study.
+    """
+
+    results: Results
+
+    @cached_property
+    def references(self) -> dict[str, Reference]:
+        """Quantity -> its reference."""
+        return {quantity.name: self._reference(quantity) for quantity in self.results.scene.quantities}
+
+    def of(self, run: Run, quantity: str) -> float | None:
+        """Return the relative error of a run, None if unknown."""
+        quantities = (run.quantities or {}).get(quantity)
+        if run.failed or quantities is None:
+            return None
+        reference = self.references[quantity]
+        if reference.true:
+            error = quantities.get("error")
+            return None if error is None else abs(float(error))
+        if reference.value is None or (reference.kind == "finest mesh" and self._is_finest(run)):
+            return None
+        value, known = np.atleast_1d(quantities["value"]), np.atleast_1d(reference.value)
+        scale = float(np.linalg.norm(known))
+        if value.shape != known.shape or scale == 0.0:
+            return None
+        return float(np.linalg.norm(value - known) / scale)
+
+    def sequence(self, parameters: Parameters) -> tuple[Run, ...]:
+        """Return the runs that differ from some settings only in the mesh size, coarse ones first."""
+        alike = [
+            run
+            for run in self.results.good
+            if replace(parameters, size=run.parameters.size) == run.parameters
+        ]
+        return tuple(sorted(alike, key=lambda run: run.parameters.size))
+
+    def strictest(self, parameters: Parameters) -> Parameters:
+        """Return settings with the smallest tolerance at which the base's method was run."""
+        numbers = [
+            float(run.parameters.tolerance)
+            for run in self.results.good
+            if not run.parameters.balanced
+            and replace(run.parameters, tolerance=parameters.tolerance, size=parameters.size) == parameters
+        ]
+        return replace(parameters, tolerance=min(numbers)) if numbers else parameters
+
+    def convergence(self, parameters: Parameters, quantity: str) -> tuple[list[float], list[float]]:
+        """Return mesh sizes and errors of a sequence of meshes."""
+        pairs = [
+            (self.results.scene.spacing[run.parameters.size], error)
+            for run in self.sequence(parameters)
+            if (error := self.of(run, quantity))
+        ]
+        return [h for h, _ in pairs], [error for _, error in pairs]
+
+    def rate(self, parameters: Parameters, quantity: str) -> float | None:
+        """Return the rate at which the error falls on the finest meshes."""
+        return measured_rate(*self.convergence(parameters, quantity))
+
+    def estimate_rate(self, parameters: Parameters) -> float | None:
+        """Return the rate at which the estimated error of the displacement falls on the finest meshes."""
+        runs = [run for run in self.sequence(parameters) if (run.parts or {}).get("discretisation")]
+        spacing = [self.results.scene.spacing[run.parameters.size] for run in runs]
+        return measured_rate(spacing, [float((run.parts or {})["discretisation"] or 0.0) for run in runs])
+
+    def _reference(self, quantity: QuantityFacts) -> Reference:
+        if quantity.source:
+            return Reference(quantity.source, true=True)
+        runs = self.sequence(self.strictest(self.results.base))
+        known = [(run, run.value(quantity.name)) for run in runs if run.value(quantity.name) is not None]
+        if not known:
+            return Reference("finest mesh", note="no run knows it")
+        finest = known[-1][1]
+        if isinstance(finest, list):
+            return Reference("finest mesh", finest, note="several numbers are not extrapolated")
+        spacing = [self.results.scene.spacing[run.parameters.size] for run, _ in known]
+        extrapolation = extrapolate(spacing, [float(value) for _, value in known])
+        kind = "finest mesh" if extrapolation.refused else "extrapolated"
+        return Reference(kind, extrapolation.value, extrapolation.rate, extrapolation.refused)
+
+    def _is_finest(self, run: Run) -> bool:
+        """Return whether a run has the discretisation of the reference on the finest mesh."""
+        sequence = self.sequence(self.strictest(self.results.base))
+        if not sequence:
+            return False
+        finest, mine = sequence[-1].parameters, run.parameters
+        alike = (mine.cell, mine.discretisation) == (finest.cell, finest.discretisation)
+        return alike and mine.size == finest.size

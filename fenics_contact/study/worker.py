@@ -9,9 +9,9 @@ import traceback
 from pathlib import Path
 from typing import Any
 
-from fenics_contact._libraries import MPI, start
+from fenics_contact._base.libraries import MPI, start
 from fenics_contact.errors import FenicsContactError
-from fenics_contact.io import write_json
+from fenics_contact.output.files import write_json
 
 
 def main(comm: MPI.Comm | None, arguments: list[str] | None = None) -> None:

@@ -9,18 +9,11 @@ from functools import lru_cache
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.accuracy import Certificate, certify, friction_error
-from fenics_contact.contact import AnyState, ContactProblem, solve_scene
-from fenics_contact.contact.dual_solve import solve_dual
-from fenics_contact.gallery import block, hemisphere, rectangle
-from fenics_contact.mesh import quadratic
-from fenics_contact.partition import bisection_partition, box_partition, graph_partition
-from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG, solve
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    PlaneStress,
     RigidSphere,
     Scene,
     Support,
@@ -28,7 +21,18 @@ from fenics_contact.scene import (
     TotalForce,
     Traction,
     Tresca,
+    box_partition,
+    solve_scene,
 )
+from fenics_contact._accuracy.certificate import certify
+from fenics_contact._accuracy.state_errors import friction_error
+from fenics_contact.gallery import block, hemisphere, rectangle
+from fenics_contact.materials import PlaneStress
+from fenics_contact.mesh import bisection_partition, graph_partition, quadratic
+from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG, solve
+from fenics_contact.results import Certificate
+from fenics_contact.results.deformed_state import AnyState
+from fenics_contact.results.dual_solve import solve_dual
 from tests.contact import effect_cases, gallery
 from tests.contact.gallery import FLOOR, SOFT
 

@@ -7,7 +7,7 @@ import sys
 
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
+from fenics_contact import solve_scene
 from tests.accuracy.algebraic import CASES, measured, solver_of
 
 NAMES = ("a linear block", "a body that friction holds", "two dimensions")

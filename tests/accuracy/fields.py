@@ -7,13 +7,14 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.accuracy import DiscretisationError, discretisation_error
-from fenics_contact.accuracy.recovery import recovered_gradients
-from fenics_contact.accuracy.sites import Sites, find_sites
-from fenics_contact.feti import TornSystem, build_torn_system, decompose, nodal_mean
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import bisection_partition
-from fenics_contact.scene import Body, IsotropicElasticity, Material, PlaneStrain, Scene, Support
+from fenics_contact import Body, BodyMesh, Scene, Support
+from fenics_contact._accuracy.discretisation import discretisation_error
+from fenics_contact._accuracy.recovery import Sites, find_sites, recovered_gradients
+from fenics_contact.feti import TornSystem, build_torn_system, decompose
+from fenics_contact.feti.averages import nodal_mean
+from fenics_contact.materials import IsotropicElasticity, Material, PlaneStrain
+from fenics_contact.mesh import bisection_partition
+from fenics_contact.results import DiscretisationError
 
 #: Displacement of points, (n, dim) -> (n, dim).
 Field = Callable[[np.ndarray], np.ndarray]

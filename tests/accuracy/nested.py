@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.contact import State
-from fenics_contact.scene.materials.constants import lame
+from fenics_contact import State
+from fenics_contact.materials.elastic import lame
 from tests.accuracy.true_error import error_by_cell
 
 #: Coordinates of the mesh lines along each axis.

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.accuracy import discretisation_error
+from fenics_contact import Body, Scene, box_partition
+from fenics_contact._accuracy.discretisation import discretisation_error
 from fenics_contact.feti import build_torn_system, decompose
-from fenics_contact.partition import bisection_partition, box_partition
-from fenics_contact.scene import Body, IsotropicElasticity, Scene
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.mesh import bisection_partition
 from tests.accuracy.fields import quadratic, torn_field
 from tests.models.bodies import bent, box, in_halves
 

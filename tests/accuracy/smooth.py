@@ -9,12 +9,12 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
+from fenics_contact import Body, BodyForce, BodyMesh, Scene, State, Support, Ufl, solve_scene
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import CELL_TYPES, BodyMesh, quadratic
-from fenics_contact.partition import bisection_partition
-from fenics_contact.scene import Body, BodyForce, IsotropicElasticity, PlaneStrain, Scene, Support, Ufl
-from fenics_contact.scene.materials.constants import lame
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.materials.elastic import lame
+from fenics_contact.mesh import bisection_partition, quadratic
+from fenics_contact.mesh.cell_types import CELL_TYPES
 from tests.accuracy.true_error import error_by_cell
 
 YOUNG, POISSON = 1000.0, 0.3

@@ -8,14 +8,22 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.accuracy import BalancedTolerance, SolverErrors
-from fenics_contact.contact import AnyState, ContactProblem, solve_scene, solve_steps
+from fenics_contact import (
+    Body,
+    ContactProblem,
+    Coulomb,
+    Scene,
+    Support,
+    Traction,
+    box_partition,
+    solve_scene,
+    solve_steps,
+)
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.qp import DualProblem, DualSolution, FaceNewton
-from fenics_contact.qp.iterate import Start
-from fenics_contact.scene import Body, Coulomb, Scene, Support, Traction
+from fenics_contact.qp import DualProblem, DualSolution, FaceNewton, Start
+from fenics_contact.results import BalancedTolerance, SolverErrors
+from fenics_contact.results.deformed_state import AnyState
 from tests.accuracy.algebraic import CASES, measured
 from tests.contact import effect_cases, gallery
 from tests.contact.gallery import SOFT

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.accuracy import certify, direct_error
-from fenics_contact.contact import FixedPoint, Status, solve_scene
-from fenics_contact.feti import DirectSystem
+from fenics_contact import Coulomb, FixedPoint, Scene, Status, Tresca, solve_scene
+from fenics_contact._accuracy.certificate import certify, direct_error
+from fenics_contact.feti.direct import DirectSystem
 from fenics_contact.qp import DualSolver, FaceNewton, Smalse
-from fenics_contact.scene import Coulomb, Scene, Tresca
 from tests.accuracy.algebraic import CASES, Measured, clamped, energy_norm, measured, solved
 from tests.contact import gallery
 

@@ -15,32 +15,30 @@ import scipy.linalg
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from fenics_contact.accuracy import (
-    Certificate,
-    certificate,
-    certify,
-    discretisation_error,
-    friction_error,
-    solver_errors,
-    state_errors,
-)
-from fenics_contact.contact import AnyState, FixedPoint, solve_scene
-from fenics_contact.contact.dual_solve import solve_dual
-from fenics_contact.gallery import rectangle
-from fenics_contact.partition import box_partition
-from fenics_contact.qp import DualSolution, FaceNewton, Smalse
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    PlaneStrain,
+    FixedPoint,
     RigidPlane,
     Scene,
     Support,
     Surface,
     Traction,
     Tresca,
+    box_partition,
+    solve_scene,
 )
+from fenics_contact._accuracy import certificate
+from fenics_contact._accuracy.certificate import certify
+from fenics_contact._accuracy.discretisation import discretisation_error
+from fenics_contact._accuracy.state_errors import friction_error, solver_errors, state_errors
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import PlaneStrain
+from fenics_contact.qp import DualSolution, FaceNewton, Smalse
+from fenics_contact.results import Certificate
+from fenics_contact.results.deformed_state import AnyState
+from fenics_contact.results.dual_solve import solve_dual
 from tests.accuracy.algebraic import energy_norm, measured
 from tests.contact import gallery
 

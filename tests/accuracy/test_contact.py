@@ -14,25 +14,28 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.accuracy import discretisation_error
-from fenics_contact.contact import ContactProblem, State, Status, solve_scene, solve_steps
-from fenics_contact.gallery import box_lattice, rectangle_lattice
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import bisection_partition
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
     LoadStep,
-    PlaneStrain,
     RigidPlane,
     RigidSphere,
     Scene,
+    State,
+    Status,
     Support,
     Surface,
+    solve_scene,
+    solve_steps,
 )
+from fenics_contact._accuracy.discretisation import discretisation_error
+from fenics_contact.gallery import box_lattice, rectangle_lattice
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.mesh import bisection_partition
+from fenics_contact.qp import FaceNewton
 from tests.accuracy.nested import Lines, Solved, bisected, refined, true_errors
 
 YOUNG, POISSON = 1000.0, 0.3

@@ -10,10 +10,10 @@ import pytest
 import ufl
 from ufl.domain import extract_unique_domain
 
-from fenics_contact.accuracy import discretisation_error
-from fenics_contact.accuracy.moduli import moduli
-from fenics_contact.fem.forms import FormLibrary
-from fenics_contact.scene import (
+from fenics_contact import Scene, Support, ThermalStrain
+from fenics_contact._accuracy.discretisation import discretisation_error, moduli
+from fenics_contact._fem.forms import FormLibrary
+from fenics_contact.materials import (
     Elasticity,
     IsotropicElasticity,
     Material,
@@ -21,9 +21,6 @@ from fenics_contact.scene import (
     OrthotropicPlaneStress,
     PlaneStrain,
     PlaneStress,
-    Scene,
-    Support,
-    ThermalStrain,
     material_axes,
     strain,
 )

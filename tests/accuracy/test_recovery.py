@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fenics_contact import Body, BodyMesh, Scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, half_disc, hemisphere, rectangle, rectangle_lattice
-from fenics_contact.mesh import BodyMesh
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import quadratic as quadratic_cells
-from fenics_contact.scene import Body, IsotropicElasticity, PlaneStrain, Scene
 from tests.accuracy.fields import (
     cubic,
     estimated,

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from fenics_contact.accuracy import discretisation_error
+from fenics_contact._accuracy.discretisation import discretisation_error
 from tests.accuracy.smooth import PLANE, Found, mesh_of, solved
 from tests.models.elements import CELLS
 

@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fenics_contact.mesh import CELL_TYPES, BodyMesh, shape_gradients, shape_values
+from fenics_contact import BodyMesh
+from fenics_contact.mesh.cell_types import CELL_TYPES, shape_gradients, shape_values
 
 #: Displacement gradient at points: shape (n, dim) -> (n, dim, dim), entry (k, j) is ∂u_k/∂x_j; or a number.
 Gradient = Callable[[np.ndarray], np.ndarray | float]

@@ -15,7 +15,11 @@ from benchmarks.constants.scenes import SCENES
 from benchmarks.study import filled
 from fenics_contact.study.runner import Job, measure
 
-MATTERS, IDLE, ASIDE = "optimize.trust:_STREAK", "optimize.bundle_trust:_RADIUS", "optimize.care:_NEAR"
+MATTERS, IDLE, ASIDE = (
+    "_optimize.subproblem:_STREAK",
+    "_optimize.bundle_trust:_RADIUS",
+    "_optimize.merit:_NEAR",
+)
 
 
 #: Tolerances of a scene by which its answer may differ on another machine.
@@ -45,11 +49,11 @@ def test_constants_are_numbers_tuples_and_mappings_with_what_is_said_of_them() -
     assert len(known) == len(constants()) > 250
     assert known["qp.face:STEEP"].value == 1e6
     assert known["qp.rescue:STIFFER"].value == 4.0, "of an assignment to two names"
-    assert known["accuracy.balanced:STEP"].value == (1e-4, 0.3)
-    assert known["partition.default_partition:TARGET_NODES"].value == {3: 700, 2: 1000}
+    assert known["_accuracy.state_errors:STEP"].value == (1e-4, 0.3)
+    assert known["mesh.bisection:TARGET_NODES"].value == {3: 700, 2: 1000}
     assert known["qp.rescue:REDUCTION"].meaning == "A rescue aims at a residual smaller by this factor"
     assert known["mesh.quality:FLAT"].meaning.startswith("A Jacobian below this")
-    assert known["optimize.bundle_trust:_RADIUS"].meaning == "first trust radius, in lengths of the problem"
+    assert known["_optimize.bundle_trust:_RADIUS"].meaning == "first trust radius, in lengths of the problem"
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from benchmarks.held import HELD
 from benchmarks.optimisation_tolerance import report as tolerance
 from benchmarks.plan import run, runs
 from benchmarks.study import chosen, filled
-from fenics_contact.contact import solve_scene
+from fenics_contact import solve_scene
 from fenics_contact.study import runner
 from fenics_contact.study.runner import Job, measure
 from tests.benchmarks.small_records import all_summaries

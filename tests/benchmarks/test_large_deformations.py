@@ -28,7 +28,7 @@ from benchmarks.large_deformations.report import (
 )
 from benchmarks.large_deformations.rounded_meshes import DIES
 from benchmarks.study import filled
-from fenics_contact.launching import clean_environment
+from fenics_contact import clean_environment
 from tests.conftest import ROOT
 
 PAGE = ROOT / "docs" / "studies" / "large_deformations.md"

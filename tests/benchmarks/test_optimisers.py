@@ -15,7 +15,7 @@ from benchmarks.optimisers.measuring import ALLOWED, FULL, METHODS, budget_of
 from benchmarks.optimisers.report import above_best, jobs, plot, states_to, tables, write
 from benchmarks.optimisers.rosenbrock import rosenbrock
 from benchmarks.study import filled
-from fenics_contact.launching import finished
+from fenics_contact._base.launching import finished
 from tests.conftest import ROOT
 
 

@@ -19,10 +19,9 @@ from typing import Any
 
 from mpi4py import MPI
 
-from fenics_contact.checkpoint import Checkpoint, interruptible
-from fenics_contact.contact import ContactProblem, solve_steps
-from fenics_contact.partition import box_partition
-from fenics_contact.progress import LOGGER_NAME, Event
+from fenics_contact import ContactProblem, box_partition, interruptible, solve_steps
+from fenics_contact._base.progress import LOGGER_NAME, Event
+from fenics_contact.design import Checkpoint
 from fenics_contact.qp import FaceNewton
 from tests.contact.step_cases import sheared_block, shears
 from tests.shape.resumed_cases import minimised, posed

@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
-from fenics_contact.checkpoint import Checkpoint, Interrupted, interruptible, safe_point, without_checkpoint
-from fenics_contact.checkpoint.interruption import SIGNALS
+from fenics_contact import Interrupted, interruptible
+from fenics_contact._base.checkpoint import SIGNALS, safe_point, without_checkpoint
+from fenics_contact.design import Checkpoint
 from fenics_contact.errors import InvalidInputError
 
 

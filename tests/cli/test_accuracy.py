@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from fenics_contact import clean_environment
 from fenics_contact.__main__ import main
-from fenics_contact.launching import clean_environment
 from fenics_contact.study import read_study, runner
 from tests.conftest import ROOT
 from tests.study.samples import BLOCK, Machine

@@ -11,11 +11,11 @@ import pytest
 import pyvista as pv
 from mpi4py import MPI
 
-from fenics_contact import cli
-from fenics_contact.cli.demos import folder_of_demos, shipped
-from fenics_contact.cli.desk import Console
-from fenics_contact.cli.info import gathered, loaded_blas
-from fenics_contact.cli.view import show_record
+from fenics_contact import _cli as cli
+from fenics_contact._cli.console import Console
+from fenics_contact._cli.demos import folder_of_demos, shipped
+from fenics_contact._cli.info import gathered, loaded_blas
+from fenics_contact._cli.view import show_record
 from tests.conftest import ROOT
 from tests.scene_file.texts import GOOD
 
@@ -52,7 +52,7 @@ def test_info_knows_versions_petsc_blas_and_ranks(capsys: pytest.CaptureFixture[
 )
 def test_a_reference_blas_is_advised_against(file: str, slow: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     assert any("blas" in Path(library).name for library in loaded_blas()), "this process multiplies matrices"
-    monkeypatch.setattr("fenics_contact.cli.info.loaded_blas", lambda: [file])
+    monkeypatch.setattr("fenics_contact._cli.info.loaded_blas", lambda: [file])
     known = gathered(MPI.COMM_SELF)
     assert known["machine"]["BLAS"] == file
     assert any("the BLAS is the slow reference one" in line for line in known["advice"]) == slow
@@ -87,7 +87,7 @@ def test_a_demo_runs_in_the_current_folder(
     demo.write_text(
         "# # A tiny demo. It writes.\nimport sys\nfrom pathlib import Path\nPath(sys.argv[1]).touch()\n"
     )
-    monkeypatch.setattr("fenics_contact.cli.demos.folder_of_demos", lambda: tmp_path / "demos")
+    monkeypatch.setattr("fenics_contact._cli.demos.folder_of_demos", lambda: tmp_path / "demos")
     monkeypatch.chdir(tmp_path)
     assert run("demo") == 0
     assert "A tiny demo\n" in capsys.readouterr().out

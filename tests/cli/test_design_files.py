@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import cli
-from fenics_contact.mesh_io import read_cad
+from fenics_contact import _cli as cli
+from fenics_contact import read_cad
 from tests.scene_file.texts import GOOD
 
 LID = f"""{GOOD}

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fenics_contact.cli import ExitCode
+from fenics_contact._cli.console import ExitCode
 from tests.conftest import LAUNCH, ROOT, launch
 from tests.scene_file.texts import GOOD, changed
 
@@ -22,7 +22,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.claim]
 SCRIPT = """
 import contextlib, io, json, sys
 from mpi4py import MPI
-from fenics_contact import cli
+from fenics_contact import _cli as cli
 comm, told = MPI.COMM_WORLD, []
 for arguments in json.loads(sys.argv[1]):
     out, err = io.StringIO(), io.StringIO()

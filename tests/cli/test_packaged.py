@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from fenics_contact.launching import clean_environment
+from fenics_contact import clean_environment
 from tests.conftest import ROOT
 
 

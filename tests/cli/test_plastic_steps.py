@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import cli
-from fenics_contact.io import read_result
+from fenics_contact import _cli as cli
+from fenics_contact.output import read_result
 
 TEXT = """
 meshes.m = { shape = "block", lower = [0, 0, 0], upper = [2, 1, 1], counts = [2, 1, 1] }

@@ -15,11 +15,10 @@ from rich.console import Console
 from rich.file_proxy import FileProxy
 from typer.testing import CliRunner
 
-from fenics_contact import cli
-from fenics_contact.contact import LoadSequence
+from fenics_contact import LoadSequence, read_scene_file
+from fenics_contact import _cli as cli
 from fenics_contact.errors import ConvergenceError, InfeasibleError, MissingRequirementError
-from fenics_contact.io import read_result
-from fenics_contact.scene_file import read_scene_file
+from fenics_contact.output import read_result
 from tests.conftest import ROOT
 from tests.scene_file.texts import GOOD, STEPS, changed
 
@@ -181,7 +180,7 @@ def test_every_ending_has_its_number(
     def fails(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("fenics_contact.cli.run.read", fails)
+    monkeypatch.setattr("fenics_contact._cli.options.read", fails)
     assert run("run", SCENES / "two_blocks.toml") == code
     written = capsys.readouterr().err
     assert ("Traceback" in written) == (code == 1), "a traceback is for bugs"
@@ -239,7 +238,7 @@ def test_without_the_libraries_for_pictures_requested_ones_are_missed(
     def missing() -> None:
         raise MissingRequirementError("pyvista is not installed", name="pyvista")
 
-    monkeypatch.setattr("fenics_contact.viz.check_renderer", missing)
+    monkeypatch.setattr("fenics_contact.pictures.canvas.check_renderer", missing)
     path = scene(tmp_path, changed(("[solver]", '[output]\npictures = ["stress", "pressure"]\n[solver]')))
     assert run("run", path, "-o", tmp_path) == cli.ExitCode.WRONG_INPUT
     told = capsys.readouterr()

@@ -13,10 +13,10 @@ import pytest
 from mpi4py import MPI
 from rich.table import Table
 
-from fenics_contact import cli
-from fenics_contact.io import only_run_in
-from fenics_contact.launching import clean_environment
-from fenics_contact.progress import is_visible
+from fenics_contact import _cli as cli
+from fenics_contact import clean_environment
+from fenics_contact._base.progress import is_visible
+from fenics_contact.output import only_run_in
 from tests.conftest import ROOT
 from tests.scene_file.texts import GOOD, STEPS, changed
 
@@ -46,7 +46,7 @@ def test_a_second_run_in_a_folder_is_refused_before_it_does_anything(
 
 #: A material of one's own, and what else may stand in its file; each fails in another way.
 OWN = """
-from fenics_contact.scene import IsotropicElasticity
+from fenics_contact.materials import IsotropicElasticity
 {before}
 def Own(**parameters):
     {inside}
@@ -185,7 +185,7 @@ def test_a_demo_whose_reader_has_gone_ends_without_a_complaint(tmp_path: Path) -
     )
     code = (
         "import sys; from pathlib import Path; from fenics_contact import __main__, cli; "
-        "from fenics_contact.cli import demos; "
+        "from fenics_contact._cli import demos; "
         f"demos.folder_of_demos = lambda: Path({str(tmp_path)!r}); "
         "sys.exit(__main__.main(['demo', 'wordy']))"
     )
@@ -204,7 +204,5 @@ def test_what_cannot_be_said_is_told_in_a_sentence() -> None:
     with open("/dev/full", "w") as full:
         answer = program("schema", stdout=full, stderr=subprocess.PIPE)
     assert answer.returncode == cli.ExitCode.FAILED
-    assert answer.stderr.startswith(
-        "error: the output of this command must be written to stdout"
-    )
+    assert answer.stderr.startswith("error: the output of this command must be written to stdout")
     assert len(answer.stderr.splitlines()) == 1

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from fenics_contact.cli.forces import forces_table
-from fenics_contact.cli.tables import state_facts, step_row
-from fenics_contact.io import forces_record
-from fenics_contact.scene_file import UnitNames
+from fenics_contact._cli.console import forces_table, state_facts, step_row
+from fenics_contact._scene_file.document import UnitNames
+from fenics_contact.output.result import forces_record
 from tests.viz.plane_states import flat_pad
 from tests.viz.states import touching_blocks
 

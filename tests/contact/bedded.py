@@ -9,19 +9,19 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, solve_scene
-from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
-    IsotropicElasticity,
     RigidPlane,
     Scene,
     Surface,
     TotalForce,
-    rigid_body_modes,
+    box_partition,
+    solve_scene,
 )
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity, rigid_body_modes
+from fenics_contact.results.deformed_state import AnyState
 
 BED, FORCE = 0.05, (300.0, 0.0, -3200.0)  # N/mm⁴, N
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.contact import AnyState
+from fenics_contact.results.deformed_state import AnyState
 from tests.contact.conic_reference import ConicReference
 
 

@@ -18,18 +18,10 @@ import clarabel
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.mesh import BodyMesh, vector_areas
-from fenics_contact.scene import (
-    BodyForce,
-    ContactPair,
-    Coulomb,
-    IsotropicElasticity,
-    Load,
-    RigidPlane,
-    Scene,
-    TotalForce,
-    Tresca,
-)
+from fenics_contact import BodyForce, BodyMesh, ContactPair, Coulomb, RigidPlane, Scene, TotalForce, Tresca
+from fenics_contact._scene.loads import Load
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.mesh.faces import vector_areas
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
 

@@ -6,19 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fenics_contact import Body, ContactPair, Coulomb, RigidPlane, Scene, Support, Surface, Traction
+from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.gallery import block
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    Discretisation,
-    IsotropicElasticity,
-    RigidPlane,
-    Scene,
-    Support,
-    Surface,
-    Traction,
-)
+from fenics_contact.materials import IsotropicElasticity
 from tests.contact.gallery import crowned
 
 #: Cells along an edge of a block, which is cut into 2 x 2 x 2 subdomains.

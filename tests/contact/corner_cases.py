@@ -7,20 +7,22 @@ import sys
 
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, FixedPoint, State
-from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.qp import FaceNewton, Smalse
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
+    FixedPoint,
     RigidPlane,
     Scene,
+    State,
     Support,
     Surface,
+    box_partition,
 )
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.qp import FaceNewton, Smalse
 
 
 def planes(*pairs: tuple[str, RigidPlane, float | None]) -> Scene:

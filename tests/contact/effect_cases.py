@@ -11,20 +11,15 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, State, solve_steps
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import quadratic
-from fenics_contact.partition import graph_partition
-from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
     LoadStep,
-    PlaneStrain,
     RigidSphere,
     Scene,
+    State,
     Support,
     Surface,
     ThermalStrain,
@@ -32,7 +27,12 @@ from fenics_contact.scene import (
     Traction,
     Tresca,
     Ufl,
+    solve_steps,
 )
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.mesh import graph_partition, quadratic
+from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG
 from tests.contact.gallery import two_blocks
 
 TOLERANCE = 1e-10

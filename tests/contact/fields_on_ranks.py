@@ -10,22 +10,21 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import quadratic
-from fenics_contact.partition import graph_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
-    PlaneStress,
     RigidPlane,
     Scene,
+    State,
     Support,
     Surface,
     Traction,
+    solve_scene,
 )
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStress
+from fenics_contact.mesh import graph_partition, quadratic
 
 SOFT, STIFF = IsotropicElasticity(70.0, 0.3), IsotropicElasticity(2100.0, 0.2)
 

@@ -6,22 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
     RigidPlane,
     Scene,
     Support,
     Surface,
     Traction,
     Tresca,
+    box_partition,
 )
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
 
 SOFT, STIFF = IsotropicElasticity(100.0, 0.3), IsotropicElasticity(300.0, 0.2)
 FLOOR = RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))

@@ -7,20 +7,20 @@ import json
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.gallery import block
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    Friction,
-    IsotropicElasticity,
     RigidPlane,
     SampledField,
     Scene,
     Support,
     Surface,
+    solve_scene,
 )
+from fenics_contact._scene.pairs import Friction
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
 
 MESH = block((0, 0, 0), (4, 1, 1), (8, 2, 2))
 FLOOR = RigidPlane((0, 0, 0), (0, 0, 1))

@@ -6,21 +6,22 @@ from dataclasses import replace
 
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
-from fenics_contact.gallery import rectangle
-from fenics_contact.partition import graph_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    Discretisation,
-    PlaneStrain,
     RigidSurface,
     Scene,
+    State,
     Support,
     Surface,
     Tie,
+    solve_scene,
 )
+from fenics_contact._scene.pairs import Discretisation
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import PlaneStrain
+from fenics_contact.mesh import graph_partition
 
 MATERIAL = PlaneStrain(1.0, 0.3)
 TOP, TIED, FREE = Surface("up", "y0"), Surface("low", "tied"), Surface("low", "free")

@@ -8,20 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import bisection_partition
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
-    IsotropicElasticity,
     RigidPlane,
     Scene,
+    State,
     Support,
     Surface,
     TotalForce,
+    solve_scene,
 )
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.mesh import bisection_partition
+from fenics_contact.qp import FaceNewton
 from tests.contact.checks import assert_solved
 
 YOUNG, POISSON = 1000.0, 0.3

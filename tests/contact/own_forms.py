@@ -7,21 +7,21 @@ import json
 import ufl
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.gallery import block
-from fenics_contact.mesh import quadratic
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
     RigidPlane,
     Scene,
     Support,
     Surface,
     Traction,
+    box_partition,
+    solve_scene,
 )
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.mesh import quadratic
 
 import dolfinx.fem  # isort: skip
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from fenics_contact import Body, BodyMesh, ContactPair, Scene, Support, Surface, Tie
 from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, Scene, Support, Surface, Tie
+from fenics_contact.materials import IsotropicElasticity
 
 STEEL = IsotropicElasticity(1000.0, 0.3)
 

@@ -7,10 +7,9 @@ import json
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState
+from fenics_contact import Body, ContactProblem, DeformedState, Scene, Support, box_partition
 from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import Body, FinitePlasticity, Scene, Support
+from fenics_contact.materials import FinitePlasticity
 
 COMM = MPI.COMM_WORLD
 MESH = block((0, 0, 0), (4, 1, 1), (8, 2, 2))

@@ -6,11 +6,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fenics_contact.contact import State
-from fenics_contact.gallery import extrude
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, PlaneStrain, Scene, Support, Surface
-from fenics_contact.surface_shapes import Sphere
+from fenics_contact import Body, BodyMesh, ContactPair, Scene, State, Support, Surface
+from fenics_contact.gallery.blocks import extrude
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.shapes import Sphere
 
 BORE, SEAT, RIM = 10.0, 30.0, 60.0  # mm
 YOUNG, NU = 2.1e5, 0.3  # N/mm²

@@ -6,8 +6,7 @@ import sys
 
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.scene import Coulomb
+from fenics_contact import ContactProblem, Coulomb
 from tests.contact.gallery import partitions, two_blocks
 
 

@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact import _dolfinx
-from fenics_contact.contact import AnyState, solve_scene
+from fenics_contact import Body, Coulomb, Scene, Support, Traction, _dolfinx, solve_scene
 from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.gallery import block
-from fenics_contact.partition import bisection_partition
+from fenics_contact.mesh import bisection_partition
 from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import Body, Coulomb, Scene, Support, Traction
+from fenics_contact.results.deformed_state import AnyState
 from tests.contact.gallery import SOFT, block_on_plane, partitions, two_blocks
 
 TOLERANCE = 1e-10

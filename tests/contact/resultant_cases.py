@@ -8,26 +8,26 @@ import sys
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
-    PlaneStrain,
     Pressure,
     RigidPlane,
     Scene,
+    State,
     Support,
     Surface,
     ThermalStrain,
     Tie,
     TotalForce,
     Traction,
+    box_partition,
     gravity,
+    solve_scene,
 )
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 
 SOFT, STIFF = IsotropicElasticity(1000.0, 0.3), IsotropicElasticity(5000.0, 0.25, 1e-5)
 

@@ -10,26 +10,27 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, solve_scene
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
-    AnySupport,
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
-    Load,
-    PlaneStrain,
     RigidPlane,
     RigidSurface,
     Scene,
     Support,
     Surface,
     Tie,
+    box_partition,
     gravity,
+    solve_scene,
 )
+from fenics_contact._scene.loads import Load
+from fenics_contact._scene.supports import AnySupport
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.mesh import quadratic
+from fenics_contact.results.deformed_state import AnyState
 
 SOFT = IsotropicElasticity(1000.0, 0.3)
 #: A point beside the end of the bar, and what acts there.

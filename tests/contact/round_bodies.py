@@ -7,18 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    IsotropicElasticity,
-    PlaneStrain,
-    RigidPlane,
-    Scene,
-    Support,
-    Surface,
-    TotalForce,
-)
+from fenics_contact import Body, BodyMesh, ContactPair, RigidPlane, Scene, Support, Surface, TotalForce
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.study.scenes.nested_box import mirrored, nested_box, nested_half
 from fenics_contact.theory import contact_modulus, hertz_line, hertz_point
 

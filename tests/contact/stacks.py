@@ -5,19 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from fenics_contact import Body, ContactPair, Coulomb, Scene, Support, Surface, Traction, Tresca
 from fenics_contact.gallery import block
-from fenics_contact.partition import graph_partition
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    IsotropicElasticity,
-    Scene,
-    Support,
-    Surface,
-    Traction,
-    Tresca,
-)
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.mesh import graph_partition
 
 RUBBER = IsotropicElasticity(100.0, 0.3)
 

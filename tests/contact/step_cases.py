@@ -10,22 +10,24 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.contact import ContactProblem, LoadSequence, State
-from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
+    LoadSequence,
     LoadStep,
     RigidPlane,
     Scene,
+    State,
     Support,
     Surface,
+    box_partition,
 )
+from fenics_contact.design import Checkpoint
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.qp import FaceNewton
 
 FLOOR = RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 WALL = RigidPlane((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))

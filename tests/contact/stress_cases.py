@@ -9,22 +9,22 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import quadratic
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
-    IsotropicElasticity,
-    PlaneStrain,
     Pressure,
     RigidSphere,
     Scene,
+    State,
     Support,
     Surface,
     Traction,
+    box_partition,
+    solve_scene,
 )
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.mesh import quadratic
 
 #: Radii, inner pressure.
 INNER, OUTER, PRESSURE = 1.0, 2.0, 3.0

@@ -11,21 +11,21 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.mesh_io import read_cad
-from fenics_contact.mesh_io.gmsh_session import gmsh_model
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
-    IsotropicElasticity,
     Scene,
     Support,
     Surface,
     TotalForce,
+    read_cad,
+    solve_scene,
 )
-from fenics_contact.surface_shapes import Parametric, Plane, Revolved, SurfaceShape, Torus
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.qp import FaceNewton
+from fenics_contact.readers import gmsh_model
+from fenics_contact.shapes import Parametric, Plane, Revolved, SurfaceShape, Torus
 
 STEEL = IsotropicElasticity(1000.0, 0.3)
 #: Ends of the parts along z, which are held and pulled.

@@ -9,26 +9,29 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, State, Status, solve_scene, solve_steps
-from fenics_contact.errors import InfeasibleError
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import box_partition
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
     LoadStep,
-    PlaneStress,
     RigidPlane,
     RigidSphere,
     Scene,
+    State,
+    Status,
     Support,
     Surface,
     Traction,
+    box_partition,
+    solve_scene,
+    solve_steps,
 )
+from fenics_contact.errors import InfeasibleError
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStress
+from fenics_contact.qp import FaceNewton
 
 RADIUS, THICKNESS, ANGLE, AROUND = 1.0, 0.02, np.pi / 2, 200
 #: Sliding is a hundred times what the belt stretches: E t = 2e4, and the tension is about one.

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, Status, solve_steps
+from fenics_contact import ContactProblem, Status, solve_steps
 from fenics_contact.qp import FaceNewton
-from fenics_contact.study import Outcome, Parameters
+from fenics_contact.study import Parameters
 from fenics_contact.study.scenes.cattaneo_mindlin import FRICTION, build, stick_half_width, theory, tractions
+from fenics_contact.study.study import Outcome
 from tests.contact.checks import assert_solved
 
 TOLERANCE = 1e-6

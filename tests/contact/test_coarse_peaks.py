@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.gallery import rectangle
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    PlaneStrain,
     RigidPlane,
     Scene,
     Support,
     Surface,
     Traction,
+    solve_scene,
 )
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import PlaneStrain
 from tests.contact.round_bodies import CELL, pressed
 
 PLATE, FLOOR = PlaneStrain(1000.0, 0.3), RigidPlane((0.0, 0.0), (0.0, 1.0))

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, Status, solve_scene
+from fenics_contact import Scene, Status, Tresca, solve_scene
 from fenics_contact.qp import DualSolver, FaceNewton, Smalse
-from fenics_contact.scene import Scene, Tresca
+from fenics_contact.results.deformed_state import AnyState
 from tests.contact.checks import assert_solved, body_displacements
 from tests.contact.conic_reference import ConicReference, ConicSolution
 from tests.contact.gallery import block_on_plane, guided, partitions, pressed_block, two_blocks

@@ -6,21 +6,22 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, contact_area, solve_scene
-from fenics_contact.contact.area import _reach
-from fenics_contact.gallery import block, half_disc, hemisphere, rectangle
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
-    IsotropicElasticity,
-    PlaneStrain,
     RigidPlane,
     Scene,
+    State,
     Support,
     Surface,
     TotalForce,
+    contact_area,
+    solve_scene,
 )
+from fenics_contact.gallery import block, half_disc, hemisphere, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.qp import FaceNewton
+from fenics_contact.results.area import _reach
 from fenics_contact.theory import hertz_line, hertz_point
 
 MODULUS = 1000.0 / (1 - 0.3**2)

@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, solve_scene
-from fenics_contact.gallery import half_disc, rectangle
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
-    J2Plasticity,
-    PlaneStrain,
+    ContactProblem,
     Pressure,
     Scene,
     Support,
     Surface,
     TotalForce,
+    solve_scene,
 )
+from fenics_contact.gallery import half_disc, rectangle
+from fenics_contact.materials import J2Plasticity, PlaneStrain
 from tests.contact.gallery import block_on_plane, two_blocks
 from tests.contact.press_fits import Disc, press_fit
 

@@ -9,14 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
-    ContactPair,
-    RigidPlane,
-    Scene,
-    Surface,
-)
+from fenics_contact import ContactPair, RigidPlane, Scene, State, Status, Surface, box_partition, solve_scene
 from tests.contact.checks import assert_solved
 from tests.contact.contrast import FRICTION, Blocks, Regions
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import FixedPoint, solve_scene
+from fenics_contact import Coulomb, FixedPoint, Tresca, solve_scene
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp import DualSolver, FaceNewton, Smalse
-from fenics_contact.scene import Coulomb, Tresca
 from tests.contact.gallery import partitions, two_blocks
 
 HASTY: dict[str, tuple[DualSolver, Coulomb | Tresca]] = {

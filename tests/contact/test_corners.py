@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import FixedPoint, State
+from fenics_contact import FixedPoint, RigidPlane, State
 from fenics_contact.qp import FaceNewton, Smalse
-from fenics_contact.scene import RigidPlane
 from tests.contact.corner_cases import corner, planes, solved
 
 
@@ -31,9 +30,7 @@ def test_a_wall_pushes_a_block_over_a_floor_that_it_sticks_to(friction: float, p
 
 def test_forces_beside_the_wall_are_those_of_another_solver() -> None:
     scene = corner(0.3, 0.002)
-    found, other = (
-        solved(scene, MPI.COMM_SELF, way) for way in (FaceNewton(1e-9), FixedPoint(Smalse(1e-7)))
-    )
+    found, other = (solved(scene, MPI.COMM_SELF, way) for way in (FaceNewton(1e-9), FixedPoint(Smalse(1e-7))))
     expected = other.contact.normal_force
     assert found.contact.normal_force == pytest.approx(expected, abs=1e-4 * expected.max())
     assert np.abs(found.contact.force).max() > 0.1

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, FixedPoint, Status, solve_scene
+from fenics_contact import Body, Coulomb, FixedPoint, Scene, Status, Support, Traction, Tresca, solve_scene
 from fenics_contact.gallery import block
 from fenics_contact.qp import DualSolver, FaceNewton, Smalse
-from fenics_contact.scene import Body, Coulomb, Scene, Support, Traction, Tresca
+from fenics_contact.results.deformed_state import AnyState
 from tests.contact.checks import assert_solved, balance, body_displacements, friction_law
 from tests.contact.conic_reference import ConicReference
 from tests.contact.gallery import (

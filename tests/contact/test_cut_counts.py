@@ -9,12 +9,11 @@ import pytest
 from mpi4py import MPI
 
 from benchmarks.cases.scenes import block_mesh, block_on_plane
-from fenics_contact.contact import solve_scene
+from fenics_contact import BodyMesh, Scene, box_partition, solve_scene
 from fenics_contact.gallery import LinkShape, two_links
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import box_partition, default_partition, graph_partition
+from fenics_contact.mesh import graph_partition
+from fenics_contact.mesh.bisection import default_partition
 from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import Scene
 from fenics_contact.study.scenes.chain_links import chain
 
 #: Takes long: what claims rest on.

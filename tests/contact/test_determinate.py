@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
+from fenics_contact import Body, ContactPair, Pressure, Scene, State, Support, Surface, Tie, solve_scene
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.gallery import rectangle
-from fenics_contact.scene import Body, ContactPair, PlaneStrain, Pressure, Scene, Support, Surface, Tie
+from fenics_contact.materials import PlaneStrain
 
 SOFT = PlaneStrain(1.0, 0.3)
 

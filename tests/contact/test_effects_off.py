@@ -11,24 +11,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import (
-    AnyState,
-    ContactProblem,
-    LoadSequence,
-    solve_scene,
-    static_admissibility,
-)
-from fenics_contact.feti import TornSystem, dual, initial_gap
-from fenics_contact.gallery import block
-from fenics_contact.pairing import contact_search, mortar
-from fenics_contact.partition import box_partition
-from fenics_contact.qp import face_newton, face_system, slip_law
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
+    LoadSequence,
     LoadStep,
     Scene,
     Support,
@@ -37,7 +26,19 @@ from fenics_contact.scene import (
     Tie,
     Traction,
     Tresca,
+    box_partition,
+    solve_scene,
 )
+from fenics_contact._equilibrium import static_admissibility
+from fenics_contact._pairing import mortar
+from fenics_contact._pairing import search as contact_search
+from fenics_contact.feti import TornSystem, dual
+from fenics_contact.feti import torn as initial_gap
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.qp import cones as slip_law
+from fenics_contact.qp import face_newton, face_system
+from fenics_contact.results.deformed_state import AnyState
 from tests.conftest import launch
 
 #: Parts of the package that only some effects need: where they are looked up, and under which name.
@@ -274,12 +275,11 @@ def test_slip_is_carried_from_the_second_load_step_on_only(calls: Counter[str]) 
 SCRIPT = """
 import sys
 from mpi4py import MPI
-from fenics_contact.contact import solve_scene
+from fenics_contact import solve_scene
 from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
-    Body, ContactPair, Coulomb, IsotropicElasticity, Scene, Support, Surface, Traction,
-)
+from fenics_contact import box_partition
+from fenics_contact import Body, ContactPair, Coulomb, Scene, Support, Surface, Traction
+from fenics_contact.materials import IsotropicElasticity
 mesh, steel = block((0, 0, 0), (1, 1, 1), (2, 2, 2)), IsotropicElasticity(1.0, 0.3)
 other = block((0, 0, 1), (1, 1, 2), (2, 2, 2))
 pair = ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), {law}, "{discretisation}")
@@ -297,19 +297,19 @@ print(*sys.modules)
 HELD, FLOATING = 'Support("upper", "x0")', 'Support("upper", "x0", (0.0, None, None))'
 NEVER = {
     *(f"fenics_contact.{room}" for room in ("shape", "optimize", "viz", "io", "study")),
-    "fenics_contact.fem.hyperelastic", "fenics_contact.fem.mean_dilatation",
-    "fenics_contact.pairing.sliding", "pyvista", "matplotlib", "vtk", "vtkmodules", "gmsh", "pymetis",
+    "fenics_contact._fem.mechanics", "fenics_contact._fem.kinematics",
+    "fenics_contact._pairing.sliding", "pyvista", "matplotlib", "vtk", "vtkmodules", "gmsh", "pymetis",
     "meshio",
 }  # fmt: skip
-AT_NEED = {"fenics_contact.pairing.mortar", "fenics_contact.accuracy", "clarabel"}
+AT_NEED = {"fenics_contact._pairing.mortar", "fenics_contact._accuracy", "clarabel"}
 
 
 @pytest.mark.parametrize(
     ("law", "discretisation", "support", "tolerance", "needed"),
     [
         ("None", "node", HELD, 1e-6, set()),
-        ("None", "node", HELD, None, {"fenics_contact.accuracy"}),
-        ("Coulomb(0.3)", "mortar", HELD, 1e-6, {"fenics_contact.pairing.mortar"}),
+        ("None", "node", HELD, None, {"fenics_contact._accuracy"}),
+        ("Coulomb(0.3)", "mortar", HELD, 1e-6, {"fenics_contact._pairing.mortar"}),
         ("Coulomb(0.3)", "node", FLOATING, 1e-6, {"clarabel"}),
     ],
 )
@@ -320,6 +320,6 @@ def test_only_modules_that_a_scene_calls_for_are_imported(
     answer = launch(1, "-c", code)
     assert answer.returncode == 0, answer.stderr
     loaded = set(answer.stdout.split())
-    assert "fenics_contact.contact.equilibrium" in loaded
+    assert "fenics_contact._equilibrium.problem" in loaded
     assert loaded & NEVER == set()
     assert loaded & AT_NEED == needed

@@ -10,21 +10,22 @@ import pytest
 from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
-from fenics_contact.contact import State, solve_scene
-from fenics_contact.feti import TornSystem, build_torn_system, decompose
-from fenics_contact.gallery import block
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
     DistanceObstacle,
     RigidPlane,
     Scene,
+    State,
     Support,
     Surface,
     Tie,
     Traction,
+    solve_scene,
 )
+from fenics_contact.feti import TornSystem, build_torn_system, decompose
+from fenics_contact.gallery import block
 from tests.contact.gallery import SOFT, STIFF, crowned, partitions
 from tests.hard.transform import turned
 
@@ -161,7 +162,7 @@ def test_rigid_motions_are_free_of_energy_far_from_the_origin() -> None:
 def test_a_slave_node_whose_projection_is_not_found_is_told(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from fenics_contact.surfaces import projection
+    from fenics_contact._surfaces import projection
 
     monkeypatch.setattr(projection, "RESIDUAL", 0.0)  # no answer of Newton's method is good enough
     scene = blocks(3)

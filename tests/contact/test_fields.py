@@ -9,8 +9,8 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import _dolfinx
-from fenics_contact.contact.fields import cell_values
 from fenics_contact.gallery import block
+from fenics_contact.results.fields import cell_values
 
 
 @pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
@@ -28,7 +28,7 @@ RANKS = """
     import numpy as np
     from mpi4py import MPI
     from fenics_contact import _dolfinx
-    from fenics_contact.contact.fields import cell_values
+    from fenics_contact.results.fields import cell_values
     from fenics_contact.gallery import block
 
     comm = MPI.COMM_WORLD

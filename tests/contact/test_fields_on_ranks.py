@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.feti import nodal_mean
+from fenics_contact import solve_scene
+from fenics_contact.feti.averages import nodal_mean
 from tests.contact.fields_on_ranks import SCENES, cut
 
 SCRIPT = Path(__file__).with_name("fields_on_ranks.py")

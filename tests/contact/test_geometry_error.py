@@ -9,20 +9,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, solve_scene
+from fenics_contact import Body, ContactPair, Coulomb, Scene, Support, Surface, TotalForce, solve_scene
 from fenics_contact.gallery import LinkShape, block, half_cylinder, half_disc, two_links
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    IsotropicElasticity,
-    PlaneStrain,
-    Scene,
-    Support,
-    Surface,
-    TotalForce,
-)
+from fenics_contact.results.deformed_state import AnyState
 
 #: Takes long: what claims rest on.
 pytestmark = [pytest.mark.slow, pytest.mark.claim]

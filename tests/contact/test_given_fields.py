@@ -11,16 +11,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
+from fenics_contact import Coulomb, Pressure, SampledField, Support, Tresca, solve_scene, write_result
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.io import read_result, write_result
-from fenics_contact.scene import (
-    Coulomb,
-    Pressure,
-    SampledField,
-    Support,
-    Tresca,
-)
+from fenics_contact.output import read_result
 from tests.contact.given_fields import MESH, NODES, forces, rising, shifted
 
 

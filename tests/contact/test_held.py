@@ -10,27 +10,29 @@ import pytest
 from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
-from fenics_contact.contact import ContactProblem, Status, check_held, solve_scene
-from fenics_contact.errors import ConvergenceError, InfeasibleError
-from fenics_contact.feti import build_torn_system, decompose
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.partition import graph_partition
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
-    PlaneStrain,
     RigidPlane,
     Scene,
+    Status,
     Support,
     Surface,
     TotalForce,
     Traction,
     Tresca,
+    solve_scene,
 )
+from fenics_contact._equilibrium.static_admissibility import check_held
+from fenics_contact.errors import ConvergenceError, InfeasibleError
+from fenics_contact.feti import build_torn_system, decompose
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.mesh import graph_partition
+from fenics_contact.qp import FaceNewton
 from tests.contact.gallery import (
     FLOOR,
     SOFT,
@@ -368,9 +370,7 @@ def test_friction_that_is_pressed_too_little_is_refused_with_what_it_bears() -> 
     loads = {share: TotalForce("right", "x1", (0.0, 0.0, -share * 0.3 * press)) for share in (0.3, 10.0)}
     state = solve_scene(replace(pushed, loads=[loads[0.3]]), MPI.COMM_SELF)
     assert state.contact.force[:, 2].sum() == pytest.approx(-0.09 * press, rel=1e-4)
-    words = (
-        r"makes slide 'right' by translation \(0, 0, -1\), and friction bears only (9\.9|10)"
-    )
+    words = r"makes slide 'right' by translation \(0, 0, -1\), and friction bears only (9\.9|10)"
     with pytest.raises(InfeasibleError, match=words):
         solve_scene(replace(pushed, loads=[loads[10.0]]), MPI.COMM_SELF)
     without = FaceNewton(doubts=False, max_products=300)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
+from fenics_contact import solve_scene
 from tests.contact.round_bodies import CELL, pressed
 
 

@@ -9,24 +9,27 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import Status, solve_scene
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh, boundary_faces, near_surfaces
-from fenics_contact.mesh_io import read_mesh, read_msh
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
-    PlaneStrain,
     Scene,
+    Status,
     Support,
     Surface,
     Tie,
     Traction,
-    bodies_from,
+    read_mesh,
+    solve_scene,
 )
+from fenics_contact._scene.scene import bodies_from
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.mesh import boundary_faces
+from fenics_contact.mesh.near_surfaces import near_surfaces
+from fenics_contact.readers import read_msh
 from tests.mesh_io.mesh_files import joined
 
 DATA = Path(__file__).parents[1] / "data"

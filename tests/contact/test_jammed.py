@@ -4,20 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from fenics_contact.contact import FixedPoint, State
+from fenics_contact import Body, ContactPair, Coulomb, FixedPoint, RigidPlane, Scene, State, Support, Surface
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.gallery import rectangle
+from fenics_contact.materials import PlaneStrain
 from fenics_contact.qp import FaceNewton, Smalse
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    PlaneStrain,
-    RigidPlane,
-    Scene,
-    Support,
-    Surface,
-)
 from tests.contact.wedges import FRICTION, driven, follow, wedge
 
 

@@ -9,12 +9,11 @@ import pytest
 PULLED = """
 import numpy as np
 from mpi4py import MPI
-from fenics_contact.contact import ContactProblem, LoadSequence
+from fenics_contact import ContactProblem, LoadSequence
 from fenics_contact.gallery import block
-from fenics_contact.partition import bisection_partition
-from fenics_contact.scene import (
-    Body, ContactPair, Coulomb, IsotropicElasticity, LoadStep, RigidPlane, Scene, Surface, TotalForce,
-)
+from fenics_contact.mesh import bisection_partition
+from fenics_contact import Body, ContactPair, Coulomb, LoadStep, RigidPlane, Scene, Surface, TotalForce
+from fenics_contact.materials import IsotropicElasticity
 
 angle, comm = np.radians(5.0), MPI.COMM_WORLD
 base = block((-1.0, 0.0, 1.0), (1.0, 1.0, 6.0), (2, 2, 4))

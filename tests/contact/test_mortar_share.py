@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.scene import Body, IsotropicElasticity, OrthotropicElasticity, Scene
-from fenics_contact.scene.approach import master_share
-from fenics_contact.study.parameters import Parameters
+from fenics_contact import Body, Scene, solve_scene
+from fenics_contact._scene.pair_geometry import master_share
+from fenics_contact.materials import IsotropicElasticity, OrthotropicElasticity
+from fenics_contact.study import Parameters
 from fenics_contact.study.scenes import hertz
 
 

@@ -6,21 +6,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
+from fenics_contact import Body, ContactPair, Coulomb, Pressure, Scene, Support, Surface, solve_scene
+from fenics_contact._pairing.search import without_rounding
 from fenics_contact.gallery import block
-from fenics_contact.pairing.contact_search import without_rounding
-from fenics_contact.partition import graph_partition
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.mesh import graph_partition
 from fenics_contact.qp import FaceNewton, Smalse
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    IsotropicElasticity,
-    Pressure,
-    Scene,
-    Support,
-    Surface,
-)
 
 STEEL = IsotropicElasticity(2.1e5, 0.3)
 

@@ -8,30 +8,31 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, State, Status, solve_scene
-from fenics_contact.errors import InfeasibleError, InvalidInputError
-from fenics_contact.gallery import block, hemisphere, rectangle
-from fenics_contact.partition import bisection_partition, box_partition
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
     DistanceObstacle,
-    IsotropicElasticity,
-    J2Plasticity,
-    Material,
     MovingObstacle,
-    PlaneStrain,
     RigidCylinder,
-    RigidObstacle,
     RigidPlane,
     RigidSphere,
     Scene,
+    State,
+    Status,
     Support,
     Surface,
     TotalForce,
+    box_partition,
+    solve_scene,
 )
+from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact.errors import InfeasibleError, InvalidInputError
+from fenics_contact.gallery import block, hemisphere, rectangle
+from fenics_contact.materials import IsotropicElasticity, J2Plasticity, Material, PlaneStrain
+from fenics_contact.mesh import bisection_partition
+from fenics_contact.qp import FaceNewton
 from tests.contact.checks import assert_solved
 
 RUBBER = IsotropicElasticity(100.0, 0.3)
@@ -160,9 +161,7 @@ def test_with_small_displacements_an_obstacle_must_not_move(material: Material) 
             Scene({"block": body}, [Support("block", "z1")], contacts=[pair]), MPI.COMM_SELF
         )
 
-    with pytest.raises(
-        InvalidInputError, match=r"has moved by time 0\.5: move the bodies against"
-    ):
+    with pytest.raises(InvalidInputError, match=r"has moved by time 0\.5: move the bodies against"):
         pressing(0.1).solve(time=0.5)
     assert pressing(0.1).solve(time=0.0).contact.count(Status.OPEN) == 9
     assert pressing(0.0).solve(time=0.5).contact.count(Status.OPEN) == 9

@@ -8,23 +8,25 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene
-from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.mesh_io import from_gmsh_model
-from fenics_contact.partition import graph_partition
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
     Scene,
+    State,
+    Status,
     Support,
     Surface,
     Traction,
+    solve_scene,
 )
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.mesh import graph_partition
+from fenics_contact.qp import FaceNewton
+from fenics_contact.readers import from_gmsh_model
 from tests.contact.checks import assert_solved
 from tests.mesh_io.msh_files import name, own_gmsh, within
 

@@ -10,20 +10,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
+from fenics_contact import Body, ContactPair, RigidSurface, Scene, Support, Surface, solve_scene
+from fenics_contact._scene.pair_geometry import outline_of, unpaired
 from fenics_contact.gallery import rectangle
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    NeoHooke,
-    PlaneStrain,
-    RigidSurface,
-    Scene,
-    Support,
-    Surface,
-    outline_of,
-    unpaired,
-)
+from fenics_contact.materials import NeoHooke, PlaneStrain
 from tests.contact.passing import pressed
 
 TOUCHING = (
@@ -112,7 +102,7 @@ def test_bodies_flatter_than_their_facets_are_long_do_not_overlap_where_they_tou
 ON_RANKS = """
     import logging, sys
     from mpi4py import MPI
-    from fenics_contact.contact import solve_scene
+    from fenics_contact import solve_scene
     from tests.contact.passing import pressed
 
     logging.basicConfig(stream=sys.stdout, format="%(message)s", level=logging.WARNING)

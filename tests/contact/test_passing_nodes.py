@@ -8,18 +8,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
+from fenics_contact import Body, ContactPair, Pressure, Scene, State, Support, Surface, solve_scene
 from fenics_contact.gallery import block, rectangle, rectangle_lattice
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    IsotropicElasticity,
-    PlaneStrain,
-    Pressure,
-    Scene,
-    Support,
-    Surface,
-)
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from tests.contact.round_bodies import pressed
 
 

@@ -9,25 +9,23 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.qp import FaceNewton, ProjectedCG
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    Discretisation,
-    Friction,
-    IsotropicElasticity,
-    PlaneStrain,
-    PlaneStress,
     Scene,
+    State,
     Support,
     Surface,
     Tie,
     Traction,
+    solve_scene,
 )
+from fenics_contact._scene.pairs import Discretisation, Friction
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain, PlaneStress
+from fenics_contact.qp import FaceNewton, ProjectedCG
 
 PRESSURE = 10.0
 SOFT, STIFF = IsotropicElasticity(1000.0, 0.3), IsotropicElasticity(3000.0, 0.2)

@@ -11,25 +11,31 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.contact import ContactProblem, DeformedState, LoadSequence, solve_scene, solve_steps
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    FinitePlasticity,
-    HistoryMaterial,
-    IsotropicElasticity,
-    J2Plasticity,
+    DeformedState,
+    LoadSequence,
     LoadStep,
-    MaterialResponse,
     Scene,
     Support,
     Surface,
     Traction,
+    box_partition,
+    solve_scene,
+    solve_steps,
+)
+from fenics_contact.design import Checkpoint
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import block
+from fenics_contact.materials import (
+    FinitePlasticity,
+    HistoryMaterial,
+    IsotropicElasticity,
+    J2Plasticity,
+    MaterialResponse,
 )
 from tests.models.bodies import in_halves
 from tests.scene.material_points import in_tension
@@ -105,9 +111,10 @@ def test_a_plastic_body_in_contact_does_not_depend_on_how_it_is_cut() -> None:
 
 ON_RANKS = """
 from mpi4py import MPI
-from fenics_contact.contact import solve_scene
+from fenics_contact import solve_scene
 from fenics_contact.gallery import block
-from fenics_contact.scene import Body, FinitePlasticity, Scene, Support
+from fenics_contact import Body, Scene, Support
+from fenics_contact.materials import FinitePlasticity
 bodies = {
     name: Body(block((z, 0, 0), (z + 1, 1, 1), (2, 2, 2)), FinitePlasticity(200.0, 0.3, 0.2, 2.0))
     for z, name in enumerate("ab")

@@ -10,10 +10,20 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, State, solve_scene, solve_steps
+from fenics_contact import (
+    Body,
+    ContactProblem,
+    Coulomb,
+    LoadStep,
+    Pressure,
+    Scene,
+    State,
+    Support,
+    solve_scene,
+    solve_steps,
+)
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import quadratic
-from fenics_contact.scene import Body, Coulomb, LoadStep, Pressure, Scene, Support
 from tests.contact.press_fits import (
     INTERFERENCE,
     SEAT,

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, solve_scene, stored_state
+from fenics_contact import ContactProblem, Coulomb, Support, Traction, solve_scene
+from fenics_contact._equilibrium.stored import stored_state
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import Coulomb, Support, Traction
 from tests.contact.gallery import block_on_plane, partitions
 
 SCENE = block_on_plane(Coulomb(0.6))

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenics_contact.contact import Damping, FixedPoint
+from fenics_contact import FixedPoint
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp import DualSolver, FaceNewton, Smalse, solve
+from fenics_contact.results import Damping
 from tests.qp.published_friction import CASES, CYCLING, cone_residual, published
 
 TOLERANCE = 1e-8

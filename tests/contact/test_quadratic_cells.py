@@ -9,29 +9,29 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block, half_cylinder, rectangle
-from fenics_contact.io import write_vtu
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.partition import bisection_partition
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
-    PlaneStrain,
     RigidPlane,
     Scene,
+    State,
     Support,
     Surface,
     Tie,
     TotalForce,
     Traction,
+    solve_scene,
+    write_vtu,
 )
-from fenics_contact.viz import plot_contact_pressure, plot_decomposition, plot_stress
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import block, half_cylinder, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.mesh import bisection_partition, quadratic
+from fenics_contact.pictures import plot_contact_pressure, plot_decomposition, plot_stress
+from fenics_contact.qp import FaceNewton
 from tests.contact import hertz
 
 SOLVER = FaceNewton(tolerance=1e-10)

@@ -8,25 +8,24 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
+    BodyMesh,
     ContactPair,
-    IsotropicElasticity,
-    NeoHooke,
-    PlaneStrain,
     Pressure,
     Scene,
     Support,
     Surface,
     Tie,
+    solve_scene,
 )
-from fenics_contact.surfaces import Geometry
+from fenics_contact._surfaces.true_surface import Geometry
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
+from fenics_contact.mesh import quadratic
+from fenics_contact.qp import FaceNewton
 
 #: Young's modulus, and Lamé's constants for Poisson's ratio 0.3.
 YOUNG, SHEAR, LAME = 100.0, 100.0 / 2.6, 100.0 * 0.3 / 1.3 / 0.4

@@ -8,23 +8,25 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, contact_area, solve_scene
-from fenics_contact.gallery import block
-from fenics_contact.mesh import quadratic
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
     RigidPlane,
     Scene,
+    State,
     Support,
     Surface,
     TotalForce,
+    contact_area,
+    solve_scene,
 )
+from fenics_contact._surfaces.facets import filled_at_corners
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.mesh import quadratic
+from fenics_contact.qp import FaceNewton
 from fenics_contact.study.scenes.hertz import POISSON, RADIUS, YOUNG, round_block
-from fenics_contact.surfaces import filled_at_corners
 
 SOLVER = FaceNewton(tolerance=1e-8)
 FORCE = 4 * (YOUNG / (1 - POISSON**2)) / (3 * RADIUS)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import Status
+from fenics_contact import Status
 from tests.conftest import run_on_ranks
 from tests.contact.gallery import SOFT
 from tests.contact.rank_cases import PARTITIONS, TENSION, collect

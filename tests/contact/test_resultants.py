@@ -11,28 +11,25 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.feti import DirectSystem
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import quadratic
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
-    Material,
-    NeoHooke,
-    PlaneStrain,
-    PlaneStress,
     RigidPlane,
     Scene,
+    State,
     Support,
     Surface,
     Traction,
+    box_partition,
     gravity,
+    solve_scene,
 )
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.direct import DirectSystem
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, Material, NeoHooke, PlaneStrain, PlaneStress
+from fenics_contact.mesh import quadratic
 from tests.contact.bedded import FORCE, Bedded, pushed
 from tests.contact.resultant_cases import BESIDE, GIVEN, MOMENT, SCENES, numbers, solved
 from tests.hard.invariants import Whole

@@ -12,26 +12,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import (
-    AnyState,
-    ContactProblem,
-    RigidMotion,
-    check_held,
-    solve_scene,
-    solve_steps,
-)
-from fenics_contact.errors import InfeasibleError, InvalidInputError
-from fenics_contact.feti import DirectSystem
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import quadratic
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
     LoadStep,
-    PlaneStrain,
     RigidPlane,
     RigidSurface,
     Scene,
@@ -39,8 +25,19 @@ from fenics_contact.scene import (
     Surface,
     Tie,
     TotalForce,
+    box_partition,
     gravity,
+    solve_scene,
+    solve_steps,
 )
+from fenics_contact._equilibrium.static_admissibility import check_held
+from fenics_contact.errors import InfeasibleError, InvalidInputError
+from fenics_contact.feti.direct import DirectSystem
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.mesh import quadratic
+from fenics_contact.results import RigidMotion
+from fenics_contact.results.deformed_state import AnyState
 from tests.contact.rigid_cases import FORCE, MOMENT, POINT, SCENES, SOFT, bar, numbers, shaft, solved
 from tests.hard.invariants import Whole
 

@@ -9,21 +9,22 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
-from fenics_contact.gallery import rectangle
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    Discretisation,
-    NeoHooke,
     RigidPlane,
     RigidSurface,
     Scene,
+    State,
     Support,
     Surface,
     Tie,
+    solve_scene,
 )
+from fenics_contact._scene.pairs import Discretisation
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import NeoHooke
 from tests.contact.half_tied import FREE, MATERIAL, TIED, TOP, half_tied, solved
 
 PARTS = ((1, 1), (2, 3), (6, 5))

@@ -8,20 +8,24 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, State, Status, solve_scene, solve_steps
-from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    Discretisation,
     LoadStep,
     RigidPlane,
     Scene,
+    State,
+    Status,
     Support,
     Surface,
+    box_partition,
+    solve_scene,
+    solve_steps,
 )
+from fenics_contact._scene.pairs import Discretisation
+from fenics_contact.gallery import block
 from tests.contact.gallery import SOFT, STIFF, crowned
 
 WALL = RigidPlane((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, Status, solve_scene
-from fenics_contact.contact.dual_solve import contact_result
-from fenics_contact.contact.nodal_forces import nodal_forces
+from fenics_contact import Coulomb, Status, Tresca, solve_scene
 from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import Coulomb, Tresca
+from fenics_contact.results.deformed_state import AnyState
+from fenics_contact.results.dual_solve import contact_result
+from fenics_contact.results.forces import nodal_forces
 from tests.contact.checks import assert_solved
 from tests.contact.gallery import block_on_plane, partitions, pressed_block, two_blocks
 from tests.contact.rank_cases import TENSION, uniaxial

@@ -7,8 +7,8 @@ import re
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import pairs_in_words, solve_scene
-from fenics_contact.scene import Coulomb, Scene
+from fenics_contact import Coulomb, Scene, solve_scene
+from fenics_contact.results.state import pairs_in_words
 from tests.contact.gallery import partitions, pressed_block, two_blocks
 
 RUBBING = r"\w+ \w+ on \w+ \w+: \d+ points, \d+ open, \d+ stick, \d+ slip; normal force \S+ N, friction \d"

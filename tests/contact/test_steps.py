@@ -8,24 +8,29 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, ContactProblem, LoadSequence, Status, solve_scene, solve_steps
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
+    LoadSequence,
     LoadStep,
     RigidPlane,
     Scene,
+    Status,
     Support,
     Surface,
     Traction,
     Tresca,
+    box_partition,
+    solve_scene,
+    solve_steps,
 )
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.qp import FaceNewton
+from fenics_contact.results.deformed_state import AnyState
 from tests.contact.conic_reference import ConicReference
 
 FRICTION, TOLERANCE = 0.3, 1e-9

@@ -13,11 +13,21 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.contact import ContactProblem, LoadSequence, Status, solve_steps
+from fenics_contact import (
+    Body,
+    ContactProblem,
+    LoadSequence,
+    LoadStep,
+    Scene,
+    Status,
+    Support,
+    Traction,
+    solve_steps,
+)
+from fenics_contact.design import Checkpoint
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
-from fenics_contact.scene import Body, IsotropicElasticity, LoadStep, Scene, Support, Traction
+from fenics_contact.materials import IsotropicElasticity
 from tests.conftest import run_on_ranks
 from tests.contact.step_cases import PATH, collect, sequence, shears
 

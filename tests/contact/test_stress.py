@@ -10,17 +10,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import Body, Scene, Support, ThermalStrain, Traction
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.scene import (
-    Body,
-    IsotropicElasticity,
-    PlaneStrain,
-    PlaneStress,
-    Scene,
-    Support,
-    ThermalStrain,
-    Traction,
-)
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain, PlaneStress
 from tests.contact.stress_cases import (
     PEAK,
     SCENES,

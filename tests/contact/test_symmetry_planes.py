@@ -8,26 +8,30 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, ContactProblem, Status, solve_scene, solve_steps
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.feti import TornSystem, build_torn_system, decompose
-from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    Discretisation,
-    IsotropicElasticity,
     LoadStep,
     RigidPlane,
     Scene,
+    Status,
     Support,
     Surface,
     Traction,
+    box_partition,
+    solve_scene,
+    solve_steps,
 )
-from fenics_contact.scene.true_surfaces import surface_of
+from fenics_contact._scene.pairs import Discretisation
+from fenics_contact._scene.parts import surface_of
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti import TornSystem, build_torn_system, decompose
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.qp import FaceNewton
+from fenics_contact.results.deformed_state import AnyState
 
 STEEL = IsotropicElasticity(1000.0, 0.3)
 TOLERANCE = 1e-9

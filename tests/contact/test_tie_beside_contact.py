@@ -9,22 +9,24 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene
-from fenics_contact.errors import ConvergenceError, InfeasibleError
-from fenics_contact.gallery import rectangle
-from fenics_contact.qp import FaceNewton, face_newton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
-    Discretisation,
-    NeoHooke,
     RigidSurface,
     Scene,
+    State,
+    Status,
     Support,
     Surface,
     Tie,
     Traction,
+    solve_scene,
 )
+from fenics_contact._scene.pairs import Discretisation
+from fenics_contact.errors import ConvergenceError, InfeasibleError
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import NeoHooke
+from fenics_contact.qp import FaceNewton, face_newton
 from tests.contact.half_tied import MATERIAL, half_tied, solved
 
 

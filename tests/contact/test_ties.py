@@ -8,24 +8,24 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.errors import InfeasibleError, InvalidInputError
-from fenics_contact.gallery import block
-from fenics_contact.pairing import find_tied_points
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    Discretisation,
-    IsotropicElasticity,
     RigidPlane,
     Scene,
     Support,
     Surface,
     Tie,
     Traction,
+    box_partition,
+    solve_scene,
 )
+from fenics_contact._pairing.search import find_tied_points
+from fenics_contact._scene.pairs import Discretisation
+from fenics_contact.errors import InfeasibleError, InvalidInputError
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
 
 STEEL = IsotropicElasticity(1000.0, 0.3)
 FACES = Surface("upper", "z0"), Surface("lower", "z1")

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+from fenics_contact import write_vtu
 from fenics_contact.errors import InvalidInputError, MissingRequirementError
-from fenics_contact.io import write_vtu
 from tests.viz.plane_states import plane_block
 from tests.viz.states import pulled, touching_blocks
 
@@ -67,8 +67,8 @@ def test_without_pyvista_the_error_names_what_to_install(monkeypatch: pytest.Mon
 RANKS = """
     import numpy as np
     from mpi4py import MPI
-    from fenics_contact.contact import solve_scene
-    from fenics_contact.scene import Coulomb
+    from fenics_contact import solve_scene
+    from fenics_contact import Coulomb
     from tests.contact.gallery import partitions, two_blocks
 
     scene = two_blocks(Coulomb(0.4))

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, solve_scene
-from fenics_contact.contact.turned_bodies import rotation_of
+from fenics_contact import Body, ContactProblem, RigidSurface, Scene, Support, solve_scene
+from fenics_contact._equilibrium.warnings import rotation_of
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.scene import Body, IsotropicElasticity, NeoHooke, RigidSurface, Scene, Support
+from fenics_contact.materials import IsotropicElasticity, NeoHooke
 
 
 def turned(angle: float) -> Scene:

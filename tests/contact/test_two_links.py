@@ -9,20 +9,22 @@ import pytest
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, Status, solve_scene
-from fenics_contact.gallery import LinkShape, two_links
-from fenics_contact.partition import box_partition
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
     Scene,
+    Status,
     Support,
     Surface,
     TotalForce,
+    box_partition,
+    solve_scene,
 )
+from fenics_contact.gallery import LinkShape, two_links
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.qp import FaceNewton
+from fenics_contact.results.deformed_state import AnyState
 from tests.contact.checks import assert_solved, friction_law
 
 TOLERANCE, FRICTION = 1e-7, 0.12

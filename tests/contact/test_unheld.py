@@ -8,24 +8,26 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import FixedPoint, State, solve_scene
-from fenics_contact.errors import InfeasibleError
-from fenics_contact.feti import DualSystem, build_torn_system, decompose
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.qp import FaceNewton, Smalse
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    PlaneStrain,
+    FixedPoint,
     RigidPlane,
     Scene,
+    State,
     Support,
     Surface,
     Tie,
     Traction,
     Tresca,
+    solve_scene,
 )
+from fenics_contact.errors import InfeasibleError
+from fenics_contact.feti import DualSystem, build_torn_system, decompose
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import PlaneStrain
+from fenics_contact.qp import FaceNewton, Smalse
 from tests.contact.stacks import RUBBER, TURN, cut, turned_stack
 
 
@@ -151,8 +153,8 @@ def test_unheld_motions_are_the_same_on_any_number_of_ranks(mpirun) -> None:
     script = """
         import numpy as np
         from mpi4py import MPI
-        from fenics_contact.contact import solve_scene
-        from fenics_contact.partition import graph_partition
+        from fenics_contact import solve_scene
+        from fenics_contact.mesh import graph_partition
         from tests.contact.stacks import cut, turned_stack
         scene = turned_stack()
         state = solve_scene(scene, MPI.COMM_WORLD, partitions=cut(scene, 4), tolerance=1e-9)

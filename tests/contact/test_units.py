@@ -8,16 +8,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, solve_scene
-from fenics_contact.feti import DualSystem, build_torn_system, decompose
-from fenics_contact.feti.inverse import LocalKind
-from fenics_contact.gallery import rectangle
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    PlaneStrain,
-    PlaneStress,
     Pressure,
     Scene,
     Support,
@@ -25,7 +19,13 @@ from fenics_contact.scene import (
     Tie,
     Traction,
     Tresca,
+    solve_scene,
 )
+from fenics_contact.feti import DualSystem, build_torn_system, decompose
+from fenics_contact.feti.inverse import LocalKind
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import PlaneStrain, PlaneStress
+from fenics_contact.results.deformed_state import AnyState
 from tests.contact.gallery import block_on_plane, partitions, pressed_block, stack, two_blocks
 from tests.hard.transform import in_units
 

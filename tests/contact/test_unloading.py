@@ -9,21 +9,26 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, FixedPoint, LoadSequence, followed_loads, solve_scene
-from fenics_contact.gallery import rectangle
-from fenics_contact.partition import bisection_partition
-from fenics_contact.qp import FaceNewton, Smalse, may_grip
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
+    FixedPoint,
+    LoadSequence,
     LoadStep,
-    PlaneStrain,
     Scene,
     Support,
     Surface,
     TotalForce,
+    solve_scene,
 )
+from fenics_contact._equilibrium import followed_loads
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import PlaneStrain
+from fenics_contact.mesh import bisection_partition
+from fenics_contact.qp import FaceNewton, Smalse
+from fenics_contact.qp.solve import may_grip
 from tests.contact.wedges import driven, follow, wedge
 
 MATERIAL = PlaneStrain(1000.0, 0.3)

@@ -7,26 +7,24 @@ import pytest
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError, LoadStepError
-from fenics_contact.fem.hyperelastic import HyperelasticMechanics
-from fenics_contact.gallery import block, half_disc, rectangle
-from fenics_contact.nonlinear import NotHeldError
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    Friction,
-    J2Plasticity,
-    Material,
-    NeoHooke,
     RigidPlane,
     RigidSurface,
     Scene,
     Support,
     Surface,
     TotalForce,
+    solve_scene,
 )
+from fenics_contact._fem.mechanics import HyperelasticMechanics
+from fenics_contact._large_deformations.newton import NotHeldError
+from fenics_contact._scene.pairs import Friction
+from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError, LoadStepError
+from fenics_contact.gallery import block, half_disc, rectangle
+from fenics_contact.materials import J2Plasticity, Material, NeoHooke
 
 RUBBER = NeoHooke(3.0, 0.45)
 FLAT = RigidPlane((0.0, 0.0), (0.0, 1.0))
@@ -39,7 +37,7 @@ def no_newton(monkeypatch: pytest.MonkeyPatch) -> None:
     def begun(*arguments: object, **options: object) -> None:
         raise AssertionError("Newton's method has begun")
 
-    monkeypatch.setattr("fenics_contact.nonlinear.TangentNewton.solve", begun)
+    monkeypatch.setattr("fenics_contact.TangentNewton.solve", begun)
 
 
 def pressed_disc(*supports: Support, friction: Friction = None) -> Scene:
@@ -119,7 +117,7 @@ def test_a_body_that_another_one_meets_is_named_once_newtons_method_finds_it_loo
         tried.append(arguments)
         raise NotHeldError("nothing holds some body")
 
-    monkeypatch.setattr("fenics_contact.nonlinear.TangentNewton.solve", loose)
+    monkeypatch.setattr("fenics_contact.TangentNewton.solve", loose)
     with pytest.raises(InfeasibleError, match=r"nothing resists body 'low': translation \(1, 0\)") as caught:
         solve_scene(two_squares(0.05), MPI.COMM_SELF)
     assert isinstance(caught.value.__cause__, NotHeldError)
@@ -132,7 +130,7 @@ def test_a_load_step_that_ends_points_at_flat_sides_on_which_nothing_acts(
     def ends(*arguments: object, **options: object) -> None:
         raise ConvergenceError("no way on")
 
-    monkeypatch.setattr("fenics_contact.nonlinear.TangentNewton.solve", ends)
+    monkeypatch.setattr("fenics_contact.TangentNewton.solve", ends)
     top, sides = Support("roll", "top", (0.0, -1.0)), Support("roll", "x0", (0.0, None))
     with pytest.raises(LoadStepError, match=r"plane of symmetry .* see surface 'x0' of body 'roll', on"):
         solve_scene(pressed_disc(top), MPI.COMM_SELF)

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, FixedPoint, State
+from fenics_contact import ContactProblem, Coulomb, FixedPoint, Scene, State, Traction, Tresca
 from fenics_contact.qp import DualSolver, FaceNewton, Smalse
-from fenics_contact.scene import Coulomb, Scene, Traction, Tresca
 from tests.contact.checks import assert_solved
 from tests.contact.gallery import block_on_plane, crowned, partitions, two_blocks
 

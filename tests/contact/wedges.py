@@ -7,21 +7,23 @@ from collections.abc import Sequence
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, LoadSequence, State
-from fenics_contact.gallery import rectangle
-from fenics_contact.partition import bisection_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    Load,
+    LoadSequence,
     LoadStep,
-    PlaneStrain,
     RigidPlane,
     Scene,
+    State,
     Surface,
     TotalForce,
 )
+from fenics_contact._scene.loads import Load
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import PlaneStrain
+from fenics_contact.mesh import bisection_partition
 
 FRICTION = 0.3
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from fenics_contact.io import read_result
+from fenics_contact.output import read_result
 
 DEMOS = Path(__file__).parents[2] / "demos"
 

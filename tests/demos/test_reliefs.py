@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenics_contact.mesh_io import read_cad
-from fenics_contact.scene import read_field
+from fenics_contact import read_cad, read_field
 
 #: Takes long: what claims rest on.
 pytestmark = [pytest.mark.slow, pytest.mark.claim]

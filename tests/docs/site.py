@@ -11,7 +11,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from fenics_contact.launching import clean_environment
+from fenics_contact import clean_environment
 from tests.docs.pages import DOCS, ROOT
 
 #: Seconds that a build may take on a busy machine.

@@ -16,12 +16,9 @@ import numpy as np
 import pytest
 
 import fenics_contact
-from fenics_contact import errors
-from fenics_contact.contact import LoadSequence, State
-from fenics_contact.io import ResultSeries
-from fenics_contact.optimize import Result
-from fenics_contact.scene import Scene
-from fenics_contact.shape import ShapeProblem
+from fenics_contact import LoadSequence, Scene, ShapeProblem, State, errors
+from fenics_contact.design import Result
+from fenics_contact.output import ResultSeries
 
 #: Classes of what skipped examples take for given, where they ask it for an attribute.
 CLASSES = {

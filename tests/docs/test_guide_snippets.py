@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.scene_file import read_scene_file
+from fenics_contact import read_scene_file
 from tests.docs.pages import DOCS, GUIDE, ROOT, Snippet, agrees, fences_of, snippets_of
 
 FILES = [*GUIDE.glob("*.md"), DOCS / "theory.md", ROOT / "README.md"]

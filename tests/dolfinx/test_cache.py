@@ -14,8 +14,7 @@ import pytest
 import ufl
 from mpi4py import MPI
 
-from fenics_contact import _dolfinx
-from fenics_contact.launching import clean_environment
+from fenics_contact import _dolfinx, clean_environment
 from tests.conftest import ROOT
 
 COMPILES = """

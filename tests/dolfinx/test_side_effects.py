@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from fenics_contact.launching import clean_environment, finished
+from fenics_contact import clean_environment
+from fenics_contact._base.launching import finished
 from tests.conftest import ROOT
 
 CODE = """

@@ -10,19 +10,19 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
-    IsotropicElasticity,
     RigidPlane,
     Scene,
     Support,
     Surface,
     Traction,
+    box_partition,
+    solve_scene,
 )
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
 from tests.feti.scenes import STEEL, Cut
 
 BAR = block((0, 0, 0), (1, 1, 6), (2, 2, 6))

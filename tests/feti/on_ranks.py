@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
-from fenics_contact.feti.numbering import DualNumbering
+from fenics_contact.feti.decomposition import DualNumbering
 from tests.feti.scenes import touching_blocks
 
 

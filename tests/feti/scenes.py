@@ -6,22 +6,23 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import bisection_partition, box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
     RigidPlane,
     Scene,
     Support,
     Surface,
     Traction,
     Tresca,
+    box_partition,
 )
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.mesh import bisection_partition
 
 CELLS = ("hexahedron", "tetrahedron")
 STEEL = IsotropicElasticity(210.0, 0.3)

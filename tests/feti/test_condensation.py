@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from fenics_contact.feti.condensation import Condensation
+from fenics_contact.feti.inverse import Condensation
 
 
 @pytest.mark.parametrize("inside", [1, 2, 5, 30])

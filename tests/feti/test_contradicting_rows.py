@@ -9,9 +9,10 @@ import pytest
 import scipy.sparse as sp
 from mpi4py import MPI
 
+from fenics_contact import box_partition
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
-from fenics_contact.partition import box_partition
-from fenics_contact.qp import DualProblem, FacePreconditioner, RowsOfFace, Scaling
+from fenics_contact.qp import DualProblem, FacePreconditioner
+from fenics_contact.qp.problem import RowsOfFace, Scaling
 from tests.contact.corner_cases import corner
 
 

@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpi4py import MPI
 
-from fenics_contact.fem.forms import FormLibrary
-from fenics_contact.fem.nodal_stiffness import cell_stiffness
-from fenics_contact.feti.copies import _spread_over_ranks, tear
+from fenics_contact._fem.forms import FormLibrary, cell_stiffness
+from fenics_contact.feti.decomposition import _spread_over_ranks, tear
 from tests.feti.scenes import touching_blocks
 
 COSTS = st.lists(st.integers(1, 10**6), min_size=1, max_size=60)

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import _dolfinx
-from fenics_contact.contact import solve_scene
+from fenics_contact import Body, Scene, TotalForce, Traction, _dolfinx, solve_scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.gallery import block
-from fenics_contact.scene import Body, Scene, TotalForce, Traction
 from tests.feti.scenes import CELLS, STEEL, clamped_block, lone_block, touching_blocks
 
 

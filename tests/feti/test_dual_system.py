@@ -10,13 +10,12 @@ import scipy.linalg
 import scipy.sparse as sp
 from mpi4py import MPI
 
+from fenics_contact import Body, ContactPair, Coulomb, RigidPlane, Scene, Support, Surface, box_partition
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
-from fenics_contact.feti.dirichlet import REGULARISATION
+from fenics_contact.feti.dual import REGULARISATION
 from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.feti.kernel_basis import whole_motions
 from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import Body, ContactPair, Coulomb, RigidPlane, Scene, Support, Surface
 from tests.feti.scenes import CELLS, STEEL, Cut, clamped_block, lone_block, ragged_block, touching_blocks
 
 #: How close the preconditioner comes to its formula: explicit Schur complements are in single precision.

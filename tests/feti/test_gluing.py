@@ -9,12 +9,17 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from fenics_contact import Body, Scene, Support
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.feti.copies import Tearing, tear
-from fenics_contact.feti.gluing import gluing_rows, prescribed_displacements, weighted_helmert
-from fenics_contact.feti.rows import Rows
+from fenics_contact.feti import Rows
+from fenics_contact.feti.decomposition import (
+    Tearing,
+    gluing_rows,
+    prescribed_displacements,
+    tear,
+    weighted_helmert,
+)
 from fenics_contact.gallery import block
-from fenics_contact.scene import Body, Scene, Support
 from tests.feti.scenes import CELLS, STEEL, Cut, lone_block, ragged_block
 
 ROLLERS = (Support("block", "z0", (None, None, 0.1)), Support("block", "x0", (0.2, None, 0.1)))

@@ -9,11 +9,11 @@ import pytest
 import scipy.sparse as sp
 from mpi4py import MPI
 
+from fenics_contact import Body, Scene
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.feti.factor import Factor, fixing_nodes, regularised
 from fenics_contact.feti.subdomain import Subdomain
 from fenics_contact.gallery import block
-from fenics_contact.scene import Body, Scene
 from tests.feti.scenes import CELLS, STEEL, Cut, lone_block, ragged_block
 
 

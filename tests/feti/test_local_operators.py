@@ -9,18 +9,14 @@ import pytest
 import scipy.sparse as sp
 from mpi4py import MPI
 
+from fenics_contact import Body, Scene, Support, TotalForce, box_partition
+from fenics_contact._base.sparse import LocalCost, explicit_cost, implicit_cost, prefers_explicit
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
-from fenics_contact.feti.condensation import Condensations
-from fenics_contact.feti.explicit import ExplicitOperator
-from fenics_contact.feti.implicit import ImplicitOperator
-from fenics_contact.feti.inverse import LocalKind
-from fenics_contact.feti.local import LocalOperator, interface_dofs
-from fenics_contact.feti.subdomain import Subdomain
+from fenics_contact.feti.inverse import Condensations, ExplicitOperator, ImplicitOperator, LocalKind
+from fenics_contact.feti.subdomain import LocalOperator, Subdomain, interface_dofs
 from fenics_contact.gallery import block
-from fenics_contact.linalg.cost_model import LocalCost, explicit_cost, implicit_cost, prefers_explicit
-from fenics_contact.partition import box_partition
+from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.qp import FaceNewton, solve
-from fenics_contact.scene import Body, IsotropicElasticity, Scene, Support, TotalForce
 from tests.feti.scenes import CELLS, STEEL, touching_blocks
 
 KINDS = (ImplicitOperator, ExplicitOperator)

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenics_contact import gallery
+from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery.memory import BYTES_A_CELL, memory, require_room
-from fenics_contact.mesh import BodyMesh
+from fenics_contact.gallery import blocks, bolted, hertz, links, ring
+from fenics_contact.gallery.blocks import BYTES_A_CELL, memory, require_room
 
 #: What no size and no count can be.
 NO_NUMBERS: list[Any] = [
@@ -30,24 +30,24 @@ def name(value: Any) -> str:
 
 
 def link(**changes: Any) -> object:
-    return gallery.LinkShape(**{"n_around": 12, "n_a": 1, "n_b": 2, **changes})
+    return ring.LinkShape(**{"n_around": 12, "n_a": 1, "n_b": 2, **changes})
 
 
 BUILDERS: list[tuple[Callable[..., object], dict[str, Any], list[str]]] = [
-    (gallery.hemisphere, {"radius": 1.0, "n": 2, "grading": 1.0}, ["n"]),
-    (gallery.half_disc, {"radius": 1.0, "n": 3, "grading": 1.0}, ["n"]),
-    (gallery.half_cylinder, {"radius": 1.0, "length": 2.0, "n": 3, "n_length": 1}, ["n", "n_length"]),
+    (hertz.hemisphere, {"radius": 1.0, "n": 2, "grading": 1.0}, ["n"]),
+    (hertz.half_disc, {"radius": 1.0, "n": 3, "grading": 1.0}, ["n"]),
+    (hertz.half_cylinder, {"radius": 1.0, "length": 2.0, "n": 3, "n_length": 1}, ["n", "n_length"]),
     (
-        partial(gallery.drilled_plate, ends=(-3.0, 3.0), heights=(0.0, 1.0)),
+        partial(bolted.drilled_plate, ends=(-3.0, 3.0), heights=(0.0, 1.0)),
         {"hole": 1.0, "half_width": 2.0, "n": 1, "n_radial": 1},
         ["n"],
     ),
     (
-        partial(gallery.bolt, grip=(0.0, 1.0), layers=(1, 1)),
+        partial(bolted.bolt, grip=(0.0, 1.0), layers=(1, 1)),
         {"shank": 0.9, "head": 1.6, "head_height": 0.5, "n": 1},
         ["n"],
     ),
-    (gallery.growing_ticks, {"length": 2.0, "first": 0.1, "ratio": 1.2}, []),
+    (blocks.growing_ticks, {"length": 2.0, "first": 0.1, "ratio": 1.2}, []),
     (
         link,
         {"inner_radius": 11.0, "straight": 26.0, "thickness": 16.0, "width": 16.0, "grading": 1.0, "n_a": 3},
@@ -78,9 +78,9 @@ def test_what_is_no_size_and_no_count_is_refused_by_its_name(
 )
 def test_what_are_no_counts_of_a_block_is_refused(value: Any) -> None:
     with pytest.raises(InvalidInputError, match=r"counts(\[\d\])? must be"):
-        gallery.block((0, 0, 0), (1, 1, 1), value)
+        blocks.block((0, 0, 0), (1, 1, 1), value)
     with pytest.raises(InvalidInputError, match=r"counts(\[\d\])? must be"):
-        gallery.rectangle((0, 0), (1, 1), (2, 1, 1) if isinstance(value, tuple) else value)
+        blocks.rectangle((0, 0), (1, 1), (2, 1, 1) if isinstance(value, tuple) else value)
 
 
 @pytest.mark.parametrize(
@@ -88,28 +88,28 @@ def test_what_are_no_counts_of_a_block_is_refused(value: Any) -> None:
 )
 def test_what_are_no_corners_of_a_block_is_refused(value: Any) -> None:
     with pytest.raises(InvalidInputError, match="upper must exceed lower in x, y and z"):
-        gallery.block((0, 0, 0), value, (1, 1, 1))
+        blocks.block((0, 0, 0), value, (1, 1, 1))
 
 
 @pytest.mark.parametrize(
     ("build", "words"),
     [
         (
-            lambda: gallery.block((0,) * 3, (1,) * 3, (3, 10**6, 10**5)),
+            lambda: blocks.block((0,) * 3, (1,) * 3, (3, 10**6, 10**5)),
             "3 x 1000000 x 100000 cells, which take",
         ),
-        (lambda: gallery.block((0,) * 3, (1,) * 3, (9999,) * 3, "tetrahedron"), r"which take 1\.2 PB"),
-        (lambda: gallery.rectangle((0, 0), (1, 1), (10**6, 10**6)), "must fit into the memory"),
-        (lambda: gallery.growing_ticks(1e20, 1e-3, 1.0 + 1e-15), "must fit into the memory"),
-        (lambda: gallery.hemisphere(1.0, 10**5), "must fit into the memory"),
-        (lambda: gallery.half_disc(1.0, 10**6), "must fit into the memory"),
+        (lambda: blocks.block((0,) * 3, (1,) * 3, (9999,) * 3, "tetrahedron"), r"which take 1\.2 PB"),
+        (lambda: blocks.rectangle((0, 0), (1, 1), (10**6, 10**6)), "must fit into the memory"),
+        (lambda: blocks.growing_ticks(1e20, 1e-3, 1.0 + 1e-15), "must fit into the memory"),
+        (lambda: hertz.hemisphere(1.0, 10**5), "must fit into the memory"),
+        (lambda: hertz.half_disc(1.0, 10**6), "must fit into the memory"),
         (
-            lambda: gallery.drilled_plate(1.0, 2.0, (-1e50, 4.0), (0, 1), 2),
+            lambda: bolted.drilled_plate(1.0, 2.0, (-1e50, 4.0), (0, 1), 2),
             "along the strip must be at most",
         ),
-        (lambda: gallery.drilled_plate(1.0, 2.0, (-4.0, 4.0), (0, 1), 10**6), "must fit into the memory"),
-        (lambda: gallery.chain_link(gallery.LinkShape(n_around=999_996, n_b=10**5)), "must fit into the"),
-        (lambda: gallery.chain([gallery.LinkShape()] * 10**5), "4800000 x 8 x 20 cells"),
+        (lambda: bolted.drilled_plate(1.0, 2.0, (-4.0, 4.0), (0, 1), 10**6), "must fit into the memory"),
+        (lambda: links.chain_link(ring.LinkShape(n_around=999_996, n_b=10**5)), "must fit into the"),
+        (lambda: links.chain([ring.LinkShape()] * 10**5), "4800000 x 8 x 20 cells"),
         (lambda: link(straight=1e30), "must differ by less than a factor of 1000"),
     ],
 )

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block, box_lattice, growing_ticks, rectangle, split_hexahedra
-from fenics_contact.mesh import BodyMesh, vector_areas
-from fenics_contact.mesh.quality import scaled_jacobian
+from fenics_contact.gallery import block, box_lattice, growing_ticks, rectangle
+from fenics_contact.gallery.blocks import split_hexahedra
+from fenics_contact.mesh import scaled_jacobian
+from fenics_contact.mesh.faces import vector_areas
 
 CELLS = ["hexahedron", "tetrahedron"]
 NORMALS = {

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import bolt, drilled_plate
-from fenics_contact.mesh import BodyMesh, vector_areas
-from fenics_contact.partition import check_one_piece
+from fenics_contact.mesh.faces import vector_areas
+from fenics_contact.mesh.partition import check_one_piece
 
 HEIGHTS = [-2.0, 0.0, 2.0]
 

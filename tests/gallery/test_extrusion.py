@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block, extrude, rectangle
-from fenics_contact.mesh import BodyMesh, vector_areas
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.gallery.blocks import extrude
+from fenics_contact.mesh.faces import vector_areas
 
 HEIGHTS = [0.0, 0.5, 2.0]
 

@@ -8,11 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from fenics_contact import box_partition
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import Link, LinkShape, chain, chain_link, two_links
-from fenics_contact.gallery.ring_spacing import drawn_together
-from fenics_contact.mesh.quality import jacobians, scaled_jacobian
-from fenics_contact.partition import box_partition
+from fenics_contact.gallery.ring import drawn_together
+from fenics_contact.mesh import scaled_jacobian
+from fenics_contact.mesh.quality import jacobians
 
 #: The grading that the docstring of `LinkShape` names, and the radius of the contact circle there.
 GRADING, CIRCLE = 2.1, 2.95

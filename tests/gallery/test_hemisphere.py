@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import half_cylinder, hemisphere
-from fenics_contact.mesh import BodyMesh, boundary_faces, vector_areas
-from fenics_contact.mesh.quality import scaled_jacobian
+from fenics_contact.mesh import boundary_faces, scaled_jacobian
+from fenics_contact.mesh.faces import vector_areas
 
 BODIES = {
     "quarter": (lambda n: hemisphere(2.0, n), 4.0 * np.pi / 3.0),

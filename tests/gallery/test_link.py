@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fenics_contact import box_partition
 from fenics_contact.errors import FenicsContactError, InvalidInputError
-from fenics_contact.gallery import Link, LinkShape, chain_link, link
-from fenics_contact.gallery.section import WireSection
-from fenics_contact.mesh import boundary_faces, vector_areas
-from fenics_contact.mesh.quality import scaled_jacobian
-from fenics_contact.partition import box_partition, check_face_connected, torn_node_counts
+from fenics_contact.gallery import Link, LinkShape, chain_link
+from fenics_contact.gallery import links as link
+from fenics_contact.gallery.ring import WireSection
+from fenics_contact.mesh import boundary_faces, scaled_jacobian
+from fenics_contact.mesh.faces import vector_areas
+from fenics_contact.mesh.partition import check_face_connected, torn_node_counts
 
 CELLS = ["hexahedron", "tetrahedron"]
 

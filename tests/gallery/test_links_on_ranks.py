@@ -10,7 +10,7 @@ from tests.gallery.links import digest
 CODE = """
     import sys
     from mpi4py import MPI
-    from fenics_contact.gallery import link
+    from fenics_contact.gallery import links as link
     from tests.gallery.links import SMALL, digest
 
     comm = MPI.COMM_WORLD

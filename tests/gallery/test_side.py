@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, half_disc, hemisphere, rectangle, side_of
-from fenics_contact.mesh import BodyMesh, quadratic
+from fenics_contact.mesh import quadratic
 
 BOX = block((0.0, 0.0, 0.0), (4.0, 2.0, 1.0), (8, 4, 2))
 

@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import PULL_AXIS, LinkShape, TwoLinks, chain, two_links
-from fenics_contact.mesh import BodyMesh
+from fenics_contact.gallery import LinkShape, TwoLinks, chain, two_links
+from fenics_contact.gallery.links import PULL_AXIS
 
 CELLS = ["hexahedron", "tetrahedron"]
 

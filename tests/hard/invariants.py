@@ -8,12 +8,13 @@ import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState
+from fenics_contact import Scene
+from fenics_contact._scene.plan import resisted_motions
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
-from fenics_contact.feti.gluing import prescribed_displacements
-from fenics_contact.feti.initial_gap import gap_with_room
-from fenics_contact.scene import Scene, rigid_body_modes
-from fenics_contact.scene.held import resisted_motions
+from fenics_contact.feti.decomposition import prescribed_displacements
+from fenics_contact.feti.torn import gap_with_room
+from fenics_contact.materials import rigid_body_modes
+from fenics_contact.results.deformed_state import AnyState
 from tests.contact.checks import residuals
 
 

@@ -8,18 +8,22 @@ from functools import cache
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, ContactResult
+from fenics_contact import (
+    Body,
+    BodyForce,
+    ContactPair,
+    ContactProblem,
+    Coulomb,
+    Scene,
+    ShapeProblem,
+    Support,
+    Surface,
+    SurfaceDesign,
+)
+from fenics_contact.design import AdaptiveTolerance, ContactForces, TotalPotential, WeakChoice
 from fenics_contact.gallery import block
 from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import Body, BodyForce, ContactPair, Coulomb, Scene, Support, Surface
-from fenics_contact.shape import (
-    AdaptiveTolerance,
-    ContactForces,
-    ShapeProblem,
-    SurfaceDesign,
-    TotalPotential,
-    WeakChoice,
-)
+from fenics_contact.results import ContactResult
 from tests.contact.gallery import FLOOR, crowned, partitions
 from tests.shape.blocks import PLASTIC, RUBBER, designs_of, side
 from tests.shape.objectives import normal_forces

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fenics_contact.io.replacing import replacing
+from fenics_contact.output.files import replacing
 
 INTRODUCTION = """\
 # Hard cases

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh
 from tests.hard.conftest import Record
 
 CELLS = ("hexahedron", "tetrahedron")

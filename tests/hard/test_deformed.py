@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fenics_contact.contact import DeformedState
+from fenics_contact import DeformedState
 from tests.hard.conftest import Record
 from tests.hard.deformed import CASES
 from tests.hard.deformed.case import TOLERANCE, Case, difference, displacement, violations

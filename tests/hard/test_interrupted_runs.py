@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenics_contact.checkpoint import Checkpoint, CheckpointError
+from fenics_contact import minimize
+from fenics_contact.design import BundleTrust, Checkpoint, CheckpointError
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import BundleTrust, minimize
 from tests.conftest import LAUNCH, ROOT, run_on_ranks
 from tests.hard.conftest import Record
 from tests.hard.interrupted_run import RUNS

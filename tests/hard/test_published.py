@@ -10,9 +10,10 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from fenics_contact.contact import Damping, FixedPoint
+from fenics_contact import FixedPoint
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, Smalse, solve
+from fenics_contact.results import Damping
 from tests.hard.conftest import Record
 from tests.hard.trial import fallbacks
 from tests.qp.published_friction import CASES, cone_residual, published

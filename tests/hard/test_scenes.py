@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State
+from fenics_contact import State
 from fenics_contact.errors import ConvergenceError
 from tests.conftest import run_on_ranks
 from tests.hard.conftest import Record

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status
+from fenics_contact import ShapeProblem, State, Status, minimize
+from fenics_contact._optimize.result import StepKind
+from fenics_contact.design import AdaptiveTolerance, BundleTrust, DesignPoint, Result
 from fenics_contact.errors import InvalidDesignError
-from fenics_contact.optimize import BundleTrust, Result, StepKind, minimize
 from fenics_contact.qp import FaceNewton
-from fenics_contact.shape import AdaptiveTolerance, DesignPoint, ShapeProblem
 from tests.hard.conftest import Record
 from tests.hard.invariants import violations
 from tests.hard.shapes import carved, kink, on_a_ramp, thick

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import FixedPoint
+from fenics_contact import FixedPoint, Tresca
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, Smalse, solve
-from fenics_contact.scene import Tresca
 from tests.contact.gallery import partitions, pressed_block
 from tests.hard.conftest import Record
 from tests.hard.trial import TOLERANCE, fallbacks

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.mesh import BodyMesh, orient
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
+    BodyMesh,
     ContactPair,
     LoadStep,
     Pressure,
@@ -25,6 +25,7 @@ from fenics_contact.scene import (
     Traction,
     Tresca,
 )
+from fenics_contact.mesh.faces import orient
 
 #: Powers of length and force in the value of each load.
 DIMENSIONS = {

@@ -11,11 +11,20 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, State, Status, solve_scene, solve_steps
+from fenics_contact import (
+    ContactProblem,
+    LoadStep,
+    Scene,
+    State,
+    Status,
+    box_partition,
+    solve_scene,
+    solve_steps,
+)
 from fenics_contact.errors import ConvergenceError
-from fenics_contact.partition import bisection_partition, box_partition, graph_partition
-from fenics_contact.qp import DualSolver, FaceNewton, SolverStep
-from fenics_contact.scene import LoadStep, Scene
+from fenics_contact.mesh import bisection_partition, graph_partition
+from fenics_contact.qp import DualSolver, FaceNewton
+from fenics_contact.qp.solution import SolverStep
 from tests.hard.transform import in_units, steps_in_units
 
 Cut = Mapping[str, np.ndarray]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from fenics_contact.contact import State, solve_scene
+from fenics_contact import Body, ContactPair, RigidPlane, Scene, State, Support, Surface, solve_scene
 from fenics_contact.gallery import block
-from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, RigidPlane, Scene, Support, Surface
+from fenics_contact.materials import IsotropicElasticity
 
 #: ½ E (δ/h)² V.
 ENERGY = 0.5 * 100.0 * (0.01 / 0.3) ** 2 * 0.7 * 0.5 * 0.3

@@ -35,7 +35,7 @@ class Module:
 
     @property
     def room(self) -> str:
-        """The part of the house it belongs to: "feti" for ``fenics_contact.feti.rows``."""
+        """The part of the house it belongs to: "feti" for ``fenics_contact.feti.decomposition``."""
         return room_of(self.name) or ""
 
     @cache

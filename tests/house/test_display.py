@@ -15,55 +15,26 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.accuracy import BalancedTolerance, certify, find_sites, solver_errors
-from fenics_contact.contact import (
-    AnyState,
-    ContactProblem,
-    FixedPoint,
-    LoadSequence,
-    NewtonSteps,
-    RigidMotion,
-    Status,
-    UnheldMotion,
-    solve_scene,
-)
-from fenics_contact.display import COLUMNS, LINES, displayed, in_lines
-from fenics_contact.gallery import block
-from fenics_contact.mesh import CELL_TYPES, BodyMesh
-from fenics_contact.optimize import (
-    Bounds,
-    BundleTrust,
-    Checkpoint,
-    ForScipy,
-    LinearConstraints,
-    NonlinearConstraint,
-    minimize,
-    pose,
-)
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     AutomaticContact,
     BodyForce,
+    BodyMesh,
+    ContactProblem,
     Coulomb,
     DistanceObstacle,
-    FinitePlasticity,
-    J2Plasticity,
+    FixedPoint,
+    LoadSequence,
     LoadStep,
-    MooneyRivlin,
     MovingObstacle,
-    NeoHooke,
-    Ogden,
-    OrthotropicElasticity,
-    OrthotropicPlaneStress,
-    PlaneStrain,
-    PlaneStress,
+    NewtonSteps,
     Pressure,
     RigidCylinder,
     RigidPlane,
     RigidSphere,
     RigidSurface,
     SampledField,
-    StVenantKirchhoff,
+    ShapeProblem,
+    Status,
     Support,
     Surface,
     ThermalStrain,
@@ -71,31 +42,59 @@ from fenics_contact.scene import (
     TotalForce,
     Tresca,
     Ufl,
+    minimize,
+    solve_scene,
 )
-from fenics_contact.shape import (
+from fenics_contact._accuracy.certificate import certify
+from fenics_contact._accuracy.recovery import find_sites
+from fenics_contact._accuracy.state_errors import solver_errors
+from fenics_contact._base.display import COLUMNS, LINES, displayed, in_lines
+from fenics_contact._optimize.problem import pose
+from fenics_contact.design import (
     AdaptiveTolerance,
+    Bounds,
+    BundleTrust,
+    Checkpoint,
     ContactArea,
     ContactForces,
+    ForScipy,
     FrictionWork,
     LargestPressure,
     LargestStress,
+    LinearConstraints,
     LoadCases,
     LoadPath,
     Maximum,
     MovedSurface,
     Movement,
+    NonlinearConstraint,
     PressureNorm,
     PressureUnevenness,
     Remeshed,
-    Remeshing,
-    ShapeProblem,
     StrainEnergy,
     TotalPotential,
     VolumeIntegral,
     WeakChoice,
-    linearise_face,
-    solve_adjoint,
 )
+from fenics_contact.design.adjoint import linearise_face, solve_adjoint
+from fenics_contact.design.remeshed import Remeshing
+from fenics_contact.gallery import block
+from fenics_contact.materials import (
+    FinitePlasticity,
+    J2Plasticity,
+    MooneyRivlin,
+    NeoHooke,
+    Ogden,
+    OrthotropicElasticity,
+    OrthotropicPlaneStress,
+    PlaneStrain,
+    PlaneStress,
+    StVenantKirchhoff,
+)
+from fenics_contact.mesh.cell_types import CELL_TYPES
+from fenics_contact.qp import FaceNewton
+from fenics_contact.results import BalancedTolerance, RigidMotion, UnheldMotion
+from fenics_contact.results.deformed_state import AnyState
 from tests.contact.gallery import partitions
 from tests.nonlinear.scenes import pressed, rounded
 from tests.shape.blocks import block_on_floor, designs_of

@@ -31,7 +31,7 @@ def python_files() -> list[Path]:
 #: The program chooses the communicator of its commands; the package is handed one.
 PROGRAM = "fenics_contact.__main__"
 #: Where all commands write through, on rank 0 alone.
-CONSOLE = "fenics_contact.cli.desk"
+CONSOLE = "fenics_contact._cli.console"
 
 
 @pytest.mark.parametrize(("name", "allowed"), [("print", [CONSOLE]), ("COMM_WORLD", [PROGRAM])])

@@ -124,19 +124,19 @@ def test_imports_point_down() -> None:
 @pytest.mark.parametrize(
     ("room", "line"),
     [
-        ("feti", "from fenics_contact.contact import coulomb"),
+        ("feti", "from fenics_contact._equilibrium import coulomb"),
         ("feti", "from fenics_contact import contact"),
         ("feti", "from ..contact.coulomb import solve"),
-        ("feti", "def f():\n    import fenics_contact.shape"),
+        ("feti", "def f():\n    import fenics_contact.design"),
         ("feti", "from fenics_contact import solve"),
         ("scene", "from fenics_contact.qp import minimise"),
-        ("optimize", "import fenics_contact.viz"),
-        ("viz", "import fenics_contact.io"),
+        ("optimize", "import fenics_contact.pictures"),
+        ("viz", "import fenics_contact.output"),
         ("viz", "import fenics_contact.study"),
         ("io", "from fenics_contact.study import run_study"),
-        ("scene_file", "from fenics_contact.viz import Units"),
-        ("io", "from fenics_contact.scene_file import read_scene_file"),
-        ("study", "from fenics_contact.cli import main"),
+        ("scene_file", "from fenics_contact.pictures import Units"),
+        ("io", "from fenics_contact._scene_file import read_scene_file"),
+        ("study", "from fenics_contact._cli import main"),
     ],
 )
 def test_an_import_that_does_not_point_down_is_found(room: str, line: str, tmp_path: Path) -> None:
@@ -146,13 +146,13 @@ def test_an_import_that_does_not_point_down_is_found(room: str, line: str, tmp_p
 @pytest.mark.parametrize(
     ("room", "line"),
     [
-        ("feti", "from fenics_contact.scene import Scene"),
+        ("feti", "from fenics_contact._scene import Scene"),
         ("feti", "from . import rows\nfrom .rows import gap\nfrom ..qp import minimise"),
-        ("viz", "from fenics_contact.contact import State"),
-        ("study", "def draw():\n    from fenics_contact.viz.sheet import sheet"),
+        ("viz", "from fenics_contact._equilibrium import State"),
+        ("study", "def draw():\n    from fenics_contact.pictures.canvas import sheet"),
         ("__main__", "from fenics_contact import cli"),
         ("cli", "from fenics_contact.study.scenes import find_study"),
-        ("scene_file", "from fenics_contact.shape import ShapeProblem"),
+        ("scene_file", "from fenics_contact.design import ShapeProblem"),
         ("qp", "import numpy"),
     ],
 )

@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 import pytest
 
-from fenics_contact import launching
+from fenics_contact import clean_environment
+from fenics_contact._base import launching
+from fenics_contact._base.launching import last_words, launcher, traces
 from fenics_contact.errors import MissingRequirementError
-from fenics_contact.launching import clean_environment, last_words, launcher, traces
 from tests.conftest import LAUNCH
 
 #: A process without a shell between: its environment is that which MPI_Init wrote into, not `os.environ`.

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenics_contact import _requirements
+from fenics_contact._base import requirements as _requirements
+from fenics_contact._base.progress import Log, _writer
 from fenics_contact.errors import MissingRequirementError
-from fenics_contact.progress.show import Log, _writer
 from tests.conftest import ROOT, launch
 
 LIBRARIES = ["numpy", "scipy", "clarabel", "mpi4py", "petsc4py", "dolfinx"]
@@ -219,7 +219,9 @@ def test_the_package_itself_reports_what_is_missing(module: str) -> None:
     answer = launch(1, "-c", HIDING.format(module=module) + "import fenics_contact")
     assert answer.returncode == 1, answer.stderr
     last = answer.stderr.strip().splitlines()[-1]
-    assert last.startswith("fenics_contact.errors.MissingRequirementError: fenics_contact needs " + module)
+    assert last.startswith(
+        "fenics_contact.errors.kinds.MissingRequirementError: fenics_contact needs " + module
+    )
 
 
 #: What solves, and what it never loads.
@@ -263,10 +265,10 @@ def test_extras_are_listed_as_such() -> None:
 @pytest.mark.parametrize(
     ("script", "use", "module"),
     [
-        ("import fenics_contact.scene_file", "scene files", "tomlkit"),
-        ("import fenics_contact.scene_file", "scene files", "pydantic"),
+        ("import fenics_contact._scene_file", "scene files", "tomlkit"),
+        ("import fenics_contact._scene_file", "scene files", "pydantic"),
         ("from fenics_contact.__main__ import main; sys.exit(main([]))", "commands", "typer"),
-        ("import fenics_contact.viz", "pictures", "pyvista"),
+        ("import fenics_contact.pictures", "pictures", "pyvista"),
     ],
 )
 def test_a_missing_extra_is_named_with_its_remedy(script: str, use: str, module: str) -> None:

@@ -85,9 +85,9 @@ def test_processes_forked_after_a_solve_refuse_to_compute(mpirun: Callable[..., 
     script = f"""{FORK}
     import numpy as np
     from mpi4py import MPI
-    from fenics_contact.accuracy import discretisation_error
-    from fenics_contact.contact import ContactProblem
-    from fenics_contact.scene import Tresca
+    from fenics_contact._accuracy.discretisation import discretisation_error
+    from fenics_contact import ContactProblem
+    from fenics_contact import Tresca
     from tests.house.pressed_block import solve
     from tests.shape.blocks import block_on_block, problem
 

@@ -7,10 +7,10 @@ from functools import cache
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
+from fenics_contact import Body, ContactProblem, Scene, ShapeProblem, Support, SurfaceDesign, Traction
+from fenics_contact.design import StrainEnergy
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.scene import Body, IsotropicElasticity, PlaneStrain, Scene, Support, Traction
-from fenics_contact.shape import ShapeProblem, StrainEnergy, SurfaceDesign
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 
 
 @cache

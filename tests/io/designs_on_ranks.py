@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fenics_contact.io import CadError, write_design_table, write_step, write_stl
+from fenics_contact.output import CadError, write_design_table, write_step, write_stl
 from tests.io.designed_block import lid, variables
 
 folder, problem, alpha = Path(sys.argv[1]), lid(on_all_ranks=True), variables()

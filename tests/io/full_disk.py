@@ -14,7 +14,8 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from fenics_contact.io import OutputError, ResultSeries, write_json, write_vtu, write_xdmf
+from fenics_contact import write_vtu
+from fenics_contact.output import OutputError, ResultSeries, write_json, write_xdmf
 from tests.io.states import touching_blocks
 
 

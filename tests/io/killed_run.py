@@ -17,10 +17,11 @@ from typing import Any
 import meshio
 from mpi4py import MPI
 
+from fenics_contact import write_result
 from fenics_contact._dolfinx.loading import dolfinx
-from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.io import ResultSeries, write_optimisation_result, write_result
-from fenics_contact.qp import CountedOperator
+from fenics_contact.design import Checkpoint
+from fenics_contact.output import ResultSeries, write_optimisation_result
+from fenics_contact.qp.problem import CountedOperator
 from tests.contact.step_cases import sequence, shears
 from tests.shape.resumed_cases import minimised, posed
 

@@ -7,8 +7,8 @@ from functools import lru_cache
 
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, Status, solve_scene
-from fenics_contact.scene import Coulomb, Scene
+from fenics_contact import Coulomb, Scene, Status, solve_scene
+from fenics_contact.results.deformed_state import AnyState
 from tests.contact.gallery import partitions, two_blocks
 
 

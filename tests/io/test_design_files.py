@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
+from fenics_contact import Body, ContactProblem, Scene, ShapeProblem, SurfaceDesign, read_field
+from fenics_contact.design import StrainEnergy
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
-from fenics_contact.io import write_design_table, write_stl
-from fenics_contact.scene import Body, IsotropicElasticity, Scene, read_field
-from fenics_contact.shape import ShapeProblem, StrainEnergy, SurfaceDesign
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.output import write_design_table, write_stl
 from tests.io.designed_block import lid, variables
 
 

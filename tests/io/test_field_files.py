@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import write_vtu
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.io import ResultSeries, StoredFields, fields_of_result, stored_fields, write_vtu
+from fenics_contact.output import ResultSeries
+from fenics_contact.output.reading import StoredFields, fields_of_result, stored_fields
 from tests.io.states import touching_blocks
 
 

@@ -11,11 +11,11 @@ import pytest
 import pyvista as pv
 from mpi4py import MPI
 
-from fenics_contact.accuracy import discretisation_error
-from fenics_contact.contact import State, Status
+from fenics_contact import State, Status, write_vtu
+from fenics_contact._accuracy.discretisation import discretisation_error
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.io import write_vtu, write_xdmf
-from fenics_contact.io.names import checked_name, file_of_each
+from fenics_contact.output import write_xdmf
+from fenics_contact.output.paraview import checked_name, file_of_each
 from tests.contact.gallery import partitions
 from tests.contact.stress_cases import composite, solved
 from tests.io.states import touching_blocks
@@ -224,8 +224,9 @@ RANKS = """
     import sys
     from pathlib import Path
     from mpi4py import MPI
-    from fenics_contact.contact import solve_scene
-    from fenics_contact.io import write_json, write_vtu, write_xdmf
+    from fenics_contact import solve_scene
+    from fenics_contact import write_vtu
+    from fenics_contact.output import write_json, write_xdmf
     from tests.contact.gallery import partitions
     from tests.io.states import blocks
 

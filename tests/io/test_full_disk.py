@@ -14,7 +14,8 @@ import pytest
 import pyvista as pv
 from mpi4py import MPI
 
-from fenics_contact.io import OutputError, ResultSeries, write_result, write_vtu, write_xdmf
+from fenics_contact import write_result, write_vtu
+from fenics_contact.output import OutputError, ResultSeries, write_xdmf
 from tests.conftest import LAUNCH, run_on_ranks
 from tests.io.states import touching_blocks
 

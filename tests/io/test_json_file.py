@@ -15,8 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.io import write_json
-from fenics_contact.io.json_file import plain
+from fenics_contact.output import write_json
+from fenics_contact.output.files import plain
 
 
 class Colour(Enum):

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from fenics_contact.io import read_result
+from fenics_contact.output import read_result
 from tests.conftest import launch
 
 pytestmark = pytest.mark.slow

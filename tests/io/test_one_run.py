@@ -14,17 +14,17 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import clean_environment
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.io import OutputError, only_run_in, write_json
-from fenics_contact.io.one_run import LOCK
-from fenics_contact.launching import clean_environment
+from fenics_contact.output import OutputError, only_run_in, write_json
+from fenics_contact.output.files import LOCK
 from tests.conftest import ROOT
 
 #: Takes the lock of a folder, says so and waits.
 HOLDER = """
 import sys
 from mpi4py import MPI
-from fenics_contact.io import only_run_in
+from fenics_contact.output import only_run_in
 with only_run_in(sys.argv[1], MPI.COMM_SELF):
     print("taken", flush=True)
     sys.stdin.read()
@@ -130,7 +130,7 @@ def test_all_ranks_agree_whether_there_is_another_run(mpirun: Callable[..., str]
         import sys
         from mpi4py import MPI
         from fenics_contact.errors import InvalidInputError
-        from fenics_contact.io import only_run_in
+        from fenics_contact.output import only_run_in
         comm, told = MPI.COMM_WORLD, []
         with only_run_in(sys.argv[1], comm):
             try:

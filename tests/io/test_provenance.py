@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fenics_contact import _dolfinx
-from fenics_contact.io import provenance, versions, write_json
+from fenics_contact.output import result as provenance
+from fenics_contact.output import versions, write_json
 
 
 def test_versions_name_everything_that_computed(tmp_path: object) -> None:

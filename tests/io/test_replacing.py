@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
-from fenics_contact.checkpoint import hidden_folder
-from fenics_contact.io.replacing import OutputError, replacing
+from fenics_contact._base.files import hidden_folder
+from fenics_contact.output import OutputError
+from fenics_contact.output.files import replacing
 
 
 def test_targets_are_replaced_at_the_end_only(tmp_path: Path) -> None:
@@ -65,7 +66,7 @@ def hidden(folder: Path) -> list[str]:
 KILLED = """
     import os, signal, sys
     from pathlib import Path
-    from fenics_contact.io.replacing import replacing
+    from fenics_contact.output.files import replacing
     with replacing(Path(sys.argv[1]) / "a") as (path,):
         path.write_text("half")
         os.kill(os.getpid(), signal.SIGKILL)

@@ -13,27 +13,30 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.accuracy import BalancedTolerance
-from fenics_contact.contact import Status, solve_scene
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block
-from fenics_contact.io import read_result, write_optimisation_result, write_result
-from fenics_contact.io.described_scene import described_scene, readable
-from fenics_contact.optimize import Result, StepKind
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     DistanceObstacle,
-    IsotropicElasticity,
     Pressure,
     Scene,
+    ShapeProblem,
+    Status,
     Support,
     Surface,
     Tie,
     Tresca,
     Ufl,
+    solve_scene,
+    write_result,
 )
-from fenics_contact.shape import ShapeProblem
+from fenics_contact._optimize.result import StepKind
+from fenics_contact.design import Result
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.output import read_result, write_optimisation_result
+from fenics_contact.output.result import described_scene, readable
+from fenics_contact.results import BalancedTolerance
 from tests.contact.rigid_cases import POINT, SCENES, solved
 from tests.io.states import touching_blocks
 from tests.shape.resumed_cases import minimised, posed
@@ -261,9 +264,10 @@ def test_a_name_with_a_folder_is_refused(tmp_path: Path) -> None:
 RANKS = """
     import sys
     from mpi4py import MPI
-    from fenics_contact.contact import solve_scene
+    from fenics_contact import solve_scene
     from fenics_contact.errors import InvalidInputError
-    from fenics_contact.io import read_result, write_result
+    from fenics_contact import write_result
+    from fenics_contact.output import read_result
     from tests.contact.gallery import partitions
     from tests.io.states import blocks
 

@@ -12,11 +12,11 @@ import pytest
 import pyvista as pv
 from mpi4py import MPI
 
-from fenics_contact import _dolfinx
-from fenics_contact.contact import State
+from fenics_contact import State, _dolfinx
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.io import ResultSeries, series, write_vtx
-from fenics_contact.io.collection import Member
+from fenics_contact.output import ResultSeries, write_vtx
+from fenics_contact.output import paraview as series
+from fenics_contact.output.paraview import Member
 from tests.contact.step_cases import sequence, shears
 from tests.io.states import touching_blocks
 from tests.shape.resumed_cases import minimised, posed
@@ -249,7 +249,7 @@ RANKS = """
     from mpi4py import MPI
     from fenics_contact import _dolfinx
     from fenics_contact.errors import InvalidInputError
-    from fenics_contact.io import ResultSeries
+    from fenics_contact.output import ResultSeries
     from tests.contact.step_cases import sequence, shears
 
     comm, folder = MPI.COMM_WORLD, sys.argv[1]

@@ -10,27 +10,29 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, solve_scene
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block, chain_link, half_disc, side_of
-from fenics_contact.gallery.ring import LinkShape
-from fenics_contact.io import CadError, write_design_table, write_step, write_stl
-from fenics_contact.io.flat_sides import flat_sides
-from fenics_contact.io.spline_fit import fitted
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.mesh_io import OnPlane, gmsh_model, read_cad
-from fenics_contact.optimize import BundleTrust, minimize
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
-    IsotropicElasticity,
+    ContactProblem,
     RigidPlane,
     Scene,
+    ShapeProblem,
     Support,
     Surface,
+    SurfaceDesign,
     Traction,
+    minimize,
+    read_cad,
+    solve_scene,
 )
-from fenics_contact.shape import MovedSurface, PressureNorm, ShapeProblem, SurfaceDesign
+from fenics_contact.design import BundleTrust, MovedSurface, PressureNorm
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import LinkShape, block, chain_link, half_disc, side_of
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.output import CadError, write_design_table, write_step, write_stl
+from fenics_contact.output.cad import fitted, flat_sides
+from fenics_contact.readers import OnPlane, gmsh_model
 from tests.io.designed_block import lid, variables
 
 RISE = 0.06
@@ -162,7 +164,7 @@ def test_a_rim_that_leaves_its_flat_side_is_refused(tmp_path: Path) -> None:
 def test_sides_that_do_not_enclose_a_body_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fenics_contact.io.step.flat_sides", lambda *given: flat_sides(*given)[:-1])
+    monkeypatch.setattr("fenics_contact.output.cad.flat_sides", lambda *given: flat_sides(*given)[:-1])
     with pytest.raises(CadError, match=r"must enclose it, 4 flat ones and 1 designed .* leave 4 open edges"):
         write_step(lid(), variables(), tmp_path / "pad.step")
 

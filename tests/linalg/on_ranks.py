@@ -10,11 +10,11 @@ import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.linalg import SharedFactor, shared_factor
+from fenics_contact import Coulomb, solve_scene
+from fenics_contact._base import sparse as shared_factor
+from fenics_contact._base.sparse import SharedFactor
 from fenics_contact.qp import FaceNewton, coarse
-from fenics_contact.qp.gram import SparseGramInverse
-from fenics_contact.scene import Coulomb
+from fenics_contact.qp.coarse import SparseGramInverse
 from tests.contact.gallery import partitions, two_blocks
 
 

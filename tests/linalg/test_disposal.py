@@ -9,8 +9,9 @@ import pytest
 import scipy.sparse as sp
 from mpi4py import MPI
 
+from fenics_contact._base import sparse as disposal
+from fenics_contact._base.sparse import SharedFactor, dispose_with, sweep
 from fenics_contact.feti.factor import Factor
-from fenics_contact.linalg import SharedFactor, disposal, dispose_with, sweep
 
 
 class Petsc:

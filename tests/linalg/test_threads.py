@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from fenics_contact.linalg.threads import SETTINGS, warn_of_threads
+from fenics_contact._base.sparse import SETTINGS, warn_of_threads
 
 
 @pytest.fixture(autouse=True)

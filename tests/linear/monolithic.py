@@ -11,8 +11,8 @@ import numpy as np
 import ufl
 from petsc4py import PETSc
 
-from fenics_contact import _dolfinx
-from fenics_contact.scene import Body, BodyForce, IsotropicElasticity, Scene, Traction
+from fenics_contact import Body, BodyForce, Scene, Traction, _dolfinx
+from fenics_contact.materials import IsotropicElasticity
 
 
 def displacement(scene: Scene, name: str) -> np.ndarray:

@@ -9,11 +9,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact import _dolfinx
-from fenics_contact.contact import State, solve_scene
+from fenics_contact import Body, Scene, State, Support, Traction, _dolfinx, box_partition, solve_scene
 from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import Body, Scene, Support, Traction
 from tests.feti.scenes import CELLS, STEEL
 from tests.linear import monolithic
 from tests.linear.scenes import BOXES, cut, error, loaded_block, two_materials

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.contact import State
+from fenics_contact import Body, BodyForce, Scene, State, Support, Traction, box_partition
 from fenics_contact.gallery import block
-from fenics_contact.partition import bisection_partition, box_partition
-from fenics_contact.scene import Body, BodyForce, Scene, Support, Traction
+from fenics_contact.mesh import bisection_partition
 from tests.feti.scenes import RUBBER, STEEL, skewed
 from tests.linear import monolithic
 

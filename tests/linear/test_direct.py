@@ -6,19 +6,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
+from fenics_contact import Body, RigidSurface, Scene, Support, Traction, solve_scene
 from fenics_contact.errors import ConvergenceError
-from fenics_contact.feti import DirectSystem
+from fenics_contact.feti.direct import DirectSystem
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.scene import (
-    Body,
-    IsotropicElasticity,
-    PlaneStrain,
-    RigidSurface,
-    Scene,
-    Support,
-    Traction,
-)
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 
 
 def cantilever(length: float, cells: int) -> Scene:

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.contact.equilibrium import default_solver
-from fenics_contact.partition import bisection_partition
+from fenics_contact import Support, solve_scene
+from fenics_contact._equilibrium.problem import default_solver
+from fenics_contact.mesh import bisection_partition
 from fenics_contact.qp import FaceNewton, ProjectedCG, Smalse
-from fenics_contact.scene import Support
 from tests.feti.scenes import CELLS
 from tests.linear.scenes import BOXES, TOLERANCE, cut, error, loaded_block, two_materials
 

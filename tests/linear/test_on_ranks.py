@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
+from fenics_contact import solve_scene
 from tests.conftest import run_on_ranks
 from tests.feti.scenes import CELLS
 from tests.linear.scenes import BOXES, TOLERANCE, cut, loaded_block

@@ -7,7 +7,7 @@ import sys
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
+from fenics_contact import solve_scene
 from tests.feti.scenes import CELLS, clamped_block
 
 LAYERS = 4  # cells along the edge of a subdomain, H/h

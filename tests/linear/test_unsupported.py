@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
+from fenics_contact import Body, Scene, State, Support, Traction, box_partition, solve_scene
+from fenics_contact._scene.loads import Load
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import Body, Load, Scene, Support, Traction
 from tests.feti.scenes import STEEL
 
 

@@ -7,10 +7,10 @@ import pytest
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
-from fenics_contact.mesh import boundary_faces, orient, vector_areas
+from fenics_contact.mesh import boundary_faces, scaled_jacobian
 from fenics_contact.mesh.cell_types import HEXAHEDRON
-from fenics_contact.mesh.faces import cell_faces, match_faces, neighbours, number_faces
-from fenics_contact.mesh.quality import cell_volumes, jacobian_ratio, jacobians, scaled_jacobian, volume
+from fenics_contact.mesh.faces import cell_faces, match_faces, neighbours, number_faces, orient, vector_areas
+from fenics_contact.mesh.quality import cell_volumes, jacobian_ratio, jacobians, volume
 
 CELLS = ["hexahedron", "tetrahedron"]
 RNG = np.random.default_rng(5)

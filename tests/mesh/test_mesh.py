@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh, boundary_faces
+from fenics_contact.mesh import boundary_faces
 from fenics_contact.mesh.cell_types import HEXAHEDRON
 from fenics_contact.mesh.quality import jacobians
 

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import LinkShape, block, rectangle, two_links
-from fenics_contact.mesh import BodyMesh, near_surfaces, quadratic
+from fenics_contact.mesh import quadratic
+from fenics_contact.mesh.near_surfaces import near_surfaces
 from tests.mesh_io.mesh_files import area
 
 

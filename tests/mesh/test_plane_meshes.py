@@ -5,26 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh, box_partition
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import (
-    block,
-    half_disc,
-    rectangle,
-    rectangle_lattice,
-    split_hexahedra,
-    split_quadrilaterals,
-)
-from fenics_contact.gallery.structured import structured_cells
-from fenics_contact.mesh import CELL_TYPES, BodyMesh, boundary_faces, orient, vector_areas
-from fenics_contact.mesh.cell_types import QUADRILATERAL
-from fenics_contact.mesh.faces import cell_faces, neighbours
-from fenics_contact.mesh.quality import jacobian_ratio, jacobians, scaled_jacobian, volume
-from fenics_contact.partition import (
-    bisection_partition,
-    box_partition,
-    check_face_connected,
-    torn_node_counts,
-)
+from fenics_contact.gallery import block, half_disc, rectangle, rectangle_lattice
+from fenics_contact.gallery.blocks import split_hexahedra, split_quadrilaterals, structured_cells
+from fenics_contact.mesh import bisection_partition, boundary_faces, scaled_jacobian
+from fenics_contact.mesh.cell_types import CELL_TYPES, QUADRILATERAL
+from fenics_contact.mesh.faces import cell_faces, neighbours, orient, vector_areas
+from fenics_contact.mesh.partition import check_face_connected, torn_node_counts
+from fenics_contact.mesh.quality import jacobian_ratio, jacobians, volume
 
 CELLS = ["quadrilateral", "triangle"]
 NORMALS = {"x0": [-3, 0], "x1": [3, 0], "y0": [0, -2], "y1": [0, 2]}

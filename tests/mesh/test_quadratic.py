@@ -7,22 +7,14 @@ import numpy as np
 import pytest
 import vtk
 
-from fenics_contact import _dolfinx
+from fenics_contact import BodyMesh, _dolfinx
 from fenics_contact._dolfinx.cells import NODE_ORDER, shape
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import (
-    CELL_TYPES,
-    BodyMesh,
-    boundary_faces,
-    corners_of,
-    in_vtk_order,
-    quadratic,
-    shape_gradients,
-    shape_values,
-    vector_areas,
-)
-from fenics_contact.surface_shapes import Sphere
+from fenics_contact.mesh import boundary_faces, in_vtk_order, quadratic
+from fenics_contact.mesh.cell_types import CELL_TYPES, shape_gradients, shape_values
+from fenics_contact.mesh.faces import corners_of, vector_areas
+from fenics_contact.shapes import Sphere
 
 QUADRATIC = ["triangle6", "quadrilateral9", "tetrahedron10", "hexahedron27"]
 VTK_CELL = {"triangle6": 22, "quadrilateral9": 28, "tetrahedron10": 24, "hexahedron27": 29}

@@ -7,9 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block, rectangle, split_hexahedra, split_quadrilaterals
-from fenics_contact.mesh import BodyMesh, boundary_faces, merge_duplicate_nodes
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.gallery.blocks import split_hexahedra, split_quadrilaterals
+from fenics_contact.mesh import boundary_faces, merge_duplicate_nodes
 
 
 def with_regions(regions: dict[str, object]) -> BodyMesh:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh, merge_duplicate_nodes
+from fenics_contact.mesh import bisection_partition, merge_duplicate_nodes
 from fenics_contact.mesh.plane import flattened
-from fenics_contact.partition import bisection_partition
 
 WAY = np.array([1.0, 0.3, -0.6])
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.surface_shapes import Circle, Joined, Plane, SurfaceShape
+from fenics_contact.shapes import Circle, Joined, Plane, SurfaceShape
 
 
 def ring() -> BodyMesh:

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import meshio
 import numpy as np
 
+from fenics_contact import BodyMesh
 from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh, vector_areas
+from fenics_contact.mesh.faces import vector_areas
 
 
 def bodies() -> dict[str, BodyMesh]:

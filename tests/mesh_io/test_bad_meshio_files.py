@@ -9,8 +9,9 @@ import meshio
 import numpy as np
 import pytest
 
+from fenics_contact import read_mesh
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh_io import from_meshio, read_mesh
+from fenics_contact.readers import from_meshio
 from tests.mesh_io.mesh_files import joined, with_tags
 from tests.mesh_io.msh_files import CUBE
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh_io import read_msh
+from fenics_contact.readers import read_msh
 from tests.mesh_io.msh_files import (
     CUBE,
     HEXAHEDRON,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh_io import from_dolfinx, read_xdmf
+from fenics_contact.readers import from_dolfinx, read_xdmf
 from tests.mesh_io.msh_files import CUBE
 from tests.mesh_io.xdmf_files import bar, cell_tags, facet_tags, meshio, third_order_triangle, write
 

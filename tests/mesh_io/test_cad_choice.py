@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh, read_cad
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.mesh_io import CadFace, InBox, OnCylinder, OnPlane, read_cad
-from fenics_contact.mesh_io.gmsh_session import gmsh_model
-from fenics_contact.surface_shapes import Cylinder, Plane
+from fenics_contact.readers import CadFace, InBox, OnCylinder, OnPlane, gmsh_model
+from fenics_contact.shapes import Cylinder, Plane
 
 WIDE, HIGH, RADIUS = 4.0, 1.0, 0.6
 

@@ -11,22 +11,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import BodyMesh, read_cad
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.mesh_io import OnCylinder, cad_shapes, from_gmsh_model, read_cad
-from fenics_contact.mesh_io.gmsh_session import gmsh_model
-from fenics_contact.surface_shapes import (
-    Cylinder,
-    Joined,
-    Plane,
-    Revolved,
-    Sphere,
-    SurfaceShape,
-    Torus,
-    closest_points,
-    principal_curvatures,
-)
+from fenics_contact.readers import OnCylinder, from_gmsh_model, gmsh_model
+from fenics_contact.readers.cad_shapes import cad_shapes
+from fenics_contact.shapes import Cylinder, Joined, Plane, Revolved, Sphere, SurfaceShape, Torus
+from fenics_contact.shapes.simple import closest_points, principal_curvatures
 
 OFF = (0.1, -0.2, 0.3)
 

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenics_contact import _dolfinx
+from fenics_contact import BodyMesh, _dolfinx
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh, boundary_faces, quadratic, vector_areas
-from fenics_contact.mesh_io import from_dolfinx, read_xdmf
+from fenics_contact.mesh import boundary_faces, quadratic
+from fenics_contact.mesh.faces import vector_areas
+from fenics_contact.readers import from_dolfinx, read_xdmf
 from tests.mesh_io.xdmf_files import CELLS, bar, cell_tags, everywhere, facet_tags, meshio, write
 
 __all__ = ["meshio"]
@@ -135,7 +136,7 @@ def test_all_ranks_receive_the_bodies_that_rank_0_reads(mpirun: Callable[..., st
     path = write(tmp_path / "bar.xdmf", mesh, cell_tags(mesh), facet_tags(mesh))
     script = f"""
         from mpi4py import MPI
-        from fenics_contact.mesh_io import read_xdmf
+        from fenics_contact.readers import read_xdmf
         bodies = read_xdmf("{path}", {{"bar": [1, 2]}}, {{"end": 3}}, comm=MPI.COMM_WORLD)
         found = [(name, round(body.volume, 9), *body.surfaces) for name, body in bodies.items()]
         every = MPI.COMM_WORLD.gather(found)
@@ -151,9 +152,9 @@ DISTRIBUTED = """
     from mpi4py import MPI
     from fenics_contact import _dolfinx
     import dolfinx.fem, dolfinx.mesh
-    from fenics_contact.contact import solve_scene
-    from fenics_contact.mesh_io import from_dolfinx
-    from fenics_contact.scene import *
+    from fenics_contact import solve_scene
+    from fenics_contact.readers import from_dolfinx
+    from fenics_contact._scene import *
 
     comm = MPI.COMM_WORLD
     kind = dolfinx.mesh.CellType.{cell}

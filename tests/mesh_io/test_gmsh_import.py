@@ -9,9 +9,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh import BodyMesh, vector_areas
-from fenics_contact.mesh_io import from_gmsh_model, read_msh
+from fenics_contact.mesh.faces import vector_areas
+from fenics_contact.readers import from_gmsh_model, read_msh
 from tests.conftest import ROOT
 from tests.mesh_io.msh_files import name, own_gmsh, rectangle_surface, two_boxes, within
 
@@ -149,7 +150,7 @@ def test_hexahedra_come_from_an_extruded_surface(gmsh: ModuleType) -> None:
 def test_all_ranks_receive_the_bodies_that_rank_0_reads(mpirun: Callable[..., str]) -> None:
     script = f"""
         from mpi4py import MPI
-        from fenics_contact.mesh_io import read_msh
+        from fenics_contact.readers import read_msh
         bodies = read_msh("{BOXES}", {{"press": ["table", "tool"]}}, ["top"], comm=MPI.COMM_WORLD)
         found = [(name, round(body.volume, 9), *body.surfaces) for name, body in bodies.items()]
         try:

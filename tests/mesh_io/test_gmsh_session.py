@@ -10,9 +10,9 @@ from types import ModuleType
 
 import pytest
 
+from fenics_contact import clean_environment
 from fenics_contact.gallery import LinkShape, chain_link
-from fenics_contact.launching import clean_environment
-from fenics_contact.mesh_io.gmsh_session import gmsh_model
+from fenics_contact.readers import gmsh_model
 from tests.house.source import ROOT
 
 SMALL = LinkShape(n_around=12, n_a=1, n_b=2)

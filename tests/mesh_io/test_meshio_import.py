@@ -9,10 +9,11 @@ import meshio
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh, read_mesh
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.mesh_io import from_meshio, read_mesh
+from fenics_contact.mesh import quadratic
+from fenics_contact.readers import from_meshio
 from tests.conftest import ROOT
 from tests.mesh_io.mesh_files import area, bodies, joined, with_tags
 from tests.mesh_io.xdmf_files import bar, cell_tags, facet_tags, write
@@ -234,7 +235,7 @@ def test_all_ranks_receive_the_bodies_that_rank_0_reads(mpirun: Callable[..., st
     joined().write(tmp_path / "press.inp")
     script = f"""
         from mpi4py import MPI
-        from fenics_contact.mesh_io import read_mesh
+        from fenics_contact import read_mesh
         bodies = read_mesh("{tmp_path / "press.inp"}", ["tool"], ["top"], comm=MPI.COMM_WORLD)
         found = [(name, round(body.volume, 9), *body.surfaces) for name, body in bodies.items()]
         try:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from fenics_contact import BodyMesh
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import IsotropicElasticity, Material, PlaneStrain
+from fenics_contact.materials import IsotropicElasticity, Material, PlaneStrain
 from tests.models.elements import PLANE
 
 

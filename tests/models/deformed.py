@@ -8,10 +8,12 @@ import numpy as np
 import scipy.sparse.linalg as spl
 from mpi4py import MPI
 
-from fenics_contact.fem import FormLibrary, Mechanics, Response, composition
+from fenics_contact import Body, BodyMesh, Scene
+from fenics_contact._fem.composition import composition
+from fenics_contact._fem.forms import FormLibrary
+from fenics_contact._fem.mechanics import Mechanics, Response
 from fenics_contact.feti.subdomain import SubdomainMesh, assemble, cut_out
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.scene import Body, Scene
+from fenics_contact.mesh import quadratic
 from tests.models.bodies import bent, box
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.fem.forms import FormLibrary
-from fenics_contact.fem.spread_force import as_tractions
+from fenics_contact import Body, BodyMesh, Scene
+from fenics_contact._fem.forms import FormLibrary
+from fenics_contact._fem.loads import as_tractions
+from fenics_contact._scene.loads import Load
 from fenics_contact.feti.subdomain import Subdomain, assemble, cut_out
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import Body, Load, Material, Scene
+from fenics_contact.materials import Material
 
 #: Reference coordinates of the vertices in VTK order.
 VERTICES = {

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import ufl
 
-from fenics_contact.scene import Elasticity, EnergyModel, strain
+from fenics_contact.materials import Elasticity, EnergyModel, strain
 
 YOUNG, POISSON = 210.0, 0.3
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse.linalg as spla
 
-from fenics_contact.fem import Response
+from fenics_contact._fem.mechanics import Response
 from tests.models.deformed import Patch
 
 

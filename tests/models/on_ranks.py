@@ -8,21 +8,19 @@ import sys
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
-    IsotropicElasticity,
-    PlaneStress,
     Pressure,
     Scene,
     Support,
     ThermalStrain,
     Ufl,
-    rigid_body_modes,
+    box_partition,
+    solve_scene,
 )
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials import IsotropicElasticity, PlaneStress, rigid_body_modes
 from tests.models.bodies import bent, box, in_halves, steel
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenics_contact.scene import (
+from fenics_contact.materials import (
     IsotropicElasticity,
     Material,
     OrthotropicElasticity,

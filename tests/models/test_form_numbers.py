@@ -6,9 +6,9 @@ import pytest
 import ufl
 
 from fenics_contact import _dolfinx
-from fenics_contact.fem import Constants, integrate
-from fenics_contact.fem.templates import volume_measure
-from fenics_contact.scene import J2Plasticity, Material, MooneyRivlin, NeoHooke
+from fenics_contact._fem.composition import integrate
+from fenics_contact._fem.templates import Constants, volume_measure
+from fenics_contact.materials import J2Plasticity, Material, MooneyRivlin, NeoHooke
 
 MATERIALS = [NeoHooke(1.0, 0.3), MooneyRivlin(1.0, 0.5, 10.0), J2Plasticity(1.0, 0.3, 0.01)]
 
@@ -16,9 +16,10 @@ MATERIALS = [NeoHooke(1.0, 0.3), MooneyRivlin(1.0, 0.5, 10.0), J2Plasticity(1.0,
 APART = """
 import ufl
 from mpi4py import MPI
-from fenics_contact.contact import solve_scene
+from fenics_contact import solve_scene
 from fenics_contact.gallery import block
-from fenics_contact.scene import Body, NeoHooke, Scene, Support
+from fenics_contact import Body, Scene, Support
+from fenics_contact.materials import NeoHooke
 
 comm = MPI.COMM_WORLD
 ufl.Constant._globalcount = 8 + comm.rank

@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
+from fenics_contact import check_history_material
 from fenics_contact.errors import InvalidInputError, UserCodeError
-from fenics_contact.fem import check_history_material
-from fenics_contact.scene import FinitePlasticity, HistoryMaterial, J2Plasticity, MaterialResponse
+from fenics_contact.materials import FinitePlasticity, HistoryMaterial, J2Plasticity, MaterialResponse
 
 UNIT = np.einsum("ik,jl->ijkl", np.eye(3), np.eye(3))
 SYMMETRIC = 0.5 * (UNIT + UNIT.swapaxes(2, 3))

@@ -8,18 +8,19 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import Body, Scene
+from fenics_contact._fem.composition import composition
+from fenics_contact._fem.forms import FormLibrary
+from fenics_contact._fem.kinematics import GaussPoints
+from fenics_contact._fem.mechanics import History, Mechanics, Response
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.fem import FormLibrary, History, Mechanics, Response, composition
-from fenics_contact.fem.gauss_points import GaussPoints
 from fenics_contact.feti.subdomain import SubdomainMesh, cut_out
-from fenics_contact.scene import (
-    Body,
+from fenics_contact.materials import (
     FinitePlasticity,
     HistoryMaterial,
     IsotropicElasticity,
     J2Plasticity,
     NeoHooke,
-    Scene,
 )
 from tests.models.bodies import box, in_halves
 from tests.models.deformed import Patch, patch_of, skew_patch, smooth_field

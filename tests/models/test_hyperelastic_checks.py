@@ -9,11 +9,11 @@ import pytest
 import ufl
 from mpi4py import MPI
 
+from fenics_contact import Body, Scene, check_hyperelastic
+from fenics_contact._fem.forms import FormLibrary
 from fenics_contact.errors import InvalidInputError, UserCodeError
-from fenics_contact.fem import check_hyperelastic
-from fenics_contact.fem.forms import FormLibrary
 from fenics_contact.gallery import rectangle
-from fenics_contact.scene import Body, Hyperelasticity, MooneyRivlin, Ogden, Scene
+from fenics_contact.materials import Hyperelasticity, MooneyRivlin, Ogden
 from tests.models.deformed import patch_of, skew_patch
 
 

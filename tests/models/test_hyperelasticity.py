@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.fem import FormLibrary
-from fenics_contact.scene import Body, IsotropicElasticity, NeoHooke, PlaneStrain, Scene, is_nonlinear
+from fenics_contact import Body, Scene
+from fenics_contact._fem.forms import FormLibrary
+from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
+from fenics_contact.materials.hyperelastic import is_nonlinear
 from tests.models.bodies import box, in_halves
 from tests.models.deformed import (
     Patch,

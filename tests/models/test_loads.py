@@ -8,19 +8,9 @@ import numpy as np
 import pytest
 import ufl
 
+from fenics_contact import Body, BodyForce, Pressure, Scene, ThermalStrain, TotalForce, Traction, Ufl, gravity
+from fenics_contact._scene.loads import Load
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import (
-    Body,
-    BodyForce,
-    Load,
-    Pressure,
-    Scene,
-    ThermalStrain,
-    TotalForce,
-    Traction,
-    Ufl,
-    gravity,
-)
 from tests.models.bodies import bent, box, steel
 from tests.models.elements import CELLS, load_by_node, whole
 

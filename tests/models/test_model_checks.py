@@ -11,12 +11,12 @@ import pytest
 import ufl
 from mpi4py import MPI
 
+from fenics_contact import Body, Scene
+from fenics_contact._fem.forms import FormLibrary
+from fenics_contact._fem.model_checks import check_kernel
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.fem.forms import FormLibrary
-from fenics_contact.fem.model_checks import check_kernel
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.scene import (
-    Body,
+from fenics_contact.materials import (
     Elasticity,
     EnergyModel,
     HistoryMaterial,
@@ -25,7 +25,6 @@ from fenics_contact.scene import (
     MaterialResponse,
     OrthotropicElasticity,
     PlaneStrain,
-    Scene,
     rigid_body_modes,
     strain,
 )

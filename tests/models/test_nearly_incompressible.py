@@ -6,22 +6,18 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
+from fenics_contact import Body, BodyMesh, ContactProblem, Scene, Support, box_partition
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import rectangle
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
-    Body,
+from fenics_contact.materials import (
     IsotropicElasticity,
     J2Plasticity,
     Material,
     MooneyRivlin,
     NeoHooke,
     Ogden,
-    Scene,
-    Support,
 )
+from fenics_contact.mesh import quadratic
 from tests.models.bodies import box, in_halves
 from tests.models.deformed import derivative_errors, equilibrium, patch_of, skew_patch, smooth_field
 

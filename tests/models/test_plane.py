@@ -6,19 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
-    Body,
-    Material,
-    OrthotropicPlaneStress,
-    PlaneStrain,
-    PlaneStress,
-    Scene,
-    Support,
-    Traction,
-)
+from fenics_contact import Body, BodyMesh, Scene, State, Support, Traction, box_partition, solve_scene
+from fenics_contact.materials import Material, OrthotropicPlaneStress, PlaneStrain, PlaneStress
 from tests.models.bodies import box
 from tests.models.elements import PLANE
 

@@ -11,19 +11,12 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 from scipy.optimize import brentq
 
-from fenics_contact.fem import as_tractions
+from fenics_contact import Body, Pressure, Scene, Traction
+from fenics_contact._fem.loads import as_tractions
 from fenics_contact.feti.subdomain import assemble
 from fenics_contact.gallery import rectangle
+from fenics_contact.materials import FinitePlasticity, HistoryMaterial, J2Plasticity
 from fenics_contact.mesh import quadratic
-from fenics_contact.scene import (
-    Body,
-    FinitePlasticity,
-    HistoryMaterial,
-    J2Plasticity,
-    Pressure,
-    Scene,
-    Traction,
-)
 from tests.models.bodies import box
 from tests.models.deformed import Patch, patch_of
 from tests.models.monolithic import Equilibrium, dofs_at, equilibrium

@@ -8,24 +8,22 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.fem.forms import FormLibrary
-from fenics_contact.feti import build_torn_system, decompose
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
-    IsotropicElasticity,
-    Material,
-    OrthotropicElasticity,
     Pressure,
     Scene,
     Support,
     ThermalStrain,
     Traction,
     Ufl,
+    box_partition,
+    solve_scene,
 )
+from fenics_contact._fem.forms import FormLibrary
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti import build_torn_system, decompose
+from fenics_contact.materials import IsotropicElasticity, Material, OrthotropicElasticity
 from tests.models.bodies import bent, box, in_halves, steel
 from tests.models.elements import CELLS, SPACE, by_node, element_stiffness, isotropic_matrix, whole
 

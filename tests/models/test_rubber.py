@@ -9,10 +9,10 @@ import pytest
 import ufl
 from scipy.optimize import brentq
 
+from fenics_contact import Body
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.scene import (
-    Body,
+from fenics_contact.materials import (
     Hyperelasticity,
     IsotropicElasticity,
     MooneyRivlin,
@@ -21,8 +21,8 @@ from fenics_contact.scene import (
     PlaneStrain,
     StVenantKirchhoff,
 )
-from fenics_contact.scene.materials.constants import lame
-from fenics_contact.scene.materials.power_sums import power_sum
+from fenics_contact.materials.elastic import lame
+from fenics_contact.materials.hyperelastic import power_sum
 from tests.models.deformed import (
     derivative_errors,
     equilibrium,

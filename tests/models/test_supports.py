@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
+from fenics_contact import Body, LoadStep, Scene, Support, Traction, solve_scene
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import Body, LoadStep, Scene, Support, Traction
 from tests.models.bodies import bent, box, steel
 from tests.models.elements import CELLS
 

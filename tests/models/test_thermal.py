@@ -8,21 +8,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
+from fenics_contact import Body, Scene, State, Support, ThermalStrain, Ufl, box_partition, solve_scene
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
-    Body,
+from fenics_contact.materials import (
     IsotropicElasticity,
     Material,
     OrthotropicElasticity,
     OrthotropicPlaneStress,
     PlaneStrain,
     PlaneStress,
-    Scene,
-    Support,
-    ThermalStrain,
-    Ufl,
     material_axes,
 )
 from tests.models.bodies import bent, box, in_halves

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fenics_contact import Body, BodyMesh, Scene, Support, TotalForce, Traction
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.scene import Body, Scene, Support, TotalForce, Traction
+from fenics_contact.mesh import quadratic
 from tests.models.bodies import bent, box, steel
 from tests.models.elements import CELLS, load_by_node, whole
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from fenics_contact.launching import clean_environment
+from fenics_contact import clean_environment
 
 ROOT = Path(__file__).parents[2]
 #: What the tests of a mutation need.

@@ -5,14 +5,13 @@ from __future__ import annotations
 from tests.mutants.copy_of_package import Mutation
 
 ONE_STEP = (
-    "tests/nonlinear/test_parts.py::"
-    "test_friction_and_plastic_flow_do_not_depend_on_how_a_load_step_is_cut"
+    "tests/nonlinear/test_parts.py::test_friction_and_plastic_flow_do_not_depend_on_how_a_load_step_is_cut"
 )
 
 LARGE_MUTATIONS = (
     Mutation(
         "pressures that follow are three percent softer than their forces say",
-        "nonlinear/loading.py",
+        "_large_deformations/loading.py",
         "blocks[number] = blocks[number] + softening",
         "blocks[number] = blocks[number] + 0.97 * softening",
         (
@@ -22,7 +21,7 @@ LARGE_MUTATIONS = (
     ),
     Mutation(
         "soft rows of forces that turn keep columns of length one",
-        "nonlinear/tangent_step.py",
+        "_large_deformations/tangent_step.py",
         "np.minimum(usual / np.abs(compliance[soft]), 1.0)",
         "np.ones(np.count_nonzero(soft))",
         (
@@ -32,49 +31,53 @@ LARGE_MUTATIONS = (
     ),
     Mutation(
         "slip of bodies that move far begins anew in every part of a load step",
-        "nonlinear/meeting.py",
+        "_large_deformations/moving_contact.py",
         "(None, None) if last is None else (last.points, last.start)",
         "(None, None) if last is None else (last.points, last.material_points)",
         (f"{ONE_STEP}[plane]",),
     ),
     Mutation(
         "slip of bodies that do not move far begins anew in every part of a load step",
-        "nonlinear/load_steps.py",
+        "_large_deformations/load_steps.py",
         "load = self._load(fraction, *self._origin)",
         "load = self._load(fraction, self._at, self._torn)",
         (f"{ONE_STEP}[metal]",),
     ),
     Mutation(
         "plastic strain goes on from every part of a load step",
-        "nonlinear/starts.py",
+        "_large_deformations/starts.py",
         "history=origin.history, time=origin.time",
         "history=self.evaluation.history, time=origin.time",
         (f"{ONE_STEP}[metal]",),
     ),
     Mutation(
         "pressures that followed before stay whole while others take their place",
-        "nonlinear/loading.py",
+        "_large_deformations/loading.py",
         "[((1.0 - part) * weight, each) for weight, each in first.following]",
         "[(weight, each) for weight, each in first.following]",
-        ("tests/nonlinear/test_parts.py::test_on_the_way_to_another_pressure_the_old_one_goes_as_the_new_one_comes",),
+        (
+            "tests/nonlinear/test_parts.py::test_on_the_way_to_another_pressure_the_old_one_goes_as_the_new_one_comes",
+        ),
     ),
     Mutation(
         "pressures that follow and are functions of time grow in proportion to it",
-        "nonlinear/loading.py",
+        "_large_deformations/loading.py",
         "mixed = replace(mixed, torn=torn, following=now.following)",
         "mixed = replace(mixed, torn=torn)",
-        ("tests/nonlinear/test_parts.py::test_a_pressure_that_is_a_function_of_time_has_its_value_at_every_part",),
+        (
+            "tests/nonlinear/test_parts.py::test_a_pressure_that_is_a_function_of_time_has_its_value_at_every_part",
+        ),
     ),
     Mutation(
         "surfaces that slide have no curvature",
-        "pairing/sliding/contact.py",
+        "_pairing/sliding/contact.py",
         'bend = np.einsum("nabd,nd->nab", at.second, at.normal)',
         'bend = 0.0 * np.einsum("nabd,nd->nab", at.second, at.normal)',
         ("tests/pairing/test_sliding_derivatives.py::test_stiffness_is_the_derivative_of_the_normal_forces",),
     ),
     Mutation(
         "directions of friction do not turn with normals",
-        "pairing/sliding/differential.py",
+        "_pairing/sliding/stiffness.py",
         "other = np.cross(change, unit) + np.cross(normal[:, None], turned)",
         "other = np.cross(change, unit)",
         (
@@ -84,14 +87,14 @@ LARGE_MUTATIONS = (
     ),
     Mutation(
         "nodes of a fold are slaves that are masters already",
-        "pairing/sliding/roles.py",
+        "_pairing/sliding/closest.py",
         "& ~self._are_masters(found, last)",
         "& (found.point >= 0)",
         ("tests/pairing/test_sliding_contact.py::test_a_node_is_no_slave_where_it_is_the_master_of_one",),
     ),
     Mutation(
         "friction of parts with histories of their own is not added up",
-        "nonlinear/load_steps.py",
+        "_large_deformations/load_steps.py",
         "self._rubbed += self._end.evaluation.rubbing",
         "self._rubbed = 0.0",
         (
@@ -101,7 +104,7 @@ LARGE_MUTATIONS = (
     ),
     Mutation(
         "nodes that meet their master later have no given gap",
-        "pairing/sliding/given_offsets.py",
+        "_pairing/sliding/points.py",
         "near[:] = True",
         "pass",
         (
@@ -111,28 +114,28 @@ LARGE_MUTATIONS = (
     ),
     Mutation(
         "forces a thousand times the rounding of positions are none",
-        "nonlinear/residuals.py",
+        "_large_deformations/equations.py",
         "ROUNDED = 4.0 *",
         "ROUNDED = 4000.0 *",
         ("tests/nonlinear/test_limits.py::test_rounding_alone_hides_nothing_of_a_small_load",),
     ),
     Mutation(
         "a tenth of what would strain bodies by their displacement counts as no force",
-        "nonlinear/residuals.py",
+        "_large_deformations/equations.py",
         "FORCE_FLOOR = 1e-4",
         "FORCE_FLOOR = 1e-1",
         ("tests/nonlinear/test_limits.py::test_a_small_load_on_a_body_that_is_moved_far_is_balanced",),
     ),
     Mutation(
         "pressures of bodies that deform much are by undeformed area",
-        "pairing/sliding/point_areas.py",
+        "_pairing/sliding/means.py",
         "np.where(self.much, self.now, self.before) * self.share",
         "self.before * self.share",
         ("tests/nonlinear/test_true_pressure.py::test_an_incompressible_block_presses_with_its_stress",),
     ),
     Mutation(
         "points at the rim of the master have all of their area",
-        "pairing/sliding/point_areas.py",
+        "_pairing/sliding/means.py",
         "np.maximum(part, 0.5), part > 0.5",
         "1.0, False",
         (
@@ -142,7 +145,7 @@ LARGE_MUTATIONS = (
     ),
     Mutation(
         "gradients of pressures hold deformed areas where displacements move them",
-        "shape/area_derivative.py",
+        "design/sensitivity.py",
         "np.where(np.isnan(moved.prescribed), by_places, 0.0)",
         "0.0 * by_places",
         ("tests/shape/test_deformed_sensitivity.py::test_plane_blocks",),

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from fenics_contact import Body, BodyMesh, ContactPair, Coulomb, Scene, Support, Surface
 from fenics_contact.gallery import rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import Body, ContactPair, Coulomb, NeoHooke, Scene, Support, Surface
+from fenics_contact.materials import NeoHooke
 
 #: Depths and ways of a die that is pressed into a block and drawn along it.
 WAY = [(0.0, -0.4), (0.0, -0.8), (0.25, -0.8), (0.5, -0.8)]

@@ -7,10 +7,11 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from scipy.sparse.linalg import splu
 
+from fenics_contact import Scene
+from fenics_contact._large_deformations.equations import Equations
+from fenics_contact._large_deformations.loading import Loading
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
-from fenics_contact.nonlinear import Equations, Loading
-from fenics_contact.qp import ContactLayout
-from fenics_contact.scene import Scene
+from fenics_contact.qp.layout import ContactLayout
 
 
 class Monolithic:

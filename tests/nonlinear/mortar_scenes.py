@@ -7,9 +7,20 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState, solve_steps
+from fenics_contact import (
+    Body,
+    ContactPair,
+    ContactProblem,
+    Coulomb,
+    DeformedState,
+    LoadStep,
+    Scene,
+    Support,
+    Surface,
+    solve_steps,
+)
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.scene import Body, ContactPair, Coulomb, LoadStep, NeoHooke, Scene, Support, Surface
+from fenics_contact.materials import NeoHooke
 from tests.nonlinear.scenes import RUBBER
 
 

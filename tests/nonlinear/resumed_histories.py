@@ -8,22 +8,23 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState, LoadSequence
-from fenics_contact.gallery import rectangle
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    FinitePlasticity,
+    DeformedState,
+    LoadSequence,
     LoadStep,
-    NeoHooke,
     Pressure,
     RigidSphere,
     Scene,
     Support,
     Surface,
+    box_partition,
 )
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import FinitePlasticity, NeoHooke
 
 SOFT, HARD = NeoHooke(1.0, 0.32), NeoHooke(10.0, 0.32)
 

@@ -6,10 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from fenics_contact import (
+    Body,
+    BodyMesh,
+    ContactPair,
+    Coulomb,
+    RigidPlane,
+    Scene,
+    Support,
+    Surface,
+    box_partition,
+)
 from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import Body, ContactPair, Coulomb, NeoHooke, RigidPlane, Scene, Support, Surface
+from fenics_contact.materials import NeoHooke
 
 RUBBER = NeoHooke(1.0, 0.3)
 

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState, LoadSequence
+from fenics_contact import Body, ContactProblem, DeformedState, LoadSequence, LoadStep, Scene, Support
 from fenics_contact.gallery import block
-from fenics_contact.scene import Body, LoadStep, Scene, Support
 from tests.nonlinear.monolithic import Monolithic
 from tests.nonlinear.scenes import RUBBER, cut, pressed, rounded
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import Body, BodyMesh, ContactPair, RigidPlane, Scene, Support, Surface
 from fenics_contact.gallery import rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import Body, ContactPair, RigidPlane, Scene, Support, Surface
 from tests.nonlinear.mortar_scenes import followed
 from tests.nonlinear.scenes import RUBBER
 

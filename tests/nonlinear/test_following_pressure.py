@@ -10,28 +10,29 @@ import pytest
 from mpi4py import MPI
 from scipy.integrate import solve_bvp
 
-from fenics_contact.contact import DeformedState, solve_scene
-from fenics_contact.fem import FormLibrary
-from fenics_contact.feti.subdomain import assemble, cut_out
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
-from fenics_contact.partition import bisection_partition, box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
+    AutomaticSteps,
     Body,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    EffectName,
-    IsotropicElasticity,
-    NeoHooke,
-    PlaneStrain,
+    DeformedState,
     Pressure,
     RigidPlane,
     Scene,
     Support,
     Surface,
+    TangentNewton,
     Ufl,
+    box_partition,
+    solve_scene,
 )
+from fenics_contact._fem.forms import FormLibrary
+from fenics_contact._scene.plan import EffectName
+from fenics_contact.feti.subdomain import assemble, cut_out
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
+from fenics_contact.mesh import bisection_partition
 from tests.models.deformed import rotation, skew_patch, smooth_field
 from tests.nonlinear.scenes import RUBBER, cut
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from fenics_contact.errors import ConvergenceError
-from fenics_contact.nonlinear.indefinite_factor import (
+from fenics_contact._large_deformations.tangent import (
     IndefiniteFactor,
     RefillableFactor,
+    _softest,
     mostly_positive,
     with_inertia,
 )
-from fenics_contact.nonlinear.tangent_operator import _softest
+from fenics_contact.errors import ConvergenceError
 
 
 def stiffness(shift: float) -> sp.csr_matrix:
@@ -50,7 +50,7 @@ def test_factors_of_another_pattern_are_not_refilled():
 
 
 def test_cholesky_factors_that_do_not_fit_are_replaced(monkeypatch):
-    monkeypatch.setattr("fenics_contact.nonlinear.indefinite_factor.WRONG", 0.0)
+    monkeypatch.setattr("fenics_contact._large_deformations.tangent.WRONG", 0.0)
     assert isinstance(mostly_positive(stiffness(0.0), None), IndefiniteFactor)
 
 

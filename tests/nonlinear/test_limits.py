@@ -9,29 +9,36 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState, Status, solve_scene, solve_steps
+from fenics_contact import (
+    AutomaticSteps,
+    Body,
+    BodyMesh,
+    ContactPair,
+    ContactProblem,
+    Coulomb,
+    DeformedState,
+    LoadStep,
+    RigidPlane,
+    Scene,
+    Status,
+    Support,
+    Surface,
+    TangentNewton,
+    Traction,
+    box_partition,
+    solve_scene,
+    solve_steps,
+)
+from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.errors import InfeasibleError, LoadStepError
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    Discretisation,
+from fenics_contact.materials import (
     Elasticity,
     IsotropicElasticity,
     J2Plasticity,
-    LoadStep,
     Material,
     NeoHooke,
     PlaneStrain,
-    RigidPlane,
-    Scene,
-    Support,
-    Surface,
-    Traction,
 )
 from tests.nonlinear.scenes import RUBBER, cut, pressed, rounded, tilted
 

@@ -10,14 +10,25 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, ContactProblem, LoadSequence, NewtonSteps, solve_scene
+from fenics_contact import (
+    AutomaticSteps,
+    Body,
+    ContactProblem,
+    LoadSequence,
+    LoadStep,
+    NewtonSteps,
+    Scene,
+    TangentNewton,
+    solve_scene,
+)
+from fenics_contact._fem.mechanics import HyperelasticMechanics
+from fenics_contact._large_deformations import newton
+from fenics_contact._large_deformations.tangent_step import tangent_step
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.fem.hyperelastic import HyperelasticMechanics
 from fenics_contact.gallery import block
-from fenics_contact.nonlinear import AutomaticSteps, TangentNewton, newton
-from fenics_contact.nonlinear.tangent_step import tangent_step
+from fenics_contact.materials import NeoHooke
 from fenics_contact.qp import FaceNewton, solve
-from fenics_contact.scene import Body, LoadStep, NeoHooke, Scene
+from fenics_contact.results.deformed_state import AnyState
 from tests.models.deformed import patch_of
 from tests.nonlinear.scenes import cut, pressed, rounded
 
@@ -137,7 +148,7 @@ def test_contact_is_solved_as_a_whole_on_the_way_without_asking_why_it_fails(
         solvers.append(solver)
         return solve(problem, bound, solver, *more, **named)
 
-    monkeypatch.setattr("fenics_contact.nonlinear.tangent_step.solve", noted)
+    monkeypatch.setattr("fenics_contact.qp.solve", noted)
     calls = itertools.count()
 
     def lost(*given: Any, **named: Any) -> Any:

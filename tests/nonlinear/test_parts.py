@@ -9,25 +9,29 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState, State, solve_steps
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.nonlinear import AutomaticSteps, Loading, meeting
-from fenics_contact.scene import (
+from fenics_contact import (
+    AutomaticSteps,
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    J2Plasticity,
+    DeformedState,
     LoadStep,
     MovingObstacle,
-    NeoHooke,
     Pressure,
-    RigidObstacle,
     RigidPlane,
     RigidSphere,
     Scene,
+    State,
     Support,
     Surface,
+    solve_steps,
 )
+from fenics_contact._large_deformations import moving_contact as meeting
+from fenics_contact._large_deformations.loading import Loading
+from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import J2Plasticity, NeoHooke
 
 SIZE = (2.0, 1.0)
 RUBBER, METAL = NeoHooke(1000.0, 0.3), J2Plasticity(1000.0, 0.3, 4.0, 50.0)

@@ -6,25 +6,32 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState, LoadSequence, solve_scene, solve_steps
-from fenics_contact.errors import InvalidInputError, UserCodeError
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
-from fenics_contact.qp import Smalse
-from fenics_contact.scene import (
+from fenics_contact import (
+    AutomaticSteps,
     Body,
     ContactPair,
+    ContactProblem,
+    DeformedState,
+    LoadSequence,
     LoadStep,
     MovingObstacle,
-    PlaneStrain,
     RigidPlane,
     RigidSurface,
     Scene,
     Support,
     Surface,
+    TangentNewton,
     Traction,
+    read_scene_file,
+    solve_scene,
+    solve_steps,
 )
-from fenics_contact.scene_file import SceneFile, SceneFileError, read_scene_file
+from fenics_contact._scene_file.reading import SceneFile
+from fenics_contact._scene_file.source import SceneFileError
+from fenics_contact.errors import InvalidInputError, UserCodeError
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import PlaneStrain
+from fenics_contact.qp import Smalse
 from tests.nonlinear.scenes import RUBBER, cut
 
 CUBE = block((0, 0, 0), (1, 1, 1), (3, 3, 3))

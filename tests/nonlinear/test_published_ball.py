@@ -9,9 +9,8 @@ from __future__ import annotations
 from mpi4py import MPI
 
 from benchmarks.large_deformations.ball_on_metal import pressed
-from fenics_contact.contact import solve_scene
+from fenics_contact import box_partition, solve_scene
 from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
 
 #: Force on 512 hexahedra, and its last digit.
 PUBLISHED, DIGIT = 37.3058, 1e-4

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import Status
+from fenics_contact import Body, ContactPair, Coulomb, Scene, Status, Support, Surface
 from fenics_contact.gallery import rectangle
-from fenics_contact.scene import Body, ContactPair, Coulomb, NeoHooke, Scene, Support, Surface
+from fenics_contact.materials import NeoHooke
 from tests.nonlinear.ironing import die
 from tests.nonlinear.mortar_scenes import followed
 

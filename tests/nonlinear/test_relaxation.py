@@ -9,11 +9,20 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, LoadSequence, State, solve_steps
+from fenics_contact import (
+    AutomaticSteps,
+    Body,
+    ContactProblem,
+    LoadSequence,
+    LoadStep,
+    Scene,
+    State,
+    Support,
+    solve_steps,
+)
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
-from fenics_contact.nonlinear import AutomaticSteps
-from fenics_contact.scene import Body, HistoryMaterial, LoadStep, MaterialResponse, Scene, Support
+from fenics_contact.materials import HistoryMaterial, MaterialResponse
 
 UNIT = np.einsum("ik,jl->ijkl", np.eye(3), np.eye(3))
 SYMMETRIC = 0.5 * (UNIT + UNIT.swapaxes(2, 3))

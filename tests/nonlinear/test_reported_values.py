@@ -9,21 +9,24 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState, solve_scene, solve_steps
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
-from fenics_contact.scene import (
+from fenics_contact import (
+    AutomaticSteps,
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    J2Plasticity,
+    DeformedState,
     LoadStep,
-    PlaneStrain,
     RigidSurface,
     Scene,
     Support,
     Surface,
+    TangentNewton,
+    solve_scene,
+    solve_steps,
 )
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import J2Plasticity, PlaneStrain
 from tests.nonlinear.scenes import RUBBER
 
 LINEAR, METAL = PlaneStrain(3.0, 0.3), J2Plasticity(3.0, 0.3, 0.1, isotropic_hardening=0.3)

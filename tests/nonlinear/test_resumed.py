@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.contact import LoadSequence, stored_state
+from fenics_contact import LoadSequence, LoadStep, Scene
+from fenics_contact._equilibrium.stored import stored_state
+from fenics_contact.design import Checkpoint
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import rectangle
-from fenics_contact.scene import LoadStep, PlaneStrain, Scene
+from fenics_contact.materials import PlaneStrain
 from tests.nonlinear.resumed_histories import advanced, drawn, problem, yielding
 
 
@@ -65,8 +66,8 @@ def test_the_rest_of_a_history_is_the_same(
 ON_RANKS = """
     import json, sys
     from mpi4py import MPI
-    from fenics_contact.checkpoint import Checkpoint
-    from fenics_contact.contact import LoadSequence
+    from fenics_contact.design import Checkpoint
+    from fenics_contact import LoadSequence
     from tests.nonlinear import resumed_histories as known
 
     comm = MPI.COMM_WORLD

@@ -9,22 +9,26 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState, solve_scene, solve_steps
-from fenics_contact.errors import LoadStepError
-from fenics_contact.gallery import half_disc, rectangle
-from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
+    AutomaticSteps,
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
+    DeformedState,
     LoadStep,
     MovingObstacle,
     RigidSphere,
     Scene,
     Support,
     Surface,
+    TangentNewton,
+    box_partition,
+    solve_scene,
+    solve_steps,
 )
+from fenics_contact.errors import LoadStepError
+from fenics_contact.gallery import half_disc, rectangle
 from tests.nonlinear.ironing import WAY, ironing
 from tests.nonlinear.scenes import RUBBER, pressed, rounded
 

@@ -10,27 +10,31 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.contact import ContactProblem, DeformedState, State, solve_steps
-from fenics_contact.errors import LoadStepError
-from fenics_contact.gallery import rectangle
-from fenics_contact.mesh import quadratic
-from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
+    AutomaticSteps,
     Body,
     ContactPair,
+    ContactProblem,
+    DeformedState,
     LoadStep,
     MovingObstacle,
-    NeoHooke,
     Pressure,
     RigidSphere,
     Scene,
+    State,
     Support,
     Surface,
+    TangentNewton,
     TotalForce,
     Traction,
+    box_partition,
+    solve_steps,
 )
+from fenics_contact.design import Checkpoint
+from fenics_contact.errors import LoadStepError
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import NeoHooke
+from fenics_contact.mesh import quadratic
 
 #: Pressures a little below the largest one before the arch snaps, and beyond it.
 LARGEST, BEYOND = 0.0073, 0.0075
@@ -116,7 +120,7 @@ def test_without_leave_to_snap_the_path_ends() -> None:
 
 def test_bodies_that_find_no_rest_end_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
     """A strip that is crushed: its load has no equilibrium that Newton's method could find."""
-    monkeypatch.setattr("fenics_contact.nonlinear.snapping.MOST", 10)
+    monkeypatch.setattr("fenics_contact._large_deformations.load_steps.MOST", 10)
     strip = Body(rectangle((0.0, 0.0), (2.0, 1.0), (4, 2)), NeoHooke(1.0, 0.3))
     crushed = Scene({"strip": strip}, [Support("strip", "x0")], [Traction("strip", "x1", (-300.0, 0.0))])
     steps = AutomaticSteps(smallest=1.0 / 4, snaps=True)

@@ -7,20 +7,23 @@ import pytest
 from mpi4py import MPI
 
 from benchmarks.large_deformations.ironing import ironing
-from fenics_contact.contact import ContactProblem, LoadSequence, State, solve_steps
-from fenics_contact.gallery import rectangle
-from fenics_contact.nonlinear.rigid_start import RigidStart
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
+    LoadSequence,
     LoadStep,
     MovingObstacle,
-    NeoHooke,
     RigidSphere,
     Scene,
+    State,
     Support,
     Surface,
+    solve_steps,
 )
+from fenics_contact._large_deformations.rigid_start import RigidStart
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import NeoHooke
 from tests.nonlinear.ironing import die
 
 #: Of the die: down, then along.

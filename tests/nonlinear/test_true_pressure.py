@@ -9,21 +9,24 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import DeformedState, State, Status, contact_area, solve_scene
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
-    Material,
-    NeoHooke,
-    PlaneStrain,
+    DeformedState,
     RigidPlane,
     Scene,
+    State,
+    Status,
     Support,
     Surface,
+    contact_area,
+    solve_scene,
 )
-from fenics_contact.viz.trace import contact_trace
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import Material, NeoHooke, PlaneStrain
+from fenics_contact.mesh import quadratic
+from fenics_contact.pictures.curves import contact_trace
 from tests.nonlinear.scenes import RUBBER, pressed, rounded
 
 MODULUS, PART = 1.0, 0.6

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.optimize import Bounds, LinearConstraints, nearest_feasible
+from fenics_contact.design import Bounds, LinearConstraints, nearest_feasible
 from tests.optimize.functions import (
     COLVILLE_A,
     COLVILLE_B,

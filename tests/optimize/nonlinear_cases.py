@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.optimize import NonlinearConstraint
+from fenics_contact.design import NonlinearConstraint
 from tests.optimize.functions import Array, Fun, maxl
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import scipy.optimize
 from mpi4py import MPI
 
-from fenics_contact.optimize import ForScipy, LinearConstraints
-from fenics_contact.scene import Coulomb
+from fenics_contact import Coulomb
+from fenics_contact.design import ForScipy, LinearConstraints
 from tests.shape.blocks import block_on_block, problem
 from tests.shape.rank_cases import same_bits
 

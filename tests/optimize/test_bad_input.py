@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fenics_contact import minimize
+from fenics_contact.design import Bounds, LinearConstraints
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import Bounds, LinearConstraints, minimize
 
 
 def bowl(x: np.ndarray) -> tuple[float, np.ndarray]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenics_contact.optimize.bundle import Bundle, Plane
-from fenics_contact.optimize.constraints import feasible_set
-from fenics_contact.optimize.subproblem import solve_step
+from fenics_contact._optimize.bundle import Bundle, Plane
+from fenics_contact._optimize.constraints import feasible_set
+from fenics_contact._optimize.subproblem import solve_step
 from tests.optimize.functions import Array, crescent, maxquad
 
 

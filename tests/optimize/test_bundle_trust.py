@@ -12,19 +12,13 @@ import clarabel
 import numpy as np
 import pytest
 
+from fenics_contact import minimize
+from fenics_contact._base.launching import finished
+from fenics_contact._optimize import bundle as quadratic_program
+from fenics_contact._optimize.result import Reason, Record, StepKind
+from fenics_contact.design import BundleTrust, LinearConstraints, NotConvergedError
 from fenics_contact.errors import ConvergenceError, InvalidInputError
-from fenics_contact.launching import finished
-from fenics_contact.optimize import (
-    BundleTrust,
-    InvalidDesignError,
-    LinearConstraints,
-    NotConvergedError,
-    Reason,
-    Record,
-    StepKind,
-    minimize,
-    quadratic_program,
-)
+from fenics_contact.errors.kinds import InvalidDesignError
 from tests.optimize.cases import BY_NAME
 from tests.optimize.functions import Array, cb2, mifflin1, shor
 
@@ -136,7 +130,7 @@ def test_noise_of_the_state_solver_below_the_tolerance_does_no_harm() -> None:
 
 def test_same_input_gives_the_same_bits_in_another_process() -> None:
     script = (
-        "from fenics_contact.optimize import BundleTrust, minimize\n"
+        "from fenics_contact._optimize import BundleTrust, minimize\n"
         "from tests.optimize.cases import BY_NAME\n"
         "case = BY_NAME['Maxquad']\n"
         "print(minimize(case.fun, case.start, BundleTrust(tolerance=1e-6)).x.tobytes().hex())\n"

@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fenics_contact._optimize.constraints import contradicting, feasible_set
+from fenics_contact.design import Bounds, LinearConstraints, nearest_feasible
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import Bounds, LinearConstraints, nearest_feasible
-from fenics_contact.optimize.constraints import feasible_set
-from fenics_contact.optimize.contradiction import contradicting
 
 BOX = Bounds([-1.0, 0.0, -np.inf], [1.0, np.inf, 2.0])
 ROWS = LinearConstraints([[1.0, 1.0, 1.0], [2.0, -1.0, 0.0]], [1.0, 1.5], [[0.0, 1.0, -1.0]], [0.25])

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import scipy.optimize
 
+from fenics_contact import minimize
+from fenics_contact.design import Bounds, ForScipy, LinearConstraints
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
-from fenics_contact.optimize import Bounds, ForScipy, LinearConstraints, minimize
 
 #: Sizes of the variables and of the objective like those of a design in millimetres.
 SIZE, UNIT = np.array([0.25, 1e-3, 20.0]), 1e5

@@ -9,9 +9,10 @@ import pytest
 import scipy.sparse as sp
 from scipy.optimize import LinearConstraint, NonlinearConstraint
 
+from fenics_contact import minimize
+from fenics_contact._optimize.constraints import feasible_set
+from fenics_contact.design import BundleTrust, ForScipy, LinearConstraints, nearest_feasible
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import BundleTrust, ForScipy, LinearConstraints, minimize, nearest_feasible
-from fenics_contact.optimize.constraints import feasible_set
 
 START = np.zeros(3)
 OWN = LinearConstraints([[1.0, 1.0, 0.0], [-1.0, -2.0, 0.0]], [1.5, 2.0], [[0.0, 1.0, -1.0]], [0.0])

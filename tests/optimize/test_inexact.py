@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fenics_contact import minimize
+from fenics_contact._optimize.result import StepKind
+from fenics_contact.design import BundleTrust, Checkpoint, Result
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import BundleTrust, Checkpoint, Result, StepKind, minimize
 from tests.optimize.cases import BY_NAME, Case
 from tests.optimize.functions import Array
 

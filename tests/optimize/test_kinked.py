@@ -9,18 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fenics_contact import minimize
+from fenics_contact._optimize.merit import neighbour
+from fenics_contact._optimize.problem import pose
+from fenics_contact._optimize.result import Reason, StepKind
+from fenics_contact.design import BundleTrust, Checkpoint, Kinked, LinearConstraints
 from fenics_contact.errors import InvalidDesignError
-from fenics_contact.optimize import (
-    BundleTrust,
-    Checkpoint,
-    Kinked,
-    LinearConstraints,
-    Reason,
-    StepKind,
-    minimize,
-    pose,
-)
-from fenics_contact.optimize.care import neighbour
 
 Array = np.ndarray
 

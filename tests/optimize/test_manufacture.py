@@ -8,20 +8,19 @@ from functools import partial
 import numpy as np
 import pytest
 
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import DesignSurface, block, rectangle, side_of
-from fenics_contact.optimize import (
+from fenics_contact import SurfaceDesign, minimize
+from fenics_contact._optimize.manufacture import joined
+from fenics_contact.design import (
     LinearConstraints,
     convex,
     fixed_rim,
-    joined,
-    minimize,
     monotone,
     nearest_feasible,
     smallest_radius,
     symmetric,
 )
-from fenics_contact.shape import SurfaceDesign
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import DesignSurface, block, rectangle, side_of
 
 Array = np.ndarray
 MESH = block((0.0, 0.0, 0.0), (4.0, 2.0, 1.0), (40, 20, 1))

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenics_contact.optimize import NonlinearConstraint
-from fenics_contact.optimize.bundle import Bundle, Plane
-from fenics_contact.optimize.constraints import Surroundings, feasible_set
-from fenics_contact.optimize.first_centre import first_centre
-from fenics_contact.optimize.merit import correcting_step, priced_step, surroundings
-from fenics_contact.optimize.problem import pose
-from fenics_contact.optimize.soft_constraint import SoftConstraint
-from fenics_contact.optimize.subproblem import solve_step
+from fenics_contact._optimize.bundle import Bundle, Plane
+from fenics_contact._optimize.bundle_trust import first_centre
+from fenics_contact._optimize.constraints import Surroundings, feasible_set
+from fenics_contact._optimize.merit import correcting_step, priced_step, surroundings
+from fenics_contact._optimize.nonlinear import SoftConstraint
+from fenics_contact._optimize.problem import pose
+from fenics_contact._optimize.subproblem import solve_step
+from fenics_contact.design import NonlinearConstraint
 
 
 def soft(gradient: list[float], value: float, penalty: float = 1.0) -> SoftConstraint:

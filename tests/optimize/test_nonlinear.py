@@ -12,21 +12,20 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import (
+from fenics_contact import minimize
+from fenics_contact._optimize.nonlinear import scaled_constraints
+from fenics_contact._optimize.result import Reason, StepKind
+from fenics_contact.design import (
     BundleTrust,
     Checkpoint,
     ForScipy,
-    InvalidDesignError,
     LinearConstraints,
     NonlinearConstraint,
     NotConvergedError,
-    Reason,
     Result,
-    StepKind,
-    minimize,
 )
-from fenics_contact.optimize.nonlinear import scaled_constraints
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import InvalidDesignError
 from tests.optimize.functions import Array, Fun, cb2, hs86, maxquad, mifflin1
 from tests.optimize.nonlinear_cases import CASES, NONLINEAR, Case, downhill, equal, square
 

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fenics_contact import minimize
+from fenics_contact.design import BundleTrust, NonlinearConstraint
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import BundleTrust, NonlinearConstraint, minimize
 
 METHOD = BundleTrust(tolerance=1e-7)
 

@@ -9,7 +9,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fenics_contact.optimize import Bounds, BundleTrust, LinearConstraints, Result, StepKind, minimize
+from fenics_contact import minimize
+from fenics_contact._optimize.result import StepKind
+from fenics_contact.design import Bounds, BundleTrust, LinearConstraints, Result
 from tests.optimize.cases import BY_NAME, CONSTRAINED, CONVEX, NONCONVEX, Case
 from tests.optimize.functions import cb3, hs86, maxq
 

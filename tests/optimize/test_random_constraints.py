@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from fenics_contact.optimize import BundleTrust, NonlinearConstraint, Result, minimize
+from fenics_contact import minimize
+from fenics_contact.design import BundleTrust, NonlinearConstraint, Result
 from tests.optimize.functions import Array, Fun
 
 METHOD = BundleTrust(tolerance=1e-6, max_iterations=500, max_evaluations=600)

@@ -11,20 +11,18 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import (
+from fenics_contact import minimize
+from fenics_contact._optimize.result import Reason, Record, StepKind
+from fenics_contact.design import (
     BundleTrust,
     Checkpoint,
     CheckpointError,
-    InvalidDesignError,
     LinearConstraints,
     NotConvergedError,
-    Reason,
-    Record,
     Result,
-    StepKind,
-    minimize,
 )
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import InvalidDesignError
 from tests.optimize.cases import BY_NAME, Case
 from tests.optimize.functions import Array, Fun, mifflin1
 

@@ -12,12 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize as scipy_minimize
 
+from fenics_contact._optimize import bundle as quadratic_program
+from fenics_contact._optimize.bundle import Bundle, Plane, QuadraticProgram, SubproblemError, solve
+from fenics_contact._optimize.constraints import FeasibleSet, feasible_set
+from fenics_contact._optimize.subproblem import solve_step
+from fenics_contact.design import LinearConstraints
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import quadratic_program
-from fenics_contact.optimize.bundle import Bundle, Plane
-from fenics_contact.optimize.constraints import FeasibleSet, LinearConstraints, feasible_set
-from fenics_contact.optimize.quadratic_program import QuadraticProgram, SubproblemError, solve
-from fenics_contact.optimize.subproblem import solve_step
 
 # Kept here because tests put something else in its place.
 RUN_CLARABEL = quadratic_program._run_clarabel

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenics_contact.optimize.result import Reason
-from fenics_contact.optimize.stopping import stopping_test
-from fenics_contact.optimize.subproblem import Step
-from fenics_contact.optimize.trust import Trial, Trust
+from fenics_contact._optimize.bundle_trust import stopping_test
+from fenics_contact._optimize.result import Reason
+from fenics_contact._optimize.subproblem import Step, Trial, Trust
 
 TRUST = Trust(t=1.0, radius=10.0, t_least=1e-3, t_most=50.0, radius_least=1e-6)
 

@@ -7,18 +7,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from fenics_contact import Body, ContactPair, Coulomb, RigidPlane, Scene, SceneResponse, Surface, TotalForce
 from fenics_contact.gallery import rectangle
-from fenics_contact.outer import SceneResponse
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    PlaneStrain,
-    RigidPlane,
-    Scene,
-    Surface,
-    TotalForce,
-)
+from fenics_contact.materials import PlaneStrain
 
 MESH = rectangle((0, 0), (2, 1), (8, 4))
 FLOOR = RigidPlane((0.0, 0.0), (0.0, 1.0))

@@ -7,7 +7,7 @@ import json
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.outer import served
+from fenics_contact import served
 from tests.outer.pushed import response
 
 comm = MPI.COMM_WORLD

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from fenics_contact import served
 from fenics_contact.errors import InfeasibleError
-from fenics_contact.outer import served
 
 comm = MPI.COMM_WORLD
 LAST = comm.size - 1

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import Coulomb, DesignResponse, Scene, SceneResponse, Support
 from fenics_contact.errors import InfeasibleError, InvalidDesignError, InvalidInputError
 from fenics_contact.gallery import rectangle
-from fenics_contact.outer import DesignResponse, SceneResponse
-from fenics_contact.scene import Coulomb, Scene, Support
 from tests.outer.pushed import NOMINAL, PUSH, QUANTITIES, response, scene
 from tests.shape.blocks import block_on_floor, problem
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import served
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.outer import served
 from tests.outer.pushed import response
 
 HERE = Path(__file__).parent

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import Status
-from fenics_contact.io import ResultSeries, write_result
-from fenics_contact.page import result_page
+from fenics_contact import Status, result_page, write_result
+from fenics_contact.output import ResultSeries
 from tests.page.browser import CHROMIUM, DRIVER, MISSING, Browser, browser
 from tests.viz.plane_states import flat_pad, plane_block, tall_pad
 from tests.viz.states import pixels, touching_blocks

@@ -16,15 +16,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import cli
-from fenics_contact.contact import State, Status
+from fenics_contact import State, Status, result_page, write_result, write_vtu
+from fenics_contact import _cli as cli
+from fenics_contact._page.content import rounded, sections, status_words
+from fenics_contact._page.page import Page
 from fenics_contact.errors import InvalidInputError, MissingRequirementError
-from fenics_contact.io import ResultSeries, result_record, write_result, write_vtu
-from fenics_contact.page import Page, result_page
-from fenics_contact.page.packing import rounded
-from fenics_contact.page.tables import sections, status_words
-from fenics_contact.viz import Units
-from fenics_contact.viz.fields import rounded_up
+from fenics_contact.output import ResultSeries
+from fenics_contact.output.result import result_record
+from fenics_contact.pictures import Units
+from fenics_contact.pictures.section import rounded_up
 from tests.viz.moving_states import block_among_movers, pressed_by_a_lid
 from tests.viz.plane_states import plane_block
 from tests.viz.states import pulled, touching_blocks
@@ -377,9 +377,10 @@ RANKS = """
     import sys
     from pathlib import Path
     from mpi4py import MPI
-    from fenics_contact.contact import solve_scene
-    from fenics_contact.page import Page, result_page
-    from fenics_contact.scene import Coulomb
+    from fenics_contact import solve_scene
+    from fenics_contact import result_page
+    from fenics_contact._page.page import Page
+    from fenics_contact import Coulomb
     from tests.contact.gallery import partitions, two_blocks
 
     comm, folder = MPI.COMM_WORLD, Path(sys.argv[1])

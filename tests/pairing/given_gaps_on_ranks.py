@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, solve_scene
+from fenics_contact import ContactProblem, Coulomb, Scene, solve_scene
 from fenics_contact.errors import FenicsContactError
-from fenics_contact.scene import Coulomb, Scene
 from tests.contact.gallery import pressed_block, two_blocks
 from tests.contact.press_fits import press_fit
 

@@ -7,10 +7,11 @@ import sys
 import numpy as np
 from mpi4py import MPI
 
+from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
+from fenics_contact._pairing.mortar.coupling import mortar_coupling
+from fenics_contact._pairing.mortar.derivatives import mortar_pulled_back
+from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.pairing import CouplingDerivatives
-from fenics_contact.pairing.mortar import mortar_coupling, mortar_pulled_back
-from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface
 from tests.pairing.mortar_surfaces import plate
 
 Numbers = dict[str, np.ndarray]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface
+from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
 
 #: Facets of the slave and of the master.
 SOLID = [(slave, master) for slave in ("quads", "triangles") for master in ("quads", "triangles")]

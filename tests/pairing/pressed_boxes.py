@@ -4,18 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fenics_contact import Body, BodyMesh, ContactPair, Pressure, Scene, Support, Surface
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    IsotropicElasticity,
-    PlaneStrain,
-    Pressure,
-    Scene,
-    Support,
-    Surface,
-)
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.mesh import quadratic
 
 PRESSURE = 100.0
 

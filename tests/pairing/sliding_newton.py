@@ -10,11 +10,10 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg
 
-from fenics_contact import _dolfinx
-from fenics_contact.pairing import sliding_contact
-from fenics_contact.pairing.sliding import SlidingPoints
-from fenics_contact.pairing.sliding.differential import spread
-from fenics_contact.scene import Scene
+from fenics_contact import Scene, _dolfinx
+from fenics_contact._pairing.sliding.points import SlidingPoints
+from fenics_contact._pairing.sliding.stiffness import spread
+from fenics_contact._pairing.sliding_contact import sliding_contact
 from tests.linear.monolithic import _forms
 
 #: Prescribed motion of the upper block's upper side in each load step: down, then along the arch.

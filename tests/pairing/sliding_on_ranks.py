@@ -7,9 +7,9 @@ import sys
 import numpy as np
 from mpi4py import MPI
 
+from fenics_contact import ContactPair, DistanceObstacle, Scene, Surface
+from fenics_contact._pairing.sliding.contact import SlidingContact
 from fenics_contact.errors import UserCodeError
-from fenics_contact.pairing.sliding import SlidingContact
-from fenics_contact.scene import ContactPair, DistanceObstacle, Scene, Surface
 from tests.pairing.sliding_scenes import free, on_arch, shaken
 
 Numbers = dict[str, np.ndarray]

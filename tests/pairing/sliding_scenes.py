@@ -4,19 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from fenics_contact import Body, BodyMesh, ContactPair, Scene, Support, Surface
+from fenics_contact._pairing.sliding.contact import SlidingContact
+from fenics_contact._pairing.sliding.points import SlidingPoints
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.pairing.sliding import SlidingContact, SlidingPoints
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    IsotropicElasticity,
-    NeoHooke,
-    PlaneStrain,
-    Scene,
-    Support,
-    Surface,
-)
+from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
+from fenics_contact.mesh import quadratic
 
 KINDS = ("hexahedron", "tetrahedron", "quadrilateral", "triangle")
 

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import Body, ContactPair, RigidPlane, Scene, Support, Surface, box_partition
+from fenics_contact._pairing.points import ContactPoints, tangent_frames
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
 from fenics_contact.gallery import block
-from fenics_contact.pairing import ContactPoints
-from fenics_contact.pairing.contact_points import tangent_frames
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import Body, ContactPair, RigidPlane, Scene, Support, Surface
 from tests.feti.scenes import STEEL
 
 FLOOR = RigidPlane((0, 0, 0), (0, 0, 2))

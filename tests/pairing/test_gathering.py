@@ -6,23 +6,24 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.pairing import ContactPoints, MortarPoints
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
-    PlaneStrain,
     Scene,
+    State,
     Support,
     Surface,
     Tie,
     Traction,
+    solve_scene,
 )
-from fenics_contact.surfaces import FacetedSurface
+from fenics_contact._pairing.points import ContactPoints
+from fenics_contact._pairing.search import MortarPoints
+from fenics_contact._surfaces.facets import FacetedSurface
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.qp import FaceNewton
 from tests.pairing.mortar_surfaces import KINDS, plate
 
 MEAN = 0.0125
@@ -47,9 +48,7 @@ def punch(covered: float) -> State:
     }
     supports = [Support("bed", "y0"), *(Support(name, "x0", (0, None)) for name in bodies)]
     pair = ContactPair(Surface("bed", "y1"), Surface("punch", "y0"))
-    return solve_scene(
-        Scene(bodies, supports, [Traction("punch", "y1", (0, -MEAN))], [pair]), MPI.COMM_SELF
-    )
+    return solve_scene(Scene(bodies, supports, [Traction("punch", "y1", (0, -MEAN))], [pair]), MPI.COMM_SELF)
 
 
 @pytest.mark.parametrize("covered", [0.2, 0.04, 0.004])

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import Body, ContactPair, RigidPlane, Scene, Support, Surface
+from fenics_contact._pairing.points import ContactPoints
 from fenics_contact.errors import InvalidInputError, UserCodeError
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.gallery import block, half_cylinder, rectangle
-from fenics_contact.pairing import ContactPoints
-from fenics_contact.scene import Body, ContactPair, PlaneStrain, RigidPlane, Scene, Support, Surface
+from fenics_contact.materials import PlaneStrain
 from tests.feti.scenes import STEEL
 
 SHIFTED = 0.03

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
+from fenics_contact._pairing.mortar.coupling import MortarCoupling, mortar_coupling
+from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.pairing.mortar import MortarCoupling, mortar_coupling
-from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface
 from tests.pairing.mortar_surfaces import KINDS, SOLID, moved, plate, rotation
 
 kinds = pytest.mark.parametrize(("slave_kind", "master_kind"), KINDS)
@@ -241,7 +241,7 @@ def test_the_size_of_chunks_does_not_matter(
         plate(master_kind, 5, low=0.3, high=1.5, turn=0.4),
     )
     whole = mortar_coupling(slave, master)
-    monkeypatch.setattr("fenics_contact.pairing.mortar.coupling.CHUNK", chunk)
+    monkeypatch.setattr("fenics_contact._pairing.mortar.coupling.CHUNK", chunk)
     cut = mortar_coupling(slave, master)
     np.testing.assert_array_equal(cut.node, whole.node)
     np.testing.assert_allclose(cut.area, whole.area, rtol=1e-13)

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from fenics_contact.pairing.mortar.clipping import clip, simplices
-from fenics_contact.pairing.mortar.local_coordinates import local_coordinates, rule
-from fenics_contact.pairing.mortar.planes import measure
-from fenics_contact.surfaces.facets import facet_shape_values
+from fenics_contact._pairing.mortar.cells import clip, simplices
+from fenics_contact._pairing.mortar.planes import local_coordinates, measure, rule
+from fenics_contact._surfaces.facets import facet_shape_values
 
 #: Coordinates that often coincide, so that corners meet corners and edges meet edges, and any others.
 coordinate = st.one_of(st.integers(-4, 4).map(lambda k: k / 4), st.floats(-1, 1))

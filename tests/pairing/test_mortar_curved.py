@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenics_contact.pairing.mortar import MortarCoupling, mortar_coupling
-from fenics_contact.surfaces.facets import FacetedSurface
+from fenics_contact._pairing.mortar.coupling import MortarCoupling, mortar_coupling
+from fenics_contact._surfaces.facets import FacetedSurface
 from tests.pairing.mortar_surfaces import KINDS, moved, rotation, shell
 
 kinds = pytest.mark.parametrize(("slave_kind", "master_kind"), KINDS)

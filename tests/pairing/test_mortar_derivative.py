@@ -9,16 +9,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fenics_contact.pairing import CouplingDerivatives
-from fenics_contact.pairing.mortar import (
-    MortarCoupling,
-    coupling_derivative,
-    mortar_coupling,
-    mortar_pulled_back,
-)
-from fenics_contact.pairing.mortar.planes import Planes
-from fenics_contact.surfaces import FacetedSurface, faceted_surface, slopes
-from fenics_contact.surfaces.reconstruction import reconstructed
+from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
+from fenics_contact._pairing.mortar import derivatives as coupling_derivative
+from fenics_contact._pairing.mortar.coupling import MortarCoupling, mortar_coupling
+from fenics_contact._pairing.mortar.derivatives import mortar_pulled_back
+from fenics_contact._pairing.mortar.planes import Planes
+from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface, slopes
+from fenics_contact._surfaces.true_surface import reconstructed
 from tests.pairing.mortar_surfaces import KINDS, lattice, plate, shell
 
 STEP = 1e-7

@@ -7,11 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fenics_contact.pairing.mortar.cells import Cells
-from fenics_contact.pairing.mortar.dual_basis import CORNERS, dual_integrals
-from fenics_contact.pairing.mortar.local_coordinates import rule
-from fenics_contact.pairing.mortar.planes import measure
-from fenics_contact.surfaces.facets import facet_shape_values
+from fenics_contact._pairing.mortar.cells import Cells
+from fenics_contact._pairing.mortar.coupling import CORNERS, dual_integrals
+from fenics_contact._pairing.mortar.planes import measure, rule
+from fenics_contact._surfaces.facets import facet_shape_values
 
 
 def covered(corners: int, parts: np.ndarray, share_of_pairs: np.ndarray) -> Cells:

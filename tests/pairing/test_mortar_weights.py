@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fenics_contact.pairing.mortar import mortar_coupling, weight_derivatives
-from fenics_contact.surfaces import FacetedSurface
+from fenics_contact._pairing.mortar.coupling import mortar_coupling
+from fenics_contact._pairing.mortar.derivatives import weight_derivatives
+from fenics_contact._surfaces.facets import FacetedSurface
 from tests.pairing.mortar_surfaces import KINDS, plate, shell
 
 

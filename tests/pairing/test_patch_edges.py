@@ -7,13 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh
+from fenics_contact._pairing.sliding.closest import patch_points
+from fenics_contact._pairing.sliding.patches import (
+    SmoothPatches,
+    n_functions,
+    patch_functions,
+    turning_functions,
+)
+from fenics_contact._surfaces.facets import corner_places, nodal_areas
+from fenics_contact._surfaces.true_surface import true_surface
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import FACET_TYPES, BodyMesh, quadratic, quadrature
-from fenics_contact.pairing.sliding.closest import patch_points
-from fenics_contact.pairing.sliding.patch_functions import n_functions, patch_functions
-from fenics_contact.pairing.sliding.patches import SmoothPatches
-from fenics_contact.pairing.sliding.turning_functions import turning_functions
-from fenics_contact.surfaces import corner_places, nodal_areas, true_surface
+from fenics_contact.mesh import quadratic
+from fenics_contact.mesh.cell_types import FACET_TYPES, quadrature
 from tests.pairing.sliding_scenes import on_arch, shaken, sliding
 
 CELLS = ("hexahedron", "tetrahedron")
@@ -90,9 +96,7 @@ def test_derivatives_of_patch_functions_are_those_of_difference_quotients(corner
     local = np.random.default_rng(3).uniform(0.1, 0.4, (6, 2)) - (0.9 if corners == 4 else 0.0)
     step, at = 1e-6, patch_functions(local, corners, order)
     for axis in range(2):
-        ahead, behind = (
-            patch_functions(local + s * step * np.eye(2)[axis], corners, order) for s in (1, -1)
-        )
+        ahead, behind = (patch_functions(local + s * step * np.eye(2)[axis], corners, order) for s in (1, -1))
         value, first = (
             (f - g) / (2 * step) for f, g in ((ahead.value, behind.value), (ahead.first, behind.first))
         )

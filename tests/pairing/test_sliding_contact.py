@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import Body, ContactPair, MovingObstacle, RigidCylinder, RigidPlane, Scene, Surface
+from fenics_contact._pairing.points import movable
+from fenics_contact._pairing.search import find_contact_points
+from fenics_contact._pairing.sliding.closest import ClosestPoints
+from fenics_contact._pairing.sliding.patches import SmoothPatches
+from fenics_contact._pairing.sliding.points import SlidingPoints
+from fenics_contact._pairing.sliding_contact import sliding_contact
+from fenics_contact._surfaces.facets import faceted_surface
+from fenics_contact._surfaces.projection import Projection
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.pairing import find_contact_points, movable, sliding_contact
-from fenics_contact.pairing.sliding.closest import ClosestPoints
-from fenics_contact.pairing.sliding.patches import SmoothPatches
-from fenics_contact.pairing.sliding.points import SlidingPoints
-from fenics_contact.scene import Body, ContactPair, MovingObstacle, RigidCylinder, RigidPlane, Scene, Surface
-from fenics_contact.surfaces import Projection, faceted_surface
 from tests.pairing.sliding_scenes import (
     KINDS,
     arched,

@@ -7,18 +7,11 @@ from functools import cache
 import numpy as np
 import pytest
 
+from fenics_contact import Body, ContactPair, DistanceObstacle, RigidCylinder, RigidSphere, Scene, Surface
+from fenics_contact._pairing.sliding.contact import SlidingContact
+from fenics_contact._pairing.sliding.points import SlidingPoints
+from fenics_contact._pairing.sliding.stiffness import spread
 from fenics_contact.mesh import quadratic
-from fenics_contact.pairing.sliding import SlidingContact, SlidingPoints
-from fenics_contact.pairing.sliding.differential import spread
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    DistanceObstacle,
-    RigidCylinder,
-    RigidSphere,
-    Scene,
-    Surface,
-)
 from tests.pairing.sliding_scenes import KINDS, on_arch, ring, same_points, shaken, sliding
 
 STEP = 2e-6

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fenics_contact import Body, ContactPair, Scene, Surface
+from fenics_contact._pairing.sliding.contact import SlidingContact
 from fenics_contact.gallery import rectangle
-from fenics_contact.pairing.sliding import SlidingContact
-from fenics_contact.scene import Body, ContactPair, NeoHooke, Scene, Surface
+from fenics_contact.materials import NeoHooke
 from tests.pairing.sliding_scenes import free, on_arch, sliding
 
 DISCRETISATIONS = ("node", "mortar")

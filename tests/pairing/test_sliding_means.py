@@ -8,8 +8,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fenics_contact.pairing.sliding import SlidingContact, SlidingPoints
-from fenics_contact.pairing.sliding.differential import spread
+from fenics_contact._pairing.sliding.contact import SlidingContact
+from fenics_contact._pairing.sliding.points import SlidingPoints
+from fenics_contact._pairing.sliding.stiffness import spread
 from tests.pairing.sliding_scenes import KINDS, on_arch, rotation, shaken, sliding
 
 STEP = 1e-6

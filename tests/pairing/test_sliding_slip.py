@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fenics_contact.pairing.sliding import SlidingPoints
-from fenics_contact.scene import Body, ContactPair, MovingObstacle, RigidCylinder, RigidPlane, Scene, Surface
+from fenics_contact import Body, ContactPair, MovingObstacle, RigidCylinder, RigidPlane, Scene, Surface
+from fenics_contact._pairing.sliding.points import SlidingPoints
 from tests.pairing.sliding_scenes import KINDS, on_arch, rotation, shaken, sliding
 
 
@@ -44,7 +44,7 @@ def test_slip_is_the_same_when_everything_turns_by_a_right_angle(kind: str, when
 def test_slip_over_several_facets_is_the_way() -> None:
     """On a plane master, by two thirds of a slave's length, in one step or in many."""
     from fenics_contact.gallery import block
-    from fenics_contact.scene import IsotropicElasticity
+    from fenics_contact.materials import IsotropicElasticity
 
     material = IsotropicElasticity(10.0, 0.3)
     low = block((0.0, 0.0, -0.5), (3.0, 1.0, 0.0), (9, 3, 1))

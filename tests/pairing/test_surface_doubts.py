@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import Body, BodyMesh, ContactPair, RigidPlane, Scene, Support, Surface
+from fenics_contact._surfaces import true_surface as reconstruction
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.gallery import LinkShape, half_cylinder, hemisphere, two_links
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, RigidPlane, Scene, Support, Surface
-from fenics_contact.surface_shapes import Sphere, placed
-from fenics_contact.surfaces import reconstruction
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.mesh import quadratic
+from fenics_contact.shapes import Sphere
+from fenics_contact.shapes.combined import placed
 
 STEEL = IsotropicElasticity(1000.0, 0.3)
 

@@ -12,21 +12,11 @@ import pytest
 from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
-from fenics_contact.contact import solve_scene
+from fenics_contact import Body, ContactPair, RigidPlane, Scene, Support, Surface, Tie, solve_scene
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.gallery import rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import quadratic
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    IsotropicElasticity,
-    PlaneStrain,
-    RigidPlane,
-    Scene,
-    Support,
-    Surface,
-    Tie,
-)
 from tests.pairing.pressed_boxes import PRESSURE, boxes, pressed
 
 CELLS = ("quadrilateral", "triangle", "hexahedron", "tetrahedron")

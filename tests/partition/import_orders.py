@@ -23,7 +23,7 @@ def cut() -> str:
     from dataclasses import replace
 
     from fenics_contact.gallery import block
-    from fenics_contact.partition import graph_partition
+    from fenics_contact.mesh import graph_partition
 
     mesh = replace(block((0, 0, 0), (7, 5, 3), (7, 5, 3)), grid=None)
     return hashlib.sha256(graph_partition(mesh, 5).tobytes()).hexdigest()[:16]

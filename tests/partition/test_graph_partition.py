@@ -10,21 +10,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fenics_contact import BodyMesh, box_partition
 from fenics_contact.errors import InvalidInputError, MissingRequirementError
 from fenics_contact.gallery import block, chain_link, half_disc, hemisphere, rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import (
-    box_partition,
+from fenics_contact.mesh import graph_partition
+from fenics_contact.mesh.bisection import default_partition, smoothed, target_parts
+from fenics_contact.mesh.partition import (
+    cell_weights,
     check_face_connected,
     check_one_piece,
-    default_partition,
-    graph_partition,
+    face_areas,
     merge_pieces,
-    target_parts,
     torn_node_counts,
 )
-from fenics_contact.partition.smoothing import smoothed
-from fenics_contact.partition.weights import cell_weights, face_areas
 
 SMALL = {
     "tetrahedron": block((0, 0, 0), (2, 2, 1), (2, 2, 1), "tetrahedron"),
@@ -107,7 +105,7 @@ def test_parts_that_metis_leaves_empty_are_filled(empty: list[int], monkeypatch:
     def metis(graph: object, vertices: np.ndarray, parts: int) -> np.ndarray:
         return full[np.arange(mesh.n_cells) % full.size]
 
-    module = importlib.import_module("fenics_contact.partition.graph_partition")
+    module = importlib.import_module("fenics_contact.mesh.metis")
     monkeypatch.setattr(module, "part_graph", metis)
     partition = graph_partition(mesh, 4)
     check_face_connected(mesh, partition)
@@ -169,7 +167,7 @@ def test_all_ranks_get_the_same_subdomains(mpirun: Callable[..., str]) -> None:
     script = """
         import hashlib
         from mpi4py import MPI
-        from fenics_contact.partition import graph_partition
+        from fenics_contact.mesh import graph_partition
         from fenics_contact.gallery import hemisphere
         partition = graph_partition(hemisphere(1.0, 8), 11)
         hashes = MPI.COMM_WORLD.gather(hashlib.sha256(partition.tobytes()).hexdigest())

@@ -13,7 +13,7 @@ from tests.partition.import_orders import cut
 
 WALK = Path(__file__).with_name("import_orders.py")
 #: Two that bring a METIS each, and the package.
-DECISIVE = ["dolfinx", "pymetis", "fenics_contact.partition"]
+DECISIVE = ["dolfinx", "pymetis", "fenics_contact.mesh"]
 ALL = [*DECISIVE, "petsc4py.PETSc", "gmsh", "pyvista"]
 
 
@@ -32,11 +32,10 @@ def solve_after(imports: str, mpirun: Callable[..., str]) -> None:
         import sys
         from dataclasses import replace
         from mpi4py import MPI
-        from fenics_contact.contact import solve_scene
+        from fenics_contact import solve_scene
         from fenics_contact.gallery import block
-        from fenics_contact.scene import (
-            Body, ContactPair, IsotropicElasticity, RigidPlane, Scene, Support, Surface
-        )
+        from fenics_contact import Body, ContactPair, RigidPlane, Scene, Support, Surface
+        from fenics_contact.materials import IsotropicElasticity
 
         pair = ContactPair(Surface("block", "z0"), RigidPlane((0, 0, 0), (0, 0, 1)))
         mesh = replace(block((0, 0, 0), (0.7, 0.5, 0.3), (7, 5, 3)), grid=None)
@@ -51,7 +50,7 @@ def solve_after(imports: str, mpirun: Callable[..., str]) -> None:
     assert energies == pytest.approx(2 * [energy], rel=1e-4)
 
 
-@pytest.mark.parametrize("imports", ["dolfinx", "dolfinx, pymetis", "fenics_contact.partition, dolfinx"])
+@pytest.mark.parametrize("imports", ["dolfinx", "dolfinx, pymetis", "fenics_contact.mesh, dolfinx"])
 def test_a_mesh_without_a_grid_is_solved_on_two_ranks(imports: str, mpirun: Callable[..., str]) -> None:
     solve_after(imports, mpirun)
 

@@ -9,9 +9,9 @@ import pytest
 
 from fenics_contact.errors import MissingRequirementError
 from fenics_contact.gallery import rectangle
-from fenics_contact.partition import metis
-from fenics_contact.partition.graph_partition import _dual_graph
-from fenics_contact.partition.weights import face_areas
+from fenics_contact.mesh import metis
+from fenics_contact.mesh.metis import _dual_graph
+from fenics_contact.mesh.partition import face_areas
 
 MESH = rectangle((0, 0), (7, 5), (7, 5), "triangle")
 GRAPH = _dual_graph(MESH.n_cells, *face_areas(MESH))

@@ -5,17 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh, box_partition
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, hemisphere
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import (
-    bisection_partition,
-    box_partition,
-    check_face_connected,
-    combine,
-    merge_pieces,
-    torn_node_counts,
-)
+from fenics_contact.mesh import bisection_partition
+from fenics_contact.mesh.partition import check_face_connected, combine, merge_pieces, torn_node_counts
 
 CELLS = ["hexahedron", "tetrahedron"]
 

@@ -8,7 +8,8 @@ import time
 
 from mpi4py import MPI
 
-from fenics_contact.progress import Task, show_progress
+from fenics_contact import show_progress
+from fenics_contact._base.progress import Task
 
 comm = MPI.COMM_WORLD
 logging.basicConfig(level=logging.WARNING, format="%(message)s")

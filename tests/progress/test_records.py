@@ -11,12 +11,11 @@ from contextlib import contextmanager
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, solve_steps
-from fenics_contact.optimize import BundleTrust, Record, minimize
-from fenics_contact.partition import box_partition
-from fenics_contact.progress import LOGGER_NAME, Event, Kind, Task
+from fenics_contact import ContactProblem, PhaseTimer, box_partition, minimize, solve_steps
+from fenics_contact._base.progress import LOGGER_NAME, Event, Kind, Task
+from fenics_contact._optimize.result import Record
+from fenics_contact.design import BundleTrust
 from fenics_contact.qp import FaceNewton, Smalse
-from fenics_contact.timing import PhaseTimer
 from tests.contact.step_cases import sheared_block, shears
 from tests.optimize.cases import BY_NAME
 from tests.optimize.nonlinear_cases import NONLINEAR

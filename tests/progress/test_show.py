@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from fenics_contact.progress import LOGGER_NAME, Task, show_progress
-from fenics_contact.progress.task import LAUNCHERS, LISTENERS, at_terminal
+from fenics_contact import show_progress
+from fenics_contact._base.progress import LAUNCHERS, LISTENERS, LOGGER_NAME, Task, at_terminal
 
 LOGGER = logging.getLogger(LOGGER_NAME)
 

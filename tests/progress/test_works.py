@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fenics_contact.progress import Event, Kind, duration
-from fenics_contact.progress.task import Work, Works
+from fenics_contact._base.progress import Event, Kind, Work, Works, duration
 
 
 def fed(events: list[tuple[float, Event]]) -> Works:

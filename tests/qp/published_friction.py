@@ -9,7 +9,9 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem
+from fenics_contact.qp import DualProblem
+from fenics_contact.qp.coarse import CoarseSpace
+from fenics_contact.qp.layout import ContactLayout
 
 #: All eleven by their names.
 CASES = {path.stem: path for path in sorted((Path(__file__).parents[1] / "data/siconos").glob("*.npz"))}

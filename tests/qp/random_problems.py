@@ -9,7 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem
+from fenics_contact.qp import DualProblem
+from fenics_contact.qp.coarse import CoarseSpace
+from fenics_contact.qp.layout import ContactLayout
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,10 +6,11 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.qp import CoarseSpace, ContactLayout, FaceSystem, classify
 from fenics_contact.qp import coarse as coarse_module
-from fenics_contact.qp.gram import GramInverse, SparseGramInverse
-from fenics_contact.qp.square_inverse import invert_square
+from fenics_contact.qp.coarse import CoarseSpace, GramInverse, SparseGramInverse, invert_square
+from fenics_contact.qp.face import classify
+from fenics_contact.qp.face_system import FaceSystem
+from fenics_contact.qp.layout import ContactLayout
 
 
 @pytest.fixture(params=["dense", "sparse"], autouse=True)

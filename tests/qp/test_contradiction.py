@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenics_contact.qp.contradiction import _until_open, _until_slip
+from fenics_contact.qp.newton_steps import _until_open, _until_slip
 
 
 def test_a_falling_force_opens_where_it_vanishes() -> None:

@@ -8,15 +8,9 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError
-from fenics_contact.qp import (
-    ContactLayout,
-    CoulombLaw,
-    FaceNewton,
-    Smalse,
-    TrescaLaw,
-    find_equilibrium,
-    solve,
-)
+from fenics_contact.qp import CoulombLaw, FaceNewton, Smalse, TrescaLaw, solve
+from fenics_contact.qp.layout import ContactLayout
+from fenics_contact.qp.solve import find_equilibrium
 from tests.qp.random_problems import random_problem
 from tests.qp.torn_bricks import Bricks, torn_problem
 from tests.qp.violations import coulomb_violations

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.qp import ContactLayout, FeasibleSet
+from fenics_contact.qp import FeasibleSet
+from fenics_contact.qp.layout import ContactLayout
 
 LAYOUT = ContactLayout.build(11, normal=[0, 5, 7], tangential=[[1, 9], [3, 8]], friction_of=[2, 0])
 FLAT = ContactLayout.build(4, normal=[0], tangential=[[2]])

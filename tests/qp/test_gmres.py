@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.qp import CoupledSystem, Stop, projected_gmres
+from fenics_contact.qp import Stop
+from fenics_contact.qp.face_system import CoupledSystem
+from fenics_contact.qp.krylov import projected_gmres
 
 Array = np.ndarray
 LIMIT = 50

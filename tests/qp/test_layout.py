@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.qp import ContactLayout
+from fenics_contact.qp.layout import ContactLayout
 
 
 def test_all_entries_are_equality_contact_or_friction():

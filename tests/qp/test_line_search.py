@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from fenics_contact.qp import DualProblem, FaceNewton, TrescaLaw, solve
-from fenics_contact.qp.iterate import Iterate, iterate_at
 from fenics_contact.qp.newton_steps import shorten
 from fenics_contact.qp.problem import CountedOperator
 from fenics_contact.qp.rescue import ProximalPoint, descend
+from fenics_contact.qp.solution import Iterate, iterate_at
 from tests.qp.published_friction import CYCLING, published
 from tests.qp.random_problems import DenseProblem, random_problem
 

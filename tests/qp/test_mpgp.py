@@ -6,9 +6,9 @@ import scipy.linalg
 from mpi4py import MPI
 from scipy.optimize import nnls
 
-from fenics_contact.qp import ContactLayout, FeasibleSet, Mpgp
-from fenics_contact.qp.augmented import largest_eigenvalue
-from fenics_contact.qp.mpgp import BoundedQuadratic, minimise
+from fenics_contact.qp import FeasibleSet
+from fenics_contact.qp.layout import ContactLayout
+from fenics_contact.qp.smalse import BoundedQuadratic, Mpgp, largest_eigenvalue, minimise
 from tests.qp.random_problems import conic_solution, count_statuses, random_problem
 
 

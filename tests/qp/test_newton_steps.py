@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.qp import ContactLayout, CoulombLaw, CountedOperator, DualProblem, Face, classify
-from fenics_contact.qp.forcing import Forcing
-from fenics_contact.qp.iterate import iterate_fitted
-from fenics_contact.qp.newton_steps import FaceState, FaceSteps
+from fenics_contact.qp import CoulombLaw, DualProblem, Face
+from fenics_contact.qp.face import classify
+from fenics_contact.qp.layout import ContactLayout
+from fenics_contact.qp.newton_steps import FaceState, FaceSteps, Forcing
+from fenics_contact.qp.problem import CountedOperator
+from fenics_contact.qp.solution import iterate_fitted
 from tests.qp.torn_bricks import Bricks, torn_problem
 
 

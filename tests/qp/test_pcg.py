@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from fenics_contact.qp import Face, FaceSystems, Stop, projected_cg
+from fenics_contact.qp import Face, Stop
+from fenics_contact.qp.face_system import FaceSystems
+from fenics_contact.qp.krylov import projected_cg
 from tests.qp.random_problems import random_problem
 from tests.qp.torn_bricks import Bricks, torn_problem
 

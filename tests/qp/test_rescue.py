@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import ConvergenceError
-from fenics_contact.qp import FaceNewton, Smalse, TrescaLaw, contact_step, measure, solve
+from fenics_contact.qp import CoulombLaw, FaceNewton, Residuals, Smalse, Start, TrescaLaw, measure, solve
 from fenics_contact.qp.face_newton import slides
-from fenics_contact.qp.forcing import Forcing
-from fenics_contact.qp.iterate import Start, iterate_at
+from fenics_contact.qp.newton_steps import Forcing
 from fenics_contact.qp.problem import CountedOperator
 from fenics_contact.qp.rescue import ProximalPoint, Rescue
-from fenics_contact.qp.slip_law import CoulombLaw
-from fenics_contact.qp.solution import Residuals, SolverStep
+from fenics_contact.qp.solution import SolverStep, contact_step, iterate_at
 from tests.qp.torn_bricks import Bricks, torn_problem
 from tests.qp.violations import coulomb_violations
 

@@ -9,17 +9,17 @@ import pytest
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.qp import (
-    ContactLayout,
     FaceNewton,
     FeasibleSet,
     ProjectedCG,
     Residuals,
     Smalse,
     TrescaLaw,
-    contact_step,
     measure,
     solve,
 )
+from fenics_contact.qp.layout import ContactLayout
+from fenics_contact.qp.solution import contact_step
 from tests.qp.random_problems import random_problem
 from tests.qp.torn_bricks import Bricks, torn_problem
 

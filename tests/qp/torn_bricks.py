@@ -14,9 +14,9 @@ import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
 
+from fenics_contact.qp import DualProblem
 from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.layout import ContactLayout
-from fenics_contact.qp.problem import DualProblem
 
 
 def element_stiffness(size: float, young: float = 1.0, poisson: float = 0.3) -> np.ndarray:

@@ -7,19 +7,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import (
+from fenics_contact import (
+    BodyMesh,
     ContactPair,
     Coulomb,
-    Friction,
     RigidCylinder,
-    RigidObstacle,
     RigidPlane,
     RigidSphere,
     Surface,
     Tie,
     Tresca,
 )
+from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact._scene.pairs import Friction
 from tests.random_scenes.bodies import Grown, box, in_plane, round_body
 from tests.random_scenes.dice import Dice
 

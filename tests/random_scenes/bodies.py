@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fenics_contact import Body, BodyMesh
 from fenics_contact.gallery import box_lattice, half_disc, hemisphere, rectangle_lattice
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.scene import (
-    Body,
+from fenics_contact.materials import (
     IsotropicElasticity,
     Material,
     OrthotropicElasticity,
@@ -18,6 +17,7 @@ from fenics_contact.scene import (
     PlaneStress,
     material_axes,
 )
+from fenics_contact.mesh import quadratic
 from tests.random_scenes.dice import Dice
 
 #: Cells along a side, hardly ever a power of two.

@@ -11,19 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact.gallery import rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import bisection_partition, graph_partition
-from fenics_contact.scene import (
-    AnySupport,
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
-    Load,
     LoadStep,
     MovingObstacle,
     Pressure,
     RigidCylinder,
-    RigidObstacle,
     RigidPlane,
     RigidSphere,
     RigidSurface,
@@ -34,6 +29,11 @@ from fenics_contact.scene import (
     TotalForce,
     Traction,
 )
+from fenics_contact._scene.loads import Load
+from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact._scene.supports import AnySupport
+from fenics_contact.gallery import rectangle
+from fenics_contact.mesh import bisection_partition, graph_partition
 from tests.random_scenes.deformed_parts import (
     any_material,
     friction_law,
@@ -259,9 +259,7 @@ def fold(dice: Dice, dim: int) -> Recipe:
     law, rubs = friction_law(dice)
     ends = [dice.between(0.15, 0.3), dice.between(0.3, 0.45)]
     whole_slot = dice.chance(0.5)
-    dice.say(
-        f"slot of {1.4 / rows:.2g} pressed by {ends[-1]:.2g}, {'one surface' if whole_slot else 'two'}"
-    )
+    dice.say(f"slot of {1.4 / rows:.2g} pressed by {ends[-1]:.2g}, {'one surface' if whole_slot else 'two'}")
     back = dice.chance(0.3)
 
     def build(frame: Frame) -> Built:

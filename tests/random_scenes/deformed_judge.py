@@ -10,7 +10,7 @@ import warnings
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState, State, solve_steps
+from fenics_contact import ContactProblem, DeformedState, State, solve_steps
 from fenics_contact.errors import ConvergenceError, FenicsContactError, InfeasibleError
 from tests.hard.deformed.case import violations
 from tests.random_scenes.deformed import History, cut, history

@@ -6,12 +6,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from fenics_contact import BodyMesh, Coulomb
+from fenics_contact._scene.pairs import Friction
 from fenics_contact.gallery import box_lattice, half_disc, hemisphere, rectangle_lattice
-from fenics_contact.mesh import BodyMesh, boundary_faces, quadratic
-from fenics_contact.scene import (
-    Coulomb,
+from fenics_contact.materials import (
     FinitePlasticity,
-    Friction,
     IsotropicElasticity,
     J2Plasticity,
     Material,
@@ -21,6 +20,7 @@ from fenics_contact.scene import (
     PlaneStrain,
     StVenantKirchhoff,
 )
+from fenics_contact.mesh import boundary_faces, quadratic
 from tests.random_scenes.dice import Dice
 from tests.random_scenes.frame import Frame
 

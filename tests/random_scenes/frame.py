@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.mesh import BodyMesh
+from fenics_contact import BodyMesh
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.partition import bisection_partition, box_partition, graph_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
     ContactPair,
-    Load,
     Pressure,
     RigidCylinder,
     RigidPlane,
@@ -27,8 +25,11 @@ from fenics_contact.scene import (
     ThermalStrain,
     TotalForce,
     Traction,
-    can_expand,
+    box_partition,
 )
+from fenics_contact._scene.loads import Load
+from fenics_contact.materials.elastic import can_expand
+from fenics_contact.mesh import bisection_partition, graph_partition
 from tests.hard.transform import in_units
 from tests.random_scenes.arrangements import ARRANGEMENTS, Arrangement
 from tests.random_scenes.bodies import body, with_surface

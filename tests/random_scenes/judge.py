@@ -10,7 +10,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
+from fenics_contact import solve_scene
 from fenics_contact.errors import ConvergenceError, FenicsContactError
 from tests.random_scenes.generator import Sample, sample
 from tests.random_scenes.refusals import unjust

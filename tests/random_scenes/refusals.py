@@ -12,10 +12,11 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from scipy.optimize import linprog
 
+from fenics_contact import ContactPair, Coulomb, Surface, Tie, Tresca
+from fenics_contact._pairing.points import ContactPoints
 from fenics_contact.errors import FenicsContactError, InfeasibleError, InvalidInputError
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
-from fenics_contact.pairing import ContactPoints
-from fenics_contact.scene import ContactPair, Coulomb, Surface, Tie, Tresca, rigid_body_modes
+from fenics_contact.materials import rigid_body_modes
 from tests.random_scenes.generator import Sample
 from tests.random_scenes.kinematics import Side, above, own_distance
 from tests.random_scenes.verifier import loose, moving

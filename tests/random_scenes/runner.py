@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
-from fenics_contact.launching import clean_environment
+from fenics_contact import clean_environment
 from tests.random_scenes.deformed_judge import judge_history
 from tests.random_scenes.judge import Outcome, Verdict, judge
 

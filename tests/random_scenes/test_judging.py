@@ -8,19 +8,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
+from fenics_contact import Body, ContactPair, Coulomb, Scene, State, Support, Surface, Traction, solve_scene
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block, hemisphere
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    IsotropicElasticity,
-    Scene,
-    Support,
-    Surface,
-    Traction,
-)
+from fenics_contact.materials import IsotropicElasticity
 from tests.random_scenes import runner
 from tests.random_scenes.generator import Sample, sample
 from tests.random_scenes.judge import Outcome, Verdict

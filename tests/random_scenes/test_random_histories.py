@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactResult
+from fenics_contact.results import ContactResult
 from tests.random_scenes import deformed_judge
 from tests.random_scenes.deformed import KINDS, history
 from tests.random_scenes.deformed_judge import judge_history

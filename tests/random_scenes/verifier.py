@@ -6,9 +6,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from fenics_contact.contact import AnyState
-from fenics_contact.pairing import ContactPoints
-from fenics_contact.scene import Coulomb, Tresca, rigid_body_modes
+from fenics_contact import Coulomb, Tresca
+from fenics_contact._pairing.points import ContactPoints
+from fenics_contact.materials import rigid_body_modes
+from fenics_contact.results.deformed_state import AnyState
 from tests.random_scenes.generator import Sample
 from tests.random_scenes.kinematics import misplaced
 from tests.random_scenes.whole import Whole

@@ -15,20 +15,17 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.mesh import CELL_TYPES, FACET_TYPES, BodyMesh, CellType
-from fenics_contact.scene import (
-    BodyForce,
+from fenics_contact import BodyForce, BodyMesh, Pressure, Scene, ThermalStrain, TotalForce
+from fenics_contact._scene.loads import Load
+from fenics_contact.materials import (
     IsotropicElasticity,
-    Load,
     OrthotropicElasticity,
     OrthotropicPlaneStress,
     PlaneStrain,
     PlaneStress,
-    Pressure,
-    Scene,
-    ThermalStrain,
-    TotalForce,
 )
+from fenics_contact.mesh import CellType
+from fenics_contact.mesh.cell_types import CELL_TYPES, FACET_TYPES
 
 #: Components of a strain in the order of its vector, shear strains doubled.
 PAIRS = {2: [(0, 0), (1, 1), (0, 1)], 3: [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]}

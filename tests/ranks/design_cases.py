@@ -8,18 +8,20 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, ContactResult, State
-from fenics_contact.optimize import BundleTrust, minimize
-from fenics_contact.scene import ContactPair, Scene, Support, Surface
-from fenics_contact.shape import (
-    ContactForces,
-    Partials,
+from fenics_contact import (
+    ContactPair,
+    ContactProblem,
+    Scene,
     ShapeProblem,
+    State,
+    Support,
+    Surface,
     SurfaceDesign,
-    TotalPotential,
-    VolumeIntegral,
+    minimize,
 )
-from fenics_contact.shape.forms import ShapeForms
+from fenics_contact.design import BundleTrust, ContactForces, Partials, TotalPotential, VolumeIntegral
+from fenics_contact.design.forms import ShapeForms
+from fenics_contact.results import ContactResult
 from tests.ranks.given import CUT, MESH, case, fails_on_last, is_last, scene
 from tests.ranks.scene_cases import OwnFloor, flat, upward
 from tests.shape.blocks import side

@@ -7,21 +7,22 @@ from typing import Any
 
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
-from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import bisection_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
     RigidPlane,
     Scene,
+    State,
     Support,
     Surface,
     Traction,
+    solve_scene,
 )
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.mesh import bisection_partition
 
 MESH = block((0.1, 0.2, 0.0), (1.1, 0.9, 0.7), (3, 3, 3))
 STEEL = IsotropicElasticity(210.0, 0.3)

@@ -4,19 +4,11 @@ from __future__ import annotations
 
 from mpi4py import MPI
 
+from fenics_contact import Body, ContactPair, Coulomb, Scene, Support, Surface, Traction
 from fenics_contact.gallery import block
-from fenics_contact.partition import bisection_partition
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.mesh import bisection_partition
 from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    IsotropicElasticity,
-    Scene,
-    Support,
-    Surface,
-    Traction,
-)
 from tests.ranks.given import (
     CUT,
     FLOOR,

@@ -9,10 +9,7 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from fenics_contact.scene import (
-    EnergyModel,
-    IsotropicElasticity,
-)
+from fenics_contact.materials import EnergyModel, IsotropicElasticity
 from tests.ranks.given import (
     MESH,
     Function,

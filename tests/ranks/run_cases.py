@@ -13,11 +13,18 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.contact import ContactProblem, State, solve_steps
-from fenics_contact.io import write_vtu
-from fenics_contact.outer import SceneResponse, served
-from fenics_contact.scene import LoadStep, Scene, Traction
+from fenics_contact import (
+    ContactProblem,
+    LoadStep,
+    Scene,
+    SceneResponse,
+    State,
+    Traction,
+    served,
+    solve_steps,
+    write_vtu,
+)
+from fenics_contact.design import Checkpoint
 from tests.ranks.given import CUT, case, fails_on_last, is_last, scene
 
 

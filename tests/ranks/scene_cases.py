@@ -9,16 +9,14 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, solve_steps
-from fenics_contact.progress import LOGGER_NAME
-from fenics_contact.scene import (
+from fenics_contact import (
     BodyForce,
     ContactPair,
+    ContactProblem,
     Coulomb,
     DistanceObstacle,
     LoadStep,
     MovingObstacle,
-    NeoHooke,
     Pressure,
     RigidSphere,
     Support,
@@ -26,7 +24,10 @@ from fenics_contact.scene import (
     ThermalStrain,
     Traction,
     Ufl,
+    solve_steps,
 )
+from fenics_contact._base.progress import LOGGER_NAME
+from fenics_contact.materials import NeoHooke
 from tests.ranks.given import (
     FLOOR,
     STEEL,

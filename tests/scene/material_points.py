@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.scene import HistoryMaterial, MaterialResponse
+from fenics_contact.materials import HistoryMaterial, MaterialResponse
 
 
 def at_rest(material: HistoryMaterial, n: int = 1) -> np.ndarray:

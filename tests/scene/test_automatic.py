@@ -8,22 +8,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_scene
+from fenics_contact import AutomaticContact, Body, ContactPair, Coulomb, Scene, Support, Surface, solve_scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import near_surfaces, quadratic
-from fenics_contact.scene import (
-    AutomaticContact,
-    Body,
-    ContactPair,
-    Coulomb,
-    IsotropicElasticity,
-    NeoHooke,
-    PlaneStrain,
-    Scene,
-    Support,
-    Surface,
-)
+from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
+from fenics_contact.mesh import quadratic
+from fenics_contact.mesh.near_surfaces import near_surfaces
 from tests.contact.gallery import partitions
 
 STEEL, RUBBER = IsotropicElasticity(2.1e5, 0.3), IsotropicElasticity(10.0, 0.3)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from fenics_contact import Body, Scene, Support
+from fenics_contact._scene.scene import bodies_from
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
-from fenics_contact.mesh_io import read_msh
-from fenics_contact.scene import Body, IsotropicElasticity, PlaneStrain, Scene, Support, bodies_from
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.readers import read_msh
 from tests.conftest import ROOT
 
 STEEL, RUBBER = IsotropicElasticity(2.1e5, 0.3), IsotropicElasticity(10.0, 0.45)

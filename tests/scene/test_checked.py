@@ -8,29 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-import fenics_contact.scene as package
-from fenics_contact.checks import checked
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block
-from fenics_contact.scene import (
+import fenics_contact._scene as package
+from fenics_contact import (
     AutomaticContact,
     Body,
     BodyForce,
     ContactPair,
     Coulomb,
     DistanceObstacle,
-    FinitePlasticity,
-    IsotropicElasticity,
-    J2Plasticity,
     LoadStep,
-    MooneyRivlin,
     MovingObstacle,
-    NeoHooke,
-    Ogden,
-    OrthotropicElasticity,
-    OrthotropicPlaneStress,
-    PlaneStrain,
-    PlaneStress,
     Pressure,
     RigidCylinder,
     RigidPlane,
@@ -38,7 +25,6 @@ from fenics_contact.scene import (
     RigidSurface,
     SampledField,
     Scene,
-    StVenantKirchhoff,
     Support,
     Surface,
     ThermalStrain,
@@ -48,6 +34,22 @@ from fenics_contact.scene import (
     Tresca,
     Ufl,
     gravity,
+)
+from fenics_contact._base.checks import checked
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import block
+from fenics_contact.materials import (
+    FinitePlasticity,
+    IsotropicElasticity,
+    J2Plasticity,
+    MooneyRivlin,
+    NeoHooke,
+    Ogden,
+    OrthotropicElasticity,
+    OrthotropicPlaneStress,
+    PlaneStrain,
+    PlaneStress,
+    StVenantKirchhoff,
 )
 
 FLOOR, STEEL = RigidPlane((0, 0, 0), (0, 0, 1)), IsotropicElasticity(2.1e5, 0.3)

@@ -8,19 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fenics_contact import Body, BodyMesh, ContactPair, RigidPlane, Scene, Surface, Tie
+from fenics_contact._scene.parts import keeping_discretisation
 from fenics_contact.gallery import block, half_disc, rectangle
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    IsotropicElasticity,
-    PlaneStrain,
-    RigidPlane,
-    Scene,
-    Surface,
-    Tie,
-    keeping_discretisation,
-)
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.mesh import quadratic
 
 STEEL, PLATE = IsotropicElasticity(2.1e5, 0.3), PlaneStrain(2.1e5, 0.3)
 

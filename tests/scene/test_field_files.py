@@ -8,8 +8,8 @@ import meshio
 import numpy as np
 import pytest
 
+from fenics_contact import read_field
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import read_field
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fenics_contact import Body, ContactPair, Scene, Surface, Tie
+from fenics_contact._base.fingerprint import described
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.fingerprint import described
 from fenics_contact.gallery import block, hemisphere
-from fenics_contact.io.described_scene import described_scene
-from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, Scene, Surface, Tie
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.output.result import described_scene
 
 SIDES = (Surface("a", "top"), Surface("b", "bottom"))
 

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fenics_contact import Body
 from fenics_contact.errors import InvalidInputError, UserCodeError
 from fenics_contact.gallery import block
-from fenics_contact.scene import Body, HistoryMaterial, IsotropicElasticity, J2Plasticity, MaterialResponse
+from fenics_contact.materials import HistoryMaterial, IsotropicElasticity, J2Plasticity, MaterialResponse
 from tests.scene.material_points import at_rest
 
 SYMMETRIC = 0.5 * (

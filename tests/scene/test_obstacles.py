@@ -7,20 +7,20 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import rectangle
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     DistanceObstacle,
-    PlaneStrain,
     RigidCylinder,
-    RigidObstacle,
     RigidPlane,
     RigidSphere,
     Scene,
     Surface,
 )
+from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import PlaneStrain
 
 OBSTACLES: dict[str, tuple[RigidObstacle, int]] = {
     "half plane": (RigidPlane((0.2, -0.1), (1.0, 3.0)), 2),

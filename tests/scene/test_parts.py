@@ -10,16 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
-    Material,
-    NeoHooke,
     RigidPlane,
     Scene,
     Support,
@@ -27,8 +22,10 @@ from fenics_contact.scene import (
     TotalForce,
     Traction,
     Tresca,
-    rigid_body_modes,
 )
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity, Material, NeoHooke, rigid_body_modes
 
 
 @pytest.mark.parametrize("modulus", [-2.1e5, 0.0, math.nan, math.inf])

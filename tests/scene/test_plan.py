@@ -9,31 +9,30 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, solve_scene
-from fenics_contact.feti import DirectSystem, DualSystem
-from fenics_contact.gallery import block, half_cylinder, half_disc, hemisphere, rectangle
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
-    ConeKind,
     ContactPair,
     Coulomb,
-    Friction,
-    IsotropicElasticity,
-    Material,
-    PlaneStrain,
     Pressure,
     RigidPlane,
     Scene,
-    SolverKind,
     Support,
     Surface,
     Tie,
     TotalForce,
     Traction,
     Tresca,
+    box_partition,
+    solve_scene,
 )
-from fenics_contact.surfaces import Geometry
+from fenics_contact._scene.pairs import Friction
+from fenics_contact._scene.plan import ConeKind, SolverKind
+from fenics_contact._surfaces.true_surface import Geometry
+from fenics_contact.feti import DualSystem
+from fenics_contact.feti.direct import DirectSystem
+from fenics_contact.gallery import block, half_cylinder, half_disc, hemisphere, rectangle
+from fenics_contact.materials import IsotropicElasticity, Material, PlaneStrain
+from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.theory import contact_modulus, hertz_line, hertz_point
 
 STEEL = IsotropicElasticity(1000.0, 0.3)

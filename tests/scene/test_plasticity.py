@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import FinitePlasticity, HistoryMaterial, J2Plasticity
+from fenics_contact.materials import FinitePlasticity, HistoryMaterial, J2Plasticity
 from tests.scene.material_points import at_rest, in_tension, tangent_error
 
 E, NU, YIELD = 2e5, 0.3, 200.0

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fenics_contact import SampledField
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import SampledField
 
 RANDOM = np.random.default_rng(7)
 

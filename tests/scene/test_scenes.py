@@ -8,16 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
-    PlaneStrain,
     RigidPlane,
     Scene,
     Support,
@@ -27,6 +23,9 @@ from fenics_contact.scene import (
     Traction,
     Tresca,
 )
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 
 STEEL = IsotropicElasticity(2.1e5, 0.3)
 FLOOR = RigidPlane((0, 0, 0), (0, 0, 1))

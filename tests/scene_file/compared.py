@@ -8,25 +8,31 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, State, solve_scene, solve_steps
-from fenics_contact.gallery import LinkShape, block, box_lattice, hemisphere, two_links
-from fenics_contact.optimize import BundleTrust, NonlinearConstraint, minimize
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
     LoadStep,
     RigidPlane,
     Scene,
+    ShapeProblem,
+    State,
     Support,
     Surface,
+    SurfaceDesign,
     TotalForce,
     Traction,
+    box_partition,
+    minimize,
+    read_scene_file,
+    solve_scene,
+    solve_steps,
 )
-from fenics_contact.scene_file import SceneFile, read_scene_file
-from fenics_contact.shape import ShapeProblem, SurfaceDesign, TotalPotential
+from fenics_contact._scene_file.reading import SceneFile
+from fenics_contact.design import BundleTrust, NonlinearConstraint, TotalPotential
+from fenics_contact.gallery import LinkShape, block, box_lattice, hemisphere, two_links
+from fenics_contact.materials import IsotropicElasticity
 from tests.conftest import ROOT
 
 STEEL = IsotropicElasticity(2.1e5, 0.3)

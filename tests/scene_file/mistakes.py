@@ -10,8 +10,9 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from fenics_contact.progress import visible
-from fenics_contact.scene_file import SceneFileError, read_scene_file
+from fenics_contact import read_scene_file
+from fenics_contact._base.progress import visible
+from fenics_contact._scene_file.source import SceneFileError
 from tests.scene_file.texts import GOOD, changed
 
 #: What is wrong -> (what the file should have, what it has, what is said).

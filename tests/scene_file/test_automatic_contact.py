@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.scene import Coulomb
-from fenics_contact.scene_file import SceneFile, SceneFileError, read_scene_file
+from fenics_contact import Coulomb, read_scene_file
+from fenics_contact._scene_file.reading import SceneFile
+from fenics_contact._scene_file.source import SceneFileError
 from tests.scene_file.texts import GOOD
 
 SELF = MPI.COMM_SELF

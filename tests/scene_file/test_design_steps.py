@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import cli
-from fenics_contact.io import read_result
-from fenics_contact.optimize import NonlinearConstraint
-from fenics_contact.scene_file import SceneFile, SceneFileError, read_scene_file
-from fenics_contact.shape import FrictionWork, LoadPath, PressureNorm
+from fenics_contact import _cli as cli
+from fenics_contact import read_scene_file
+from fenics_contact._scene_file.reading import SceneFile
+from fenics_contact._scene_file.source import SceneFileError
+from fenics_contact.design import FrictionWork, LoadPath, NonlinearConstraint, PressureNorm
+from fenics_contact.output import read_result
 from tests.scene_file.texts import GOOD, STEPS
 
 SURFACE = {"body": "block", "surface": "z0", "net": [2, 2], "lower": -0.02, "upper": 0.02}

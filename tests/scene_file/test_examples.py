@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.optimize import LinearConstraints, NonlinearConstraint
-from fenics_contact.scene_file import SceneFileError, read_scene_file
+from fenics_contact import read_scene_file
+from fenics_contact._scene_file.source import SceneFileError
+from fenics_contact.design import LinearConstraints, NonlinearConstraint
 from tests.conftest import ROOT
 from tests.scene_file.compared import compare_states, two_blocks
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fenics_contact._scene_file.values import Expression, VectorExpression, between
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene_file import Expression, VectorExpression
-from fenics_contact.scene_file.expression import between
 
 POINTS = np.array([[0.5, -1.0, 2.0], [0.0, 3.0, -4.0]])
 X, Y, Z = POINTS.T

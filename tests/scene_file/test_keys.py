@@ -8,11 +8,11 @@ from typing import Literal
 import pytest
 from pydantic import Field, PositiveFloat, ValidationError
 
+from fenics_contact import Coulomb
+from fenics_contact._scene_file.model import CoulombFriction
+from fenics_contact._scene_file.part import Part, keys_of
+from fenics_contact._scene_file.validation import json_schema
 from fenics_contact.gallery import LinkShape
-from fenics_contact.scene import Coulomb
-from fenics_contact.scene_file import json_schema
-from fenics_contact.scene_file.contacts import CoulombFriction
-from fenics_contact.scene_file.part import Part, keys_of
 
 
 @dataclass

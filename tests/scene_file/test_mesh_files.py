@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.mesh_io import read_msh
-from fenics_contact.mesh_io.gmsh_session import gmsh_model
-from fenics_contact.scene_file import SceneFileError, read_scene_file
+from fenics_contact import BodyMesh, read_scene_file
+from fenics_contact._scene_file.source import SceneFileError
+from fenics_contact.readers import gmsh_model, read_msh
 from tests.conftest import ROOT
 
 

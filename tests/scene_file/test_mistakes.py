@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import read_scene_file
+from fenics_contact._scene_file.source import SceneFileError, parse
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene_file import SceneFileError, read_scene_file
-from fenics_contact.scene_file.source import parse
 from tests.conftest import ROOT
 from tests.scene_file.mistakes import MISTAKES, page, said
 from tests.scene_file.texts import GOOD, changed
@@ -221,12 +221,12 @@ def test_all_ranks_report_the_same_mistake(mpirun: Callable[..., str]) -> None:
             if comm.rank == 0:
                 print(found[0])
         from fenics_contact.errors import InvalidInputError
-        from fenics_contact.scene_file import read_scene_file
+        from fenics_contact import read_scene_file
         mesh = {"shape": "block", "lower": [0, 0, 0], "upper": [1, 1, 1], "counts": [1, 1, 1]}
         data = {"meshes": {"m": mesh}, "materials": {"s": {"model": f"{folder}/{comm.rank}.py:A"}}}
         file = read_scene_file({**data, "bodies": {"a": {"mesh": "m", "material": "s"}}}, comm)
         if comm.rank == 0:
-            code = "from fenics_contact.scene import IsotropicElasticity as E; A = lambda: E(1.0, 0.0)"
+            code = "from fenics_contact._scene import IsotropicElasticity as E; A = lambda: E(1.0, 0.0)"
             (folder / "0.py").write_text(code)
         try:
             file.scene

@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.cli import main
+from fenics_contact import read_scene_file
+from fenics_contact._base.progress import is_visible
+from fenics_contact._cli.app import main
+from fenics_contact._scene_file.source import SceneFileError
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.progress import is_visible
-from fenics_contact.scene_file import SceneFileError, read_scene_file
 from tests.scene_file.mutations import bases, mutated
 
 QUICK, ALL = 150, 3000

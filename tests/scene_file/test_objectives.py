@@ -9,15 +9,17 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.optimize import NonlinearConstraint
-from fenics_contact.scene_file import SceneFile, SceneFileError, read_scene_file
-from fenics_contact.shape import (
+from fenics_contact import read_scene_file
+from fenics_contact._scene_file.reading import SceneFile
+from fenics_contact._scene_file.source import SceneFileError
+from fenics_contact.design import (
     ContactArea,
     FrictionWork,
     LargestPressure,
     LargestStress,
     Maximum,
     Movement,
+    NonlinearConstraint,
     Objective,
     PressureNorm,
     PressureUnevenness,

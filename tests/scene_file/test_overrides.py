@@ -11,8 +11,10 @@ import jsonschema
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.scene_file import SceneFile, SceneFileError, json_schema, read_scene_file
-from fenics_contact.scene_file.lines import lines_of, nearest
+from fenics_contact import read_scene_file
+from fenics_contact._scene_file.reading import SceneFile
+from fenics_contact._scene_file.source import SceneFileError, lines_of, nearest
+from fenics_contact._scene_file.validation import json_schema
 from tests.conftest import ROOT
 from tests.scene_file.mistakes import MISTAKES
 from tests.scene_file.texts import GOOD, changed

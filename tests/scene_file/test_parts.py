@@ -9,9 +9,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import scene
+from fenics_contact import read_scene_file
+from fenics_contact._scene import loads as loads_module
+from fenics_contact._scene import obstacles, pairs
+from fenics_contact._scene import supports as supports_module
+from fenics_contact._scene_file.reading import SceneFile
+from fenics_contact._scene_file.source import SceneFileError
+from fenics_contact._scene_file.values import Expression, VectorExpression
 from fenics_contact.gallery import LinkShape, block, chain, half_disc, hemisphere, rectangle
-from fenics_contact.scene_file import Expression, SceneFile, SceneFileError, VectorExpression, read_scene_file
+from fenics_contact.materials import elastic, hyperelastic, orthotropic, plastic
 from tests.scene_file.texts import changed
 
 SELF = MPI.COMM_SELF
@@ -77,50 +83,50 @@ def test_the_parts_of_a_chain_are_its_links() -> None:
 @pytest.mark.parametrize(
     ("given", "built"),
     [
-        (STEEL, scene.IsotropicElasticity(2.1e5, 0.3, 1.2e-5)),
+        (STEEL, elastic.IsotropicElasticity(2.1e5, 0.3, 1.2e-5)),
         (
             {
                 "model": "orthotropic", "young_moduli": [3, 2, 1], "poisson_ratios": [0.1, 0.2, 0.3],
                 "shear_moduli": [1, 1, 1], "axis_1": [0, 2, 0], "axis_2": [-1, 1, 0],
             },
-            scene.OrthotropicElasticity(
-                (3, 2, 1), (0.1, 0.2, 0.3), (1, 1, 1), scene.material_axes((0, 1, 0), (-1, 0, 0))
+            orthotropic.OrthotropicElasticity(
+                (3, 2, 1), (0.1, 0.2, 0.3), (1, 1, 1), orthotropic.material_axes((0, 1, 0), (-1, 0, 0))
             ),
         ),
         (
             YIELDING | {"model": "j2_plasticity", "kinematic_hardening": 1e3},
-            scene.J2Plasticity(2.1e5, 0.3, 235, 2e3, 1e3),
+            plastic.J2Plasticity(2.1e5, 0.3, 235, 2e3, 1e3),
         ),
         (
             YIELDING | {"model": "finite_plasticity", "saturation_stress": 300, "saturation_rate": 9},
-            scene.FinitePlasticity(2.1e5, 0.3, 235, 2e3, 300, 9),
+            plastic.FinitePlasticity(2.1e5, 0.3, 235, 2e3, 300, 9),
         ),
         (
             {"model": "neo_hooke", "young_modulus": 10, "poisson_ratio": 0.4999, "mean_dilatation": True},
-            scene.NeoHooke(10.0, 0.4999, mean_dilatation=True),
+            hyperelastic.NeoHooke(10.0, 0.4999, mean_dilatation=True),
         ),
         (
             {"model": "mooney_rivlin", "c10": 1.0, "c01": 0.2, "bulk_modulus": 1e3},
-            scene.MooneyRivlin(1.0, 0.2, 1e3),
+            hyperelastic.MooneyRivlin(1.0, 0.2, 1e3),
         ),
         (
             {"model": "ogden", "shear_moduli": [2, -0.4], "exponents": [1.3, -2], "bulk_modulus": 9},
-            scene.Ogden((2.0, -0.4), (1.3, -2.0), 9.0),
+            hyperelastic.Ogden((2.0, -0.4), (1.3, -2.0), 9.0),
         ),
         (
             {"model": "st_venant_kirchhoff", "young_modulus": 10, "poisson_ratio": 0.2},
-            scene.StVenantKirchhoff(10.0, 0.2),
+            hyperelastic.StVenantKirchhoff(10.0, 0.2),
         ),
     ],
     ids=["isotropic", "orthotropic", "j2", "finite", "neo", "mooney", "ogden", "st_venant"],
 )  # fmt: skip
-def test_materials_are_those_of_the_package(given: dict[str, Any], built: scene.Material) -> None:
+def test_materials_are_those_of_the_package(given: dict[str, Any], built: elastic.Material) -> None:
     assert file_of(material=given).scene.bodies["a"].material == built
 
 
 OWN = """
 from dataclasses import dataclass
-from fenics_contact.scene import IsotropicElasticity
+from fenics_contact.materials import IsotropicElasticity
 
 @dataclass(frozen=True)
 class Soft(IsotropicElasticity):
@@ -170,22 +176,22 @@ def test_loads_and_supports_are_those_of_the_package() -> None:
     ]
     found = file_of(loads=loads, supports=supports).scene
     assert list(found.loads) == [
-        scene.Traction("a", "z1", VectorExpression((Expression("x"), 0.0, 1.5))),
-        scene.TotalForce("a", "z1", (1.0, 2.0, 3.0)),
-        scene.TotalForce("a", "z1", (1.0, 2.0, 3.0), at=(5.0, 0.0, 0.0)),
-        scene.TotalForce("a", "z1", (0.0, 0.0, 0.0), moment=(0.0, 0.0, 7.0)),
-        scene.Pressure("a", "x1", Expression("2 * z")),
-        scene.BodyForce("a", (0.0, 0.0, -1.0)),
-        scene.gravity("a", 2.0, (0, 0, -10)),
-        scene.ThermalStrain("a", 50.0),
+        loads_module.Traction("a", "z1", VectorExpression((Expression("x"), 0.0, 1.5))),
+        loads_module.TotalForce("a", "z1", (1.0, 2.0, 3.0)),
+        loads_module.TotalForce("a", "z1", (1.0, 2.0, 3.0), at=(5.0, 0.0, 0.0)),
+        loads_module.TotalForce("a", "z1", (0.0, 0.0, 0.0), moment=(0.0, 0.0, 7.0)),
+        loads_module.Pressure("a", "x1", Expression("2 * z")),
+        loads_module.BodyForce("a", (0.0, 0.0, -1.0)),
+        loads_module.gravity("a", 2.0, (0, 0, -10)),
+        loads_module.ThermalStrain("a", 50.0),
     ]
     assert list(found.supports) == [
-        scene.Support("a", "z0"),
-        scene.Support("a", "x0", (Expression("0.1 * y"), None, 0.5)),
+        supports_module.Support("a", "z0"),
+        supports_module.Support("a", "x0", (Expression("0.1 * y"), None, 0.5)),
     ]
 
 
-def contact_with(**keys: Any) -> scene.ContactPair:
+def contact_with(**keys: Any) -> pairs.ContactPair:
     contact = {"slave": {"body": "a", "surface": "z0"}, "master": FLOOR, **keys}
     (pair,) = file_of(contacts=[contact]).scene.contacts
     return pair
@@ -249,12 +255,12 @@ def test_obstacles_and_laws_of_friction_are_those_of_the_package() -> None:
         for master, law in zip(masters, laws, strict=True)
     ]
     found = file_of(contacts=contacts).scene.contacts
-    assert [pair.friction for pair in found] == [None, scene.Coulomb(0.2), scene.Tresca(3.0), None]
+    assert [pair.friction for pair in found] == [None, pairs.Coulomb(0.2), pairs.Tresca(3.0), None]
     assert [pair.master for pair in found] == [
-        scene.RigidPlane((0, 0, 0), (0, 0, 1)),
-        scene.RigidSphere((0, 0, -9), 9.0),
-        scene.RigidCylinder((0, 0, -9), (1, 0, 0), 9.0),
-        scene.DistanceObstacle(Expression("z")),
+        obstacles.RigidPlane((0, 0, 0), (0, 0, 1)),
+        obstacles.RigidSphere((0, 0, -9), 9.0),
+        obstacles.RigidCylinder((0, 0, -9), (1, 0, 0), 9.0),
+        obstacles.DistanceObstacle(Expression("z")),
     ]
 
 

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import scene
-from fenics_contact.scene_file import SceneFile, SceneFileError, read_scene_file
+from fenics_contact import read_scene_file
+from fenics_contact._scene import supports as supports_module
+from fenics_contact._scene_file.reading import SceneFile
+from fenics_contact._scene_file.source import SceneFileError
 
 SELF = MPI.COMM_SELF
 STEEL = {"young_modulus": 2.1e5, "poisson_ratio": 0.3}
@@ -35,8 +37,13 @@ def test_a_rigid_surface_is_that_of_the_package() -> None:
     moved = {**RIGID, "value": [0, "free", -1, "free", 0, 0.02], "moment": [3, 0, 0]}
     loaded = {**RIGID, "force": [0, 0, -5]}
     for given, expected in (
-        (moved, scene.RigidSurface("a", "z1", (1, 0.5, 3), (0, None, -1), (None, 0, 0.02), moment=(3, 0, 0))),
-        (loaded, scene.RigidSurface("a", "z1", (1, 0.5, 3), (None,) * 3, (None,) * 3, (0, 0, -5))),
+        (
+            moved,
+            supports_module.RigidSurface(
+                "a", "z1", (1, 0.5, 3), (0, None, -1), (None, 0, 0.02), moment=(3, 0, 0)
+            ),
+        ),
+        (loaded, supports_module.RigidSurface("a", "z1", (1, 0.5, 3), (None,) * 3, (None,) * 3, (0, 0, -5))),
     ):
         assert list(file_of(supports=[given]).scene.supports) == [expected]
     plane = {
@@ -46,7 +53,7 @@ def test_a_rigid_surface_is_that_of_the_package() -> None:
         "supports": [{**RIGID, "surface": "x1", "at": [2, 0.5], "value": [0, "free", 0.1]}],
     }
     (found,) = read_scene_file(plane, SELF).scene.supports
-    assert found == scene.RigidSurface("a", "x1", (2, 0.5), (0, None), 0.1)
+    assert found == supports_module.RigidSurface("a", "x1", (2, 0.5), (0, None), 0.1)
 
 
 def test_steps_turn_a_rigid_surface() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fenics_contact.shape import (
+from fenics_contact.design import (
     ContactArea,
     FrictionWork,
     LargestPressure,

@@ -7,20 +7,21 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.gallery import DesignSurface, block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
+    BodyMesh,
     ContactPair,
-    IsotropicElasticity,
+    ContactProblem,
     Scene,
     Support,
     Surface,
+    SurfaceDesign,
     Traction,
 )
-from fenics_contact.shape import SurfaceDesign, TotalPotential
+from fenics_contact.design import TotalPotential
+from fenics_contact.gallery import DesignSurface, block
+from fenics_contact.materials import IsotropicElasticity
 from tests.contact.gallery import FLOOR, Friction, crowned, partitions
 from tests.shape.chains import SOLVER
 from tests.shape.quotients import Remembering

@@ -7,21 +7,23 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.errors import InvalidDesignError
-from fenics_contact.gallery import block
-from fenics_contact.mesh_io import refilled
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
     Scene,
+    ShapeProblem,
     Support,
     Surface,
+    SurfaceDesign,
 )
-from fenics_contact.shape import Remeshed, ShapeProblem, StrainEnergy, SurfaceDesign
+from fenics_contact.design import Remeshed, StrainEnergy
+from fenics_contact.errors import InvalidDesignError
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.readers.gmsh import refilled
 
 STONE = IsotropicElasticity(100.0, 0.2)
 COUNTS = (8, 2, 6)

@@ -9,26 +9,25 @@ import numpy as np
 from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.gallery import PULL_AXIS, LinkShape, TwoLinks, two_links
-from fenics_contact.partition import box_partition
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
     Scene,
     Support,
     Surface,
+    SurfaceDesign,
     TotalForce,
     Tresca,
+    box_partition,
 )
-from fenics_contact.shape import (
-    SurfaceDesign,
-    TotalPotential,
-)
-from fenics_contact.surfaces import Geometry
+from fenics_contact._surfaces.true_surface import Geometry
+from fenics_contact.design import TotalPotential
+from fenics_contact.gallery import LinkShape, TwoLinks, two_links
+from fenics_contact.gallery.links import PULL_AXIS
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.qp import FaceNewton
 from tests.contact.gallery import Friction
 from tests.shape.quotients import Line, Remembering
 

@@ -7,17 +7,18 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, ContactResult
-from fenics_contact.optimize import BundleTrust, NonlinearConstraint, Result, minimize
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import Coulomb
-from fenics_contact.shape import (
+from fenics_contact import ContactProblem, Coulomb, ShapeProblem, minimize
+from fenics_contact.design import (
     AdaptiveTolerance,
+    BundleTrust,
     ContactForces,
-    DesignFunction,
-    ShapeProblem,
+    NonlinearConstraint,
+    Result,
     TotalPotential,
 )
+from fenics_contact.design.design_function import DesignFunction
+from fenics_contact.qp import FaceNewton
+from fenics_contact.results import ContactResult
 from tests.contact.gallery import partitions
 from tests.shape.blocks import block_on_floor, designs_of
 

@@ -5,24 +5,25 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.nonlinear import AutomaticSteps
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
+from fenics_contact import (
+    AutomaticSteps,
     Body,
+    BodyMesh,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    NeoHooke,
-    RigidObstacle,
     RigidPlane,
     RigidSphere,
     Scene,
     Support,
     Surface,
+    SurfaceDesign,
+    box_partition,
 )
-from fenics_contact.shape import Objective, SurfaceDesign
+from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact.design import Objective
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import NeoHooke
 from tests.shape.quotients import Remembering
 
 RUBBER, HARDER = NeoHooke(1.0, 0.3), NeoHooke(2.0, 0.3)

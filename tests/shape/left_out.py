@@ -9,14 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.shape import (
-    contact_derivative,
-    problem,
-    projection_derivative,
-    sensitivity,
-    work_derivative,
+from fenics_contact.design import (
+    contact_derivatives as contact_derivative,
 )
-from fenics_contact.shape.linearised_face import LinearisedFace
+from fenics_contact.design import (
+    contact_derivatives as projection_derivative,
+)
+from fenics_contact.design import (
+    load_derivatives as work_derivative,
+)
+from fenics_contact.design import (
+    problem,
+    sensitivity,
+)
+from fenics_contact.design.adjoint import LinearisedFace
 from tests.shape.quotients import Patch
 
 

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.scene import Coulomb, LoadStep, Traction
-from fenics_contact.shape import LoadCases, ShapeProblem, TotalPotential
+from fenics_contact import ContactProblem, Coulomb, LoadStep, ShapeProblem, Traction
+from fenics_contact.design import LoadCases, TotalPotential
 from tests.contact.gallery import partitions
 from tests.shape.blocks import block_on_block, designs_of
 from tests.shape.chains import SOLVER

@@ -9,18 +9,20 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.scene import (
-    AnySupport,
+from fenics_contact import (
+    ContactProblem,
     Coulomb,
     LoadStep,
     RigidSurface,
     Scene,
+    ShapeProblem,
     Support,
     Surface,
+    SurfaceDesign,
     Traction,
 )
-from fenics_contact.shape import FrictionWork, LoadPath, Objective, ShapeProblem, SurfaceDesign
+from fenics_contact._scene.supports import AnySupport
+from fenics_contact.design import FrictionWork, LoadPath, Objective
 from tests.contact.gallery import partitions
 from tests.shape.blocks import block_on_block, block_on_floor, designs_of
 from tests.shape.chains import SOLVER

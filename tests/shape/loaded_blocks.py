@@ -8,16 +8,12 @@ from functools import cache
 import numpy as np
 import ufl
 
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
-    Load,
-    PlaneStrain,
     Pressure,
     SampledField,
     Scene,
@@ -27,6 +23,10 @@ from fenics_contact.scene import (
     Traction,
     Ufl,
 )
+from fenics_contact._scene.loads import Load
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.mesh import quadratic
 from tests.contact.gallery import FLOOR, crowned
 from tests.shape.objectives import objectives
 from tests.shape.plane_blocks import FLOOR as GROUND

@@ -10,17 +10,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
+from fenics_contact import Body, ContactProblem, Coulomb, Scene, Surface, Tresca, box_partition
+from fenics_contact.design import Objective, TotalPotential
 from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
-    Body,
-    Coulomb,
-    Scene,
-    Surface,
-    Tresca,
-)
-from fenics_contact.shape import Objective, TotalPotential
 from tests.contact.gallery import crowned
 from tests.shape.aims import aims
 from tests.shape.blocks import PLASTIC, RUBBER, block_on_block, problem

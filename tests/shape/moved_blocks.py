@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from fenics_contact.scene import Coulomb, Scene, Tresca
+from fenics_contact import Coulomb, Scene, Tresca
 from tests.shape.blocks import block_on_block, block_on_floor, problem
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Line

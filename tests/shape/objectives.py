@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import ufl
 
-from fenics_contact.contact import ContactResult
-from fenics_contact.shape import ContactForces, Objective, TotalPotential, VolumeIntegral
+from fenics_contact.design import ContactForces, Objective, TotalPotential, VolumeIntegral
+from fenics_contact.results import ContactResult
 
 
 def _squares(forces: np.ndarray) -> tuple[float, np.ndarray]:

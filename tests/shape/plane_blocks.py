@@ -8,26 +8,27 @@ from functools import cache
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.gallery import rectangle
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
+    BodyMesh,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    PlaneStrain,
-    PlaneStress,
-    RigidObstacle,
     RigidPlane,
     RigidSphere,
     Scene,
     Support,
     Surface,
+    SurfaceDesign,
     Traction,
     Tresca,
 )
-from fenics_contact.shape import SurfaceDesign, TotalPotential
+from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact.design import TotalPotential
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import PlaneStrain, PlaneStress
+from fenics_contact.mesh import quadratic
 from tests.contact.gallery import Friction, crowned, partitions
 from tests.shape.aims import aims
 from tests.shape.chains import SOLVER

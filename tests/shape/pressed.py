@@ -8,10 +8,10 @@ from functools import cache
 
 import numpy as np
 
-from fenics_contact.contact import ContactResult, Status
+from fenics_contact import Body, ContactPair, Coulomb, Scene, Status, Support, Surface
+from fenics_contact.design import WeakChoice
 from fenics_contact.gallery import block
-from fenics_contact.scene import Body, ContactPair, Coulomb, Scene, Support, Surface
-from fenics_contact.shape import WeakChoice
+from fenics_contact.results import ContactResult
 from tests.contact.gallery import FLOOR, Friction, crowned
 from tests.shape.blocks import RUBBER, problem
 from tests.shape.quotients import Line, Remembering

@@ -7,19 +7,9 @@ from functools import cache
 
 import numpy as np
 
+from fenics_contact import Body, BodyForce, ContactPair, Coulomb, Scene, Support, Surface, Traction, Tresca
 from fenics_contact.gallery import block
 from fenics_contact.mesh import quadratic
-from fenics_contact.scene import (
-    Body,
-    BodyForce,
-    ContactPair,
-    Coulomb,
-    Scene,
-    Support,
-    Surface,
-    Traction,
-    Tresca,
-)
 from tests.contact.gallery import FLOOR, Friction, crowned
 from tests.shape.blocks import PLASTIC, RUBBER
 from tests.shape.objectives import objectives

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, ContactProblem, Status
-from fenics_contact.shape import DesignPoint, Objective, ShapeProblem
+from fenics_contact import ContactProblem, ShapeProblem, Status
+from fenics_contact.design import DesignPoint, Objective
+from fenics_contact.results.deformed_state import AnyState
 
 Problem = TypeVar("Problem")
 

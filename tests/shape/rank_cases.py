@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from fenics_contact import BodyForce, Coulomb, Surface, ThermalStrain, TotalForce, Tresca
+from fenics_contact.design import PressureNorm
+from fenics_contact.design.motion import MeshMotion
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
-from fenics_contact.scene import BodyForce, Coulomb, Surface, ThermalStrain, TotalForce, Tresca
-from fenics_contact.shape import MeshMotion, PressureNorm
 from tests.shape.aims import aims
 from tests.shape.blocks import block_on_block, problem
 from tests.shape.chains import chain_problem

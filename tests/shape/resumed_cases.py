@@ -12,11 +12,16 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.optimize import BundleTrust, Checkpoint, LinearConstraints, Result, minimize
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import Coulomb
-from fenics_contact.shape import AdaptiveTolerance, ContactForces, ShapeProblem, TotalPotential
+from fenics_contact import ContactProblem, Coulomb, ShapeProblem, box_partition, minimize
+from fenics_contact.design import (
+    AdaptiveTolerance,
+    BundleTrust,
+    Checkpoint,
+    ContactForces,
+    LinearConstraints,
+    Result,
+    TotalPotential,
+)
 from tests.contact.gallery import partitions
 from tests.shape.blocks import block_on_floor, designs_of
 from tests.shape.chains import BOXES, chain, chain_designs

@@ -8,11 +8,21 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, ContactResult
+from fenics_contact import (
+    Body,
+    ContactPair,
+    ContactProblem,
+    Scene,
+    ShapeProblem,
+    Support,
+    Surface,
+    SurfaceDesign,
+    minimize,
+)
+from fenics_contact.design import BundleTrust, Checkpoint, ContactForces, Result
 from fenics_contact.gallery import DesignSurface, block
-from fenics_contact.optimize import BundleTrust, Checkpoint, Result, minimize
-from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, Scene, Support, Surface
-from fenics_contact.shape import ContactForces, ShapeProblem, SurfaceDesign
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.results import ContactResult
 from tests.contact.gallery import FLOOR, Friction, partitions
 
 Array = np.ndarray

@@ -9,36 +9,32 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.errors import ConvergenceError
-from fenics_contact.gallery import rectangle
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    Material,
-    NeoHooke,
-    PlaneStrain,
     RigidPlane,
     Scene,
+    ShapeProblem,
     Support,
     Surface,
+    SurfaceDesign,
     Traction,
 )
-from fenics_contact.shape import (
+from fenics_contact.design import (
+    Adjoint,
     Objective,
+    Partials,
     PressureNorm,
     PressureUnevenness,
-    ShapeProblem,
     StrainEnergy,
-    SurfaceDesign,
     WeakChoice,
-    linearise_face,
-    solve_adjoint,
 )
-from fenics_contact.shape.adjoint import Adjoint
-from fenics_contact.shape.linearised_face import LinearisedFace
-from fenics_contact.shape.objective import Partials
+from fenics_contact.design.adjoint import LinearisedFace, linearise_face, solve_adjoint
+from fenics_contact.errors import ConvergenceError
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import Material, NeoHooke, PlaneStrain
 from tests.shape.blocks import block_on_floor, problem
 from tests.shape.chains import line
 from tests.shape.objectives import objectives

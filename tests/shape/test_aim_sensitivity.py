@@ -6,7 +6,7 @@ from functools import cache
 
 import pytest
 
-from fenics_contact.shape import Objective
+from fenics_contact.design import Objective
 from tests.shape import chains, mortar_lines, moved_blocks, quadratic_blocks
 from tests.shape.aims import aims
 from tests.shape.quotients import Line, check_adjoint

@@ -9,21 +9,20 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, State, Status
-from fenics_contact.errors import InvalidDesignError, InvalidInputError
-from fenics_contact.gallery import block
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
-    IsotropicElasticity,
+    ContactProblem,
     RigidPlane,
     Scene,
+    State,
+    Status,
     Support,
     Surface,
     ThermalStrain,
     Traction,
 )
-from fenics_contact.shape import (
+from fenics_contact.design import (
     ContactArea,
     FrictionWork,
     LargestPressure,
@@ -36,7 +35,10 @@ from fenics_contact.shape import (
     StrainEnergy,
     TotalPotential,
 )
-from fenics_contact.shape.forms import ShapeForms
+from fenics_contact.design.forms import ShapeForms
+from fenics_contact.errors import InvalidDesignError, InvalidInputError
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
 from tests.contact.gallery import FLOOR, crowned
 from tests.shape import moved_blocks
 from tests.shape.blocks import RUBBER

@@ -6,11 +6,21 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.gallery import rectangle
-from fenics_contact.optimize import BundleTrust, minimize
-from fenics_contact.scene import Body, ContactPair, Coulomb, PlaneStrain, Scene, Support, Surface, Traction
-from fenics_contact.shape import (
+from fenics_contact import (
+    Body,
+    ContactPair,
+    ContactProblem,
+    Coulomb,
+    Scene,
+    ShapeProblem,
+    Support,
+    Surface,
+    SurfaceDesign,
+    Traction,
+    minimize,
+)
+from fenics_contact.design import (
+    BundleTrust,
     DesignPoint,
     FrictionWork,
     LargestPressure,
@@ -18,10 +28,10 @@ from fenics_contact.shape import (
     Maximum,
     Objective,
     PressureNorm,
-    ShapeProblem,
-    SurfaceDesign,
 )
-from fenics_contact.shape.forms import ShapeForms
+from fenics_contact.design.forms import ShapeForms
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import PlaneStrain
 
 RUBBER, MEAN = PlaneStrain(100.0, 0.3), 2.0
 

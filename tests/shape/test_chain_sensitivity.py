@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenics_contact.contact import Status
-from fenics_contact.surfaces import Geometry
+from fenics_contact import Status
+from fenics_contact._surfaces.true_surface import Geometry
 from tests.shape.chains import REGIMES, line
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Line

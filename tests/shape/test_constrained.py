@@ -9,16 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.io import read_result, write_optimisation_result
-from fenics_contact.optimize import Checkpoint, NonlinearConstraint, Result, minimize
-from fenics_contact.shape import (
+from fenics_contact import ShapeProblem, minimize
+from fenics_contact.design import (
     AdaptiveTolerance,
+    Checkpoint,
     ContactForces,
-    DesignFunction,
-    ShapeProblem,
+    NonlinearConstraint,
+    Result,
     TotalPotential,
 )
+from fenics_contact.design.design_function import DesignFunction
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.output import read_result, write_optimisation_result
 from tests.shape.constrained_blocks import BOUND, FORCE, largest_force, minimised, posed
 from tests.shape.objectives import normal_forces
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fenics_contact.scene import Coulomb, IsotropicElasticity
+from fenics_contact import Coulomb
+from fenics_contact.materials import IsotropicElasticity
 from tests.shape.blocks import block_on_block, problem
 
 LOAD = (0.6, 0.12, -2.0)

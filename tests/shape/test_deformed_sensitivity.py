@@ -10,12 +10,19 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from fenics_contact.contact import DeformedState, Status
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.nonlinear import AutomaticSteps
-from fenics_contact.pairing.sliding import points as sliding_points
-from fenics_contact.scene import LoadStep, Material, MovingObstacle, PlaneStrain, Scene, Surface
-from fenics_contact.shape import (
+from fenics_contact import (
+    AutomaticSteps,
+    DeformedState,
+    LoadStep,
+    MovingObstacle,
+    Scene,
+    ShapeProblem,
+    Status,
+    Surface,
+    SurfaceDesign,
+)
+from fenics_contact._pairing.sliding import points as sliding_points
+from fenics_contact.design import (
     ContactArea,
     LargestPressure,
     LoadPath,
@@ -23,11 +30,13 @@ from fenics_contact.shape import (
     Objective,
     PressureNorm,
     PressureUnevenness,
-    ShapeProblem,
     StrainEnergy,
-    SurfaceDesign,
-    area_derivative,
 )
+from fenics_contact.design import (
+    sensitivity as area_derivative,
+)
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials import Material, PlaneStrain
 from tests.shape.deformed_blocks import HARDER, design_problem, pressed
 
 Patch = pytest.MonkeyPatch

@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fenics_contact import Body, Scene, Support, SurfaceDesign
+from fenics_contact.design.design import bernstein, tensor_bernstein
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle, side_of
-from fenics_contact.scene import Body, Scene, Support
-from fenics_contact.shape import SurfaceDesign
-from fenics_contact.shape.bernstein import bernstein, tensor_bernstein
 from tests.shape.blocks import RUBBER, side
 from tests.shape.chains import crossed_links
 

@@ -9,27 +9,28 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import rectangle
-from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
-from fenics_contact.optimize import BundleTrust, minimize
-from fenics_contact.outer import SceneResponse
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import (
+from fenics_contact import (
+    AutomaticSteps,
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    Material,
-    NeoHooke,
-    PlaneStrain,
     RigidPlane,
     Scene,
+    SceneResponse,
+    ShapeProblem,
     Support,
     Surface,
+    SurfaceDesign,
+    TangentNewton,
+    minimize,
 )
-from fenics_contact.shape import LoadCases, Movement, Remeshed, ShapeProblem, SurfaceDesign
-from fenics_contact.surface_shapes import Plane
+from fenics_contact.design import BundleTrust, LoadCases, Movement, Remeshed
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import Material, NeoHooke, PlaneStrain
+from fenics_contact.qp import FaceNewton
+from fenics_contact.shapes import Plane
 
 STEEL, RUBBER = PlaneStrain(100.0, 0.3), NeoHooke(1.0, 0.3)
 #: A design whose middle lies inside the floor, by more than facets explain.

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
+from fenics_contact import ContactProblem, Coulomb, SampledField, Scene, ShapeProblem, Tresca
+from fenics_contact._scene.fields import gradients_of
+from fenics_contact.design import Objective
+from fenics_contact.design import contact_derivatives as contact_derivative
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import Coulomb, SampledField, Scene, Tresca, gradients_of
-from fenics_contact.shape import Objective, ShapeProblem, contact_derivative
 from tests.shape.blocks import block_on_block, block_on_floor, designs_of, problem
 from tests.shape.objectives import objectives
 from tests.shape.plane_blocks import line_of, on_block, on_obstacle, plane_problem

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
+from fenics_contact import ContactProblem, Coulomb, Scene, ShapeProblem
+from fenics_contact.design import TotalPotential
 from fenics_contact.errors import InvalidDesignError
-from fenics_contact.scene import Coulomb, Scene
-from fenics_contact.shape import ShapeProblem, TotalPotential
 from tests.shape.blocks import block_on_block, block_on_floor, designs_of, problem
 from tests.shape.moved_blocks import DRAG, PUSH
 from tests.shape.objectives import objectives

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
+from fenics_contact import ContactProblem, ShapeProblem
+from fenics_contact._optimize.result import StepKind
+from fenics_contact.design import AdaptiveTolerance, DesignPoint, Result, WeakChoice
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import Result, StepKind
-from fenics_contact.shape import AdaptiveTolerance, DesignPoint, ShapeProblem, WeakChoice
 from tests.contact.gallery import partitions
 from tests.shape.objectives import objectives
 from tests.shape.pressed import DESIGN, SWITCHES

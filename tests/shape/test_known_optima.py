@@ -8,20 +8,29 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.gallery import rectangle
-from fenics_contact.optimize import BundleTrust, NonlinearConstraint, Result, minimize
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
-    PlaneStress,
+    ContactProblem,
     RigidPlane,
     Scene,
+    ShapeProblem,
     Support,
     Surface,
+    SurfaceDesign,
     TotalForce,
+    minimize,
 )
-from fenics_contact.shape import LargestStress, Objective, ShapeProblem, StrainEnergy, SurfaceDesign
+from fenics_contact.design import (
+    BundleTrust,
+    LargestStress,
+    NonlinearConstraint,
+    Objective,
+    Result,
+    StrainEnergy,
+)
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import PlaneStress
 
 WIDTH, HEIGHT, FORCE, YOUNG = 1.0, 2.0, 3.0, 1000.0
 STRESS = LargestStress("column", p=12.0)

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import Body, Scene, Support, minimize
+from fenics_contact.design import LoadCases
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import minimize
-from fenics_contact.scene import Body, Scene, Support
-from fenics_contact.shape import LoadCases
 from tests.shape.blocks import RUBBER
 from tests.shape.load_cases_on_ranks import WEIGHTS, cases_of
 

@@ -12,21 +12,24 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, Status, solve_steps
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import BundleTrust, NonlinearConstraint, minimize
-from fenics_contact.scene import LoadStep, Support
-from fenics_contact.shape import (
+from fenics_contact import ContactProblem, LoadStep, ShapeProblem, Status, Support, minimize, solve_steps
+from fenics_contact.design import (
     AdaptiveTolerance,
+    BundleTrust,
     FrictionWork,
     LoadPath,
     Movement,
+    NonlinearConstraint,
     Objective,
     PressureNorm,
-    ShapeProblem,
-    load_path,
-    slip_history,
 )
+from fenics_contact.design import (
+    adjoint as slip_history,
+)
+from fenics_contact.design import (
+    several as load_path,
+)
+from fenics_contact.errors import InvalidInputError
 from tests.contact.gallery import partitions
 from tests.shape.chains import SOLVER
 from tests.shape.load_paths import PathLine, beam, line_of, path_of

@@ -9,9 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fenics_contact import Pressure, ShapeProblem
+from fenics_contact.design import (
+    load_derivatives as resultant_derivative,
+)
+from fenics_contact.design import (
+    load_derivatives as work_derivative,
+)
+from fenics_contact.design import (
+    motion as volume_integral,
+)
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import Pressure
-from fenics_contact.shape import ShapeProblem, resultant_derivative, volume_integral, work_derivative
 from tests.shape.loaded_blocks import OBJECTIVES, PLANE_PUSH, SCENES, line, loaded
 from tests.shape.plane_blocks import plane_problem
 from tests.shape.quotients import Patch, check_adjoint, check_default_settings, check_statuses, miss_without

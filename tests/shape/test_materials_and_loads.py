@@ -8,13 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fenics_contact.gallery import block
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
     ContactPair,
-    IsotropicElasticity,
-    OrthotropicElasticity,
     Pressure,
     Scene,
     Surface,
@@ -23,7 +20,10 @@ from fenics_contact.scene import (
     Tresca,
     Ufl,
 )
-from fenics_contact.shape import Objective, work_derivative
+from fenics_contact.design import Objective
+from fenics_contact.design import load_derivatives as work_derivative
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity, OrthotropicElasticity
 from tests.contact.gallery import FLOOR, crowned
 from tests.shape.aims import aims
 from tests.shape.blocks import problem

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.pairing import CouplingDerivatives, MortarPoints
-from fenics_contact.shape.mortar_derivative import mortar_points_pulled_back
-from fenics_contact.surfaces import FacetedSurface
-from fenics_contact.surfaces.facets import faceted_surface
-from fenics_contact.surfaces.reconstruction import reconstructed
+from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
+from fenics_contact._pairing.search import MortarPoints
+from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
+from fenics_contact._surfaces.true_surface import reconstructed
+from fenics_contact.design.contact_derivatives import mortar_points_pulled_back
 from tests.pairing.mortar_surfaces import SOLID, shell
 
 STEP, SHARE = 1e-6, 0.3

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, Status
-from fenics_contact.shape import ShapeProblem, TotalPotential, mortar_derivative
+from fenics_contact import ContactProblem, ShapeProblem, Status
+from fenics_contact.design import TotalPotential
+from fenics_contact.design import contact_derivatives as mortar_derivative
 from tests.shape.blocks import designs_of
 from tests.shape.mortar_lines import BLOCKS, NAMES, OBJECTIVES, line
 from tests.shape.quotients import Patch, miss_without

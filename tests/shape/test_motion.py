@@ -8,16 +8,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import Body, BodyMesh, Scene, Support, SurfaceDesign, box_partition
+from fenics_contact.design.motion import DesignGeometry, MeshMotion, motion_of
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import decompose
 from fenics_contact.gallery import LinkShape, block, box_lattice, chain_link
-from fenics_contact.mesh import BodyMesh
 from fenics_contact.mesh.quality import thickness
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import Body, Scene, Support
-from fenics_contact.shape import MeshMotion, SurfaceDesign
-from fenics_contact.shape.geometry import DesignGeometry
-from fenics_contact.shape.motion import motion_of
 from tests.shape.blocks import RUBBER
 from tests.shape.chains import chain_problem, crossed_links
 

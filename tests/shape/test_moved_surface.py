@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fenics_contact import SurfaceDesign
+from fenics_contact.design import MovedSurface
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import half_disc, side_of
-from fenics_contact.shape import MovedSurface, SurfaceDesign
 
 
 def arc(alpha: list[float], *, known: bool = True) -> MovedSurface:

@@ -7,20 +7,20 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fenics_contact.gallery import block
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
     DistanceObstacle,
     RigidCylinder,
-    RigidObstacle,
     RigidSphere,
     Scene,
     Surface,
     Traction,
     Tresca,
 )
+from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact.gallery import block
 from tests.contact.gallery import Friction, crowned
 from tests.shape.blocks import RUBBER, problem
 from tests.shape.objectives import objectives

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.optimize import BundleTrust, LinearConstraints, Result, StepKind, minimize
+from fenics_contact import ContactProblem, Coulomb, ShapeProblem, minimize
+from fenics_contact._optimize.result import StepKind
+from fenics_contact.design import BundleTrust, ContactForces, LinearConstraints, Result, TotalPotential
 from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import Coulomb
-from fenics_contact.shape import ContactForces, ShapeProblem, TotalPotential
 from tests.contact.gallery import partitions
 from tests.shape.blocks import block_on_floor, designs_of
 from tests.shape.chains import chain_problem

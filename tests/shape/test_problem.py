@@ -9,18 +9,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, ContactProblem, ContactResult
+from fenics_contact import ContactProblem, Coulomb, Scene, ShapeProblem, SurfaceDesign
+from fenics_contact.design import ContactForces, Partials, TotalPotential, VolumeIntegral
+from fenics_contact.design.forms import ShapeForms
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
-from fenics_contact.scene import Coulomb, Scene
-from fenics_contact.shape import (
-    ContactForces,
-    Partials,
-    ShapeProblem,
-    SurfaceDesign,
-    TotalPotential,
-    VolumeIntegral,
-)
-from fenics_contact.shape.forms import ShapeForms
+from fenics_contact.results import ContactResult
+from fenics_contact.results.deformed_state import AnyState
 from tests.contact.gallery import partitions
 from tests.shape.blocks import block_on_block, designs_of, problem, side
 from tests.shape.chains import SOLVER

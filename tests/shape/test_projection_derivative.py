@@ -8,21 +8,26 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fenics_contact.gallery import block
-from fenics_contact.pairing.contact_points import tangent_frames
-from fenics_contact.shape import projection_derivative
-from fenics_contact.shape.projection_derivative import (
+from fenics_contact._pairing.points import tangent_frames
+from fenics_contact._surfaces.facets import (
+    FacetedSurface,
+    Relief,
+    faceted_surface,
+    heights,
+    outside,
+    shape_functions,
+)
+from fenics_contact._surfaces.projection import Projection, project
+from fenics_contact._surfaces.true_surface import by_shape, height_over, reconstructed
+from fenics_contact.design import contact_derivatives as projection_derivative
+from fenics_contact.design.contact_derivatives import (
     PointDerivatives,
     frames_pulled_back,
+    normals_pulled_back,
     projection_pulled_back,
 )
-from fenics_contact.shape.surface_derivative import normals_pulled_back
-from fenics_contact.surface_shapes import Torus
-from fenics_contact.surfaces.facets import FacetedSurface, Relief, faceted_surface, outside, shape_functions
-from fenics_contact.surfaces.projection import Projection, project
-from fenics_contact.surfaces.reconstruction import reconstructed
-from fenics_contact.surfaces.relief import heights
-from fenics_contact.surfaces.true_surface import by_shape, height_over
+from fenics_contact.gallery import block
+from fenics_contact.shapes import Torus
 
 CELLS = ("hexahedron", "tetrahedron")
 #: What is known of the master: its facets, the shape they stand for, or its nodes, which suggest one.

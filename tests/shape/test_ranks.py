@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import Status
+from fenics_contact import Status
 from tests.conftest import run_on_ranks
 from tests.shape.rank_cases import JUDGES, PROBLEMS, collect
 

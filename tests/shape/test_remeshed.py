@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh, Scene, minimize
+from fenics_contact.design import BundleTrust, NonlinearConstraint, Remeshed, TotalPotential
+from fenics_contact.design.motion import MeshMotion
 from fenics_contact.errors import FenicsContactError, InvalidDesignError, InvalidInputError
 from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh, boundary_faces
-from fenics_contact.mesh_io import refilled
-from fenics_contact.optimize import BundleTrust, NonlinearConstraint, minimize
-from fenics_contact.scene import Scene
-from fenics_contact.shape import MeshMotion, Remeshed, TotalPotential
+from fenics_contact.mesh import boundary_faces
+from fenics_contact.readers.gmsh import refilled
 from tests.shape.bridges import COUNTS, FAR, bridge, bridge_problem, farthest
 
 

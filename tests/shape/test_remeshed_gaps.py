@@ -8,13 +8,22 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
+from fenics_contact import (
+    Body,
+    BodyMesh,
+    ContactPair,
+    ContactProblem,
+    Scene,
+    ShapeProblem,
+    Support,
+    Surface,
+    SurfaceDesign,
+)
+from fenics_contact.design import Remeshed, TotalPotential
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import Body, ContactPair, PlaneStrain, Scene, Support, Surface
-from fenics_contact.shape import Remeshed, ShapeProblem, SurfaceDesign, TotalPotential
-from fenics_contact.surface_shapes import Plane
+from fenics_contact.materials import PlaneStrain
+from fenics_contact.shapes import Plane
 
 STEEL = PlaneStrain(100.0, 0.3)
 FAR = np.array([-0.02, 0.05, -0.03, 0.01, 0.04])

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, State, Status
-from fenics_contact.scene import Coulomb, RigidSurface, Scene, Support
-from fenics_contact.shape import FrictionWork, Partials, sensitivity
+from fenics_contact import ContactProblem, Coulomb, RigidSurface, Scene, State, Status, Support
+from fenics_contact.design import FrictionWork, Partials, sensitivity
 from tests.contact.gallery import partitions
 from tests.shape.aims import aims
 from tests.shape.blocks import block_on_block, designs_of, problem

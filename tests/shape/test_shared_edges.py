@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem
-from fenics_contact.scene import Coulomb, Scene, Surface, Tresca
-from fenics_contact.shape import SurfaceDesign, TotalPotential
+from fenics_contact import ContactProblem, Coulomb, Scene, Surface, SurfaceDesign, Tresca
+from fenics_contact.design import TotalPotential
 from tests.contact.gallery import partitions
 from tests.shape.chains import SOLVER
 from tests.shape.plane_blocks import OBJECTIVES, on_block, on_obstacle

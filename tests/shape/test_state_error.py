@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, Status
+from fenics_contact import Body, ContactPair, ContactProblem, Coulomb, Scene, Status, Support, Surface, Tresca
+from fenics_contact.design import DesignPoint, TotalPotential
+from fenics_contact.design.adjoint import linearise_face
 from fenics_contact.gallery import block
 from fenics_contact.qp import DualSolver, FaceNewton, Smalse
-from fenics_contact.scene import Body, ContactPair, Coulomb, Scene, Support, Surface, Tresca
-from fenics_contact.shape import DesignPoint, TotalPotential, linearise_face
 from tests.contact.gallery import FLOOR, Friction, crowned, partitions
 from tests.shape.blocks import RUBBER, block_on_block, block_on_floor, designs_of
 from tests.shape.objectives import objectives

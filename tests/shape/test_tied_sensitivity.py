@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenics_contact.shape import tied_derivative
+from fenics_contact.design import contact_derivatives as tied_derivative
 from tests.shape.quotients import Patch, check_adjoint, check_default_settings, check_statuses, miss_without
 from tests.shape.tied_blocks import OBJECTIVES, SCENES, line
 

@@ -11,20 +11,22 @@ import pytest
 import ufl
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, ContactResult, State, Status
-from fenics_contact.gallery import block
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
     ContactPair,
+    ContactProblem,
     Coulomb,
-    IsotropicElasticity,
     Scene,
+    ShapeProblem,
+    State,
+    Status,
     Support,
     Surface,
+    SurfaceDesign,
     Traction,
 )
-from fenics_contact.shape import (
+from fenics_contact.design import (
     ContactForces,
     DesignPoint,
     FrictionWork,
@@ -34,14 +36,14 @@ from fenics_contact.shape import (
     Objective,
     PressureNorm,
     PressureUnevenness,
-    ShapeProblem,
     StrainEnergy,
-    SurfaceDesign,
     TotalPotential,
     VolumeIntegral,
-    linearise_face,
-    solve_adjoint,
 )
+from fenics_contact.design.adjoint import linearise_face, solve_adjoint
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.results import ContactResult
 from tests.contact.gallery import crowned, partitions
 from tests.shape.blocks import side
 from tests.shape.objectives import friction_forces, normal_forces

@@ -9,11 +9,23 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, ContactResult, Status, solve_scene
+from fenics_contact import (
+    Body,
+    BodyMesh,
+    ContactPair,
+    ContactProblem,
+    Coulomb,
+    Scene,
+    Status,
+    Support,
+    Surface,
+    solve_scene,
+)
+from fenics_contact.design import ContactForces, Objective, WeakChoice
+from fenics_contact.design.adjoint import linearise_face
 from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import Body, ContactPair, Coulomb, IsotropicElasticity, Scene, Support, Surface
-from fenics_contact.shape import ContactForces, Objective, WeakChoice, linearise_face
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.results import ContactResult
 from tests.contact.gallery import partitions, two_blocks
 from tests.shape.objectives import objectives
 from tests.shape.pressed import DESIGN, SWITCHES, Pressed, line

@@ -7,11 +7,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fenics_contact.contact import State
+from fenics_contact import Coulomb, State
+from fenics_contact.design import Objective, Partials, TotalPotential
+from fenics_contact.design.forms import ShapeForms
+from fenics_contact.design.objective import WeightedSum
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import Coulomb
-from fenics_contact.shape import Objective, Partials, TotalPotential, WeightedSum
-from fenics_contact.shape.forms import ShapeForms
 from tests.shape.blocks import block_on_floor, problem
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Remembering

@@ -7,22 +7,22 @@ from functools import cache
 
 import numpy as np
 
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    Discretisation,
-    IsotropicElasticity,
-    PlaneStrain,
     Scene,
     Support,
     Surface,
     Tie,
     Traction,
 )
+from fenics_contact._scene.pairs import Discretisation
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.mesh import quadratic
 from tests.contact.gallery import FLOOR, crowned
 from tests.shape.objectives import objectives
 from tests.shape.plane_blocks import FLOOR as GROUND

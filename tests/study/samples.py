@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fenics_contact.study import BALANCED, Parameters, Results, Run
-from fenics_contact.study.protocol import QuantityFacts, SceneFacts
 from fenics_contact.study.runner import Job, Record
+from fenics_contact.study.study import QuantityFacts, SceneFacts
 
 SIZES = (2, 4, 8)
 BASE = Parameters(4, discretisation="mortar")
@@ -98,9 +98,8 @@ class Machine:
 BLOCK = """
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import rectangle
-from fenics_contact.scene import (
-    Body, ContactPair, PlaneStress, RigidPlane, Scene, Support, Surface, Traction,
-)
+from fenics_contact import Body, ContactPair, RigidPlane, Scene, Support, Surface, Traction
+from fenics_contact.materials import PlaneStress
 from fenics_contact.study import Parameters, Problem, Quantity, StudyScene, Sweep
 
 

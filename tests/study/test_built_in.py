@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.study import Parameters, Settings, find_study, run_study
-from fenics_contact.study.certificates import check_certificates
-from fenics_contact.study.errors import Errors
+from fenics_contact.study import Errors, Parameters, Settings, run_study
 from fenics_contact.study.measuring import measured
+from fenics_contact.study.results import check_certificates
 from fenics_contact.study.runner import Job, measure
-from fenics_contact.study.scenes import BUILT_IN
+from fenics_contact.study.scenes import BUILT_IN, find_study
 from fenics_contact.study.scenes.nested_box import mirrored, nested_box, nested_half
 
 

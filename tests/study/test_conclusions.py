@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from fenics_contact.study import BALANCED, Errors, Run
-from fenics_contact.study.certificates import check_certificates
-from fenics_contact.study.figures.accuracy import pareto_front
-from fenics_contact.study.tables import accuracy_table, cost_table, reliable
+from fenics_contact.study import BALANCED, Errors, Run, accuracy_table, cost_table
+from fenics_contact.study.figures import pareto_front
+from fenics_contact.study.report import reliable
+from fenics_contact.study.results import check_certificates
 from tests.study.samples import BASE, results, run
 
 

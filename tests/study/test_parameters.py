@@ -9,7 +9,7 @@ import pytest
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.study import BALANCED, Parameters, Sweep
-from fenics_contact.study.parameters import parameters_from
+from fenics_contact.study.study import parameters_from
 
 
 @pytest.mark.parametrize(

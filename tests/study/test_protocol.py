@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.study import find_study
+from fenics_contact.study.scenes import find_study
 
 
 def test_a_study_without_anything_to_measure_is_refused() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenics_contact.study.richardson import extrapolate, measured_rate
+from fenics_contact.study.results import extrapolate, measured_rate
 
 
 @pytest.mark.parametrize("rate", [0.5, 1.0, 2.0, 3.5])

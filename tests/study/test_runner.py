@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from fenics_contact.progress import LOGGER_NAME, Event
+from fenics_contact._base.progress import LOGGER_NAME, Event
 from fenics_contact.study import runner
 from fenics_contact.study.runner import Job, Record, Store, fingerprint, measure, measure_all, summarised
 

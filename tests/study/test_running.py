@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
-from fenics_contact.study import Settings, runner, running
-from fenics_contact.study.running import prepare
+from fenics_contact.study import Settings, runner
+from fenics_contact.study import runner as running
+from fenics_contact.study.runner import prepare
 from tests.study.samples import BLOCK, Machine
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError, UserCodeError
-from fenics_contact.surface_shapes import (
+from fenics_contact.shapes import (
     Extruded,
     Joined,
     Parametric,
@@ -18,9 +18,9 @@ from fenics_contact.surface_shapes import (
     SignedDistance,
     Sphere,
     Torus,
-    evaluate_shape,
-    placed,
 )
+from fenics_contact.shapes.combined import placed
+from fenics_contact.shapes.simple import evaluate_shape
 
 AXIS = (1.0, 2.0, -1.0)
 CENTRE = (0.1, -0.2, 0.3)

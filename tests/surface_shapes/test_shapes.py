@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from fenics_contact.surface_shapes import (
+from fenics_contact.shapes import (
     Cylinder,
     Extruded,
     Joined,
@@ -22,13 +22,10 @@ from fenics_contact.surface_shapes import (
     Sphere,
     SurfaceShape,
     Torus,
-    closest_points,
-    evaluate_shape,
-    placed,
-    principal_curvatures,
-    simplified,
-    tensor_grid,
 )
+from fenics_contact.shapes.combined import placed, simplified
+from fenics_contact.shapes.parametric import tensor_grid
+from fenics_contact.shapes.simple import closest_points, evaluate_shape, principal_curvatures
 
 AXIS = (1.0, 2.0, -1.0)
 CENTRE = (0.1, -0.2, 0.3)

@@ -5,12 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenics_contact.surface_shapes import Cylinder, Joined, Plane, SurfaceShape, placed
-from fenics_contact.surfaces.facets import FacetedSurface, facet_shape_values, faceted_surface
-from fenics_contact.surfaces.projection import interpolated_normal
-from fenics_contact.surfaces.reconstruction import reconstructed
-from fenics_contact.surfaces.relief import corner_normals, heights
-from fenics_contact.surfaces.true_surface import by_shape, height_over
+from fenics_contact._surfaces.facets import (
+    FacetedSurface,
+    corner_normals,
+    facet_shape_values,
+    faceted_surface,
+    heights,
+)
+from fenics_contact._surfaces.projection import interpolated_normal
+from fenics_contact._surfaces.true_surface import by_shape, height_over, reconstructed
+from fenics_contact.shapes import Cylinder, Joined, Plane, SurfaceShape
+from fenics_contact.shapes.combined import placed
 from tests.pairing.mortar_surfaces import lattice
 
 CAN = (Cylinder((0, 0, 0), (0, 0, 1), 2.0), Plane((0, 0, 0), (0, 0, 1)))

@@ -7,12 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fenics_contact._surfaces.facets import FacetedSurface, heights, slopes
+from fenics_contact._surfaces.true_surface import height_over, reconstructed, without_folds
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.surface_shapes import Cylinder
-from fenics_contact.surfaces import FacetedSurface, heights
-from fenics_contact.surfaces.reconstruction import reconstructed, without_folds
-from fenics_contact.surfaces.relief import slopes
-from fenics_contact.surfaces.true_surface import height_over
+from fenics_contact.shapes import Cylinder
 from tests.pairing.mortar_surfaces import lattice
 
 

@@ -8,10 +8,10 @@ from itertools import permutations, product
 import numpy as np
 import pytest
 
-from fenics_contact.surfaces import surface_tangents
-from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface
-from fenics_contact.surfaces.fitting import PolynomialFit
-from fenics_contact.surfaces.reconstruction import reconstructed
+from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
+from fenics_contact._surfaces.fitting import PolynomialFit
+from fenics_contact._surfaces.tangents import surface_tangents
+from fenics_contact._surfaces.true_surface import reconstructed
 from tests.pairing.mortar_surfaces import lattice
 
 
@@ -63,9 +63,7 @@ def lean(found: np.ndarray, normals: np.ndarray) -> float:
 
 def strip(kind: str, cells: int, layers: int, turn: np.ndarray) -> FacetedSurface:
     """A quarter of a cylinder of radius 2 around y, turned."""
-    angle, y = np.meshgrid(
-        np.linspace(0, np.pi / 2, cells + 1), np.linspace(0, 1, layers + 1), indexing="ij"
-    )
+    angle, y = np.meshgrid(np.linspace(0, np.pi / 2, cells + 1), np.linspace(0, 1, layers + 1), indexing="ij")
     return lattice(np.stack([2 * np.sin(angle), y, 2 * np.cos(angle)], axis=-1) @ turn.T, kind, True)
 
 

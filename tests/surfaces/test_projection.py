@@ -7,9 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenics_contact.surfaces.facet_areas import quadrature_areas
-from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface, shape_functions
-from fenics_contact.surfaces.projection import Projection, project
+from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface, quadrature_areas, shape_functions
+from fenics_contact._surfaces.projection import Projection, project
 
 CORNERS = [4, 3]
 Height = Callable[[np.ndarray, np.ndarray], np.ndarray]

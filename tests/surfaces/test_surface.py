@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.surfaces.facet_areas import quadrature_areas
-from fenics_contact.surfaces.facets import (
+from fenics_contact._surfaces.facets import (
     FacetedSurface,
     edge_distance,
     faceted_surface,
     outside,
+    quadrature_areas,
     shape_functions,
 )
+from fenics_contact.errors import InvalidInputError
 
 
 def disc(n: int, radius: float = 2.0) -> FacetedSurface:

@@ -8,14 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fenics_contact import BodyMesh
+from fenics_contact._surfaces.facets import FacetedSurface, facet_shape_values, faceted_surface, heights
+from fenics_contact._surfaces.projection import interpolated_normal
+from fenics_contact._surfaces.true_surface import by_shape, height_over, reconstructed, true_surface
 from fenics_contact.gallery import block, hemisphere
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.surface_shapes import Cylinder, Sphere, SurfaceShape, Torus
-from fenics_contact.surfaces.facets import FacetedSurface, facet_shape_values, faceted_surface
-from fenics_contact.surfaces.projection import interpolated_normal
-from fenics_contact.surfaces.reconstruction import reconstructed
-from fenics_contact.surfaces.relief import heights
-from fenics_contact.surfaces.true_surface import by_shape, height_over, true_surface
+from fenics_contact.shapes import Cylinder, Sphere, SurfaceShape, Torus
 from tests.pairing.mortar_surfaces import lattice, ticks
 
 TORUS = Torus((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 3.0, 1.0)

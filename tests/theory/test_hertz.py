@@ -9,13 +9,7 @@ import pytest
 from scipy.integrate import trapezoid
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.theory import (
-    PointContact,
-    contact_modulus,
-    hertz_line,
-    hertz_point,
-    relative_curvatures,
-)
+from fenics_contact.theory import PointContact, contact_modulus, hertz_line, hertz_point, relative_curvatures
 
 #: Semi-axes over those of a circle of the same mean curvature, by the angle whose cosine is the difference of
 #: the curvatures over their sum: Timoshenko and Goodier, Theory of elasticity, section 140.

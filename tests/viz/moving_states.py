@@ -7,23 +7,23 @@ from functools import lru_cache
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, State, solve_steps
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     ContactPair,
-    IsotropicElasticity,
+    ContactProblem,
     LoadStep,
-    Material,
     MovingObstacle,
-    NeoHooke,
     RigidCylinder,
     RigidPlane,
     RigidSphere,
     Scene,
+    State,
     Support,
     Surface,
+    solve_steps,
 )
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, Material, NeoHooke
 
 
 def _turning(time: float) -> tuple[np.ndarray, tuple[float, float, float]]:

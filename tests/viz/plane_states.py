@@ -7,23 +7,24 @@ from functools import lru_cache
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
     Coulomb,
     DistanceObstacle,
-    IsotropicElasticity,
-    PlaneStrain,
     RigidCylinder,
     RigidPlane,
     RigidSphere,
     Scene,
+    State,
+    Status,
     Support,
     Surface,
+    solve_scene,
 )
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 
 FLOOR = RigidPlane((0.0, 0.0), (0.0, 1.0))
 

@@ -10,11 +10,12 @@ import numpy as np
 from matplotlib.image import imread
 from mpi4py import MPI
 
-from fenics_contact.contact import AnyState, Status, solve_scene
+from fenics_contact import Body, Coulomb, Scene, Status, Support, Traction, solve_scene
 from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import quadratic
-from fenics_contact.scene import Body, Coulomb, IsotropicElasticity, PlaneStrain, Scene, Support, Traction
-from fenics_contact.viz import Picture
+from fenics_contact.pictures import Picture
+from fenics_contact.results.deformed_state import AnyState
 from tests.contact.gallery import partitions, two_blocks
 
 

@@ -13,12 +13,12 @@ import pytest
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
+from fenics_contact import State, solve_scene
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.viz import Units, before_after, plot_before_after
-from fenics_contact.viz.before_after import _outlines as profiles
-from fenics_contact.viz.colours import GREY, ORANGE
-from fenics_contact.viz.view import axis_label
+from fenics_contact.pictures import Units, plot_before_after
+from fenics_contact.pictures import designs as before_after
+from fenics_contact.pictures.canvas import GREY, ORANGE, axis_label
+from fenics_contact.pictures.designs import _outlines as profiles
 from tests.contact.gallery import partitions
 from tests.viz.plane_states import plane_block
 from tests.viz.states import contains, painted, pixels, pulled, touching_blocks

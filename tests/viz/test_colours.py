@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from matplotlib.colors import Colormap, to_rgb
 
+from fenics_contact import box_partition
 from fenics_contact.gallery import block
-from fenics_contact.partition import box_partition
-from fenics_contact.viz.colours import (
+from fenics_contact.pictures.canvas import (
     BLUE,
     ERROR_MAP,
     FAMILIES,
@@ -23,7 +23,7 @@ from fenics_contact.viz.colours import (
     colour_subdomains,
     neighbours,
 )
-from fenics_contact.viz.curves import LOOKS
+from fenics_contact.pictures.curves import LOOKS
 
 #: Linear RGB as seen without the medium, the long and the short cones (Machado, Oliveira, Fernandes, 2009).
 DEFICIENCIES = {

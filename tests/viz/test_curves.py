@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.viz import plot_curves
+from fenics_contact.pictures import plot_curves
 from tests.viz.states import contains, pixels
 
 X = np.linspace(0.0, 1.0, 11)

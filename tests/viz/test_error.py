@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.viz import plot_error
-from fenics_contact.viz.colours import ERROR_MAP
+from fenics_contact.pictures import plot_error
+from fenics_contact.pictures.canvas import ERROR_MAP
 from tests.viz.plane_states import flat_pad, plane_block
 from tests.viz.states import contains, painted, pixels, touching_blocks
 

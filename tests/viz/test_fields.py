@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.contact import body_grid
 from fenics_contact.gallery import block
-from fenics_contact.viz.fields import cells_of, drawn_bodies, lengths, moved, nodal
+from fenics_contact.pictures.section import cells_of, drawn_bodies, lengths, moved, nodal
+from fenics_contact.results.multi_block import body_grid
 from tests.viz.states import pulled, touching_blocks
 
 

@@ -14,13 +14,13 @@ import pytest
 from matplotlib.figure import Figure
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.surface_shapes import Plane, Sphere
-from fenics_contact.viz import plot_contact_status, plot_stress, status
-from fenics_contact.viz.obstacles import obstacle_layers, obstacles_of, outline, shade_obstacles
-from fenics_contact.viz.patch import contact_patches
-from fenics_contact.viz.section import strongest_contact
-from fenics_contact.viz.sheet import sheet
-from fenics_contact.viz.view import Frame, oblique_view
+from fenics_contact.pictures import plot_contact_status, plot_stress
+from fenics_contact.pictures import states as status
+from fenics_contact.pictures.canvas import Frame, oblique_view, sheet
+from fenics_contact.pictures.drawing import obstacle_layers, obstacles_of, outline, shade_obstacles
+from fenics_contact.pictures.section import strongest_contact
+from fenics_contact.pictures.unrolled import contact_patches
+from fenics_contact.shapes import Plane, Sphere
 from tests.viz.moving_states import block_among_movers, pressed_by_a_lid
 from tests.viz.plane_states import caged_block, plane_block
 from tests.viz.states import contains, painted, pixels, touching_blocks

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 from IPython.core.formatters import DisplayFormatter
 
-from fenics_contact import viz
+from fenics_contact import pictures as viz
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.viz import Picture, plot_curves
-from fenics_contact.viz.picture import SHOWN_WIDTH
+from fenics_contact.pictures import Picture, plot_curves
+from fenics_contact.pictures.canvas import SHOWN_WIDTH
 
 LINE: dict[str, Any] = {"series": {"line": ([0.0, 1.0], [0.0, 2.0])}, "xlabel": "x (mm)", "ylabel": "y (N)"}
 

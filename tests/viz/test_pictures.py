@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fenics_contact import Body, Scene, box_partition
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import DesignSurface, block
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import Body, IsotropicElasticity, Scene
-from fenics_contact.viz import plot_control_net, plot_convergence, plot_decomposition
-from fenics_contact.viz.control_net import PIECES, _bars
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.pictures import plot_control_net, plot_convergence, plot_decomposition
+from fenics_contact.pictures.designs import PIECES, _bars
 from tests.viz.states import contains, painted, pixels
 
 SMALL = 320

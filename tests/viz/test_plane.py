@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenics_contact.contact import Status
+from fenics_contact import Body, Scene, Status
 from fenics_contact.gallery import rectangle
-from fenics_contact.scene import Body, PlaneStrain, Scene
-from fenics_contact.viz import plot_contact_pressure, plot_decomposition, plot_stress
-from fenics_contact.viz.plane import refined
-from fenics_contact.viz.trace import contact_trace, walk
+from fenics_contact.materials import PlaneStrain
+from fenics_contact.pictures import plot_contact_pressure, plot_decomposition, plot_stress
+from fenics_contact.pictures.curves import contact_trace, walk
+from fenics_contact.pictures.section import refined
 from tests.viz.plane_states import hung_block, pin_in_ring, plane_block
 from tests.viz.states import contains, painted, pixels
 
@@ -157,8 +157,8 @@ RANKS = """
     import sys
     from pathlib import Path
     from mpi4py import MPI
-    from fenics_contact.contact import solve_scene
-    from fenics_contact.viz import plot_contact_pressure, plot_stress
+    from fenics_contact import solve_scene
+    from fenics_contact.pictures import plot_contact_pressure, plot_stress
     from tests.viz.plane_states import plane_block
 
     comm, folder = MPI.COMM_WORLD, Path(sys.argv[1])

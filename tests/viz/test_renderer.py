@@ -9,16 +9,18 @@ from collections.abc import Iterator
 
 import pytest
 
+from fenics_contact import clean_environment
 from fenics_contact.errors import MissingRequirementError
-from fenics_contact.launching import clean_environment
-from fenics_contact.viz import check_libraries, check_renderer, renderer
+from fenics_contact.pictures import canvas as renderer
+from fenics_contact.pictures._libraries import check_libraries
+from fenics_contact.pictures.canvas import check_renderer
 
 #: Draws a ball, and tells whether the environment is changed afterwards.
 DRAWN = """
 import os
 import numpy as np
-from fenics_contact.viz.stage import Layer, balls, render
-from fenics_contact.viz.view import Frame, face_on
+from fenics_contact.pictures.canvas import Layer, balls, render
+from fenics_contact.pictures.canvas import Frame, face_on
 layers = [Layer(balls(np.zeros((1, 3)), 0.5))]
 frame = Frame(np.array([-2.0, -1.0]), np.array([2.0, 1.0]))
 image = render(layers, face_on(np.array([0.0, 0.0, 1.0])), frame, 40)

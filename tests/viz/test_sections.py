@@ -10,13 +10,24 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
+from fenics_contact import Body, ContactPair, RigidPlane, Scene, State, Support, Surface, solve_scene
 from fenics_contact.gallery import block
-from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, RigidPlane, Scene, Support, Surface
-from fenics_contact.viz import painting, plot_stress
-from fenics_contact.viz.fields import contact_places, drawn_bodies, moved, points_of
-from fenics_contact.viz.section import Section, Spot, cut, section_frame, sections_of, strongest_contact
-from fenics_contact.viz.view import Frame, face_on, oblique_view
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.pictures import drawing as painting
+from fenics_contact.pictures import plot_stress
+from fenics_contact.pictures.canvas import Frame, face_on, oblique_view
+from fenics_contact.pictures.section import (
+    Section,
+    Spot,
+    contact_places,
+    cut,
+    drawn_bodies,
+    moved,
+    points_of,
+    section_frame,
+    sections_of,
+    strongest_contact,
+)
 from tests.viz.states import touching_blocks
 
 SOFT = IsotropicElasticity(100.0, 0.3)

@@ -13,11 +13,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.viz import Picture, Units
-from fenics_contact.viz.patch_axes import label_axes
-from fenics_contact.viz.picture import png_path
-from fenics_contact.viz.sheet import add_colour_bar, sheet, show_image
-from fenics_contact.viz.view import Frame, face_on
+from fenics_contact.pictures import Picture, Units
+from fenics_contact.pictures.canvas import Frame, add_colour_bar, face_on, png_path, sheet, show_image
+from fenics_contact.pictures.unrolled import label_axes
 from tests.viz.states import pixels
 
 

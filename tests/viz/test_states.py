@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenics_contact.contact import Status
+from fenics_contact import Status
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.viz import Units, plot_contact_pressure, plot_field, plot_stress
-from fenics_contact.viz.fields import component, contact_places, drawn_bodies, field_entries
-from fenics_contact.viz.patch import contact_patches
-from fenics_contact.viz.plane import refined
-from fenics_contact.viz.stress import chosen_scale
+from fenics_contact.pictures import Units, plot_contact_pressure, plot_stress
+from fenics_contact.pictures.section import component, contact_places, drawn_bodies, field_entries, refined
+from fenics_contact.pictures.states import chosen_scale, plot_field
+from fenics_contact.pictures.unrolled import contact_patches
 from tests.viz.states import contains, painted, pixels, pulled, touching_blocks
 
 SMALL = 320
@@ -151,9 +150,9 @@ RANKS = """
     import sys
     from pathlib import Path
     from mpi4py import MPI
-    from fenics_contact.contact import solve_scene
-    from fenics_contact.scene import Coulomb
-    from fenics_contact.viz import plot_contact_pressure, plot_decomposition, plot_stress
+    from fenics_contact import solve_scene
+    from fenics_contact import Coulomb
+    from fenics_contact.pictures import plot_contact_pressure, plot_decomposition, plot_stress
     from tests.contact.gallery import partitions, two_blocks
 
     comm, folder = MPI.COMM_WORLD, Path(sys.argv[1])

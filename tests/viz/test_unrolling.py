@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene
-from fenics_contact.gallery import extrude
-from fenics_contact.scene import Body, ContactPair, Coulomb, IsotropicElasticity, Scene, Support, Surface
-from fenics_contact.viz import Units, plot_contact_pressure, plot_contact_status
-from fenics_contact.viz.patch import contact_patches
-from fenics_contact.viz.unrolling import Unrolling, unrolling_of
+from fenics_contact import Body, ContactPair, Coulomb, Scene, State, Status, Support, Surface, solve_scene
+from fenics_contact.gallery.blocks import extrude
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.pictures import Units, plot_contact_pressure, plot_contact_status
+from fenics_contact.pictures.unrolled import Unrolling, contact_patches, unrolling_of
 from tests.viz.plane_states import ring
 from tests.viz.states import painted, pixels
 
@@ -98,7 +97,7 @@ def test_states_in_one_picture_are_unrolled_alike() -> None:
 
 
 def test_points_that_face_away_on_other_surfaces_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fenics_contact.viz.patch.unrolling_of", lambda *_: None)
+    monkeypatch.setattr("fenics_contact.pictures.unrolled.unrolling_of", lambda *_: None)
     (patch,) = contact_patches([fitted()], 0, None)
     assert patch.unrolling is None
     total = AROUND * (LAYERS + 1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenics_contact.viz.view import axis_label, face_on, frame_around, oblique_view
+from fenics_contact.pictures.canvas import axis_label, face_on, frame_around, oblique_view
 
 RNG = np.random.default_rng(3)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.viz.words import checked_range, headline, nice_number, written
+from fenics_contact.pictures.canvas import checked_range, headline, nice_number, written
 
 
 @pytest.mark.parametrize(

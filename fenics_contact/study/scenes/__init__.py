@@ -7,9 +7,9 @@ import importlib.util
 import sys
 from pathlib import Path
 
-from fenics_contact.checks import require_file
+from fenics_contact._base.checks import require_file
 from fenics_contact.errors import InvalidInputError, scene_file_code
-from fenics_contact.study.protocol import StudyScene
+from fenics_contact.study.study import StudyScene
 
 #: Names of the built-in studies.
 BUILT_IN = ("hertz", "cattaneo_mindlin", "chain_links")

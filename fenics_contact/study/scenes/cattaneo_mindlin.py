@@ -26,13 +26,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact._libraries import MPI
-from fenics_contact.contact import State, Status
-from fenics_contact.mesh import CELL_TYPES, BodyMesh, quadratic
-from fenics_contact.scene import Body, ContactPair, Coulomb, LoadStep, PlaneStrain, Scene, Support, Surface
-from fenics_contact.study.parameters import BALANCED, Parameters, Sweep
-from fenics_contact.study.protocol import Outcome, Problem, Quantity, StudyScene
+from fenics_contact._base.libraries import MPI
+from fenics_contact._scene.body import Body
+from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface
+from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact._scene.supports import Support
+from fenics_contact.materials.elastic import PlaneStrain
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.cell_types import CELL_TYPES
+from fenics_contact.mesh.quadratic import quadratic
+from fenics_contact.results.contact import Status
+from fenics_contact.results.state import State
 from fenics_contact.study.scenes.nested_box import mirrored, nested_half
+from fenics_contact.study.study import BALANCED, Outcome, Parameters, Problem, Quantity, StudyScene, Sweep
 
 YOUNG, POISSON, FRICTION = 1000.0, 0.3, 0.4
 RADIUS, SIZE = 2000.0, 30.0

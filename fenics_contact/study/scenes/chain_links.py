@@ -10,21 +10,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from fenics_contact._libraries import MPI
-from fenics_contact.gallery import LinkShape, TwoLinks, two_links
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    IsotropicElasticity,
-    Scene,
-    Support,
-    Surface,
-    TotalForce,
-)
-from fenics_contact.shape import SurfaceDesign
-from fenics_contact.study.parameters import BALANCED, Parameters, Sweep
-from fenics_contact.study.protocol import Outcome, Problem, Quantity, StudyScene
+from fenics_contact._base.libraries import MPI
+from fenics_contact._scene.body import Body
+from fenics_contact._scene.loads import TotalForce
+from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface
+from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.supports import Support
+from fenics_contact.design.design import SurfaceDesign
+from fenics_contact.gallery.links import TwoLinks, two_links
+from fenics_contact.gallery.ring import LinkShape
+from fenics_contact.materials.elastic import IsotropicElasticity
+from fenics_contact.study.study import BALANCED, Outcome, Parameters, Problem, Quantity, StudyScene, Sweep
 
 FRICTION, PULL = 0.3, 80e3
 #: Cells around, through and across a link for each unit of `Parameters.size`; 4 is the published mesh.

@@ -16,20 +16,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from fenics_contact._libraries import MPI
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    IsotropicElasticity,
-    Scene,
-    Support,
-    Surface,
-    TotalForce,
-)
-from fenics_contact.study.parameters import BALANCED, Parameters, Sweep
-from fenics_contact.study.protocol import Outcome, Problem, Quantity, StudyScene
+from fenics_contact._base.libraries import MPI
+from fenics_contact._scene.body import Body
+from fenics_contact._scene.loads import TotalForce
+from fenics_contact._scene.pairs import ContactPair, Surface
+from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.supports import Support
+from fenics_contact.materials.elastic import IsotropicElasticity
+from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.study.scenes.nested_box import mirrored, nested_box
+from fenics_contact.study.study import BALANCED, Outcome, Parameters, Problem, Quantity, StudyScene, Sweep
 
 YOUNG, POISSON, RADIUS = 1000.0, 0.3, 1000.0
 SIZE = 40.0

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.gallery import (
+from fenics_contact.gallery.blocks import (
     box_lattice,
     box_sides,
     rectangle_lattice,
     split_hexahedra,
     split_quadrilaterals,
 )
-from fenics_contact.mesh import BodyMesh
+from fenics_contact.mesh.body_mesh import BodyMesh
 
 #: Vertex of a hexahedron by whether it lies above its middle in x (1), y (2) and z (4).
 VERTEX = np.array([0, 1, 3, 2, 4, 5, 7, 6])

@@ -8,11 +8,19 @@ from dataclasses import dataclass, field
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState, solve_steps
+from fenics_contact import (
+    AutomaticSteps,
+    ContactProblem,
+    DeformedState,
+    LoadStep,
+    Scene,
+    TangentNewton,
+    solve_steps,
+)
+from fenics_contact._large_deformations.equations import Equations
+from fenics_contact._scene.supports import AnySupport
 from fenics_contact.feti import decompose
-from fenics_contact.nonlinear import AutomaticSteps, Equations, TangentNewton
-from fenics_contact.partition import bisection_partition
-from fenics_contact.scene import AnySupport, LoadStep, Scene
+from fenics_contact.mesh import bisection_partition
 
 States = Sequence[DeformedState]
 TOLERANCE = 1e-9

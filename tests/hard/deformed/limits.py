@@ -6,18 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from fenics_contact import Body, LoadStep, RigidPlane, Scene, Support, Traction
 from fenics_contact.errors import LoadStepError
 from fenics_contact.gallery import rectangle
-from fenics_contact.scene import (
-    Body,
-    LoadStep,
-    NeoHooke,
-    RigidPlane,
-    Scene,
-    StVenantKirchhoff,
-    Support,
-    Traction,
-)
+from fenics_contact.materials import NeoHooke, StVenantKirchhoff
 from tests.hard.deformed.case import Case, States, case, displacement, ways
 from tests.hard.deformed.materials import SOFT, rounded, top
 

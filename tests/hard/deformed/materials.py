@@ -6,21 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from fenics_contact import Body, ContactPair, Coulomb, RigidPlane, Scene, Support, Surface
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    FinitePlasticity,
-    Material,
-    MooneyRivlin,
-    NeoHooke,
-    Ogden,
-    RigidPlane,
-    Scene,
-    Support,
-    Surface,
-)
+from fenics_contact.materials import FinitePlasticity, Material, MooneyRivlin, NeoHooke, Ogden
 from tests.hard.deformed.case import Case, States, case, displacement, reaction, ways
 
 SOFT = NeoHooke(1.0, 0.3)

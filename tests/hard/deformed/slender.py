@@ -6,16 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from fenics_contact.gallery import rectangle
-from fenics_contact.mesh import BodyMesh, boundary_faces
-from fenics_contact.scene import (
+from fenics_contact import (
     AutomaticContact,
     Body,
+    BodyMesh,
     ContactPair,
     Coulomb,
     LoadStep,
     MovingObstacle,
-    NeoHooke,
     Pressure,
     RigidPlane,
     RigidSphere,
@@ -24,6 +22,9 @@ from fenics_contact.scene import (
     Surface,
     Traction,
 )
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import NeoHooke
+from fenics_contact.mesh import boundary_faces
 from tests.hard.deformed.case import Case, States, case, last_of, reaction, times, ways
 
 RUBBER = NeoHooke(1.0, 0.3)

@@ -6,20 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
     Coulomb,
     MovingObstacle,
-    NeoHooke,
     RigidPlane,
     RigidSphere,
     Scene,
     Support,
     Surface,
 )
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import NeoHooke
 from tests.hard.deformed.case import Case, States, case, displacement, reaction, times, ways
 
 SOFT, HARD = NeoHooke(1.0, 0.3), NeoHooke(10.0, 0.3)

@@ -4,18 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from fenics_contact import Body, ContactPair, Coulomb, RigidPlane, RigidSurface, Scene, Support, Surface
 from fenics_contact.gallery import block
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    NeoHooke,
-    RigidPlane,
-    RigidSurface,
-    Scene,
-    Support,
-    Surface,
-)
+from fenics_contact.materials import NeoHooke
 from tests.hard.deformed.case import Case, States, case, displacement, ways
 
 RUBBER = NeoHooke(1.0, 0.3)

@@ -6,21 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from fenics_contact.contact import State, Status
-from fenics_contact.errors import InfeasibleError, InvalidInputError
-from fenics_contact.gallery import block
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
     ContactPair,
     Coulomb,
     RigidPlane,
     Scene,
+    State,
+    Status,
     Support,
     Surface,
     TotalForce,
     Tresca,
 )
+from fenics_contact.errors import InfeasibleError, InvalidInputError
+from fenics_contact.gallery import block
 from tests.contact.gallery import block_on_plane, cornered_block, stack, two_blocks
 from tests.hard.scenes.parts import SOFT, STIFF, clamped, cubes, force
 from tests.hard.trial import Trial, cut_trial, trial

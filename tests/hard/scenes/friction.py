@@ -7,24 +7,25 @@ from functools import partial
 
 import numpy as np
 
-from fenics_contact.contact import State, Status
-from fenics_contact.errors import InfeasibleError
-from fenics_contact.gallery import block
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
     ContactPair,
     Coulomb,
-    Friction,
-    IsotropicElasticity,
     LoadStep,
     RigidPlane,
     Scene,
+    State,
+    Status,
     Support,
     Surface,
     Traction,
     Tresca,
 )
+from fenics_contact._scene.pairs import Friction
+from fenics_contact.errors import InfeasibleError
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
 from tests.contact.gallery import SOFT, block_on_plane, pressed_block, stack
 from tests.hard.invariants import violations
 from tests.hard.scenes.parts import FLOOR, cubes, force

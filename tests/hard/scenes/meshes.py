@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from fenics_contact import Body, BodyMesh, Coulomb, Scene
 from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.mesh.quality import jacobians, scaled_jacobian
-from fenics_contact.scene import Body, Coulomb, Scene
+from fenics_contact.mesh import scaled_jacobian
+from fenics_contact.mesh.quality import jacobians
 from tests.contact.gallery import SOFT, block_on_plane, crowned, two_blocks
 from tests.hard.transform import renumbered_mesh, turned
 from tests.hard.trial import Answer, Trial, bisected, cut_trial, trial

@@ -7,12 +7,22 @@ from functools import partial
 
 import numpy as np
 
-from fenics_contact.contact import State, Status
+from fenics_contact import (
+    Body,
+    BodyMesh,
+    ContactPair,
+    Coulomb,
+    Scene,
+    State,
+    Status,
+    Support,
+    Surface,
+    TotalForce,
+    Traction,
+)
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition import merge_pieces
-from fenics_contact.scene import Body, ContactPair, Coulomb, Scene, Support, Surface, TotalForce, Traction
+from fenics_contact.mesh.partition import merge_pieces
 from tests.contact.gallery import (
     FLOOR,
     SOFT,

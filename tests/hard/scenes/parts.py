@@ -7,22 +7,22 @@ from itertools import pairwise
 
 import numpy as np
 
-from fenics_contact.gallery import block
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    Friction,
-    IsotropicElasticity,
-    Load,
-    RigidObstacle,
     RigidPlane,
     Scene,
     Support,
     Surface,
     TotalForce,
 )
+from fenics_contact._scene.loads import Load
+from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact._scene.pairs import Friction
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
 
 SOFT, STIFF = IsotropicElasticity(100.0, 0.3), IsotropicElasticity(300.0, 0.2)
 UP = (0.0, 0.0, 1.0)

@@ -8,23 +8,24 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.contact import State, Status
-from fenics_contact.gallery import block, box_lattice, rectangle
-from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
-    PlaneStress,
     RigidSphere,
     Scene,
+    State,
+    Status,
     Support,
     Surface,
     TotalForce,
     Traction,
 )
+from fenics_contact.gallery import block, box_lattice, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStress
+from fenics_contact.mesh import quadratic
 from tests.contact.contrast import FRICTION, Blocks, Regions
 from tests.contact.gallery import crowned
 from tests.contact.hertz import Hertz, errors

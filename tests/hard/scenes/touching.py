@@ -7,23 +7,23 @@ from functools import partial
 
 import numpy as np
 
-from fenics_contact.contact import State, Status
-from fenics_contact.gallery import block, hemisphere, rectangle
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene import (
+from fenics_contact import (
     Body,
     BodyForce,
+    BodyMesh,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
-    PlaneStrain,
     RigidPlane,
     Scene,
+    State,
+    Status,
     Support,
     Surface,
     TotalForce,
     Traction,
 )
+from fenics_contact.gallery import block, hemisphere, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from tests.contact.gallery import SOFT, block_on_plane, pressed_block
 from tests.hard.scenes.parts import FLOOR, UP
 from tests.hard.trial import Trial, bisected, cut_trial, failing_trial, ragged, trial

@@ -1,0 +1,549 @@
+"""An upper bound of the algebraic error from duality: an admissible multiplier and displacement.
+
+The nearest multiplier within its cone and in equilibrium: the projection on the intersection.
+
+An admissible multiplier near a computed one: within its cone and in equilibrium.
+
+An admissible displacement near a computed one, and the energy of the correction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._base.display import displayed
+from fenics_contact._base.sparse import LAST_PLACES, ROUNDING
+from fenics_contact.feti.direct import DirectSolution, DirectSystem
+from fenics_contact.feti.dual import DualSystem
+from fenics_contact.qp.coarse import CoarseSpace
+from fenics_contact.qp.cones import FeasibleSet
+from fenics_contact.qp.face import Marks, face_basis
+from fenics_contact.qp.layout import ContactLayout
+from fenics_contact.qp.problem import DualProblem
+from fenics_contact.qp.reductions import Vector, global_max, global_sum
+from fenics_contact.qp.solution import DualSolution, contact_step
+
+#: Newton steps and halvings of one.
+STEPS, HALVINGS = 100, 30
+#: Fraction of the predicted decrease that a step must achieve, or of the imbalance that it may leave.
+ARMIJO, REDUCED = 1e-4, 0.5
+#: Largest weight of multipliers at their bounds, relative to free ones.
+HELD = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """α with λ₀ − Gᵀα, its multiplier, the remaining G λ − e, and the value of the convex function."""
+
+    alpha: Vector
+    trial: Vector
+    multiplier: Vector
+    lacking: Vector
+    value: float
+
+
+def nearest(problem: DualProblem, feasible: FeasibleSet, start: Vector, enough: float) -> Vector:
+    """Return the multiplier of a cone in equilibrium that is nearest to a given one. Collective; no product.
+
+    With P the projection on the cone it is λ(α) = P(λ₀ − Gᵀα), where α minimises the convex function
+
+        −½‖λ(α) − λ₀‖² − α·(G λ(α) − e),
+
+    whose gradient is e − G λ(α): a semismooth Newton method with as many unknowns as there are rigid motions.
+    Where the cone has only one multiplier in equilibrium, α grows without bound while G λ − e tends to zero.
+    Norms are those of the scaled multipliers.
+
+    Args:
+        problem: The dual problem.
+        feasible: The cone.
+        start: λ₀, owned.
+        enough: Norm of G λ − e, measured in multipliers, at which to stop.
+
+    Returns:
+        Within the cone, owned; in equilibrium unless there is no such multiplier.
+    """
+    search = _Search(problem, feasible, start)
+    point = search.at(np.zeros(problem.coarse.m))
+    for _ in range(STEPS):
+        left = search.length(point)
+        if left <= enough:
+            break
+        following = search.step(point, left)
+        if following is None:
+            break
+        point = following
+    return point.multiplier
+
+
+class _Search:
+    """The convex function and Newton's steps on it."""
+
+    def __init__(self, problem: DualProblem, feasible: FeasibleSet, start: Vector) -> None:
+        self._problem, self._feasible, self._start = problem, feasible, start
+        self._coarse = problem.scaled_problem.coarse
+        self._factor = evening(problem)
+        self._size = problem.norm(start) or 1.0
+
+    def at(self, alpha: Vector) -> _Point:
+        trial = self._start - self._factor * self._coarse.transpose(alpha)
+        multiplier = self._feasible.project(trial)
+        way = (multiplier - self._start) / self._factor
+        lacking = self._problem.coarse.residual(multiplier)
+        value = -0.5 * float(global_sum(self._problem.comm, way @ way)[0]) - float(alpha @ lacking)
+        return _Point(alpha, trial, multiplier, lacking, value)
+
+    def length(self, point: _Point) -> float:
+        return self._problem.coarse.norm(point.lacking)
+
+    def step(self, point: _Point, left: float) -> _Point | None:
+        """Return a better point along the Newton step, None if there is none. Collective."""
+        weight = HELD * min(1.0, left / self._size)
+        direction = self._coarse.restricted(self._slope(point, weight)).solve(point.lacking)
+        promised = float(point.lacking @ direction)
+        share = 1.0
+        for _ in range(HALVINGS):
+            trial = self.at(point.alpha + share * direction)
+            decreases = trial.value <= point.value - ARMIJO * share * promised
+            if decreases or self.length(trial) <= REDUCED * left:
+                return trial
+            share *= 0.5
+        return None
+
+    def _slope(self, point: _Point, weight: float) -> sp.csr_matrix:
+        """Return a root of P' + weight (1 − P') at a point, shape (size, size), owned."""
+        layout, size, trial = self._feasible.layout, len(self._start), point.trial
+        root = np.ones(size)
+        root[layout.normal] = np.where(trial[layout.normal] > 0.0, 1.0, np.sqrt(weight))
+        tau, rows = trial[layout.tangential], layout.tangential
+        length = np.linalg.norm(tau, axis=1)
+        outside = length > self._feasible.slip_bound
+        far = np.where(outside, length, 1.0)
+        across = np.where(outside, np.sqrt(self._feasible.slip_bound / far + weight), 1.0)
+        along = np.where(outside, np.sqrt(weight), 1.0)
+        ray = tau / far[:, None]
+        blocks = across[:, None, None] * np.eye(rows.shape[1]) + (along - across)[:, None, None] * (
+            ray[:, :, None] * ray[:, None, :]
+        )
+        root[rows] = 0.0
+        i, j = np.broadcast_arrays(rows[:, :, None], rows[:, None, :])
+        discs = sp.csr_matrix((blocks.ravel(), (i.ravel(), j.ravel())), shape=(size, size))
+        return (sp.diags(root) + discs).tocsr()
+
+
+def evening(problem: DualProblem) -> Vector:
+    """Return the factors of the scaled multipliers, one where stiffness is uniform, owned."""
+    return np.ones(problem.layout.size) if problem.scaling is None else problem.scaling.factor
+
+
+#: Imbalance above this fraction of all forces, at which duality gives no bound.
+UNBALANCED = 1e-9
+#: Rounds of alternating projections on the cone and on equilibrium.
+ROUNDS = 100
+#: A round that leaves more than this fraction of the imbalance makes no progress.
+PROGRESS = 0.9
+#: A slip bound larger than any force.
+ENDLESS = 1e300
+
+
+@dataclass(frozen=True, eq=False)
+class Statuses:
+    """Statuses of contact at a multiplier, and the rows that are free for them.
+
+    Attributes:
+        problem: The dual problem.
+        closed: Closed contacts, shape (n_contact,), owned.
+        stick: Sticking discs, shape (n_friction,), owned.
+        slip: Discs on the circle, shape (n_friction,), owned; the others are pinned (Ψ = 0).
+        directions: Multiplier whose friction forces give the directions, owned.
+    """
+
+    problem: DualProblem
+    closed: Marks
+    stick: Marks
+    slip: Marks
+    directions: Vector
+
+    @cached_property
+    def free(self) -> sp.csr_matrix:
+        """Basis of the rows whose multipliers are free and in which r should vanish, shape (size, n_face)."""
+        return basis(self.problem.layout, self.closed, self.stick, self.slip, self.directions)
+
+    @cached_property
+    def coarse(self) -> CoarseSpace:
+        """Equilibrium on the free rows only, in scaled multipliers. Collective on first use."""
+        return self.problem.scaled_problem.coarse.restricted(self.free)
+
+    def spaces(self) -> Iterator[tuple[sp.csr_matrix, CoarseSpace]]:
+        """Bases of rows with their equilibrium: of the free rows, of all closed contacts, of all."""
+        yield self.free, self.coarse
+        layout, coarse = self.problem.layout, self.problem.scaled_problem.coarse
+        nowhere = np.zeros_like(self.slip)
+        pressing = basis(layout, self.closed, self.stick | self.slip, nowhere, self.directions)
+        yield pressing, coarse.restricted(pressing)
+        yield sp.identity(layout.size, format="csr"), coarse
+
+    def settled(self, residual: Vector) -> Vector:
+        """Return r without the rigid motions that fit it best on the free rows. Collective."""
+        scaled = self.free.T @ (evening(self.problem) * residual)
+        return residual - self.problem.coarse.transpose(self.coarse.coefficients(scaled))
+
+
+@dataclass(frozen=True, eq=False)
+class Admissible:
+    """An admissible multiplier of a Tresca problem.
+
+    Attributes:
+        multiplier: λ with λ_N ≥ 0, ‖τ‖ ≤ Ψ and G λ = e, owned.
+        statuses: Statuses of contact.
+        slip_bound: Ψ of the Tresca problem, shape (n_friction,), owned. It is the given one unless that
+            follows the normal forces of a solution and no multiplier within it balances the load: at a load
+            that friction only just resists this depends on the solver's tolerance. It is then raised to the
+            computed forces.
+        unbalanced: The remaining G λ − e, measured in multipliers, relative to ‖λ‖.
+    """
+
+    multiplier: Vector
+    statuses: Statuses
+    slip_bound: Vector
+    unbalanced: float
+
+
+def admissible(
+    problem: DualProblem, slip_bound: Vector, follows: Marks, multiplier: Vector, residual: Vector
+) -> Admissible:
+    """Compute an admissible multiplier near a given one. Collective; no product.
+
+    Where the map w = λ − ρ r of the solver indicates open contact, the normal force is set to zero, where it
+    indicates slip, friction is set on its circle: a deficit there costs energy of first order, as gap and
+    slip are not small. Elsewhere λ is projected on the cone.
+
+    Args:
+        problem: The dual problem.
+        slip_bound: Ψ, shape (n_friction,), owned.
+        follows: Discs whose slip bound follows the normal force, shape (n_friction,), owned. That of the
+            others is given and not raised.
+        multiplier: λ, owned.
+        residual: r = F λ − d − Gᵀα, owned.
+    """
+    layout = problem.layout
+    trial = multiplier - contact_step(layout, problem.diagonal) * residual
+    wanted = trial[layout.tangential]
+    length = np.linalg.norm(wanted, axis=1)
+    slip = (slip_bound > 0.0) & (length >= slip_bound)
+    start = np.array(multiplier)
+    start[layout.normal[trial[layout.normal] <= 0.0]] = 0.0
+    start[layout.tangential[slip]] = (slip_bound[slip] / length[slip])[:, None] * wanted[slip]
+    stick = (slip_bound > 0.0) & ~slip
+    statuses = Statuses(problem, trial[layout.normal] > 0.0, stick, slip, start)
+    feasible = FeasibleSet(layout, slip_bound)
+    balanced, left = _balanced(statuses, feasible, start)
+    if left > ROUNDING:
+        balanced, left = _balanced_by_nearest(problem, feasible, start)
+    if left > UNBALANCED and global_max(problem.comm, float(follows.any())):
+        endless = FeasibleSet(layout, np.where(follows, ENDLESS, slip_bound))
+        balanced, left = _balanced(statuses, endless, start)
+        raised = np.maximum(slip_bound, np.linalg.norm(balanced[layout.tangential], axis=1))
+        slip_bound = np.where(follows, raised, slip_bound)
+    return Admissible(balanced, statuses, slip_bound, left)
+
+
+def _balanced_by_nearest(problem: DualProblem, feasible: FeasibleSet, start: Vector) -> tuple[Vector, float]:
+    """Return the nearest multiplier of the cone in equilibrium, and the remaining G λ − e. Collective.
+
+    Slower than `_balanced` and without its preferences, but it finds a multiplier whenever there is one:
+    alternating projections stagnate before they reach a narrow set.
+    """
+    closest = nearest(problem, feasible, start, ROUNDING * _forces(problem, start))
+    return closest, _unbalanced(problem, closest)
+
+
+def _balanced(statuses: Statuses, feasible: FeasibleSet, start: Vector) -> tuple[Vector, float]:
+    """Return a multiplier of the cone in equilibrium, and the remaining G λ − e. Collective.
+
+    The shortest change of the free multipliers restores equilibrium or, where these do not suffice, of all
+    closed ones, or of all; the result is projected on the cone again. Neighbouring contact forces take part:
+    gluing forces alone would carry the difference through the bodies, which bends thin ones. Forces across
+    open gaps come last, as each costs its gap in energy.
+    """
+    problem, point = statuses.problem, feasible.project(start)
+    left = _unbalanced(problem, point)
+    for rows, coarse in statuses.spaces():
+        for _ in range(ROUNDS):
+            if left <= ROUNDING:
+                return point, left
+            lacking = rows @ coarse.transpose(coarse.solve(problem.coarse.residual(point)))
+            point = feasible.project(point - evening(problem) * lacking)
+            before, left = left, _unbalanced(problem, point)
+            if left > PROGRESS * before:
+                break
+    return point, left
+
+
+def basis(
+    layout: ContactLayout, closed: Marks, stick: Marks, turning: Marks, multiplier: Vector
+) -> sp.csr_matrix:
+    """Return Z of a face, see `fenics_contact.qp.face.face_basis`, by the directions of friction forces.
+
+    Args:
+        layout: Positions of the multipliers.
+        closed: Contacts whose normal row is in it, shape (n_contact,).
+        stick: Discs of which both rows are in it, shape (n_friction,).
+        turning: Discs of which the direction across the friction force is in it, shape (n_friction,).
+        multiplier: Multiplier with the friction forces, owned.
+    """
+    tau = multiplier[layout.tangential]
+    length = np.linalg.norm(tau, axis=1, keepdims=True)
+    direction = np.divide(tau, length, out=np.zeros_like(tau), where=length > 0.0)
+    return face_basis(layout, closed, stick, turning, direction)
+
+
+def _unbalanced(problem: DualProblem, multiplier: Vector) -> float:
+    size = _forces(problem, multiplier)
+    left = problem.coarse.norm(problem.coarse.residual(multiplier))
+    return left / size if size > 0.0 else 0.0
+
+
+def _forces(problem: DualProblem, multiplier: Vector) -> float:
+    """Return the norm of all forces, [force]. Collective."""
+    return max(problem.norm(multiplier), problem.coarse.norm(problem.coarse.load))
+
+
+#: Number of corrections for the regularisation of the contact block.
+REFINEMENTS = 12
+#: Largest remaining violation relative to the initial one.
+UNLIFTED = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Lifted:
+    """A correction w of the interface after which all equality rows hold and no contact penetrates.
+
+    Attributes:
+        displacement: w, shape (n_interface,), [length].
+        energy: wᵀ S w, [force · length].
+        residual: r after it, owned, [length]; zero in the rows that were closed.
+        multiplier: Estimate −M r of the multiplier's error, owned, [force].
+        left: Remaining violation relative to the initial one; more than rounding only if rows are
+            contradictory.
+    """
+
+    displacement: Vector
+    energy: float
+    residual: Vector
+    multiplier: Vector
+    left: float
+
+
+def lift(system: DualSystem, known: Admissible, residual: Vector, cancelled: float) -> Lifted:
+    """Close the rows that should be closed, and those that would penetrate after the correction. Collective.
+
+    The correction is that of the Dirichlet preconditioner, w = D⁻¹Bᵀ(B D⁻¹Bᵀ)⁻¹ r, with its energy wᵀ S w:
+    the preconditioned residual rᵀ M r. The effect of regularising the contact block is corrected at the cost
+    of that small block alone; S is applied once, for half an F-product.
+
+    Args:
+        system: The dual system.
+        known: An admissible multiplier with its statuses.
+        residual: Its r = F λ − d − Gᵀα, owned, [length].
+        cancelled: Norm of the displacements that cancel in r, [length].
+    """
+    comm, tangential = system.problem.comm, system.problem.layout.tangential
+    slid = np.linalg.norm(residual[tangential], axis=1)
+    step = contact_step(system.problem.layout, system.problem.diagonal)[tangential[:, 0]]
+    # Where a slip is short, removing its part across the friction force costs less energy than keeping it.
+    statuses = known.statuses
+    across = statuses.slip & (step * slid < known.slip_bound)
+    rows = _Rows(system, known, statuses.closed, statuses.stick, across)
+    closing = _close(rows, residual, cancelled)
+    if closing.left > UNLIFTED:  # a node of two pairs may be set to stick where it should close
+        nothing = np.zeros_like(across)
+        closing = _close(replace(rows, stick=nothing, across=nothing), residual, cancelled)
+    energy, force = system.inverse.energy(closing.displacement)
+    energy = float(global_sum(comm, energy)[0])
+    after = closing.residual - closing.rows.spread(closing.rows.wanted(closing.residual))
+    estimate = -system.preconditioner.lifting(closing.rows.restriction).multiplier(force)
+    return Lifted(closing.displacement, energy, after, estimate, closing.left)
+
+
+@dataclass(frozen=True, eq=False)
+class _Closing:
+    """Displacement w that closes rows, r after it, and the remaining violation relative to the start."""
+
+    rows: _Rows
+    displacement: Vector
+    residual: Vector
+    left: float
+
+
+def _close(rows: _Rows, residual: Vector, cancelled: float) -> _Closing:
+    """Close rows, and those that penetrate afterwards. Collective; no application of S."""
+    system = rows.system
+    comm, w = system.problem.comm, np.zeros(len(system.inverse.interface))
+    start = global_max(comm, np.abs(rows.wanted(residual)).max(initial=0.0))
+    small = max(UNLIFTED * start, LAST_PLACES * cancelled)
+    lifting, current, violation = system.preconditioner.lifting(rows.restriction), residual, start
+    for _ in range(REFINEMENTS):
+        w += lifting.jump(rows.spread(rows.wanted(current)))
+        current = residual - system.interface_jump(w)
+        more = rows.penetrating(current, small)
+        violation = global_max(comm, np.abs(rows.wanted(current)).max(initial=0.0))
+        if global_sum(comm, np.count_nonzero(more))[0] > 0.0:
+            rows = replace(rows, closed=rows.closed | more)
+            lifting = system.preconditioner.lifting(rows.restriction)
+        elif violation <= small:
+            return _Closing(rows, w, current, 0.0)
+    return _Closing(rows, w, current, violation / start)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """The rows that a correction closes: all equality rows and some of contacts.
+
+    Attributes:
+        system: The dual system.
+        known: An admissible multiplier.
+        closed: Contacts to close, shape (n_contact,), owned.
+        stick: Discs whose slip is removed, shape (n_friction,), owned.
+        across: Discs whose slip across the friction force is removed, shape (n_friction,), owned.
+    """
+
+    system: DualSystem
+    known: Admissible
+    closed: Marks
+    stick: Marks
+    across: Marks
+
+    @cached_property
+    def restriction(self) -> sp.csr_matrix:
+        """Z with orthonormal columns, shape (size, n_face), owned."""
+        layout = self.system.problem.layout
+        return basis(layout, self.closed, self.stick, self.across, self.known.multiplier)
+
+    def wanted(self, residual: Vector) -> Vector:
+        """Return Zᵀ r, shape (n_face,)."""
+        return np.asarray(self.restriction.T @ residual)
+
+    def spread(self, y: Vector) -> Vector:
+        """Return Z y, owned."""
+        return np.asarray(self.restriction @ y)
+
+    def penetrating(self, residual: Vector, tolerance: float) -> Marks:
+        """Mark contacts that are not closed and penetrate by more than a tolerance."""
+        return np.asarray(~self.closed & (residual[self.system.problem.layout.normal] < -tolerance))
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """Bounds of the algebraic error of a state in energy norm, [√(force · length)].
+
+    Attributes:
+        bound: Upper bound of ‖u − u⋆‖, also for the continuous displacement of the fields; infinite if no
+            admissible pair was found.
+        moved: Its part due to making the multiplier admissible.
+        gap: J(v) − θ(λ) of the admissible pair, [force · length].
+        known: The admissible multiplier and its statuses.
+        error: Estimated error of the state's multiplier, owned, [force].
+    """
+
+    bound: float
+    moved: float
+    gap: float
+    known: Admissible
+    error: Vector
+
+
+def certify(system: DualSystem, solution: DualSolution) -> Certificate:
+    """Bound the algebraic error of a solution. Collective; at most one product and two applications of S.
+
+    With an admissible multiplier λ (λ_N ≥ 0, ‖τ‖ ≤ Ψ, G λ = e), u = K⁺(f − Bᵀλ) + R α, and an admissible
+    displacement v = u + w, at given slip bounds
+
+        J(v) − θ(λ) = ½ wᵀK w + Σ λ_N (c − B v)_N + Σ (Ψ‖s‖ − τ·s),   s the slip of v,
+
+    a sum of non-negative terms, and J(v) − θ(λ) ≥ ½‖v − u⋆‖² + ½‖u − u⋆‖² in energy norm, u⋆ being the
+    solution. So u⋆ is in the ball around the midpoint u + ½w of radius ½√(4 gap − ‖w‖²), and no displacement
+    x is farther from it than ‖x − u − ½w‖ + ½√(4 gap − ‖w‖²). The bound is for the farther of two
+    displacements: u, and that of the fields, in which copies of nodes agree (`DualSystem.conforming`). The
+    change δ that made the multiplier admissible counts with its own energy δᵀF δ.
+
+    The correction w is that of the preconditioner, whose quality determines the sharpness: mostly a factor of
+    two, for nearly incompressible bodies, thin plates and stiff bodies on soft ones ten to thirty.
+
+    The bound is for Tresca's problem with the slip bounds of the solution. Where these are given, that is the
+    actual problem; and it is infinite where no multiplier within them balances the load. Where they follow
+    the normal forces it does not bound the distance to the solution of Coulomb's law, see `friction_error`
+    for the rest; and where they are too small for the load, Tresca's problem has no solution and they are
+    raised, see `Admissible`.
+
+    It holds to rounding: energies and products are in double precision, rows that are closed to 1e-9 of their
+    initial violation count as closed, and a load that is balanced to 1e-9 as balanced.
+
+    Args:
+        system: The dual system.
+        solution: A solution of its problem, of any accuracy.
+
+    References:
+        W. Prager, J. L. Synge, Approximations in elasticity based on the concept of function space, Quart.
+        Appl. Math. 5 (1947). S. Repin, A posteriori estimates for partial differential equations, de Gruyter
+        2008, chapter 3.
+    """
+    problem, residual, moved = system.problem, solution.residual, 0.0
+    follows = system.torn.friction_coefficient[system.torn.owned_discs] > 0.0
+    known = admissible(problem, solution.slip_bound, follows, solution.multiplier, residual)
+    change = known.multiplier - solution.multiplier
+    if problem.norm(change) > LAST_PLACES * problem.norm(solution.multiplier):
+        product = system.apply(change)
+        moved = float(np.sqrt(max(problem.dot(change, product), 0.0)))
+        residual = known.statuses.settled(residual + product)
+    lifted = lift(system, known, residual, _cancelled(problem, solution))
+    rest = _pressed(problem, known, lifted.residual) + _rubbed(problem, known, lifted.residual)
+    gap = 0.5 * lifted.energy + rest
+    radius = 0.5 * float(np.sqrt(lifted.energy + 4.0 * rest))
+    bound = max(_distances(system, solution, lifted)) + radius + moved
+    if lifted.left > UNLIFTED or known.unbalanced > UNBALANCED:
+        bound = np.inf
+    return Certificate(bound, moved, gap, known, change + lifted.multiplier)
+
+
+def _distances(system: DualSystem, solution: DualSolution, lifted: Lifted) -> tuple[float, float]:
+    """Return the distances from u + ½w of the computed displacement and of that of the fields. Collective."""
+    energy, _ = system.inverse.energy(system.sewn(solution.residual) - 0.5 * lifted.displacement)
+    shown = float(np.sqrt(global_sum(system.problem.comm, energy)[0]))
+    return 0.5 * float(np.sqrt(lifted.energy)), shown
+
+
+def direct_error(system: DirectSystem, solution: DirectSolution) -> float:
+    """Return the energy norm of the error of a factorisation, √(rᵀK⁻¹r), [√(force · length)]."""
+    return float(np.sqrt(max(system.energy_of_residual(solution.displacement), 0.0)))
+
+
+def _cancelled(problem: DualProblem, solution: DualSolution) -> float:
+    """Return the norm of the displacements that cancel in r. Collective."""
+    moved = np.abs(solution.product - problem.rhs).max(initial=0.0)
+    return global_max(problem.comm, max(moved, np.abs(problem.rhs).max(initial=0.0)))
+
+
+def _pressed(problem: DualProblem, known: Admissible, residual: Vector) -> float:
+    """Return Σ λ_N gap, the work of normal forces that act across a gap. Collective."""
+    normal = problem.layout.normal
+    return float(global_sum(problem.comm, known.multiplier[normal] @ np.maximum(residual[normal], 0.0))[0])
+
+
+def _rubbed(problem: DualProblem, known: Admissible, residual: Vector) -> float:
+    """Return Σ Ψ‖s‖ − τ·s, the deficit of the dissipation by friction forces. Collective.
+
+    As (Ψ − ‖τ‖)‖s‖ + ½‖τ‖‖s‖‖ŝ − τ̂‖², which is free of cancellation where force and slip are parallel.
+    """
+    tau, slid = known.multiplier[problem.layout.tangential], -residual[problem.layout.tangential]
+    force, way = np.linalg.norm(tau, axis=1), np.linalg.norm(slid, axis=1)
+    short = known.slip_bound - force
+    short[short <= ROUNDING * known.slip_bound] = 0.0
+    turned = slid / np.where(way > 0.0, way, 1.0)[:, None] - tau / np.where(force > 0.0, force, 1.0)[:, None]
+    lost = way * (short + 0.5 * force * np.einsum("ia,ia->i", turned, turned))
+    return float(global_sum(problem.comm, lost.sum())[0])

@@ -1,0 +1,293 @@
+"""Checks of the numbers from which meshes are built, with the argument's name in messages.
+
+Type checks of a class's arguments: values of other types would silently mean something else.
+
+Checks that input files exist.
+
+Vectors given by users: two or three finite numbers.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import reprlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import MISSING, fields, is_dataclass
+from functools import cache
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, Literal, TypeAlias, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+
+#: Largest number of cells in a row, and of any other count: more is a typing error.
+MOST = 1_000_000
+#: Bound on coordinates and sizes: their products, and the squares of these, must be finite, too.
+LARGEST = 1e60
+#: Largest logarithm of the ratio of two cells of one mesh.
+STEEPEST = 8.0
+
+
+def check_count(value: int, name: str, least: int = 1) -> None:
+    """Reject a count that is not an integer from ``least`` to `MOST`."""
+    if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
+        raise InvalidInputError(
+            f"{name} must be an integer of at least {least}, got {brief(value)}: choose another count"
+        )
+    if value > MOST:
+        raise InvalidInputError(f"{name} must be at most {MOST}, got {brief(value)}: choose a smaller count")
+
+
+def check_numbers(**given: Any) -> None:
+    """Reject arguments, given by their names, that are not finite numbers, or too large to be multiplied."""
+    for name, value in given.items():
+        if not _is_number(value):
+            raise InvalidInputError(
+                f"{name} must be a finite number of less than {LARGEST:g}, got {brief(value)}: give another"
+            )
+
+
+def check_grading(value: Any) -> None:
+    """Reject a grading, the logarithm of a ratio of cells of one mesh, that is negative or too large."""
+    check_numbers(grading=value)
+    if not 0.0 <= value <= STEEPEST:
+        raise InvalidInputError(
+            f"grading must lie between 0 and 8, got {value}: 0 gives equal cells, 3 makes the smallest 20 "
+            "times smaller than the largest"
+        )
+
+
+def check_row(values: Any, name: str, count: int) -> None:
+    """Reject a value that is not a sequence of ``count`` finite numbers."""
+    known = isinstance(values, Sequence | np.ndarray) and np.ndim(values) == 1 and len(values) == count
+    if not known or not all(map(_is_number, values)):
+        raise InvalidInputError(
+            f"{name} must be {count} finite numbers of less than {LARGEST:g}, got {brief(values)}: give them"
+        )
+
+
+def brief(value: Any) -> str:
+    """Return a value for messages, also an integer that Python refuses to convert to text."""
+    if isinstance(value, int) and value.bit_length() > 100:
+        return "an integer of more than thirty digits"
+    try:
+        text = repr(value)
+    except ValueError:  # such an integer inside it
+        return f"a {type(value).__name__} of very large integers"
+    return text if len(text) <= 200 else f"{text[:197]}..."
+
+
+def _is_number(value: Any) -> bool:
+    real = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    return real and -LARGEST < value < LARGEST
+
+
+Class = TypeVar("Class", bound=type)
+
+#: Plain types, their names, and other accepted types; a boolean is not a number.
+_PLAIN: dict[Any, tuple[str, tuple[type, ...]]] = {
+    float: ("a number", (int, float, np.integer, np.floating)),
+    int: ("an integer", (int, np.integer)),
+    bool: ("True or False", (bool, np.bool_)),
+    str: ("a string", (str,)),
+    NoneType: ("None", (NoneType,)),
+}
+
+
+def checked(*own: str) -> Callable[[Class], Class]:
+    """Let a dataclass reject values whose types are not those of its fields, before its own checks.
+
+    Place it below ``@dataclass``.
+
+    Args:
+        own: Fields whose types the class checks itself.
+
+    Example:
+        >>> from dataclasses import dataclass
+        >>> @dataclass
+        ... @checked()
+        ... class Wire:
+        ...     '''A wire.
+        ...
+        ...     Attributes:
+        ...         radius: Above zero.
+        ...     '''
+        ...     radius: float
+        >>> Wire("thick")
+        Traceback (most recent call last):
+        fenics_contact.errors.kinds.InvalidInputError: Wire.radius must be a number, got 'thick': above zero
+    """
+
+    def with_check(cls: Class) -> Class:
+        further = getattr(cls, "__post_init__", None)  # its own, or that of a base
+
+        def __post_init__(self: Any) -> None:
+            _check(self, cls, own)
+            if further is not None:
+                further(self)
+
+        __post_init__.__doc__ = getattr(further, "__doc__", None) or "Reject values of other types."
+        cls.__post_init__ = __post_init__  # type: ignore[attr-defined]
+        return cls
+
+    return with_check
+
+
+def _check(instance: Any, cls: type, own: tuple[str, ...]) -> None:
+    """Reject the first field whose value does not fit its type.
+
+    Raises:
+        InvalidInputError: States what the field must be, what it is, and its meaning.
+    """
+    hints = _hints(cls)
+    for field in fields(instance):
+        if field.name in own or field.name not in hints:
+            continue
+        name = f"{type(instance).__name__}.{field.name}"
+        wrong = _misfit(getattr(instance, field.name), hints[field.name], name)
+        if wrong is not None:
+            place, hint, value = wrong
+            explanation = meaning(type(instance), field.name)
+            given = f"{place} must be {_named(hint)}, got {reprlib.repr(value)}"
+            raise InvalidInputError(f"{given}: {explanation}" if explanation else given)
+
+
+@cache
+def _hints(cls: type) -> dict[str, Any]:
+    return get_type_hints(cls)
+
+
+def _misfit(value: Any, hint: Any, place: str) -> tuple[str, Any, Any] | None:
+    """Return where a value does not fit, the declared type and the value there; None if it fits."""
+    if get_origin(hint) in (Union, UnionType):
+        if any(_misfit(value, option, place) is None for option in get_args(hint)):
+            return None
+        # For the alternative of the right form the misfit is located more precisely.
+        inner = (_misfit(value, option, place) for option in get_args(hint))
+        return next((wrong for wrong in inner if wrong and wrong[0] != place), (place, hint, value))
+    if not _is_one(value, hint):
+        return place, hint, value
+    for key, part in _parts(value, hint):
+        inside = get_args(hint)[-1 if get_origin(hint) is Mapping else 0]
+        if (wrong := _misfit(part, inside, f"{place}[{key!r}]")) is not None:
+            return wrong
+    return None
+
+
+def _is_one(value: Any, hint: Any) -> bool:
+    """Return whether a value has the outer type of a hint, regardless of its content."""
+    kind = get_origin(hint) or hint
+    if kind is Any:
+        return True
+    if kind is Literal:
+        return any(value == option and type(value) is type(option) for option in get_args(hint))
+    if kind in _PLAIN:
+        return isinstance(value, _PLAIN[kind][1]) and (kind is bool or not isinstance(value, bool))
+    if kind in (Sequence, tuple):
+        many = value.ndim > 0 if isinstance(value, np.ndarray) else isinstance(value, Sequence)
+        return many and not isinstance(value, str | bytes)
+    if members := _members(kind):
+        return all(hasattr(value, member) for member in members)
+    return callable(value) if kind is Callable else isinstance(value, kind)
+
+
+def _parts(value: Any, hint: Any) -> Sequence[tuple[Any, Any]]:
+    """Return the items of a sequence or a mapping, with indices or keys."""
+    kind = get_origin(hint)
+    if kind is Mapping:
+        return list(value.items())
+    return list(enumerate(value)) if kind in (Sequence, tuple) else []
+
+
+def _members(kind: Any) -> list[str]:
+    """Return the members that a protocol requires; none for other types."""
+    if not getattr(kind, "_is_protocol", False):
+        return []
+    protocols = [each for each in kind.__mro__ if getattr(each, "_is_protocol", False)]
+    return [name for each in reversed(protocols) for name in vars(each) if not name.startswith("_")]
+
+
+def _named(hint: Any) -> str:
+    """Describe what a type requires."""
+    kind, inside = get_origin(hint) or hint, get_args(hint)
+    if kind in (Union, UnionType, Literal):
+        *first, last = [repr(part) if kind is Literal else _named(part) for part in inside]
+        return f"{', '.join(first)} or {last}" if first else last
+    if kind in _PLAIN:
+        return _PLAIN[kind][0]
+    if kind in (Sequence, tuple):
+        return f"a sequence (each {_named(inside[0])})"
+    if kind is Mapping:
+        return f"a mapping (each value {_named(inside[-1])})"
+    if members := _members(kind):
+        return f"a {kind.__name__} with {', '.join(members[:-1])} and {members[-1]}"
+    if kind is Callable:
+        return "a function"
+    name = str(kind.__name__)
+    if not is_dataclass(kind):
+        return f"a {name}"
+    needed = [field.name for field in fields(kind) if field.default is field.default_factory is MISSING]
+    return f"{name}({', '.join(needed)})"
+
+
+def meaning(owner: Any, name: str) -> str:
+    """Return the documentation of a field or an argument of a class or function, "" if there is none.
+
+    Args:
+        owner: The class or function.
+        name: Name of the field or argument.
+    """
+    for known in getattr(owner, "__mro__", (owner,)):
+        text = inspect.cleandoc(known.__doc__ or "")
+        if match := re.search(rf"^    {name}: (.*(?:\n {{8}}.*)*)", text, re.MULTILINE):
+            words = re.split(r"\.(?: |$)", " ".join(match[1].split()))[0].replace("``", "")
+            ordinary = words[1:2].islower() and "'s" not in words.split()[0]  # neither ΔT nor Poisson's
+            return f"{words[0].lower() if ordinary else words[0]}{words[1:]}"
+    return ""
+
+
+def require_file(path: Path, what: str = "a file") -> None:
+    """Reject a path that is not a readable file, also if its name is too long or its folder closed.
+
+    Args:
+        path: The path.
+        what: Description of the expected file, with its article.
+
+    Raises:
+        InvalidInputError: States what is there instead.
+    """
+    try:
+        if path.is_file():
+            return
+        instead = "a folder" if path.is_dir() else "something else" if path.exists() else "none"
+        reason = f"there is {instead}"
+    except OSError as error:
+        reason = f"it cannot be looked at: {error.strerror or error}"
+    raise InvalidInputError(f"there must be {what} '{path}', {reason}: check the name and folder")
+
+
+#: A vector given by a user.
+GivenVector: TypeAlias = tuple[float, ...]
+
+
+def floats(values: np.ndarray) -> GivenVector:
+    """Return the entries of a one-dimensional array as plain numbers."""
+    return tuple(float(value) for value in values)
+
+
+def unit_vector(name: str, value: GivenVector, dim: int) -> GivenVector:
+    """Return a direction at unit length.
+
+    Raises:
+        InvalidInputError: If it does not have ``dim`` finite entries or is zero.
+    """
+    length = float(np.linalg.norm(value)) if len(value) == dim else 0.0
+    if not (np.isfinite(length) and length > 0):
+        raise InvalidInputError(
+            f"{name} must be {dim} finite numbers, not all zero, got {value!r}: for a floor in space give "
+            "(0, 0, 1)"
+        )
+    return floats(np.asarray(value) / length)

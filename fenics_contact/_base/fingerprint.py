@@ -1,0 +1,155 @@
+"""Descriptions of problems that another run of the same script reproduces.
+
+Check that all ranks have the same input, instead of solving a mixture or waiting forever.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import partial
+from pathlib import PurePath
+from types import FunctionType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError, agree
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+#: Largest number of differences in a message.
+MOST_NAMED = 4
+
+
+def described(value: Any, name: str, *, carried: bool = True) -> dict[str, str]:
+    """Describe a value by its parts: one entry for each number, text or array.
+
+    Arrays are described by shape, type and a hash of their bits, dataclasses, mappings and sequences by their
+    contents, functions by their names and the values in their closures and defaults, classes by their names;
+    any other object only by its class.
+
+    Args:
+        value: The value.
+        name: Its name.
+        carried: Whether to describe closures and defaults of functions.
+
+    Example:
+        >>> described({"length": 2.0}, "beam")
+        {'beam': '1 entries', "beam['length']": '2.0'}
+    """
+    parts: dict[str, str] = {}
+    _describe(value, name, parts, (), carried)
+    return parts
+
+
+def differences(there: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
+    """Name the differences between two descriptions, the first few in full.
+
+    Args:
+        there: The stored one.
+        here: The present one.
+    """
+    unlike = [name for name in {**there, **here} if there.get(name) != here.get(name)]
+    named = [
+        f"{name} ({there.get(name, 'absent')}, {here.get(name, 'absent')})" for name in unlike[:MOST_NAMED]
+    ]
+    more = len(unlike) - MOST_NAMED
+    return [*named, f"{more} more"] if more > 0 else named
+
+
+def _describe(
+    value: Any, name: str, descriptions: dict[str, str], around: tuple[int, ...], carried: bool
+) -> None:
+    """Add the parts of a value, which is nested in the objects of these identities."""
+    known = _leaf(value)
+    if known is not None:
+        descriptions[name] = known
+        return
+    descriptions[name], parts = _branches(value, name)
+    if id(value) not in around and (carried or not isinstance(value, FunctionType)):
+        for part, inner in parts:
+            _describe(inner, part, descriptions, (*around, id(value)), carried)
+
+
+def _leaf(value: Any) -> str | None:
+    if isinstance(value, np.ndarray):
+        digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()[:16]
+        return f"{value.dtype} array of shape {value.shape}, sha256 {digest}"
+    if isinstance(value, Enum):
+        return f"{type(value).__name__}.{value.name}"
+    if isinstance(value, np.generic):
+        return repr(value.item())
+    if value is None or isinstance(value, str | bytes | bool | int | float | complex | PurePath):
+        return repr(value)
+    return None
+
+
+def _branches(value: Any, name: str) -> tuple[str, list[tuple[str, Any]]]:
+    """Return the type of an object and its parts by name."""
+    if isinstance(value, Mapping):
+        return f"{len(value)} entries", [(f"{name}[{key!r}]", part) for key, part in value.items()]
+    if isinstance(value, Sequence):
+        return f"{len(value)} entries", [(f"{name}[{index}]", part) for index, part in enumerate(value)]
+    if is_dataclass(value) and not isinstance(value, type):
+        return _class(value), [(f"{name}.{part.name}", getattr(value, part.name)) for part in fields(value)]
+    if isinstance(value, partial):
+        return "partial", [(f"{name}.{part}", getattr(value, part)) for part in ("func", "args", "keywords")]
+    if isinstance(value, FunctionType):
+        cells = zip(value.__code__.co_freevars, value.__closure__ or (), strict=True)
+        carried = [(f"{name}.{variable}", cell.cell_contents) for variable, cell in cells if _filled(cell)]
+        given = [] if value.__defaults__ is None else [(f"{name}.defaults", value.__defaults__)]
+        return f"{value.__module__}.{value.__qualname__}", [*carried, *given]
+    if hasattr(value, "__qualname__"):
+        return f"{value.__module__}.{value.__qualname__}", []
+    return _class(value), []
+
+
+def _filled(cell: Any) -> bool:
+    """Return whether a variable of an enclosing function has a value yet."""
+    try:
+        cell.cell_contents
+    except ValueError:
+        return False
+    return True
+
+
+def _class(value: Any) -> str:
+    return f"{type(value).__module__}.{type(value).__qualname__}"
+
+
+def require_alike(comm: MPI.Comm, descriptions: Mapping[str, str]) -> None:
+    """Reject input that differs from rank to rank. Collective on ``comm``.
+
+    Args:
+        comm: Communicator of the ranks that must have the same input.
+        descriptions: This rank's input, from `described`.
+
+    Raises:
+        InvalidInputError: On all ranks; names the differences between two of them.
+    """
+    if comm.size == 1:
+        return
+    digest = hashlib.sha256(repr(list(descriptions.items())).encode()).digest()
+    digests = comm.allgather(digest)
+    other = next((rank for rank, each in enumerate(digests) if each != digests[0]), 0)
+    if other == 0:
+        return
+    first = comm.bcast(dict(descriptions))
+    named = comm.bcast(differences(first, descriptions) or [_order(first, descriptions)], root=other)
+    error = InvalidInputError(
+        f"all ranks must be given the same, but on rank 0 and rank {other} differ {'; '.join(named)}: build "
+        "it from the same numbers on every rank, or on rank 0 alone and send it with comm.bcast"
+    )
+    agree(comm, error)
+
+
+def _order(there: Mapping[str, str], here: Mapping[str, str]) -> str:
+    """Describe where two descriptions differ in order."""
+    pairs = zip(there, here, strict=True)
+    one, other = next(((one, other) for one, other in pairs if one != other), ("", ""))
+    return f"the order of entries ({one}, {other})"

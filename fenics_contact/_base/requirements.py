@@ -1,0 +1,241 @@
+"""Requirements of the package, checked before they are used.
+
+dolfinx, petsc4py, mpi4py and gmsh come from the system and not from pip, so no installer has compared their
+versions with the requirements. Presence and versions are checked when the package is imported, features of a
+library when it is loaded.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import logging
+import re
+import signal
+import sys
+import threading
+from dataclasses import dataclass
+from importlib import metadata
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+from fenics_contact.errors import MissingRequirementError
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A library, its oldest supported version, and how to install it."""
+
+    module: str
+    oldest: str
+    debian: str
+    conda: str
+    distribution: str = ""
+    tested: tuple[str, ...] = ()
+
+    def version(self) -> str | None:
+        """Return the installed version without importing the library; None if it has no metadata."""
+        try:
+            return metadata.version(self.distribution or self.module)
+        except metadata.PackageNotFoundError:
+            return None
+
+    def error(self, found: str) -> MissingRequirementError:
+        """Return the error that states what is needed, what was found and how to install it."""
+        return MissingRequirementError(
+            f"fenics_contact needs {self.module} {self.oldest} or newer, found {found}. "
+            f"Debian: {self.debian}; conda-forge: {self.conda}",
+            name=self.module,
+        )
+
+
+_DEBIAN_FENICSX = "apt-get install --no-install-recommends python3-dolfinx-real"
+
+_MPI4PY = Requirement("mpi4py", "3.1", _DEBIAN_FENICSX, "conda install -c conda-forge mpi4py")
+_PETSC4PY = Requirement(
+    "petsc4py", "3.18", _DEBIAN_FENICSX, 'conda install -c conda-forge petsc4py "petsc=*=real*"'
+)
+DOLFINX = Requirement(
+    "dolfinx",
+    "0.5",
+    _DEBIAN_FENICSX,
+    "conda install -c conda-forge fenics-dolfinx",
+    distribution="fenics-dolfinx",
+    tested=("0.5", "0.9"),
+)
+_NUMERICAL = [
+    Requirement("numpy", "1.24", _DEBIAN_FENICSX, "conda install -c conda-forge numpy"),
+    Requirement("scipy", "1.10", _DEBIAN_FENICSX, "conda install -c conda-forge scipy"),
+    Requirement("clarabel", "0.11", "pip install clarabel", "conda install -c conda-forge clarabel"),
+]
+_GMSH = Requirement(
+    "gmsh",
+    "4.8",
+    "apt-get install --no-install-recommends python3-gmsh",
+    "conda install -c conda-forge python-gmsh",
+)
+_PYMETIS = Requirement("pymetis", "2025.2", "pip install pymetis", "conda install -c conda-forge pymetis")
+
+
+def check() -> None:
+    """Check all libraries that every part of the package needs, without loading or starting them.
+
+    Raises:
+        MissingRequirementError: A library is missing or too old.
+    """
+    for requirement in [*_NUMERICAL, _MPI4PY, _PETSC4PY, DOLFINX]:
+        _check_installed(requirement)
+
+
+def load_mpi() -> ModuleType:
+    """Return ``mpi4py.MPI``; starts MPI unless ``mpi4py.rc`` prevents it.
+
+    Raises:
+        MissingRequirementError: mpi4py cannot be loaded.
+    """
+    return _load(_MPI4PY, "mpi4py.MPI")
+
+
+def petsc_is_started() -> bool:
+    """Return whether PETSc can be used; starts nothing."""
+    petsc = sys.modules.get("petsc4py.PETSc")
+    return petsc is not None and bool(petsc.Sys.isInitialized())
+
+
+def load_petsc(world: MPI.Comm | None = None) -> ModuleType:
+    """Return ``petsc4py.PETSc``; starts PETSc on ``world``, by default all ranks, unless it runs. Collective.
+
+    Raises:
+        MissingRequirementError: petsc4py cannot be loaded, or PETSc was built with complex numbers or
+            without a sparse Cholesky factorisation.
+    """
+    load_mpi()
+    if world is not None:
+        _load(_PETSC4PY, "petsc4py").init(comm=world)
+    petsc = _load(_PETSC4PY, "petsc4py.PETSc")
+    _restore_sigpipe()
+    _check_petsc(_PETSC4PY, petsc)
+    return petsc
+
+
+def _restore_sigpipe() -> None:
+    """Let writes to closed pipes raise errors of Python again: PETSc's handler would end all ranks."""
+    handler = signal.getsignal(signal.SIGPIPE)
+    if handler is not None and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGPIPE, handler)
+
+
+def require_extra(use: str, extra: str, *modules: str) -> None:
+    """Check libraries that only a part of the package needs, without loading them.
+
+    Raises:
+        MissingRequirementError: One of them is not installed.
+    """
+    for module in modules:
+        if importlib.util.find_spec(module) is None:
+            raise MissingRequirementError(
+                f"{use} need {module}, found none: pip install 'fenics_contact[{extra}]'", name=module
+            )
+
+
+def check_gmsh() -> None:
+    """Check gmsh, which only geometries need.
+
+    Raises:
+        MissingRequirementError: gmsh is missing, too old or cannot be loaded.
+    """
+    _check_installed(_GMSH)
+    module = _load(_GMSH, "gmsh")
+    if _GMSH.version() is None:  # Debian 12 installs it without metadata
+        _check_version(_GMSH, module.__version__)
+
+
+def load_pymetis() -> ModuleType:
+    """Check and return pymetis, which only the partition of graphs needs.
+
+    Raises:
+        MissingRequirementError: pymetis is missing, too old or cannot be loaded.
+    """
+    _check_installed(_PYMETIS)
+    return _load(_PYMETIS, "pymetis")
+
+
+def pymetis_error(ending: str) -> MissingRequirementError:
+    """Return the error of an installed pymetis that does not run."""
+    return _PYMETIS.error(f"{_PYMETIS.version() or 'one'} that {ending}")
+
+
+def _check_installed(requirement: Requirement) -> None:
+    """Raise if a library is missing or too old, without importing it."""
+    if importlib.util.find_spec(requirement.module) is None:
+        raise requirement.error("none")
+    version = requirement.version()
+    if version is not None:
+        _check_version(requirement, version)
+
+
+def _check_version(requirement: Requirement, version: str) -> None:
+    """Raise if a version is too old, warn if it was never tested."""
+    if _numbers(version) < _numbers(requirement.oldest):
+        raise requirement.error(version)
+    if requirement.tested and ".".join(map(str, _numbers(version)[:2])) not in requirement.tested:
+        _log.warning(
+            "%s %s was never tested with fenics_contact, only %s were: first compare a case you know",
+            requirement.module,
+            version,
+            " and ".join(requirement.tested),
+        )
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    """Return the leading numbers of a version: (0, 10, 0) for "0.10.0.post2"."""
+    leading = re.match(r"\d+(\.\d+)*", version)
+    return tuple(map(int, leading.group().split("."))) if leading else ()
+
+
+def _load(requirement: Requirement, module: str) -> ModuleType:
+    """Import a module of an installed library, and name the library if that fails.
+
+    One that was built against another NumPy or MPI, for instance, is found but cannot be loaded.
+    """
+    try:
+        return importlib.import_module(module)
+    except (ImportError, OSError) as reason:
+        version = requirement.version() or "one"
+        raise requirement.error(
+            f"{version} that cannot be loaded ({reason}): a library under it is missing or of another version"
+        ) from reason
+
+
+def _check_petsc(requirement: Requirement, petsc: ModuleType) -> None:
+    """Raise where PETSc computes with complex numbers or cannot factor a sparse matrix."""
+    version = requirement.version() or "one"
+    if petsc.ScalarType(0).dtype.kind != "f":
+        raise requirement.error(f"{version} with complex numbers, where real ones are needed")
+    if not (factors(petsc, "cholmod") or factors(petsc, "mumps")):
+        raise requirement.error(f"{version} with neither CHOLMOD nor MUMPS, where one is needed")
+
+
+def factors(petsc: ModuleType, package: str) -> bool:
+    """Try a package on a matrix of one entry: ``hasExternalPackage`` is wrong on some builds."""
+    matrix = petsc.Mat().createAIJ((1, 1), nnz=1, comm=petsc.COMM_SELF)
+    matrix.setValue(0, 0, 1.0)
+    matrix.assemble()
+    preconditioner = petsc.PC().create(petsc.COMM_SELF)
+    preconditioner.setOperators(matrix)
+    preconditioner.setType(petsc.PC.Type.CHOLESKY)
+    preconditioner.setFactorSolverType(package)
+    try:
+        preconditioner.setFactorSetUpSolverType()
+    except petsc.Error:
+        return False
+    finally:
+        preconditioner.destroy()
+        matrix.destroy()
+    return True

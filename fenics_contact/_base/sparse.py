@@ -1,0 +1,352 @@
+"""Cost model for sparse factors and dense matrices of a subdomain, from measured rates.
+
+The choice depends only on sizes, not on timings, so that a run is reproducible. `python -m benchmarks.prices`
+repeats the measurements and compares them with the predictions.
+
+Destroy PETSc objects together with the Python object that uses them.
+
+petsc4py frees nothing when a Python reference goes away: PETSc objects must be destroyed explicitly, those
+shared by several ranks on all of them in the same order.
+
+How far sums of floating-point numbers that cancel can be trusted.
+
+Sparse matrices whose rows or columns are multiplied by numbers, without the cost of a product.
+
+A sparse matrix factored on a few ranks and used by all.
+
+Oversubscription by BLAS threads of MPI ranks.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import weakref
+from collections import Counter
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from fenics_contact._base.libraries import MPI, PETSc, check_not_forked, start
+from fenics_contact.errors import safe_log
+
+#: Products that a factored subdomain is expected to serve: a state with friction, and its adjoint.
+PRODUCTS = 100
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Rates of one core with OpenBLAS, other cores idle, caches cold.
+
+    Attributes:
+        factor: Seconds to factor a sparse matrix of n dofs of a solid, divided by n^1.37.
+        substitution: Seconds for forward and backward substitution, divided by n^1.3.
+        condensation: Time to form a Schur complement relative to that of factoring the whole matrix.
+        dense: Floating point operations per second of a dense factorisation and inversion.
+        stream: Bytes per second that the product with a packed triangle reads.
+    """
+
+    factor: float = 0.75e-6
+    substitution: float = 2.8e-8
+    condensation: float = 1.0
+    dense: float = 30e9
+    stream: float = 15e9
+
+
+#: Bytes of a sparse factor of n dofs of a solid, divided by n^1.5.
+FACTOR_BYTES = 29.0
+#: Bytes of the two packed triangles of dense operators, divided by the square of the interface dofs.
+TRIANGLE_BYTES = 6.0
+#: Rates measured as `Rates` describes.
+MEASURED = Rates()
+
+
+@dataclass(frozen=True)
+class LocalCost:
+    """Cost of one subdomain.
+
+    Attributes:
+        setup: Seconds to factor it.
+        product: Seconds to apply K⁺ and S once each on the interface.
+    """
+
+    setup: float
+    product: float
+
+    def total(self, products: int) -> float:
+        """Return the seconds of the set-up and of a number of products."""
+        return self.setup + products * self.product
+
+
+def implicit_cost(size: int, interface: int, rates: Rates = MEASURED) -> LocalCost:
+    """Predict the cost of sparse factors of a subdomain with ``size`` dofs, ``interface`` of them shared."""
+    blocks = (size, size - interface)
+    return LocalCost(
+        rates.factor * sum(n**1.37 for n in blocks), rates.substitution * sum(n**1.3 for n in blocks)
+    )
+
+
+def explicit_cost(size: int, interface: int, rates: Rates = MEASURED) -> LocalCost:
+    """Predict the cost of dense interface matrices of a subdomain."""
+    sparse = rates.condensation * size**1.37 + (size - interface) ** 1.37
+    # K⁺ in double precision and S in single, each a triangle.
+    triangles = (4 + 2) * interface**2
+    return LocalCost(rates.factor * sparse + interface**3 / rates.dense, triangles / rates.stream)
+
+
+def prefers_explicit(size: int, interface: int, *, products: int = PRODUCTS, rates: Rates = MEASURED) -> bool:
+    """Return whether dense interface matrices are expected to be faster than sparse factors.
+
+    Args:
+        size: Dofs of the subdomain.
+        interface: Dofs that B touches.
+        products: Expected number of products with the dual operator, and with the preconditioner.
+        rates: Rates of the machine.
+
+    Example:
+        >>> prefers_explicit(2079, 729), prefers_explicit(10125, 3534)
+        (True, False)
+    """
+    explicit, implicit = _totals(size, interface, products, rates)
+    return explicit < implicit
+
+
+def expected_seconds(size: int, interface: int) -> float:
+    """Return the cost of a subdomain stored in the cheaper way; arguments as for `prefers_explicit`."""
+    return min(_totals(size, interface, PRODUCTS, MEASURED))
+
+
+def expected_bytes(size: int, interface: int) -> float:
+    """Return the memory of a factored subdomain stored in the cheaper way; arguments as above."""
+    if prefers_explicit(size, interface):
+        return TRIANGLE_BYTES * interface**2 + FACTOR_BYTES * (size - interface) ** 1.5
+    return FACTOR_BYTES * (size**1.5 + (size - interface) ** 1.5)
+
+
+def _totals(size: int, interface: int, products: int, rates: Rates) -> tuple[float, float]:
+    """Return the seconds of the explicit and of the implicit way."""
+    explicit, implicit = (cost(size, interface, rates) for cost in (explicit_cost, implicit_cost))
+    return explicit.total(products), implicit.total(products)
+
+
+#: Size of the communicator and index in the order of registration there: the same on all its ranks.
+Key = tuple[int, int]
+
+#: Objects of several ranks whose owner is gone on this rank.
+_waiting: dict[Key, tuple[tuple[PETSc.Object, ...], object]] = {}
+_registered: Counter[int] = Counter()
+
+
+def dispose_with(
+    owner: object, *objects: PETSc.Object, comm: MPI.Comm | None = None, keep: object = None
+) -> None:
+    """Destroy PETSc objects when their owner is no longer used.
+
+    Args:
+        owner: The Python object that holds them.
+        *objects: They must not refer to the owner.
+        comm: Communicator they live on: that of the scene or of its first ranks, or None for this rank alone.
+            Objects of one rank are destroyed at once, others by `sweep`; they must be registered by all ranks
+            in the same order.
+        keep: An object that must live as long as they do, such as the mesh whose communicator they use.
+    """
+    finalizer: Any
+    if comm is None or comm.size == 1:
+        finalizer = weakref.finalize(owner, _destroy, objects, keep)
+    else:
+        _registered[comm.size] += 1
+        finalizer = weakref.finalize(owner, _retire, (comm.size, _registered[comm.size]), objects, keep)
+    finalizer.atexit = False
+
+
+def sweep(comm: MPI.Comm) -> None:
+    """Destroy the shared objects that no rank uses any more. Collective on ``comm``."""
+    if comm.size == 1:
+        return
+    waiting = [set(keys) for keys in comm.allgather(sorted(_waiting))]
+    for key in sorted(waiting[0]):
+        if all(key in keys for keys in waiting[: key[0]]) and key in _waiting:
+            _destroy(*_waiting.pop(key))
+
+
+def _retire(key: Key, objects: tuple[PETSc.Object, ...], keep: object) -> None:
+    _waiting[key] = objects, keep
+
+
+def _destroy(objects: tuple[PETSc.Object, ...], keep: object) -> None:
+    for part in objects:
+        part.destroy()
+
+
+#: What is left of terms that cancel counts as rounding below this part of them: sums over a body leave some
+#: hundred units in the last place.
+ROUNDING = 1e-13
+#: The same where few operations lie between: numbers that differ by less, relatively, are the same.
+LAST_PLACES = 1e-14
+
+
+def scaled_rows(matrix: sp.csr_matrix, factors: np.ndarray) -> sp.csr_matrix:
+    """Return diag(factors) @ matrix, which stores no zeros; factors have shape (n_rows,)."""
+    return _with_values(matrix, matrix.data * np.repeat(factors, np.diff(matrix.indptr)))
+
+
+def scaled_columns(matrix: sp.csr_matrix, factors: np.ndarray) -> sp.csr_matrix:
+    """Return matrix @ diag(factors), which stores no zeros; factors have shape (n_columns,)."""
+    return _with_values(matrix, matrix.data * factors[matrix.indices])
+
+
+def _with_values(matrix: sp.csr_matrix, values: np.ndarray) -> sp.csr_matrix:
+    if np.count_nonzero(values) == len(values):
+        return sp.csr_matrix((values, matrix.indices, matrix.indptr), shape=matrix.shape)
+    # Zeros are taken out in place: the pattern must not be that of the given matrix.
+    result = sp.csr_matrix((values, matrix.indices, matrix.indptr), shape=matrix.shape, copy=True)
+    result.eliminate_zeros()
+    return result
+
+
+Vector = npt.NDArray[np.float64]
+
+#: Number of rows per rank that takes part in the factorisation.
+ROWS_PER_RANK = 20_000
+#: Added to the diagonal of the scaled matrix, so that a singular one can be factored, too; one step of
+#: refinement removes its effect from the solutions.
+SHIFT = 1e-13
+
+_subsets: dict[tuple[int, int], MPI.Comm] = {}
+
+
+class SharedFactor:
+    """LU factors of Σ A_rank by MUMPS on the first ranks of a communicator.
+
+    Attributes:
+        size: Number of rows.
+        holders: Number of ranks that hold the factors.
+    """
+
+    def __init__(
+        self, comm: MPI.Comm, share: sp.csr_matrix, scale: Vector, *, holders: int | None = None
+    ) -> None:
+        """Sum the shares and factor. Collective on ``comm``.
+
+        Args:
+            comm: Communicator of the ranks that use the factors.
+            share: This rank's summand, shape (m, m).
+            scale: Positive factors for rows and columns that bring the entries to order one, shape (m,),
+                replicated.
+            holders: Ranks that hold the factors; one for every `ROWS_PER_RANK` rows by default.
+        """
+        start(comm)
+        self._comm, self.size, self._scale = comm, share.shape[0], scale
+        wanted = -(-self.size // ROWS_PER_RANK) if holders is None else holders
+        self.holders = max(1, min(comm.size, wanted))
+        self._bounds = np.linspace(0, self.size, self.holders + 1).astype(np.int64)
+        rows = self._own_rows(share)
+        self._holds = comm.rank < self.holders
+        self._subset = _first_ranks(comm, self.holders)
+        if self._holds:
+            self._factor(rows)
+
+    def solve(self, right: Vector, *, refine: bool = True) -> Vector:
+        """Return A⁻¹ times a replicated vector, shape (m,), replicated. Collective.
+
+        Args:
+            right: Right side, the same on every rank.
+            refine: Correct for the shift.
+        """
+        check_not_forked()
+        solution = np.empty(self.size)
+        if self._holds:
+            start, stop = self._bounds[self._comm.rank : self._comm.rank + 2]
+            own = self._scale[start:stop]
+            self._right.array_w[:] = own * right[start:stop]
+            self._ksp.solve(self._right, self._left)
+            if refine:
+                self._matrix.mult(self._left, self._residual)
+                self._residual.aypx(-1.0, self._right)
+                self._ksp.solve(self._residual, self._correction)
+                self._left.axpy(1.0, self._correction)
+            local = own * self._left.array_r
+            counts = np.diff(self._bounds)
+            self._subset.Gatherv(local, (solution, counts, self._bounds[:-1], MPI.DOUBLE))
+        if self._comm.size > 1:
+            self._comm.Bcast(solution)
+        return solution
+
+    def _own_rows(self, share: sp.csr_matrix) -> sp.csr_matrix:
+        """Return the scaled rows that this rank is to hold, summed over all ranks."""
+        entries = share.tocoo()
+        holder = np.searchsorted(self._bounds, entries.row, side="right") - 1
+        order = np.argsort(holder, kind="stable")
+        cuts = np.searchsorted(holder[order], np.arange(1, self._comm.size))
+        values = entries.data * self._scale[entries.row] * self._scale[entries.col]
+        columns = (entries.row, entries.col, values)
+        outgoing = zip(*(np.split(column[order], cuts) for column in columns), strict=True)
+        incoming = self._comm.alltoall(list(outgoing))
+        row, column, value = (np.concatenate([part[i] for part in incoming]) for i in range(3))
+        first = self._bounds[min(self._comm.rank, self.holders - 1)]
+        height = self._bounds[self._comm.rank + 1] - first if self._comm.rank < self.holders else 0
+        return sp.csr_matrix((value, (row - first, column)), shape=(height, self.size))
+
+    def _factor(self, rows: sp.csr_matrix) -> None:
+        start, height = self._bounds[self._comm.rank], rows.shape[0]
+        # Every diagonal entry must exist for the shift, also zeros, which sums of sparse matrices drop.
+        entries, own = rows.tocoo(), np.arange(height)
+        value = np.concatenate([entries.data, np.zeros(height)])
+        place = np.concatenate([entries.row, own]), np.concatenate([entries.col, start + own])
+        rows = sp.csr_matrix((value, place), shape=rows.shape)
+        csr = (rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data)
+        shape = ((height, self.size), (height, self.size))
+        self._matrix = PETSc.Mat().createAIJ(shape, csr=csr, comm=self._subset)
+        shifted = self._matrix.copy()
+        shifted.shift(SHIFT)
+        self._ksp = PETSc.KSP().create(self._subset)
+        self._ksp.setOperators(shifted)
+        self._ksp.setType(PETSc.KSP.Type.PREONLY)
+        pc = self._ksp.getPC()
+        pc.setType(PETSc.PC.Type.LU)
+        pc.setFactorSolverType("mumps")
+        self._ksp.setUp()
+        self._right, self._left = self._matrix.createVecs()
+        self._residual, self._correction = self._matrix.createVecs()
+        vectors = (self._right, self._left, self._residual, self._correction)
+        dispose_with(self, pc, self._ksp, shifted, self._matrix, *vectors, comm=self._subset)
+
+
+def _first_ranks(comm: MPI.Comm, count: int) -> MPI.Comm:
+    """Return a communicator of the first ranks, made once for each communicator and count. Collective."""
+    if count == 1:
+        return MPI.COMM_SELF
+    if count == comm.size:
+        return comm
+    key = (comm.py2f(), count)
+    if key not in _subsets:
+        _subsets[key] = comm.Split(0 if comm.rank < count else MPI.UNDEFINED)
+    return _subsets[key]
+
+
+_LOG = logging.getLogger(__name__)
+
+#: Environment variables for the number of threads of OpenBLAS, MKL and OpenMP.
+SETTINGS = ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+
+
+@lru_cache
+def warn_of_threads(ranks: int) -> None:
+    """Warn, once, if several ranks run and the number of their threads is unset.
+
+    The number itself is the user's choice: a library that changed it would affect the whole process.
+
+    Args:
+        ranks: Number of ranks.
+    """
+    if ranks > 1 and not any(os.environ.get(name) for name in SETTINGS):
+        safe_log(
+            _LOG.warning,
+            "%d ranks share the cores, and the BLAS of each may start threads on all of them, which can take "
+            "several times as long: export OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 before Python starts",
+            ranks,
+        )

@@ -1,0 +1,112 @@
+"""`fenics-contact info`: the software that this machine computes and draws with, and what slows it down."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fenics_contact import _dolfinx
+from fenics_contact._base import requirements as _requirements
+from fenics_contact._base.display import counted
+from fenics_contact._base.libraries import MPI
+from fenics_contact._cli.console import Console, console_of, facts
+from fenics_contact.errors import MissingRequirementError
+from fenics_contact.output.files import json_text
+from fenics_contact.output.result import versions
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_BLAS = re.compile(r"/\S*/lib(?:openblas|mkl_rt|blis|atlas|satlas|tatlas|blas)[^/\s]*\.so\S*")
+_REFERENCE = re.compile(r"/blas/libblas|libblas\.so\.3\.\d")
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command to the program."""
+    app.command("info", short_help="versions, PETSc, BLAS, MPI, pictures")(info)
+
+
+def info(
+    context: typer.Context,
+    as_json: Annotated[bool, typer.Option("--json", help="Write JSON, for programs.")] = False,
+) -> None:
+    """Show versions, PETSc's packages, the BLAS, MPI, and whether pictures can be drawn."""
+    console = console_of(context)
+    known = gathered(console.comm)
+    if as_json:
+        console.say(json_text(known).rstrip())
+        return
+    console.show(facts(known["versions"], "versions"))
+    console.say()
+    console.show(facts(known["machine"], "machine"))
+    for line in known["advice"]:
+        console.say(f"! {line}")
+
+
+def gathered(comm: MPI.Comm) -> dict[str, Any]:
+    """Return the rows of `info`. Collective."""
+    local = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    first = local.rank == 0
+    local.Free()
+    nodes = comm.allreduce(int(first))
+    libraries = loaded_blas()
+    machine = {
+        "ranks": f"{comm.size} on {counted(nodes, 'node')}, {os.cpu_count()} cores on this one",
+        "threads": ", ".join(f"{name}={os.environ.get(name, 'not set')}" for name in THREADS),
+        "BLAS": ", ".join(libraries) or "not found",
+        "PETSc packages": ", ".join(_packages()),
+        "pictures": _pictures(comm),
+        "VTX files": "yes (ADIOS2)" if _dolfinx.has_vtx() else "no (dolfinx without ADIOS2)",
+    }
+    return {"versions": versions(), "machine": machine, "advice": list(_advice(comm, libraries))}
+
+
+def loaded_blas() -> list[str]:
+    """Return the files of the BLAS libraries in this process, as far as the system reports them."""
+    try:
+        maps = Path("/proc/self/maps").read_text()
+    except OSError:
+        return []
+    return sorted({os.path.realpath(file) for file in _BLAS.findall(maps)})
+
+
+def _packages() -> Iterator[str]:
+    from fenics_contact._base.libraries import PETSc
+
+    for package in ("cholmod", "mumps"):
+        yield f"{package} {'works' if _requirements.factors(PETSc, package) else 'is not there'}"
+
+
+def _pictures(comm: MPI.Comm) -> str:
+    words = ""
+    if comm.rank == 0:
+        try:
+            from fenics_contact.pictures.canvas import check_renderer
+
+            check_renderer()
+            words = "can be drawn"
+        except MissingRequirementError as error:
+            words = f"cannot be drawn: {error}"
+    return str(comm.bcast(words))
+
+
+def _advice(comm: MPI.Comm, libraries: list[str]) -> Iterator[str]:
+    if any(map(_REFERENCE.search, libraries)):
+        yield (
+            "the BLAS is the slow reference one: install OpenBLAS (Debian: apt-get install "
+            "libopenblas0-pthread) and choose it (update-alternatives --config "
+            "libblas.so.3-x86_64-linux-gnu); factorisations take a fraction of the time"
+        )
+    if comm.size > 1 and all(os.environ.get(name) != "1" for name in THREADS[:2]):
+        yield (
+            "several ranks, and BLAS may use threads on top: set OPENBLAS_NUM_THREADS=1 and OMP_NUM_THREADS=1"
+        )
+
+
+__all__ = ["Console", "add_to", "gathered", "loaded_blas"]

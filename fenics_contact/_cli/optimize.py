@@ -1,0 +1,207 @@
+"""`fenics-contact optimize`: the shape optimisation of a scene file.
+
+Files of an optimised surface for other programs, as a scene file asks for them.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import typer
+
+from fenics_contact._base.display import force_units
+from fenics_contact._base.progress import show_progress
+from fenics_contact._cli.console import Console, ExitCode, console_of, facts
+from fenics_contact._cli.options import (
+    DryOption,
+    OutputOption,
+    PicturesOption,
+    PythonOption,
+    ResumeOption,
+    SceneArgument,
+    SetOption,
+    ToleranceOption,
+    checkpoint_of,
+    read,
+    resumable,
+    show_outputs,
+    show_plan,
+)
+from fenics_contact._cli.view import Gallery, can_draw, draw_state
+from fenics_contact._optimize.result import Result
+from fenics_contact._scene_file.building import ShapeTask
+from fenics_contact._scene_file.reading import SceneFile
+from fenics_contact.design.problem import ShapeProblem
+from fenics_contact.design.several import LoadPath
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.output.cad import CadError, write_step
+from fenics_contact.output.files import only_run_in
+from fenics_contact.output.paraview import ResultSeries, file_of_each
+from fenics_contact.output.result import write_optimisation_result
+from fenics_contact.output.surfaces import write_design_table, write_stl
+from fenics_contact.results.state import pairs_in_words
+
+_MILLIMETRES = {"µm": 1e-3, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+
+
+def check_design_files(file: SceneFile) -> None:
+    """Refuse kinds of files that the scene cannot have, before anything is solved.
+
+    Raises:
+        InvalidInputError: If the scene is plane and STL is asked for, or STEP in an unknown unit.
+    """
+    kinds, length = file.document.output.design, file.document.units.length
+    if "stl" in kinds and file.scene.dim == 2:
+        raise InvalidInputError('output.design must be "csv" or "step" for a plane scene, got "stl"')
+    if "step" in kinds and length not in _MILLIMETRES:
+        raise InvalidInputError(
+            f'output.design "step" needs a unit of length that is known in millimetres, got {length!r}: name '
+            f"one of {', '.join(_MILLIMETRES)} in [units]"
+        )
+
+
+def write_design_files(
+    console: Console, file: SceneFile, problem: ShapeProblem | LoadPath, alpha: np.ndarray
+) -> list[Path]:
+    """Write the files of a design that the scene file asks for, and return them. Collective."""
+    kinds, length, folder = file.document.output.design, file.document.units.length, file.folder
+    bodies = sorted({design.body for design in problem.designs})
+    written = []
+    if "csv" in kinds:
+        for number in range(len(problem.designs)):
+            path = folder / ("design.csv" if number == 0 else f"design_{number + 1}.csv")
+            written.append(write_design_table(problem, alpha, path, design=number, length=length))
+    if "stl" in kinds:
+        for body, path in file_of_each(bodies, folder, "design", ".stl").items():
+            written.append(write_stl(problem, alpha, path, body=body))
+    if "step" in kinds:
+        for body, path in file_of_each(bodies, folder, "design", ".step").items():
+            _write_step(console, problem, alpha, path, body, _MILLIMETRES[length])
+            written.append(path)
+    return written
+
+
+def _write_step(
+    console: Console, problem: ShapeProblem | LoadPath, alpha: np.ndarray, path: Path, body: str, scale: float
+) -> None:
+    """Write a body, or what can be written of it. Collective."""
+    try:
+        write_step(problem, alpha, path, body=body, scale=scale)
+    except CadError as error:
+        console.say(f"{path.name} has the designed surface alone: {error}")
+        write_step(problem, alpha, path, body=body, scale=scale, solid=False)
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command to the program."""
+    app.command("optimize", short_help="optimise the contact shape of a scene file")(optimize)
+
+
+def optimize(
+    context: typer.Context,
+    scene: SceneArgument,
+    output: OutputOption = None,
+    tolerance: ToleranceOption = None,
+    settings: SetOption = None,
+    pictures: PicturesOption = True,
+    resume: ResumeOption = None,
+    dry_run: DryOption = False,
+    python: PythonOption = True,
+) -> None:
+    """Optimise the contact shape described by the [design] of a scene file."""
+    console = console_of(context)
+    with show_progress(console.comm):
+        file = read(console, scene, output, tolerance, settings, python)
+        file.require_design()
+        check_design_files(file)
+        show_plan(console, file, sensitivity=True)
+        console.say()
+        if dry_run:
+            show_outputs(console, file, draws=pictures)
+            return
+        task = file.shape_task()
+        words = file.document.design.objective_in_words  # type: ignore[union-attr]
+        console.say(f"{task.problem.size} design variables, objective {words}")
+        with only_run_in(file.folder, console.comm):
+            result, written = _minimised(console, file, task, resume)
+            console.show(facts(_facts(file, task, result)))
+            gallery = Gallery()
+            if pictures and can_draw(console, file, gallery):
+                _draw(console, file, task, result, gallery)
+    names = ", ".join(["result.json", *(path.name for path in (*written, *gallery.drawn))])
+    console.say(f"results in {file.folder}/: {names}")
+    if not result.reason.success:
+        console.say(f"not converged: {result.reason.value}")
+        raise typer.Exit(int(ExitCode.NOT_CONVERGED))
+    gallery.require_all()
+
+
+def _minimised(
+    console: Console, file: SceneFile, task: ShapeTask, resume: bool | None
+) -> tuple[Result, list[Path]]:
+    """Run the optimisation and write its files; return these, too. Collective."""
+    checkpoint = checkpoint_of(file, resume)
+    kinds = file.document.output.files
+    series = ResultSeries(file.folder, "designs", console.comm, formats=kinds) if kinds else None
+    follow = None if series is None else series.follow(task.problem)
+    with resumable(console, checkpoint):
+        result = task.minimize(callback=follow, checkpoint=checkpoint)
+    more = {"scene_file": file.source.name, "title": file.title}
+    write_optimisation_result(result, task.problem, file.folder, more=more)
+    written = [] if series is None else [series.path]
+    written += write_design_files(console, file, task.problem, result.x)
+    # A run that stopped at a limit can continue from its checkpoint with a larger one.
+    if checkpoint is not None and result.reason.success and console.comm.rank == 0:
+        Path(checkpoint.path).unlink(missing_ok=True)
+    return result, written
+
+
+def _facts(file: SceneFile, task: ShapeTask, result: Result) -> dict[str, str]:
+    problem = task.problem
+    before, after, units = problem.first, problem.at(result.x), file.document.units
+    assert before is not None
+    drop = (before.value - after.value) / abs(before.value) * 100 if before.value else 0.0
+    rows = {
+        "objective before": f"{before.value:.9g}",
+        "objective after": f"{after.value:.9g}",
+        "drop": f"{drop:.3f} %",
+        "iterations": f"{result.iterations}, {result.evaluations} evaluations",
+        "work": f"{problem.products} products with F",
+        "stopped because": result.reason.value,
+    }
+    for one in result.constraints:
+        rows[f"constraint {one.name}"] = f"{one.value:.6g}{', active' if one.active else ''}"
+    for name, point in (("before", before), ("after", after)):
+        state = point.state
+        force, _ = force_units(units.force, units.length, state.scene.dim)
+        for number, words in enumerate(pairs_in_words(state.scene, state.contact, force, units.stress)):
+            rows[f"contact {number} {name}"] = words
+    volume, start = problem.volume(result.x)[0], problem.volume(task.start)[0]
+    rows["volume"] = f"{volume / start:.6f} of that at the start"
+    rows["seconds"] = ", ".join(f"{name} {spent:.2f}" for name, spent in problem.seconds.items())
+    return rows
+
+
+def _draw(console: Console, file: SceneFile, task: ShapeTask, result: Result, gallery: Gallery) -> None:
+    """Draw the states before and after, the control net and the history. Collective."""
+    from fenics_contact.pictures.designs import plot_control_net, plot_convergence
+
+    problem = task.problem
+    for name, point in (("before", problem.first), ("after", problem.at(result.x))):
+        assert point is not None
+        draw_state(console, file, {name: point.state}, gallery, f"_{name}")
+    moved, at = problem.points_of(result.x), 0
+    for number, design in enumerate(problem.designs):
+        points, part = file.scene.bodies[design.body].mesh.points, result.x[at : at + design.size]
+        nets: Any = tuple(design.control_points(points, alpha) for alpha in (np.zeros(design.size), part))
+        path = file.folder / ("control_net.png" if number == 0 else f"control_net_{number + 1}.png")
+        plot_control_net(design.lattice, (points, moved[design.body]), nets, path, comm=console.comm)
+        gallery.drawn.append(path)
+        at += design.size
+    values = [record.value for record in result.history]
+    kinds = [record.kind.value for record in result.history]
+    path = file.folder / "convergence.png"
+    plot_convergence(values, kinds, path, title=file.title, comm=console.comm)
+    gallery.drawn.append(path)

@@ -1,0 +1,146 @@
+"""Options that several commands share.
+
+Preview of what will be built and written.
+
+Interruption and continuation of runs.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+import typer
+
+from fenics_contact._base.checkpoint import Checkpoint, interruptible
+from fenics_contact._base.progress import is_visible
+from fenics_contact._cli.console import Console, facts, write_stderr
+from fenics_contact._scene_file.reading import SceneFile, read_scene_file
+from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
+
+SceneArgument: TypeAlias = Annotated[
+    Path, typer.Argument(metavar="SCENE.toml", help="The scene file.", show_default=False)
+]
+OutputOption: TypeAlias = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", help="Folder of the results instead of the file's.", show_default=False),
+]
+ToleranceOption: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--tolerance", help='Relative residual, or "balanced", instead of the file\'s.', show_default=False
+    ),
+]
+SetOption: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Another value for a key of the file, such as contacts.0.friction.coefficient=0.2; repeatable.",
+        show_default=False,
+    ),
+]
+PicturesOption: TypeAlias = Annotated[
+    bool, typer.Option("--pictures/--no-pictures", help="Draw the pictures that the file requests.")
+]
+ResumeOption: TypeAlias = Annotated[
+    bool | None,
+    typer.Option(
+        "--resume/--fresh",
+        help="Require a checkpoint, or start anew; by default continue from one if it exists.",
+        show_default=False,
+    ),
+]
+DryOption: TypeAlias = Annotated[
+    bool,
+    typer.Option(
+        "--dry-run",
+        help="Only report what would be built and written. Python files that the scene names are run.",
+    ),
+]
+PythonOption: TypeAlias = Annotated[
+    bool,
+    typer.Option("--python/--no-python", help='Run Python files that the scene names ("file.py:Name").'),
+]
+
+
+def read(
+    console: Console,
+    scene: Path,
+    output: Path | None,
+    tolerance: str | None,
+    settings: list[str] | None,
+    python: bool = True,
+) -> SceneFile:
+    """Read a scene file with the values that options override. Collective."""
+    overrides = list(settings or ())
+    if tolerance is not None:
+        overrides.append(f"solver.tolerance={tolerance}")
+    if output is not None:
+        if not is_visible(str(output)):
+            raise InvalidInputError(f"--output must be a path that can be shown, got {str(output)!r}")
+        overrides.append(f"output.folder={json.dumps(str(output), ensure_ascii=False)}")
+    return read_scene_file(scene, console.comm, overrides=overrides, python=python)
+
+
+def checkpoint_of(file: SceneFile, resume: bool | None) -> Checkpoint | None:
+    """Return the checkpoint of a long run, None if the file requests none."""
+    if not file.document.output.checkpoint:
+        return None
+    return Checkpoint(file.folder / "checkpoint.npz", resume=resume, comm=file.comm)
+
+
+def show_plan(console: Console, file: SceneFile, *, sensitivity: bool = False) -> None:
+    """Print the plan of a scene. Collective."""
+    plan = file.scene.plan(file.partitions, sensitivity=sensitivity)
+    rows = {line[:15].strip(): line[16:] for line in str(plan).splitlines()}
+    if file.steps and not sensitivity:
+        rows["load steps"] = str(len(file.steps))
+    console.say(f"{file.title}: {file.source.name} on {console.ranks}")
+    console.show(facts(rows))
+
+
+def show_outputs(console: Console, file: SceneFile, *, draws: bool) -> None:
+    """Report what a run would write."""
+    output = file.document.output
+    pictures = f", pictures of {', '.join(output.pictures)}" if draws and output.pictures else ""
+    kinds = f", {', '.join(output.files)} files" if output.files else ""
+    shapes = (
+        f", {', '.join(output.design)} files of the design" if file.document.design and output.design else ""
+    )
+    console.say(f"would write to {file.folder}/: result.json{kinds}{shapes}{pictures}")
+    console.say("nothing was solved (--dry-run)")
+
+
+@contextmanager
+def resumable(console: Console, checkpoint: Checkpoint | None) -> Iterator[None]:
+    """Let signals stop the block where it can continue, and report how to continue an incomplete run.
+
+    Collective.
+    """
+    with interruptible(console.comm), _reporting(console, checkpoint):
+        yield
+
+
+@contextmanager
+def _reporting(console: Console, checkpoint: Checkpoint | None) -> Iterator[None]:
+    if checkpoint is None:
+        yield
+        return
+    path = Path(checkpoint.path)
+    resumed = path.exists() and checkpoint.resume is not False
+    if resumed:
+        console.say(f"going on from {path} (--fresh starts anew)")
+    try:
+        yield
+    except InvalidInputError as error:
+        if resumed:
+            raise InvalidInputError(f"{error} (with --fresh the run starts anew)") from error
+        raise
+    except (ConvergenceError, InfeasibleError):
+        if console.comm.rank == 0 and path.exists():
+            write_stderr(f"what is done is kept in {path}; the same command goes on from there\n")
+        raise

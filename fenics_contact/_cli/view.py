@@ -1,0 +1,309 @@
+"""`fenics-contact view`: numbers, a picture and a web page of a result.
+
+Pictures of a run, if the libraries for them are installed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.table import Table
+
+from fenics_contact._base.requirements import require_extra
+from fenics_contact._cli.console import Console, console_of, facts, forces_table
+from fenics_contact._scene_file.reading import SceneFile
+from fenics_contact._scene_file.source import suggestion
+from fenics_contact.errors import InvalidInputError, MissingRequirementError, agree, together
+from fenics_contact.output.reading import FIELD_FILES, fields_of_result, read_result, stored_fields
+from fenics_contact.results.linear_state import as_linear
+from fenics_contact.results.state import State
+
+if TYPE_CHECKING:
+    from fenics_contact.pictures.canvas import Units
+
+
+@dataclass
+class Gallery:
+    """The pictures of a run: those that were drawn, and those that could not be."""
+
+    drawn: list[Path] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
+
+    def require_all(self) -> None:
+        """Refuse to end well without a picture that the scene file requests, once everything else is written.
+
+        Raises:
+            InvalidInputError: If one is missing; the reason was said where it was drawn.
+        """
+        if self.missing:
+            raise InvalidInputError(
+                f"the pictures that a scene file requests must be possible, {', '.join(self.missing)} could "
+                "not be drawn, everything else is written: take it out of [output] pictures, or run with "
+                "--no-pictures"
+            )
+
+
+def can_draw(console: Console, file: SceneFile, gallery: Gallery) -> bool:
+    """Return whether pictures can be drawn; if not, say what is missing for them. Collective."""
+    error: Exception | None = None
+    try:
+        from fenics_contact.pictures.canvas import check_renderer
+
+        if console.comm.rank == 0:
+            check_renderer()
+    except MissingRequirementError as missing:
+        error = missing
+    try:
+        agree(console.comm, error)
+    except MissingRequirementError as missing:
+        console.say(f"no pictures: {missing}")
+        if "pictures" in file.document.output.model_fields_set:
+            gallery.missing += [f"{kind}.png" for kind in file.document.output.pictures]
+        return False
+    return True
+
+
+def units_of(file: SceneFile) -> Units:
+    """Return the names of units for pictures."""
+    from fenics_contact.pictures.canvas import Units
+
+    names = file.document.units
+    return Units(length=names.length, force=names.force, stress=names.stress)
+
+
+def draw_state(
+    console: Console, file: SceneFile, states: Mapping[str, State], gallery: Gallery, suffix: str = ""
+) -> None:
+    """Draw the pictures that a file requests. Collective."""
+    state = list(states.values())[-1]
+    for kind in file.document.output.pictures:
+        path = file.folder / f"{kind}{suffix}.png"
+        try:
+            _DRAWN[kind](file, states, state, path)
+        except InvalidInputError as error:
+            console.say(f"no picture {path.name}: {error}")
+            gallery.missing.append(path.name)
+        else:
+            gallery.drawn.append(path)
+
+
+def _stress(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
+    from fenics_contact.pictures.states import plot_stress
+
+    plot_stress(state, path, title=file.title, units=units_of(file))
+
+
+def _pressure(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
+    from fenics_contact.pictures.states import plot_contact_pressure
+
+    plot_contact_pressure(state, path, title=file.title, units=units_of(file))
+
+
+def _status(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
+    from fenics_contact.pictures.states import plot_contact_status
+
+    plot_contact_status(states, path, title=file.title, units=units_of(file))
+
+
+def _decomposition(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
+    from fenics_contact.pictures.states import plot_decomposition
+
+    plot_decomposition(file.scene, file.partitions, path, comm=file.comm)
+
+
+def _error(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
+    from fenics_contact.pictures.states import plot_error
+
+    errors = as_linear(state, "errors").estimate_errors(geometry=False)
+    parts = {body: errors.by_cell(body) for body in state.scene.bodies}
+    plot_error(state, path, parts, title=file.title, units=units_of(file))
+
+
+_DRAWN: dict[str, Callable[[SceneFile, Mapping[str, State], State, Path], None]] = {
+    "stress": _stress,
+    "pressure": _pressure,
+    "status": _status,
+    "decomposition": _decomposition,
+    "error": _error,
+}
+
+
+#: Entries of a result that are shown, in this order; the others are long.
+SHOWN = (
+    "kind", "written", "ranks", "solver", "counts", "residuals", "energies", "errors", "seconds", "contact",
+    "rigid_motions", "optimisation", "more",
+)  # fmt: skip
+#: Longest list that is printed in full, and largest number of evaluations.
+LONGEST, MOST = 8, 20
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command to the program."""
+    app.command("view", short_help="numbers, a picture and a web page of a result")(view)
+
+
+def view(
+    context: typer.Context,
+    result: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RESULT",
+            help="A folder of results, a result.json, or a .vtu, .vtm or .pvd file.",
+            show_default=False,
+        ),
+    ],
+    save: Annotated[
+        Path | None, typer.Option("--save", help="PNG file to draw to.", show_default=False)
+    ] = None,
+    page: Annotated[
+        str | None,
+        typer.Option(
+            "--page",
+            metavar="[FILE.html]",
+            help="Write a web page to turn, cut and read, page.html beside the result unless named.",
+            show_default=False,
+        ),
+    ] = None,
+    field: Annotated[
+        str,
+        typer.Option("--field", help="Field shown by the colours, as in the list."),
+    ] = "von_mises",
+    scale: Annotated[float, typer.Option("--scale", help="Factor of the displacement.")] = 1.0,
+) -> None:
+    """Show a result: its numbers and its fields; --save draws a picture, --page makes a web page."""
+    console = console_of(context)
+    with together(console.comm):
+        if console.comm.rank == 0:
+            _view(console, result, save, field, scale)
+            if page is not None:
+                _write_page(console, result, page)
+
+
+def with_page_named(arguments: Sequence[str]) -> list[str]:
+    """Give --page of this command an empty value where no file follows it, as the library wants one."""
+    command = next((word for word in arguments if not word.startswith("-")), "")
+    if command != "view":
+        return list(arguments)
+    named = [*arguments[1:], ""]
+    return [
+        f"{word}=" if word == "--page" and not after.endswith(".html") else word
+        for word, after in zip(arguments, named, strict=True)
+    ]
+
+
+def _write_page(console: Console, result: Path, name: str) -> None:
+    from fenics_contact._page.page import result_page
+
+    target = Path(name) if name else (result if result.is_dir() else result.parent) / "page.html"
+    result_page(result, target)
+    console.say(f"page in {target}, {target.stat().st_size / 1e6:.1f} MB: open it in a browser")
+
+
+def _view(console: Console, result: Path, save: Path | None, field: str, scale: float) -> None:
+    """Print a result, and draw it to a file if one is given."""
+    try:
+        there, reason = result.exists(), "nothing is there"
+    except OSError as error:
+        there, reason = False, error.strerror or str(error)
+    if not there:
+        raise InvalidInputError(
+            f"a result needs a folder or file that exists, got '{result}' ({reason}): correct the path"
+        )
+    if result.suffix in FIELD_FILES:
+        fields: Path | None = result
+    else:
+        record = read_result(result)
+        show_record(console, record)
+        folder = result if result.is_dir() else result.parent
+        fields = fields_of_result(folder)
+        pictures = sorted(path.name for path in folder.glob("*.png"))
+        if pictures:
+            console.say(f"pictures in {folder}/: {', '.join(pictures)}")
+    if fields is None:
+        console.say("no .vtm or .pvd file of fields is there to draw")
+        return
+    members = stored_fields(fields)
+    shown = next(member for member in members if member.value == members[-1].value)
+    bodies = shown.read()
+    ranges = _ranges(bodies)
+    console.show(facts(ranges, f"fields of {shown.file.name}"))
+    if save is None:
+        return
+    if field not in ranges:
+        raise InvalidInputError(
+            f"--field must be one of {list(ranges)}, got {field!r}: {suggestion(field, list(ranges))}choose "
+            "one of them"
+        )
+    from fenics_contact.pictures.states import plot_field
+
+    plot_field(bodies, field, save, scale=scale)
+    console.say(f"picture in {save}")
+
+
+def _ranges(bodies: dict[str, Any]) -> dict[str, str]:
+    """Return name -> range of every field of bodies."""
+    require_extra("lists of fields", "viz", "pyvista", "matplotlib")
+    from fenics_contact.pictures.canvas import Units
+    from fenics_contact.pictures.section import field_entries
+
+    ends = {entry["name"]: entry["extremes"][0] for entry in field_entries([bodies], Units())}
+    return {name: f"{end[0]:.5g} to {end[1]:.5g}" if end else "" for name, end in ends.items()}
+
+
+def show_record(console: Console, record: dict[str, Any]) -> None:
+    """Print the entries of a result."""
+    for name in SHOWN:
+        value = record.get(name)
+        if value in (None, {}, []):
+            continue
+        if isinstance(value, dict):
+            history = value.get("history")
+            rest = {key: part for key, part in value.items() if key != "history"}
+            console.show(facts(dict(_flat(rest)), name))
+            console.say()
+            if history:
+                console.show(evaluations(history))
+                console.say()
+        elif isinstance(value, list):
+            for number, part in enumerate(value):
+                console.show(facts(dict(_flat(part)), f"{name} {number}"))
+            console.say()
+        else:
+            console.show(facts({name: value}))
+    if record.get("forces"):
+        console.show(forces_table(record["forces"], record.get("more", {}).get("unit_names")))
+
+
+def evaluations(history: dict[str, list[Any]]) -> Table:
+    """Return a table of the evaluations of an optimisation, the first and the last ones."""
+    table = Table(box=None, pad_edge=False, title="evaluations", title_justify="left")
+    for column in ("evaluation", "step", "value", "best"):
+        table.add_column(column, justify="left" if column == "step" else "right")
+    rows = list(zip(*(history[name] for name in ("evaluations", "kind", "value", "best")), strict=True))
+    for number, row in enumerate(rows):
+        if number == 1 and len(rows) > MOST:
+            table.add_row("...")
+        if number == 0 or number > len(rows) - MOST:
+            table.add_row(*map(_number, row))
+    return table
+
+
+def _flat(value: Any, name: str = "") -> list[tuple[str, str]]:
+    """Return the parts of a nested entry by dotted names."""
+    if isinstance(value, dict):
+        parts = [_flat(part, f"{name}.{key}" if name else str(key)) for key, part in value.items()]
+        return [row for rows in parts for row in rows]
+    if isinstance(value, list):
+        shown = ", ".join(_number(part) for part in value[:LONGEST])
+        return [(name, f"{shown}, ... ({len(value)} in all)" if len(value) > LONGEST else shown)]
+    return [(name, _number(value))]
+
+
+def _number(value: Any) -> str:
+    if value is None:
+        return ""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

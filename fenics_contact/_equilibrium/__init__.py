@@ -1,0 +1,1 @@
+"""Equilibrium of scenes with contact and friction."""

@@ -1,0 +1,293 @@
+"""Equilibria of scenes with nonlinear materials: found along a path of loads, each with its history."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fenics_contact._base.libraries import MPI
+from fenics_contact._base.progress import PhaseTimer
+from fenics_contact._equilibrium.static_admissibility import (
+    check_held,
+    require_resisted,
+    unresisted_in_words,
+    unresisted_motions,
+)
+from fenics_contact._equilibrium.stored import Stored, stored_configuration
+from fenics_contact._equilibrium.warnings import ContactWarnings, TurnedBodies, advice
+from fenics_contact._large_deformations.equations import Equations, ResidualState
+from fenics_contact._large_deformations.load_steps import AutomaticSteps, Path, PathEndsError, Snap
+from fenics_contact._large_deformations.loading import FollowingPressures, Loading, TurnedSurface
+from fenics_contact._large_deformations.moving_contact import (
+    ContactConfiguration,
+    MovingContact,
+    StillContact,
+)
+from fenics_contact._large_deformations.newton import NotHeldError
+from fenics_contact._large_deformations.starts import Effort, NonlinearEquilibrium
+from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact._scene.supports import RigidSurface
+from fenics_contact.errors import InfeasibleError, InvalidInputError, LoadStepError, together
+from fenics_contact.feti.decomposition import Decomposition, prescribed_displacements
+from fenics_contact.feti.torn import TornSystem, build_torn_system
+from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.qp.solution import Solution
+from fenics_contact.results.contact import ContactResult
+from fenics_contact.results.deformed_state import DeformedState, row_values_at
+from fenics_contact.results.dual_solve import contact_result
+from fenics_contact.results.rigid_motions import UnheldMotion
+from fenics_contact.results.state import Energies, State, Tolerance
+
+if TYPE_CHECKING:
+    from fenics_contact._pairing.sliding.slip import MaterialPoints
+
+
+class DeformedEquilibria:
+    """Successive equilibria of a scene with nonlinear materials, on the subdomains of one decomposition.
+
+    Attributes:
+        scene: The scene whose meshes they have.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        decomposition: Decomposition,
+        steps: AutomaticSteps | None,
+        timer: PhaseTimer,
+        beside: DeformedEquilibria | None = None,
+    ) -> None:
+        """Prepare the forms of all materials. Collective.
+
+        Args:
+            scene: The scene.
+            decomposition: Its subdomains.
+            steps: How loads are followed; None for the default.
+            timer: Collects the wall time.
+            beside: Those of another geometry, whose unchanged parts are reused.
+
+        Raises:
+            InvalidInputError: If the scene has a rigid surface that is free to move.
+        """
+        _require_prescribed(scene)
+        self.scene, self._steps = scene, steps or AutomaticSteps()
+        self._decomposition, self._timer = decomposition, timer
+        self._equations = Equations(scene, decomposition)
+        self._assembled: TornSystem | None = None if beside is None else beside._assembled
+        self._unresisted: tuple[UnheldMotion, ...] | None = None
+        self._turned, self._doubts = TurnedBodies(), ContactWarnings()
+
+    def solve(
+        self,
+        scene: Scene,
+        origin: State | None,
+        tolerance: Tolerance,
+        time: float,
+        step: LoadStep | None = None,
+        *,
+        overlap: bool = False,
+    ) -> DeformedState:
+        """Compute the equilibrium of a scene. Collective.
+
+        Args:
+            scene: The scene with its loads.
+            origin: The state before, whose history goes on; None for bodies at rest.
+            tolerance: Of all residuals; None for that of the solver.
+            time: Time at the end, for obstacles that move and materials that creep.
+            step: The load step, with its functions of time; None without any.
+            overlap: Whether bodies may overlap at the start, as those of a design do.
+
+        Raises:
+            InvalidInputError: If the tolerance is no number, or time runs backwards and materials remember.
+            InfeasibleError: If nothing holds some body.
+            LoadStepError: If the load cannot be followed; has the last equilibrium.
+        """
+        steps = self._steps
+        if tolerance is not None:
+            if not isinstance(tolerance, float):
+                raise InvalidInputError(
+                    f"the tolerance of nonlinear materials must be a number, got {tolerance!r}: their errors "
+                    "are not estimated; leave it out for 1e-8"
+                )
+            steps = replace(steps, newton=replace(steps.newton, tolerance=tolerance))
+        equations, timer = self._equations, self._timer
+        before, start, known = None, equations.at_rest(), None
+        if isinstance(origin, DeformedState):
+            before, known = origin.load, origin.equilibrium.linearisation
+            start = origin.equilibrium.configuration
+        self._require_later(scene, start.time, time)
+        with timer.phase("assemble"):
+            load = self._loading(scene, time, overlap)
+            if step is not None and (callable(step.loads) or callable(step.supports)):
+                course = _LoadHistory(step, scene, self._loading, self._decomposition.comm)
+                load = replace(load, course=course)
+            if before is None:
+                check_held(load.torn)
+            if self._unresisted is None:  # supports stay what they are in later steps
+                self._unresisted = unresisted_motions(load.torn)
+            require_resisted(self._unresisted, load.torn, load.prescribed)
+        try:
+            path = steps.follow(equations, before, load, start, timer, known, held=not self._unresisted)
+        except (InfeasibleError, NotHeldError) as failure:
+            if not self._unresisted:
+                raise
+            raise InfeasibleError(unresisted_in_words(self._unresisted)) from failure
+        except PathEndsError as failure:
+            last = None if failure.path is None else _state_after(failure.path, origin, timer)
+            where = "" if step is None else f"load step {step.name!r}: "
+            hints = advice(scene, last or origin, moves=isinstance(equations.contact, MovingContact))
+            words = f"{where}{failure}{hints}"
+            raise LoadStepError(words, failure.history, last) from failure
+        state = _state_after(path, origin, timer)
+        self._turned.tell(state)
+        if isinstance(equations.contact, StillContact):
+            self._doubts.warn_of_sliding(state)
+        return state
+
+    def restored(self, stored: Stored, scene: Scene) -> DeformedState:
+        """Build a state from what `stored_deformed` returned, with one factorisation. Collective.
+
+        Args:
+            stored: The arrays.
+            scene: The scene with the loads of the state.
+
+        Raises:
+            InvalidInputError: If the arrays are those of another system.
+        """
+        timer, equations = self._timer, self._equations
+        with timer.phase("assemble"):
+            load = whole = self._loading(scene, float(stored["times"][1]))
+            at, load = stored_configuration(stored, load, equations.contact, self._decomposition)
+            evaluation = equations.evaluate_at(load, at)
+        near = evaluation.linearised(timer, None)
+        evaluation = equations.evaluate_at(load, near.of(evaluation).at)
+        end = NonlinearEquilibrium(evaluation, near, Effort(factorisations=1))
+        fractions = tuple(map(float, stored["parts"]))
+        rows = stored.get("snaps", ())
+        snaps = tuple(Snap(fraction, way, work, int(stages)) for fraction, way, work, stages in rows)
+        since = float(stored.get("since", 0.0))
+        rubbed = float(stored.get("rubbed", 0.0))
+        path = Path(whole, end, None, None, fractions, since, snaps, rubbed, end.effort)
+        return _state_after(path, None, timer, stored.get("slip"))
+
+    def _require_later(self, scene: Scene, before: float, time: float) -> None:
+        materials = [each for body in scene.bodies.values() for each in body.materials]
+        if time < before and any(isinstance(each, HistoryMaterial) for each in materials):
+            raise InvalidInputError(
+                f"the time of load steps must not decrease where materials have a history, got {time:g} "
+                f"after {before:g}: give later times, or none"
+            )
+
+    def _loading(self, scene: Scene, time: float, overlap: bool = False) -> Loading:
+        """Return what acts at a time. Collective."""
+        self._assembled = build_torn_system(
+            scene, self._decomposition, overlap=overlap, previous=self._assembled
+        )
+        prescribed = prescribed_displacements(scene, self._decomposition.tearing)
+        following: tuple[tuple[float, FollowingPressures], ...] = ()
+        if scene.following_pressures:
+            following = ((1.0, FollowingPressures(scene, self._decomposition)),)
+        turned = TurnedSurface.all_of(scene, self._decomposition)
+        return Loading(self._assembled, prescribed, time, following, turned)
+
+
+def _require_prescribed(scene: Scene) -> None:
+    """Reject rigid surfaces that forces move."""
+    for support in scene.supports:
+        if isinstance(support, RigidSurface) and support.free.any():
+            kinds = {type(each).__name__ for body in scene.bodies.values() for each in body.materials}
+            raise InvalidInputError(
+                "the whole motion of a RigidSurface must be prescribed where materials are nonlinear, but on "
+                f"surface {support.surface!r} of body {support.body!r} components are left free, with "
+                f"force {support.force!r} and moment {support.moment!r}, and the scene has {sorted(kinds)}: "
+                "prescribe displacement and rotation and read the force from the state's reactions(); or "
+                "apply the force by a TotalForce, which leaves the surface flexible, or to a stiff body that "
+                "is tied to the surface"
+            )
+
+
+class _LoadHistory:
+    """The functions of time of a load step; a `LoadHistory`."""
+
+    def __init__(
+        self, step: LoadStep, scene: Scene, loading: Callable[[Scene, float], Loading], comm: MPI.Comm
+    ) -> None:
+        self.loads, self.supports = callable(step.loads), callable(step.supports)
+        self._step, self._scene, self._loading, self._comm = step, scene, loading, comm
+
+    def at(self, time: float) -> Loading:
+        """Return what acts at a time. Collective."""
+        with together(self._comm):
+            scene = self._step.at(self._scene, time)
+        return self._loading(scene, time)
+
+
+def _state_after(
+    path: Path, origin: State | None, timer: PhaseTimer, known: np.ndarray | None = None
+) -> DeformedState:
+    """Return the state at the end of a path from another state. Collective.
+
+    Args:
+        path: The path.
+        origin: The state at its start.
+        timer: Collects the wall time.
+        known: The slip of its contact and that before, if the path has none.
+    """
+    end, evaluation = path.end, path.end.evaluation
+    ended = f", at {path.fractions[-1]:.3g} of the load step" if path.fractions[-1] < 1.0 else ""
+    values, torn, moved = row_values_at(end), evaluation.loaded, evaluation.at.displacement
+    solution = Solution(
+        multiplier=values.multiplier,
+        residuals=evaluation.residuals,
+        iterations=len(path.effort.history),
+        products=path.effort.products,
+        history=path.effort.history,
+        reason=f"every residual is below the tolerance{ended}"
+        if path.effort.history
+        else "read from a checkpoint",
+    )
+    with timer.phase("state"):
+        contact = contact_result(torn, values, moved)
+        if evaluation.contact.points is not None and path.start is not None:
+            contact = _of_moved(contact, evaluation.contact, path.start, origin)
+        if known is not None:
+            contact = replace(contact, slip=known[0], slip_before=known[1])
+        energies = _energies(evaluation, path.rubbed)
+    return DeformedState(
+        torn=torn, solution=solution, torn_displacement=moved, contact=contact, energies=energies,
+        seconds=dict(timer.seconds), equilibrium=end, load=path.load, begun=path.begun,
+        fractions=path.fractions, since=path.since, snaps=path.snaps,
+        factorisations=path.effort.factorisations,
+    )  # fmt: skip
+
+
+def _of_moved(
+    contact: ContactResult, now: ContactConfiguration, start: MaterialPoints, origin: State | None
+) -> ContactResult:
+    """Return the contact of moved bodies with its areas, the slip of its load step and of all before."""
+    slip, points = now.slip(start), now.points
+    assert points is not None
+    before = np.zeros_like(slip)
+    if isinstance(origin, DeformedState) and (old := origin.equilibrium.evaluation.contact.points):
+        before = points.carry_slip(origin.contact.total_slip, old)
+    areas = points.areas(now.torn.scene)
+    return replace(contact, slip=slip, slip_before=before, area=areas.true, nominal_area=areas.nominal)
+
+
+def _energies(evaluation: ResidualState, rubbed: float) -> Energies:
+    """Return the stored energy, the work of dead loads and of friction in the last load step. Collective.
+
+    The work of pressures that follow their surfaces depends on the way: then it is not known.
+
+    Args:
+        evaluation: The equations at the end.
+        rubbed: Work of friction before the last step of histories, [force · length].
+    """
+    stored = [np.nan if response.energy is None else response.energy for response in evaluation.responses]
+    strain = float(evaluation.torn.numbering.comm.allreduce(float(np.sum(stored))))
+    dead = evaluation.softening is None
+    work = evaluation.torn.load_work(evaluation.at.displacement) if dead else np.nan
+    return Energies(strain, work, rubbed + evaluation.rubbing)

@@ -1,0 +1,552 @@
+"""The entry point: from a scene to its equilibrium, and on to the next load, geometry or slip.
+
+Transfer a multiplier to the system of another geometry or load.
+
+From a torn system to its state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from fenics_contact._base.display import displayed
+from fenics_contact._base.libraries import MPI, check_not_forked
+from fenics_contact._base.progress import PhaseTimer
+from fenics_contact._equilibrium.followed_loads import FollowedLoads
+from fenics_contact._equilibrium.static_admissibility import check_held
+from fenics_contact._equilibrium.stored import Stored, restored_solution, with_stored_slip
+from fenics_contact._equilibrium.warnings import ContactWarnings, PassingBodies, TurnedBodies
+from fenics_contact._pairing.points import ContactPoints
+from fenics_contact._scene.loads import Load
+from fenics_contact._scene.obstacles import MovingObstacle
+from fenics_contact._scene.plan import SolverKind, choose_solver
+from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact._scene.supports import RigidSurface
+from fenics_contact.errors import InvalidInputError, collectively, together
+from fenics_contact.feti.decomposition import Decomposition, decompose
+from fenics_contact.feti.direct import DirectSystem
+from fenics_contact.feti.dual import DualSystem
+from fenics_contact.feti.same_input import check_same_input
+from fenics_contact.feti.torn import TornSystem, build_torn_system, check_apart
+from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG
+from fenics_contact.qp.solution import DualSolution
+from fenics_contact.qp.solve import DualSolver
+from fenics_contact.results.contact import no_contact
+from fenics_contact.results.deformed_state import AnyState
+from fenics_contact.results.dual_solve import contact_result, row_values, solve_dual
+from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.state import State, Tolerance, checked_tolerance, compute_energies
+
+if TYPE_CHECKING:
+    from fenics_contact._accuracy.state_errors import BalancedTolerance
+    from fenics_contact._equilibrium.balancing import Solve
+    from fenics_contact._equilibrium.deformed import DeformedEquilibria
+    from fenics_contact._large_deformations.load_steps import AutomaticSteps
+
+
+def carried_over(old: DualSystem, solution: DualSolution, new: DualSystem) -> np.ndarray:
+    """Return a start for ``new``, owned: unchanged gluing forces, contact forces in the new frames.
+
+    Contact points are identified by pair and slave node; a new point starts open. Collective.
+    """
+    before, after = old.torn, new.torn
+    start = np.zeros(len(after.numbering.owned))
+    # Ties of a moved scene may have other points; gluing rows are unchanged.
+    same = before.n_equality == after.n_equality
+    gluing_old = before.numbering.owned < (before.n_equality if same else before.n_gluing)
+    gluing_new = after.numbering.owned < (after.n_equality if same else after.n_gluing)
+    start[gluing_new] = solution.multiplier[gluing_old]
+    normal = before.numbering.gather(solution.multiplier, before.normal_rows)
+    tau = before.numbering.gather(solution.multiplier, before.tangential_rows.ravel()).reshape(
+        -1, before.dim - 1
+    )
+    match = _matches(before.points, after.points)
+    matched = match >= 0
+    values = np.zeros(after.points.count)
+    values[matched] = normal[match[matched]]
+    _put(new, start, after.normal_rows, values)
+    if len(after.frictional):
+        friction = np.zeros((before.points.count, before.dim))
+        friction[before.frictional] = np.einsum("na,nad->nd", tau, before.points.tangents[before.frictional])
+        in_space = np.where(matched[:, None], friction[match], 0.0)[after.frictional]
+        turned = np.einsum("nad,nd->na", after.points.tangents[after.frictional], in_space)
+        _put(new, start, after.tangential_rows.ravel(), turned.ravel())
+    return start
+
+
+def _matches(before: ContactPoints, after: ContactPoints) -> np.ndarray:
+    """Return for each new point the old one of the same pair and slave node, −1 where there is none."""
+    if before.count == 0:
+        return np.full(after.count, -1)
+    width = int(max(before.slave.max(), after.slave.max(initial=0))) + 1
+    old, new = before.pair * width + before.slave, after.pair * width + after.slave
+    order = np.argsort(old)
+    index = np.minimum(np.searchsorted(old[order], new), before.count - 1)
+    return np.where(old[order[index]] == new, order[index], -1)
+
+
+def _put(system: DualSystem, vector: np.ndarray, rows: np.ndarray, values: np.ndarray) -> None:
+    position = system.torn.numbering.owned_index(rows)
+    vector[position[position >= 0]] = values[position >= 0]
+
+
+#: Largest relative residual of a scene without contact; its solution then equals that of a direct solver.
+LINEAR_TOLERANCE = 1e-10
+
+
+def dual_state(
+    torn: TornSystem,
+    previous: State | None,
+    known: State | None,
+    solver: DualSolver,
+    tolerance: float | BalancedTolerance | None,
+    timer: PhaseTimer,
+) -> LinearState:
+    """Compute a state by its multipliers. Collective.
+
+    Args:
+        torn: The torn system.
+        previous: LinearState of a neighbouring geometry or load to start from, or None.
+        known: LinearState of which unchanged parts are reused, or None.
+        solver: The dual solver.
+        tolerance: Its tolerance, or its share of the discretisation error; None: `BalancedTolerance()`.
+        timer: Collects the wall time.
+    """
+    system, start = _dual_system(torn, previous, known, timer)
+    before = known_system(known)
+    solve = solve_dual if before is None else FollowedLoads(before, timer).solve
+    if isinstance(tolerance, float):
+        return _to_tolerance(system, solve, solver.with_tolerance(tolerance), start, timer)
+    return _balanced(system, solve, solver, tolerance, start, timer)
+
+
+def _dual_system(
+    torn: TornSystem, previous: State | None, known: State | None, timer: PhaseTimer
+) -> tuple[DualSystem, np.ndarray | None]:
+    """Return the dual system, with parts of a known state, and a start from the previous one. Collective."""
+    system, old = DualSystem(torn, timer, previous=known_system(known)), known_system(previous)
+    if previous is not None and old is not None and isinstance(previous.solution, DualSolution):
+        return system, carried_over(old, previous.solution, system)
+    return system, None
+
+
+def known_system(state: State | None) -> DualSystem | None:
+    """Return the dual system of a state, whose unchanged parts the next one reuses."""
+    system = state.system if isinstance(state, LinearState) else None
+    return system if isinstance(system, DualSystem) else None
+
+
+def _to_tolerance(
+    system: DualSystem, solve: Solve, solver: DualSolver, start: np.ndarray | None, timer: PhaseTimer
+) -> LinearState:
+    """Compute the state to the tolerance of a solver. Collective."""
+    with timer.phase("solve"):
+        solution = solve(system, solver, start)
+    with timer.phase("state"):
+        displacement = system.displacement(solution.multiplier, solution.alpha)
+    return replace(state_of(system, solution, displacement, timer), tolerance=solver.tolerance)
+
+
+def _balanced(
+    system: DualSystem,
+    solve: Solve,
+    solver: DualSolver,
+    balanced: BalancedTolerance | None,
+    start: np.ndarray | None,
+    timer: PhaseTimer,
+) -> LinearState:
+    """Compute the state as accurately as the mesh deserves. Collective."""
+    # A fixed tolerance needs no estimates and should not import them.
+    from fenics_contact._accuracy.state_errors import BalancedTolerance
+    from fenics_contact._equilibrium.balancing import solve_balanced
+
+    wanted = balanced or BalancedTolerance()
+    rounds = solve_balanced(system, solve, solver, wanted, start, timer)
+    state = state_of(system, rounds.solution, rounds.displacement, timer)
+    return replace(state, known_errors=rounds.state_errors(state.energies.norm), tolerance=wanted)
+
+
+def state_of(
+    system: DualSystem, solution: DualSolution, displacement: np.ndarray, timer: PhaseTimer
+) -> LinearState:
+    """Return the state of a solution with its torn displacement. Collective."""
+    with timer.phase("state"):
+        contact = contact_result(system.torn, row_values(system, solution), displacement)
+        friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))
+        rigid = system.kernel @ solution.alpha
+        energies = compute_energies(system.torn, displacement, solution.multiplier, friction, rigid)
+    return LinearState(
+        torn=system.torn, system=system, solution=solution, torn_displacement=displacement, contact=contact,
+        energies=energies, seconds=dict(timer.seconds),
+    )  # fmt: skip
+
+
+def direct_state(torn: TornSystem, previous: State | None, timer: PhaseTimer) -> LinearState:
+    """Compute the state of one body without multipliers. Collective."""
+    system = previous.system if isinstance(previous, LinearState) else None
+    known = system if isinstance(system, DirectSystem) else None
+    system = DirectSystem(torn, timer, previous=known)
+    with timer.phase("solve"):
+        solution = system.solve()
+    return LinearState(
+        torn=torn, system=system, solution=solution, torn_displacement=solution.displacement,
+        contact=no_contact(torn.points), seconds=dict(timer.seconds),
+        energies=compute_energies(torn, solution.displacement, solution.multiplier, 0.0),
+    )  # fmt: skip
+
+
+def default_solver(kind: SolverKind) -> DualSolver:
+    """Return the dual solver of a kind, with its tolerance."""
+    if kind is SolverKind.FACE_NEWTON:
+        return FaceNewton()
+    return ProjectedCG(tolerance=LINEAR_TOLERANCE)
+
+
+@displayed
+class ContactProblem:
+    """Successive equilibria of a scene; each starts from the one before.
+
+    What a change does not affect (topology, numbering, matrices, factors, contact points) is not recomputed,
+    and the solver starts from the last contact forces. `LoadSequence` and `ShapeProblem` are built on it.
+
+    Attributes:
+        scene: The scene as it was given.
+        comm: Communicator over which the subdomains are spread.
+        solver: Dual solver with its tolerance; None: the one that `Scene.plan` names.
+        tolerance: Largest relative residual of the solutions, see `solve_scene`.
+        steps: How loads on nonlinear materials are followed; None: the default
+            `fenics_contact._large_deformations.load_steps.AutomaticSteps`.
+        timer: Wall time of this rank by phase, over all solutions.
+        state: The last solution, None before the first.
+
+    Example:
+        >>> equilibria = ContactProblem(scene, comm, tolerance=1e-6)  # doctest: +SKIP
+        >>> first, again = equilibria.solve(), equilibria.solve(scene)  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        comm: MPI.Comm,
+        *,
+        partitions: Mapping[str, np.ndarray] | None = None,
+        solver: DualSolver | None = None,
+        tolerance: Tolerance = None,
+        steps: AutomaticSteps | None = None,
+    ) -> None:
+        """Prepare; nothing is computed yet. Arguments as for `solve_scene`."""
+        self.scene, self.comm = scene, comm
+        self.solver, self.tolerance, self.steps = solver, tolerance, steps
+        self.timer = PhaseTimer()
+        self.state = None
+        self._partitions, self._decomposition = partitions, None
+        self._contact_doubts, self._turned = ContactWarnings(), TurnedBodies()
+        self._passing_bodies = PassingBodies()
+
+    state: AnyState | None
+    _decomposition: Decomposition | None
+    _deformed_equilibria: DeformedEquilibria | None = None
+
+    def _facts(self) -> dict[str, Any]:
+        return {
+            "scene": {name: body.in_words for name, body in self.scene.bodies.items()},
+            "ranks": self.comm.size,
+            "solver": "that of the scene's plan" if self.solver is None else self.solver,
+            "tolerance": "by default" if self.tolerance is None else self.tolerance,
+            "state": "none yet" if self.state is None else self.state.contact,
+            "seconds": self.timer.seconds,
+        }
+
+    @property
+    def partitions(self) -> Mapping[str, np.ndarray]:
+        """Body name -> subdomain of every cell, numbered from 0 within the body. Collective on first use."""
+        if self._partitions is None:
+            with together(self.comm):
+                self._partitions = self.scene.partition(self.comm.size)
+        return self._partitions
+
+    @property
+    def decomposition(self) -> Decomposition:
+        """The subdomains of the scene. Collective on first use."""
+        return self._decomposed(self.scene)
+
+    def _decomposed(self, scene: Scene) -> Decomposition:
+        """Return the subdomains, those of the first scene solved: its supports fix some nodes."""
+        if self._decomposition is None:
+            with self.timer.phase("decompose"):
+                self._decomposition = decompose(scene, self.partitions, self.comm)
+        return self._decomposition
+
+    @classmethod
+    def following(
+        cls,
+        state: AnyState,
+        *,
+        solver: DualSolver | None = None,
+        tolerance: Tolerance = None,
+        steps: AutomaticSteps | None = None,
+    ) -> ContactProblem:
+        """Return the problem whose last solution is the given state, with its subdomains."""
+        decomposition = state.torn.decomposition
+        problem = cls(
+            state.scene, decomposition.comm,
+            partitions=decomposition.partitions, solver=solver, tolerance=tolerance, steps=steps,
+        )  # fmt: skip
+        problem._decomposition, problem.state = decomposition, state
+        return problem
+
+    def on(self, scene: Scene, partitions: Mapping[str, np.ndarray] | None = None) -> ContactProblem:
+        """Return the problem of a scene on other meshes, solved alike; what was told is not told again."""
+        other = ContactProblem(
+            scene, self.comm,
+            partitions=partitions, solver=self.solver, tolerance=self.tolerance, steps=self.steps,
+        )  # fmt: skip
+        other._contact_doubts, other._turned = self._contact_doubts, self._turned
+        other._passing_bodies = self._passing_bodies
+        return other
+
+    def number(self, scene: Scene | None = None) -> float:
+        """Return the tolerance as a number, for states that are differentiated or compared. Collective.
+
+        Where none is given, or `BalancedTolerance`, which leaves the status of points uncertain, it is that
+        of the solver: of the one given, of Newton's method, or of the one that the scene's plan names.
+
+        Args:
+            scene: As for `solve`.
+        """
+        scene = self.scene if scene is None else scene
+        with together(self.comm):
+            given = checked_tolerance(self.tolerance)
+        if isinstance(given, float):
+            return given
+        if scene.is_nonlinear:
+            from fenics_contact._large_deformations.load_steps import AutomaticSteps
+
+            return (self.steps or AutomaticSteps()).newton.tolerance
+        if self.solver is not None:
+            return self.solver.tolerance
+        count = self._decomposed(scene).tearing.n_subdomains
+        return default_solver(choose_solver(scene, count, sensitivity=True)).tolerance
+
+    @collectively("ContactProblem.check_apart", lambda self, *_, **__: self.comm)
+    def check_apart(self, scene: Scene) -> None:
+        """Refuse a scene whose bodies overlap before they are loaded, unless a pair says so. Collective.
+
+        Raises:
+            InvalidInputError: Names the pair, the number of nodes and the depth.
+        """
+        check_apart(scene, self._decomposed(scene))
+
+    @collectively("ContactProblem.overlaps", lambda self, *_, **__: self.comm)
+    def overlaps(self, state: State) -> tuple[str, ...]:
+        """Return words about surfaces that overlap before they are loaded and are pressed apart. Collective.
+
+        Of nonlinear materials, none.
+        """
+        return () if state.scene.is_nonlinear else self._contact_doubts.overlaps(state)
+
+    @collectively("ContactProblem.solve", lambda self, *_, **__: self.comm)
+    def solve(
+        self,
+        scene: Scene | None = None,
+        *,
+        start: State | Literal["last"] | None = "last",
+        slip_from: State | None = None,
+        tolerance: Tolerance = None,
+        overlap: bool = False,
+        sensitivity: bool = False,
+        time: float = 1.0,
+        step: LoadStep | None = None,
+    ) -> AnyState:
+        """Compute an equilibrium. Collective.
+
+        Args:
+            scene: The scene with other loads, values of supports or coordinates; None: the original one.
+            start: State of a neighbouring geometry or load to start from, None for that from which slip is
+                measured, or none.
+            slip_from: State from which slip is measured, that of the last load step; by default the
+                undeformed state.
+            tolerance: Overrides the problem's tolerance.
+            overlap: Whether bodies may overlap before they are loaded, as those of a design do.
+            sensitivity: Whether derivatives of the state are wanted; they need the dual system, and the
+                default tolerance is then a number.
+            time: Time of the equilibrium, for obstacles that move (`MovingObstacle`) and materials that
+                creep.
+            step: The load step, of whose functions of time a load of which parts are followed has the values
+                in between.
+
+        Raises:
+            InvalidInputError: If scene or partition cannot be used, or supports hold other components than
+                those of the scene that was solved first.
+            InfeasibleError: If nothing holds some body against its load.
+            ConvergenceError: If the solver does not reach its tolerance; the last solution stays unchanged.
+        """
+        check_not_forked()
+        scene = self.scene if scene is None else scene
+        with together(self.comm):
+            _require_obstacles_at(scene, time)
+        wanted = self.tolerance if tolerance is None else tolerance
+        with together(self.comm):
+            wanted = checked_tolerance(wanted)
+        if scene.is_nonlinear:
+            if self.solver is not None:
+                raise InvalidInputError(
+                    f"dual solvers are for linear materials, this scene has others, got {self.solver!r}: "
+                    "give steps=AutomaticSteps(TangentNewton(...)) of fenics_contact._large_deformations instead"
+                )
+            self.state = self._equilibria(scene).solve(scene, slip_from, wanted, time, step, overlap=overlap)
+            self._passing_bodies.warn(self.state)
+            return self.state
+        previous = (self.state if start == "last" else start) or slip_from
+        decomposition = self._decomposed(scene)
+        check_same_input(self.comm, scene, solver=self.solver, tolerance=wanted)
+        with together(self.comm):
+            kind = choose_solver(scene, decomposition.tearing.n_subdomains, sensitivity=sensitivity)
+        known = self._alike(scene, previous)
+        with self.timer.phase("assemble"):
+            torn = self._torn(scene, known, overlap)
+            if slip_from is not None:
+                earlier, moved = slip_from.torn, slip_from.torn_displacement
+                torn = torn.with_slip_from(earlier.relative(moved), earlier.sliding(moved))
+            same = known is not None and torn.points is known.torn.points
+            if known is None or not same or _loads_of(torn.scene) != _loads_of(known.scene):
+                check_held(torn)
+        if self.solver is None and kind is SolverKind.DIRECT:
+            self.state = direct_state(torn, known, self.timer)
+            self._turned.tell(self.state)
+            return self.state
+        solver = self.solver or default_solver(kind)
+        # Derivatives need the status of every contact point, which a balanced state leaves uncertain.
+        if wanted is None and (self.solver is not None or sensitivity):
+            wanted = solver.tolerance
+        self.state = dual_state(torn, previous, known, solver, wanted, self.timer)
+        if not (overlap and self._contact_doubts.asked):  # designs differ little from the first one
+            with self.timer.phase("state"):
+                self._contact_doubts.warn(self.state, overlap=overlap)
+                self._turned.tell(self.state)
+                self._passing_bodies.warn(self.state)
+        return self.state
+
+    def _equilibria(self, scene: Scene) -> DeformedEquilibria:
+        """Return what finds equilibria of nonlinear materials. Collective on first use."""
+        from fenics_contact._equilibrium.deformed import DeformedEquilibria
+
+        equilibria = self._deformed_equilibria
+        if equilibria is None or not scene.has_meshes_of(equilibria.scene):
+            equilibria = DeformedEquilibria(
+                scene, self._decomposed(scene), self.steps, self.timer, beside=equilibria
+            )
+            self._deformed_equilibria = equilibria
+        return equilibria
+
+    @collectively("ContactProblem.restore", lambda self, *_, **__: self.comm)
+    def restore(self, stored: Stored, scene: Scene | None = None) -> AnyState:
+        """Build a state from what `stored_state` returned: one product instead of a solve. Collective.
+
+        Of nonlinear materials one factorisation.
+
+        Args:
+            stored: The arrays, from the same subdomains on any number of ranks.
+            scene: The scene with coordinates, loads and supports of the state; None: the original one.
+
+        Returns:
+            The state; its multiplier is that of the stored one, its residuals are recomputed. The last
+            solution stays unchanged: assign the state to `state` to continue from it.
+
+        Raises:
+            InvalidInputError: If the arrays are those of another system.
+        """
+        scene = self.scene if scene is None else scene
+        if scene.is_nonlinear:
+            return self._equilibria(scene).restored(stored, scene)
+        if not stored:
+            torn = self._torn(scene, self.state, overlap=True)
+            return direct_state(torn, self.state, self.timer)
+        with self.timer.phase("assemble"):
+            torn = with_stored_slip(self._torn(scene, self.state, overlap=True), stored)
+        system = DualSystem(torn, self.timer, previous=known_system(self.state))
+        with self.timer.phase("state"):
+            solution = restored_solution(system, stored)
+            displacement = system.displacement(solution.multiplier, solution.alpha)
+        return state_of(system, solution, displacement, self.timer)
+
+    def _alike(self, scene: Scene, start: State | None) -> State | None:
+        """Return the state to reuse: the last one if it has the scene's meshes, else the start."""
+        if start is None or self.state is None:
+            return start
+        return self.state if scene.has_meshes_of(self.state.scene) else start
+
+    def _torn(self, scene: Scene, previous: State | None, overlap: bool) -> TornSystem:
+        return build_torn_system(
+            scene,
+            self._decomposed(scene),
+            overlap=overlap,
+            previous=None if previous is None else previous.torn,
+        )
+
+
+@collectively("solve_scene", lambda scene, comm, **_: comm)
+def solve_scene(
+    scene: Scene,
+    comm: MPI.Comm,
+    *,
+    partitions: Mapping[str, np.ndarray] | None = None,
+    solver: DualSolver | None = None,
+    tolerance: Tolerance = None,
+    steps: AutomaticSteps | None = None,
+) -> AnyState:
+    """Compute the equilibrium of a scene. Collective on ``comm``.
+
+    Args:
+        scene: Bodies, supports, loads and contact pairs, the same on every rank.
+        comm: Communicator over which the subdomains are spread.
+        partitions: Body name -> subdomain of every cell, numbered from 0 within the body; None lets
+            `Scene.partition` cut the bodies into subdomains of a suitable size.
+        solver: Dual solver with its tolerance; None: the one that `Scene.plan` names.
+        tolerance: Largest relative residual of the solution, or an `accuracy.BalancedTolerance`, which
+            solves as accurately as the mesh deserves. By default the solver's own, and without a solver
+            balanced. Give a number, 1e-6 or less, where the status of single contact points matters, or small
+            differences between states. Where materials are nonlinear a number, 1e-8 by default.
+        steps: How loads on nonlinear materials are followed; None: the default
+            `fenics_contact._large_deformations.load_steps.AutomaticSteps`.
+
+    Raises:
+        InvalidInputError: If scene or partition cannot be used.
+        InfeasibleError: If nothing holds some body against its load.
+        ConvergenceError: If the solver does not reach its tolerance.
+
+    Example:
+        >>> state = solve_scene(scene, MPI.COMM_WORLD)  # doctest: +SKIP
+        >>> parts = {"block": box_partition(mesh, (2, 1, 1))}  # doctest: +SKIP
+        >>> state = solve_scene(scene, MPI.COMM_SELF, partitions=parts)  # doctest: +SKIP
+    """
+    problem = ContactProblem(
+        scene, comm, partitions=partitions, solver=solver, tolerance=tolerance, steps=steps
+    )
+    return problem.solve()
+
+
+def _require_obstacles_at(scene: Scene, time: float) -> None:
+    """Refuse obstacles that have moved by a time where bodies with small displacements do not see it.
+
+    Raises:
+        InvalidInputError: They have.
+    """
+    if scene.deforms_much:
+        return
+    for pair in scene.contacts:
+        if isinstance(pair.master, MovingObstacle) and not pair.master.is_where_it_was(time):
+            raise InvalidInputError(
+                f"with small displacements obstacles must stand still, but that of {pair.place} has moved by "
+                f"time {time:g}: move the bodies against it by their supports, or give a body a material for "
+                "large deformations"
+            )
+
+
+def _loads_of(scene: Scene) -> tuple[list[Load], list[RigidSurface]]:
+    """Return the loads of a scene, and the rigid surfaces, at whose points loads act."""
+    return list(scene.loads), [each for each in scene.supports if isinstance(each, RigidSurface)]

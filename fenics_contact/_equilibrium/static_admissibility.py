@@ -1,0 +1,478 @@
+"""Check that every body is held: a conic feasibility problem on rigid motions, before any factorisation.
+
+Motions that nothing resists where bodies are at rest: nonlinear scenes with one have no way to begin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+
+from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._pairing.points import ContactPoints
+from fenics_contact._scene.body import Body
+from fenics_contact._scene.obstacles import MovingObstacle
+from fenics_contact._scene.pairs import ContactPair, Surface
+from fenics_contact._scene.plan import RANK_TOLERANCE, held_components, point_loads, resisted_motions
+from fenics_contact.errors import ConvergenceError, InfeasibleError, together
+from fenics_contact.feti.factor import fixing_nodes
+from fenics_contact.feti.subdomain import common_kernel
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.materials.kernels import rigid_body_modes
+from fenics_contact.results.rigid_motions import MOTION_ROUNDING, UnheldMotion, motion_in_words
+
+#: A load that needs all but this fraction of the friction is at the limit: how far the body slides would be
+#: decided by rounding.
+MARGIN = 1e-6
+#: Loads count as balanced when less than this fraction of them remains; the conic solver is run to a tenth.
+LEFT = 1e-8
+#: Weight of the normal forces relative to the unbalanced load: it bounds the forces of bodies that grip each
+#: other, and leaves nothing unbalanced where forces below its inverse times the load suffice.
+SMALL = 1e-9
+
+
+def check_held(torn: TornSystem) -> None:
+    """Reject a scene in which some body can move away under the load. Collective.
+
+    Checks whether support reactions, reactions of the material itself (an elastic bed) and admissible contact
+    forces (compressive, inside the friction cone or disc) exist that balance the load on every body. If not,
+    the dual problem is infeasible: there is a rigid motion along which the load does more work than friction
+    takes. If that takes all friction but a fraction `MARGIN`, forces exist, but the amount of sliding along
+    that motion is undetermined.
+
+    Args:
+        torn: The torn system; its matrices are not used.
+
+    Raises:
+        InfeasibleError: Names the body and the motion, and whether it is only just held.
+    """
+    comm = torn.numbering.comm
+    with together(comm):
+        bodies = [RigidBody(torn, index) for index in range(len(torn.scene.bodies))]
+    loads = comm.allreduce(np.array([body.load_wrench(torn) for body in bodies]))
+    loads[np.abs(loads) <= ROUNDING * comm.allreduce(np.abs(torn.load).sum())] = 0.0
+    with together(comm):
+        floating = [index for index, body in enumerate(bodies) if not body.held]
+        if comm.rank == 0 and floating:
+            _check_balance(torn, [bodies[index] for index in floating], loads[floating])
+
+
+def _check_balance(torn: TornSystem, bodies: list[RigidBody], loads: np.ndarray) -> None:
+    scale = float(np.abs(loads).max())
+    if scale == 0.0:
+        return
+    support = sp.block_diag([body.support for body in bodies])
+    tied = sp.vstack([body.tie_wrenches(torn) for body in bodies])
+    reactions, right = sp.hstack([support, tied]), -loads.ravel() / scale
+    contact = sp.vstack([body.contact_wrenches(torn) for body in bodies])
+    bound = torn.tresca_bound / scale
+    balance = _Balance(torn, reactions, contact, right, bound)
+    left = balance.left(1.0 - MARGIN)
+    if left is None:
+        return
+    without_margin = balance.left(1.0)
+    part, left = (1.0 - MARGIN, left) if without_margin is None else (1.0, without_margin)
+    found = _Motion.of(balance, part, left, bodies)
+    # The certificate points against the right side, which is minus the load. The pushed body may take others
+    # along: it is the one on which the load does most work.
+    pushed = int(np.argmax(np.einsum("bm,bm->b", found.bodies, loads)))
+    if without_margin is None:
+        raise InfeasibleError(
+            f"every body must be held by supports, contact or friction, but body {bodies[pushed].name!r} is "
+            f"held only just: the load uses up all friction against {found.words(pushed)}, and how far it "
+            "slides is not determined. Support it, or raise the friction coefficient"
+        )
+    raise InfeasibleError(
+        f"every body must be held by supports, contact or friction, but body {bodies[pushed].name!r} can "
+        f"move away under the load: {found.words(pushed)} meets "
+        f"{'too little friction' if found.rubs else 'no resistance'}. {found.advice(pushed, torn, bodies)}"
+    )
+
+
+class RigidBody:
+    """A body regarded as rigid: its modes, and the wrenches of supports, ties, contacts and loads on it."""
+
+    def __init__(self, torn: TornSystem, index: int) -> None:
+        tearing = torn.decomposition.tearing
+        self.name = tearing.body_names[index]
+        self._nodes = slice(int(tearing.node_offset[index]), int(tearing.node_offset[index + 1]))
+        body = torn.scene.bodies[self.name]
+        self._points = body.mesh.points
+        self._modes = rigid_body_modes(self._points)
+        supports = resisted_motions(held_components(torn.scene, self.name, self._modes))
+        #: Wrenches that supports and material can exert in both directions, shape (n_modes, n).
+        self.support = _both(supports, _resisted_by_material(body, self._modes))
+
+    @property
+    def held(self) -> bool:
+        """Whether supports and material alone resist every motion."""
+        return self.support.shape[1] == self.support.shape[0]
+
+    def contact_wrenches(self, torn: TornSystem) -> sp.csr_matrix:
+        """Wrenches of unit normal and tangential multipliers, (n_modes, n_contact + (dim - 1) n_friction)."""
+        points, arms = torn.points, self.arms(torn.points)
+        # The contact force on the slave is n λ_N − t τ; the master feels the opposite (negative weights).
+        normal = np.einsum("nd,ndm->mn", points.normal, arms)
+        slip = -np.einsum("nad,ndm->mna", points.tangents[torn.frictional], arms[torn.frictional])
+        return sp.csr_matrix(np.hstack([normal, slip.reshape(len(normal), -1)]))
+
+    def tie_wrenches(self, torn: TornSystem) -> sp.csr_matrix:
+        """Wrenches of unit forces at tied points, shape (n_modes, n)."""
+        arms = self.arms(torn.ties)
+        sliding = np.array([tie.sliding for tie in torn.scene.ties], dtype=bool)[torn.ties.pair]
+        bonded = arms[~sliding].reshape(-1, arms.shape[2]).T
+        gliding = np.einsum("nd,ndm->mn", torn.ties.normal[sliding], arms[sliding])
+        return sp.csr_matrix(np.hstack([bonded, gliding]))
+
+    def load_wrench(self, torn: TornSystem) -> np.ndarray:
+        """Wrench of the loads on this rank's part of the body, shape (n_modes,)."""
+        count = self._modes.shape[2]
+        wrench = np.zeros(count)
+        for subdomain in torn.subdomains:
+            if subdomain.mesh.body == self.name:
+                wrench += subdomain.load @ self._modes[subdomain.mesh.nodes].reshape(-1, count)
+        if torn.decomposition.comm.rank == 0:
+            wrench += point_loads(torn.scene, self.name, self._modes)
+        return wrench
+
+    def arms(self, points: ContactPoints) -> np.ndarray:
+        """Return the jump at each point when the body alone moves, shape (n, dim, n_modes)."""
+        jump = points.jump[:, self._nodes]
+        moved = jump @ self._modes.reshape(self._modes.shape[0], -1)
+        return np.asarray(moved).reshape(points.count, *self._modes.shape[1:])
+
+    def axis(self, motion: np.ndarray) -> str:
+        """Return in words what a motion with a rotation, shape (n_modes,), turns the body about."""
+        dim = self._points.shape[1]
+        centre = self._points.mean(axis=0)
+        size = np.abs(self._points - centre).max()
+        turning = np.zeros(3)
+        turning[3 - len(motion[dim:]) :] = motion[dim:]
+        across = np.cross(turning, np.pad(motion[:dim], (0, 3 - dim)))[:dim]
+        at = _in_words(centre + size * across / (turning @ turning), size)
+        return at if dim == 2 else f"the axis through {at} along {_in_words(_digits(turning), 1.0)}"
+
+
+def _resisted_by_material(body: Body, modes: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of the rigid motions that cost energy, shape (n_modes, n)."""
+    count = modes.shape[2]
+    flat = modes.reshape(-1, count)
+    kernel = common_kernel(body.materials, body.mesh.points).reshape(len(flat), -1)
+    if kernel.shape[1] == count:
+        return np.zeros((count, 0))
+    free, _ = np.linalg.qr(np.linalg.lstsq(flat, kernel, rcond=None)[0])
+    basis, _, _ = np.linalg.svd(np.identity(count) - free @ free.T)
+    return np.asarray(basis[:, : count - kernel.shape[1]])
+
+
+def _both(supports: np.ndarray, material: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of the motions that either resists."""
+    if not material.shape[1]:
+        return supports
+    basis, size, _ = np.linalg.svd(np.hstack([supports, material]), full_matrices=False)
+    return np.asarray(basis[:, size > RANK_TOLERANCE])
+
+
+@dataclass(frozen=True)
+class _Left:
+    """The direction of what no forces balance, (n_wrenches,), and the forces that come closest, (n,)."""
+
+    motion: np.ndarray
+    forces: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Balance:
+    """Forces that are to balance a load on rigid bodies.
+
+    Attributes:
+        torn: The torn system with its friction coefficients.
+        support: Wrenches that act in both directions, shape (n_wrenches, n).
+        contact: Wrenches of unit contact forces, shape (n_wrenches, n_contact + (dim - 1) n_friction).
+        right: The wrench to balance, shape (n_wrenches,).
+        tresca_bound: Tresca bounds in the unit of force of ``right``, shape (n_friction,).
+    """
+
+    torn: TornSystem
+    support: sp.spmatrix
+    contact: sp.spmatrix
+    right: np.ndarray
+    tresca_bound: np.ndarray
+
+    def left(self, part: float, speed: np.ndarray | float = 0.0) -> _Left | None:
+        """Minimise ‖[support contact] x − right‖ + Σ μ s λ_N over x = (reactions, λ_N, τ) in its cones.
+
+        The smallest distance, unlike feasibility, is well determined also where forces only just suffice.
+
+        Args:
+            part: The fraction of the friction that may be used.
+            speed: Sliding speeds s for the associated law to be freed of lift-off, shape (n_friction,).
+
+        Returns:
+            None if the load is balanced, else the direction of what is left.
+        """
+        import clarabel  # only needed if some loaded body floats
+
+        torn, right = self.torn, self.right
+        forces, admissible, limit, cones = _admissible(self.support.shape[1], torn, (part, self.tresca_bound))
+        # Unknowns: x, the distance t and the remainder y; ‖y‖ ≤ t.
+        size, left = forces.size, np.arange(len(right))
+        cost = SMALL * forces
+        cost[self.support.shape[1] + torn.frictional] += part * torn.friction_coefficient * speed
+        balance = sp.hstack(
+            [self.support, self.contact, sp.csr_matrix((len(left), 1)), sp.identity(len(left))]
+        )
+        distance = sp.hstack([sp.csr_matrix((1 + len(left), size)), -sp.identity(1 + len(left))])
+        admissible = sp.hstack([admissible, sp.csr_matrix((admissible.shape[0], 1 + len(left)))])
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 0.1 * LEFT
+        solution = clarabel.DefaultSolver(
+            sp.csc_matrix((balance.shape[1],) * 2),
+            np.concatenate([cost, [1.0], np.zeros(len(left))]),
+            sp.vstack([balance, admissible, distance], format="csc"),
+            np.concatenate([right, limit, np.zeros(1 + len(left))]),
+            [clarabel.ZeroConeT(len(left)), *cones, clarabel.SecondOrderConeT(1 + len(left))],
+            settings,
+        ).solve()
+        if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
+            raise ConvergenceError(
+                "the check whether every body is held needs an answer, the conic solver ended with "
+                f"{solution.status}: check the scale of loads and lengths"
+            )
+        if solution.x[size] <= LEFT:
+            return None
+        return _Left(np.array(solution.z[: len(left)]), np.array(solution.x[:size]))
+
+    def motion(self, part: float, left: _Left) -> _Left:
+        """Return the motion on which bodies set off, and the forces against it.
+
+        The direction v of what is left obeys the associated law, v_N ≥ μ (|v_T| − s), by which what slides
+        lifts off where s = 0. Where s = |v_T|, v_N ≥ 0 ⊥ λ_N and what slides stays on: a fixed point in v.
+
+        Reference: V. Acary, F. Cadoux, G. Goeleven, J. Malick, *A formulation of the linear discrete
+        Coulomb friction problem via convex optimization*, ZAMM 91 (2011) 155–175.
+        """
+        torn, before = self.torn, None
+        slip = self.contact[:, torn.points.count :]
+        for _ in range(50):  # most settle within five times
+            if (digits := _digits(left.motion).tolist()) == before:
+                break
+            velocity = (slip.T @ left.motion).reshape(len(torn.frictional), torn.dim - 1)
+            before, left = digits, self.left(part, np.linalg.norm(velocity, axis=1)) or left
+        return left
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """How bodies set off.
+
+    Attributes:
+        bodies: Coefficients of the modes of each body, shape (n_bodies, n_modes).
+        pressed: Normal forces meanwhile, relative to the load, shape (n_contact,).
+        rubs: Whether friction acts against it.
+        slides: Whether more friction would: something slides that is pressed.
+    """
+
+    bodies: np.ndarray
+    pressed: np.ndarray
+    rubs: bool
+    slides: bool
+
+    @classmethod
+    def of(cls, balance: _Balance, part: float, left: _Left, bodies: list[RigidBody]) -> _Motion:
+        """Return the motion of what is left of a balance with a part of the friction."""
+        left, points = balance.motion(part, left), balance.torn.points
+        motion = left.motion.reshape(len(bodies), -1)
+        normal, tangential = np.split(left.forces[balance.support.shape[1] :], [points.count])
+        lost = tangential @ (balance.contact[:, points.count :].T @ left.motion)
+        jump = sum(body.arms(points) @ own for body, own in zip(bodies, motion, strict=True))
+        slip = jump - np.einsum("nd,nd->n", jump, points.normal)[:, None] * points.normal
+        least = MARGIN * abs(float(balance.right @ left.motion))
+        rubs = bool(abs(lost) > least)
+        return cls(motion, normal, rubs, rubs or float(normal @ np.linalg.norm(slip, axis=1)) > least)
+
+    def words(self, body: int) -> str:
+        """Return the motion of a body in words."""
+        return motion_in_words(_digits(self.bodies[body]))
+
+    def advice(self, body: int, torn: TornSystem, bodies: list[RigidBody]) -> str:
+        """Return what would stop the motion of a body."""
+        touch = "let it touch something in the direction of the load"
+        if self.slides:
+            more = "raise the friction coefficient" if len(torn.frictional) else "give its contact friction"
+            return f"Support it, {touch}, or {more}"
+        own = np.abs(bodies[body].arms(torn.points)).any(axis=(1, 2)) & (self.pressed > MARGIN)
+        if not _digits(self.bodies[body])[torn.dim :].any() or not own.any():
+            return f"Support it, or {touch}"
+        places = " and ".join(torn.scene.contacts[pair].place for pair in np.unique(torn.points.pair[own]))
+        axis = bodies[body].axis(self.bodies[body])
+        return (
+            f"It turns about {axis}, pressed by {places}, and no friction would stop that: support it, let "
+            f"that contact reach further, or {touch}"
+        )
+
+
+def _admissible(
+    reactions: int, torn: TornSystem, friction: tuple[float, np.ndarray]
+) -> tuple[np.ndarray, sp.csr_matrix, np.ndarray, list[Any]]:
+    """Return which unknowns are normal forces, and A, b and cones with b − A x in the cones."""
+    import clarabel
+
+    part, tresca_bound = friction
+    # Surfaces that supports hold apart cannot be pressed together, whatever the supports could carry.
+    pressed = ~torn.relations[1].held(torn.decomposition.fixed)[torn.frictional]
+    coefficient = part * pressed * torn.friction_coefficient
+    n_normal, discs, width = torn.points.count, len(torn.frictional), torn.dim
+    size = reactions + n_normal + (width - 1) * discs
+    coulomb = torn.tresca_bound == 0.0
+    # Rows −(Ψ, τ) of each disc, with Ψ = μ λ_N or a given bound.
+    disc = width * np.arange(discs)
+    tau = reactions + n_normal + np.arange((width - 1) * discs).reshape(-1, width - 1)
+    rows = np.concatenate([disc[coulomb], (disc[:, None] + 1 + np.arange(width - 1)).ravel()])
+    columns = np.concatenate([reactions + torn.frictional[coulomb], tau.ravel()])
+    values = np.concatenate([-coefficient[coulomb], -np.ones(tau.size)])
+    cone = sp.csr_matrix((values, (rows, columns)), shape=(width * discs, size))
+    bound = np.zeros((discs, width))
+    bound[:, 0] = part * tresca_bound
+    normal = np.zeros(size)
+    normal[reactions : reactions + n_normal] = 1.0
+    press = -sp.identity(size, format="csr")[normal > 0]
+    limit = np.concatenate([np.zeros(n_normal), bound.ravel()])
+    cones = [clarabel.NonnegativeConeT(n_normal), *[clarabel.SecondOrderConeT(width)] * discs]
+    return normal, sp.vstack([press, cone], format="csr"), limit, cones
+
+
+def _digits(motion: np.ndarray) -> np.ndarray:
+    """Return what words say of a motion, relative to its largest part."""
+    return np.round(motion / np.abs(motion).max(), 3) + 0.0  # no -0
+
+
+def _in_words(place: np.ndarray, size: float) -> str:
+    """Return coordinates to a thousandth of a size."""
+    rounded = np.round(place / size, 3) * size + 0.0
+    return f"({', '.join(f'{x:.3g}' for x in rounded)})"
+
+
+#: Wrenches that are reduced at a time.
+CHUNK = 4096
+
+
+def unresisted_motions(torn: TornSystem) -> tuple[UnheldMotion, ...]:
+    """Return the rigid motions that no support, tie, contact or material resists at rest. Collective.
+
+    Contact counts wherever its surfaces face each other, also across a gap, and in both directions. Surfaces
+    with friction and obstacles that move may meet anywhere later: they count against all motions.
+
+    Args:
+        torn: The torn system of the undeformed bodies; its matrices are not used.
+    """
+    comm = torn.numbering.comm
+    found: tuple[UnheldMotion, ...] = ()
+    with together(comm):
+        if comm.rank == 0:
+            found = _unresisted(torn)
+    return tuple(comm.bcast(found))
+
+
+def require_resisted(motions: tuple[UnheldMotion, ...], torn: TornSystem, prescribed: np.ndarray) -> None:
+    """Reject scenes in which a body that nothing resists is loaded or moved. Collective.
+
+    Stress would drive it, if only by rounding. Bodies at which nothing happens may stay until they are met.
+
+    Args:
+        motions: What `unresisted_motions` returned.
+        torn: The torn system with its load.
+        prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
+
+    Raises:
+        InfeasibleError: With the bodies and their motions.
+    """
+    if not motions:
+        return
+    tearing = torn.decomposition.tearing
+    acted = np.zeros(len(tearing.body_names))
+    for part in torn.subdomains:
+        acted[tearing.body_names.index(part.mesh.body)] += np.abs(part.load).sum()
+    acted = torn.numbering.comm.allreduce(acted)
+    moved = np.nan_to_num(prescribed)
+    busy = {
+        name
+        for number, name in enumerate(tearing.body_names)
+        if acted[number] or moved[tearing.node_offset[number] : tearing.node_offset[number + 1]].any()
+    }
+    driven = [motion for motion in motions if busy & set(motion.bodies)]
+    if driven:
+        raise InfeasibleError(unresisted_in_words(driven))
+
+
+def unresisted_in_words(motions: list[UnheldMotion] | tuple[UnheldMotion, ...]) -> str:
+    """Return the message of an error that names motions and says what to do."""
+    each = ", and ".join(f"body {motion}" for motion in motions)
+    return (
+        "every motion of every body must be resisted where materials are nonlinear, also if no load drives "
+        f"it, but nothing resists {each}: support it there (a symmetric part on its plane of symmetry), or "
+        "give its contacts friction"
+    )
+
+
+def _unresisted(torn: TornSystem) -> tuple[UnheldMotion, ...]:
+    bodies = [RigidBody(torn, index) for index in range(len(torn.scene.bodies))]
+    if all(body.held for body in bodies):
+        return ()
+    supports = sp.block_diag([body.support for body in bodies])
+    ties = sp.vstack([body.tie_wrenches(torn) for body in bodies])
+    wrenches = sp.hstack([supports, ties, *_of_contact(torn, bodies)], format="csc")
+    basis, resistance = np.zeros((wrenches.shape[0], 0)), np.zeros(0)
+    for start in range(0, wrenches.shape[1], CHUNK):  # each is on two bodies at most, so all are many zeros
+        more = wrenches[:, start : start + CHUNK].toarray()
+        basis, resistance, _ = np.linalg.svd(np.hstack([basis * resistance, more]), full_matrices=False)
+    rank = np.count_nonzero(resistance > RANK_TOLERANCE * resistance.max(initial=0.0))
+    rest = scipy.linalg.null_space(basis[:, :rank].T) if rank else np.eye(len(basis))
+    return _separate(rest, [body.name for body in bodies])
+
+
+def _of_contact(torn: TornSystem, bodies: list[RigidBody]) -> list[sp.csc_matrix]:
+    """Return the wrenches of the contact of each pair on all bodies, shape (n_wrenches, n) each."""
+    names = [body.name for body in bodies]
+    normal = sp.vstack([body.contact_wrenches(torn) for body in bodies]).tocsc()
+    found = []
+    for number, pair in enumerate(torn.scene.contacts):
+        if pair.has_friction or isinstance(pair.master, MovingObstacle):
+            found.append(_of_any(torn, pair, names))
+        else:
+            found.append(normal[:, np.flatnonzero(torn.points.pair == number)])
+    return found
+
+
+def _of_any(torn: TornSystem, pair: ContactPair, names: list[str]) -> sp.csc_matrix:
+    """Return the wrenches of any forces between the bodies of a pair."""
+    mesh = torn.scene.bodies[pair.slave.body].mesh
+    at = mesh.points[fixing_nodes(mesh.points)]
+    size = rigid_body_modes(at).shape[2]
+    result = np.zeros((len(names), size, at.size))
+    for side, sign in ((pair.slave, 1.0), (pair.master, -1.0)):
+        if isinstance(side, Surface):
+            modes = rigid_body_modes(torn.scene.bodies[side.body].mesh.points, at)
+            result[names.index(side.body)] += sign * modes.reshape(at.size, size).T
+    return sp.csc_matrix(result.reshape(-1, at.size))
+
+
+def _separate(motions: np.ndarray, names: list[str]) -> tuple[UnheldMotion, ...]:
+    """Return motions, as columns, each in terms of its own mode, so that most are of one body."""
+    count = motions.shape[1]
+    if count == 0:
+        return ()
+    order = scipy.linalg.qr(motions.T, mode="r", pivoting=True)[-1]
+    motions = motions @ np.linalg.inv(motions[order[:count]])
+    motions = motions / np.abs(motions).max(axis=0)
+    motions[np.abs(motions) <= MOTION_ROUNDING] = 0.0
+    parts = motions.T.reshape(count, len(names), -1)
+    return tuple(
+        UnheldMotion({name: own for name, own in zip(names, part, strict=True) if own.any()})
+        for part in parts
+    )

@@ -1,0 +1,1 @@
+"""Forms of elasticity and of loads, written once on templates and bound to any mesh."""

@@ -1,0 +1,89 @@
+"""The materials on the cells of a mesh, and integrals over all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from ufl.core.expr import Expr
+
+from fenics_contact._fem.templates import Constants, scalar_constants
+from fenics_contact._scene.body import Body
+from fenics_contact.errors import user_code
+from fenics_contact.materials.elastic import Material
+
+#: Builds an integrand (UFL) from a material and its constants, None for materials that are left out.
+OfMaterial = Callable[[Material, Constants], Expr | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Composition:
+    """The materials of the cells of one mesh.
+
+    Attributes:
+        materials: The materials.
+        cells: Tag (from 1, in the order of the materials) -> cells of the mesh; None if there is only one.
+    """
+
+    materials: tuple[Material, ...]
+    cells: dict[int, np.ndarray] | None = None
+
+    def same_as(self, other: Composition) -> bool:
+        """Return whether the other has the same materials at the same cells."""
+        if self.materials != other.materials or self.cells is None or other.cells is None:
+            return self.materials == other.materials and self.cells is other.cells
+        return all(np.array_equal(cells, other.cells[tag]) for tag, cells in self.cells.items())
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """Values of the constants of `integrate`."""
+        return tuple(value for material in self.materials for value in material.parameters)
+
+
+def composition(body: Body, cells: np.ndarray) -> Composition:
+    """Return the materials of some cells of a body.
+
+    Args:
+        body: The body.
+        cells: Cells of the body in the order of the mesh on which forms are to be bound.
+    """
+    materials = body.materials
+    if len(materials) == 1:
+        return Composition(materials)
+    number = body.material_of_cells[cells]
+    here = np.unique(number)
+    if len(here) == 1:
+        return Composition((materials[here[0]],))
+    return Composition(materials, {k + 1: np.flatnonzero(number == k) for k in range(len(materials))})
+
+
+def material_sets(body: Body) -> tuple[tuple[Material, ...], ...]:
+    """Return the materials of all compositions that parts of a body can have."""
+    single = tuple((material,) for material in body.materials)
+    return single if len(single) == 1 else (*single, body.materials)
+
+
+def integrate(
+    materials: tuple[Material, ...], cell_type: str, integrand: OfMaterial, measure: ufl.Measure
+) -> tuple[ufl.Form, Constants]:
+    """Return ∫ integrand over all materials (a form) and its constants.
+
+    Args:
+        materials: As in `Composition`.
+        cell_type: Of the template.
+        integrand: Takes each material with its constants.
+        measure: dx on the template.
+    """
+    all_constants: list[ufl.Constant] = []
+    form = None
+    for number, material in enumerate(materials):
+        constants = scalar_constants(cell_type, len(material.parameters))
+        with user_code(f"the UFL of material {type(material).__name__}"):
+            density = integrand(material, constants)
+        all_constants.extend(constants)
+        if density is not None:
+            part = density * (measure if len(materials) == 1 else measure(number + 1))
+            form = part if form is None else form + part
+    return form, tuple(all_constants)

@@ -1,0 +1,170 @@
+"""The forms of bodies under large deformations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import ufl
+from ufl.core.expr import Expr
+
+from fenics_contact import _dolfinx
+from fenics_contact._fem.composition import integrate
+from fenics_contact._fem.templates import (
+    UNSEEN,
+    Constants,
+    Templates,
+    Written,
+    coefficient_shape,
+    polynomial,
+    volume_measure,
+)
+from fenics_contact.materials.elastic import Material
+from fenics_contact.materials.hyperelastic import (
+    deformation_gradient,
+    gradient_in_space,
+    has_mean_dilatation,
+    is_nonlinear,
+    volume_change,
+)
+from fenics_contact.materials.plastic import HistoryMaterial
+
+
+class Fields(NamedTuple):
+    """The displacement, and the dilatation and pressure of cells, on the template.
+
+    Attributes:
+        u: Displacement.
+        dilatation: θ, a polynomial in each cell.
+        pressure: U'(θ), projected on such polynomials.
+        tests: Such polynomials as test and as trial function.
+        unseen: Whether `UNSEEN` names the cells.
+    """
+
+    u: Expr
+    dilatation: Expr
+    pressure: Expr
+    tests: tuple[Expr, Expr]
+    unseen: bool
+
+
+#: Returns an integrand from a material, the fields and the material's constants.
+Density = Callable[[Any, Fields, Constants], "Expr | None"]
+
+
+def prepare_forms(templates: Templates, materials: tuple[Material, ...], cell_type: str) -> None:
+    """Compile the missing forms of a set of materials, one of them nonlinear. Collective."""
+    for kind in FORMS | (MEAN_FORMS if have_mean_energy(materials) else {}):
+        name = (kind, *(type(material) for material in materials), cell_type)
+        templates.get((kind, materials, cell_type), name, partial(_written, kind, materials, cell_type))
+
+
+def have_mean_energy(materials: tuple[Material, ...]) -> bool:
+    """Return whether some material has an energy of the mean dilatation of each cell."""
+    return any(has_mean_dilatation(each) and not isinstance(each, HistoryMaterial) for each in materials)
+
+
+def _written(kind: str, materials: tuple[Material, ...], cell_type: str) -> Written:
+    """Return a form; its coefficients are the displacement and the fields of `MeanDilatation`."""
+    (u,) = _dolfinx.field_symbols(cell_type, 1)
+    space = _dolfinx.cellwise_space(cell_type, coefficient_shape(cell_type))
+    means, pressures = (ufl.Coefficient(space, count=number) for number in (1, 2))
+    centre = ufl.Coefficient(_dolfinx.cellwise_space(cell_type, (len(u),)), count=3)
+    q, r = (polynomial(each(space), centre, cell_type) for each in (ufl.TestFunction, ufl.TrialFunction))
+    dilatation, pressure = (polynomial(each, centre, cell_type) for each in (means, pressures))
+    fields = Fields(u, dilatation, pressure, (q, r), cell_type in UNSEEN)
+    density = (FORMS | MEAN_FORMS)[kind]
+
+    def integrand(material: Material, constants: Constants) -> Expr | None:
+        if isinstance(material, HistoryMaterial):
+            return None  # what it answers is added to the assembled forms
+        return density(material, fields, constants)
+
+    form, constants = integrate(materials, cell_type, integrand, volume_measure(cell_type))
+    return form, constants, (u, means, pressures, centre)
+
+
+def _apart(fields: Fields) -> Expr:
+    """Return what J has beside its projection."""
+    return ufl.det(deformation_gradient(fields.u)) - fields.dilatation
+
+
+def _energy(material: Any, fields: Fields, constants: Constants) -> Expr:
+    """Return the energy per undeformed volume."""
+    u, F = fields.u, deformation_gradient(fields.u)
+    if has_mean_dilatation(material):
+        shape = material.shape_energy(gradient_in_space(F), constants)
+        energy = shape + material.volume_energy(fields.dilatation, constants)
+        if fields.unseen:
+            energy += material.unseen_modulus(constants) / 2 * _apart(fields) ** 2
+        return energy
+    return (
+        material.density(F, constants) if is_nonlinear(material) else material.stiffness(u, u, constants) / 2
+    )
+
+
+def _work(material: Any, fields: Fields, constants: Constants) -> Expr:
+    """Return the work of the stresses on a test function per undeformed volume."""
+    u, v = fields.u, ufl.TestFunction(fields.u.ufl_function_space())
+    if has_mean_dilatation(material):
+        shape = ufl.inner(material.shape_stress(deformation_gradient(u), constants), ufl.grad(v))
+        return shape + _pressure_at(material, fields, constants) * volume_change(u, v)
+    return material.work(u, v, constants) if is_nonlinear(material) else material.stiffness(u, v, constants)
+
+
+def _tangent(material: Any, fields: Fields, constants: Constants) -> Expr:
+    """Return the growth of the work with the displacement at fixed dilatations and pressures."""
+    u, space = fields.u, fields.u.ufl_function_space()
+    v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
+    if has_mean_dilatation(material):
+        growth = ufl.derivative(volume_change(u, v), u, du)
+        volume = _pressure_at(material, fields, constants) * growth
+        if fields.unseen:
+            volume += material.unseen_modulus(constants) * volume_change(u, v) * volume_change(u, du)
+        return material.shape_tangent(u, du, v, constants) + volume
+    if is_nonlinear(material):
+        return material.tangent(u, du, v, constants)
+    return material.stiffness(du, v, constants)
+
+
+def _pressure_at(material: Any, fields: Fields, constants: Constants) -> Expr:
+    """Return the pressure at a point: that of the cell, and of what its dilatation leaves out."""
+    if not fields.unseen:
+        return fields.pressure
+    return fields.pressure + material.unseen_modulus(constants) * _apart(fields)
+
+
+def _volume_change(material: Any, fields: Fields, constants: Constants) -> Expr | None:
+    """Return the change of J, tested by polynomials in cells."""
+    if not has_mean_dilatation(material):
+        return None
+    du = ufl.TrialFunction(fields.u.ufl_function_space())
+    return fields.tests[0] * volume_change(fields.u, du)
+
+
+def _pressure(material: Any, fields: Fields, constants: Constants) -> Expr | None:
+    """Return U' of the dilatation, tested by polynomials in cells."""
+    if not has_mean_dilatation(material):
+        return None
+    return fields.tests[0] * material.pressure(fields.dilatation, constants)
+
+
+def _bulk_modulus(material: Any, fields: Fields, constants: Constants) -> Expr | None:
+    """Return U'' of the dilatation, less what the tangent has of it at points, between polynomials."""
+    if not has_mean_dilatation(material):
+        return None
+    modulus = material.bulk_modulus_at(fields.dilatation, constants)
+    if fields.unseen:
+        modulus -= material.unseen_modulus(constants)
+    return fields.tests[0] * fields.tests[1] * modulus
+
+
+#: Integrands of the forms of every set of materials with a nonlinear one, by number of arguments.
+FORMS: dict[str, Density] = {"energy": _energy, "internal force": _work, "tangent": _tangent}
+#: Those in addition where one of the materials has a mean dilatation, see `MeanDilatation`.
+MEAN_FORMS: dict[str, Density] = {
+    "volume change": _volume_change,
+    "cell pressure": _pressure,
+    "bulk modulus": _bulk_modulus,
+}

@@ -1,0 +1,346 @@
+"""UFL forms of a scene, each compiled once and bound to every subdomain mesh.
+
+Typical nodal stiffness of cells, for weighting stiff and soft neighbours.
+
+The temperature change of a body in UFL, and the stress including thermal strain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import ufl
+from ufl.core.expr import Expr
+
+from fenics_contact import _dolfinx
+from fenics_contact._base.libraries import MPI
+from fenics_contact._fem.composition import Composition, integrate, material_sets
+from fenics_contact._fem.load_forms import (
+    FIRST_COUNT,
+    Symbol,
+    from_ufl,
+    load_fields,
+    load_key,
+    load_name,
+    load_parameters,
+    load_work,
+)
+from fenics_contact._fem.loads import as_tractions
+from fenics_contact._fem.mechanics import Mechanics
+from fenics_contact._fem.model_checks import check_model, unit_cell_stiffness
+from fenics_contact._fem.templates import (
+    Constants,
+    Templates,
+    Written,
+    scalar_constants,
+    volume_measure,
+)
+from fenics_contact._scene.fields import Ufl, evaluate
+from fenics_contact._scene.loads import Load, Pressure, ThermalStrain
+from fenics_contact._scene.scene import Scene
+from fenics_contact.errors import together
+from fenics_contact.materials.elastic import Material, Transverse
+from fenics_contact.materials.hyperelastic import Hyperelasticity, is_nonlinear
+from fenics_contact.materials.plastic import HistoryMaterial
+
+if TYPE_CHECKING:
+    from fenics_contact._fem.loads import FollowingPressure
+
+
+class FormLibrary:
+    """The compiled forms of a scene, by content and cell type."""
+
+    def __init__(self, comm: MPI.Comm) -> None:
+        """Start empty; `prepare` fills it."""
+        self._comm, self._templates = comm, Templates(comm)
+        self._typical_modulus: dict[tuple[Material, str], float] = {}
+        self._deformable: set[tuple[Material, str]] = set()
+
+    @property
+    def compiled(self) -> tuple[tuple[object, ...], ...]:
+        """Names of the forms compiled so far."""
+        return self._templates.names
+
+    @property
+    def templates(self) -> Templates:
+        """The compiled forms, to which upper floors add their own on demand."""
+        return self._templates
+
+    def prepare(self, scene: Scene) -> None:
+        """Compile the missing forms of a scene. Collective on the library's communicator.
+
+        Raises:
+            InvalidInputError: If a material contradicts itself (see `check_model`), or the value of a load
+                has the wrong shape.
+        """
+        for body in scene.bodies.values():
+            cell_type = body.mesh.cell_type
+            for materials in material_sets(body):
+                self._prepare_stiffness(materials, cell_type)
+        with together(self._comm):
+            for body in scene.bodies.values():
+                for material in body.materials:
+                    self._check(material, body.mesh.cell_type)
+        for load in as_tractions(scene):
+            body = scene.bodies[load.body]
+            for materials in material_sets(body):
+                self._prepare_load(load, materials, body.mesh.cell_type)
+
+    def stiffness(
+        self, parts: Composition, cell_type: str, space: _dolfinx.fem.FunctionSpace
+    ) -> _dolfinx.fem.Form:
+        """Return the bilinear form of the materials ``parts`` bound to ``space``."""
+        template = self._templates["stiffness", parts.materials, cell_type]
+        return template.bind([space, space], parts.parameters, cells=parts.cells)
+
+    def load(
+        self,
+        load: Load,
+        parts: Composition,
+        cell_type: str,
+        space: _dolfinx.fem.FunctionSpace,
+        points: np.ndarray,
+        facets: tuple[np.ndarray, np.ndarray] | None = None,
+        acted: np.ndarray | None = None,
+    ) -> _dolfinx.fem.Form:
+        """Return the linear form of ``load`` bound to ``space``.
+
+        Args:
+            load: The load; a resultant must have been spread.
+            parts: Materials of the mesh.
+            cell_type: Of the mesh.
+            space: Displacements on the mesh.
+            points: Coordinates by input node of the mesh, shape (n, dim), [length].
+            facets: (cells, local facets) on which a surface load acts.
+            acted: Marks of the nodes of its surface by input node, shape (n,).
+        """
+        template = self._templates[load_key(load, parts.materials, cell_type)]
+        cells = parts.cells if isinstance(load, ThermalStrain) else None
+        functions = load_fields(load, space, points, acted)
+        return template.bind([space], load_parameters(load, parts), functions, facets, cells=cells)
+
+    def prepare_mechanics(self, scene: Scene) -> None:
+        """Compile the missing forms of nonlinear materials and following pressures of a scene. Collective.
+
+        Raises:
+            InvalidInputError: If a hyperelastic model contradicts itself (see `check_hyperelastic`).
+        """
+        from fenics_contact._fem.loads import prepare_following  # linear scenes go without
+        from fenics_contact._fem.mechanics import prepare_mechanics
+        from fenics_contact._fem.model_checks import check_hyperelastic
+
+        prepare_mechanics(self._templates, scene)
+        prepare_following(self._templates, scene)
+        with together(self._comm):
+            for body in scene.bodies.values():
+                for material in body.materials:
+                    cell_type = body.mesh.cell_type
+                    if (
+                        isinstance(material, Hyperelasticity)
+                        and (material, cell_type) not in self._deformable
+                    ):
+                        check_hyperelastic(material, cell_type, self._templates)
+                        self._deformable.add((material, cell_type))
+
+    def mechanics(
+        self, parts: Composition, cell_type: str, space: _dolfinx.fem.FunctionSpace, points: np.ndarray
+    ) -> Mechanics:
+        """Return forces and tangent of the materials ``parts`` on one mesh of a scene with nonlinear ones.
+
+        Args:
+            parts: Materials of the mesh.
+            cell_type: Of the mesh.
+            space: Displacements on the mesh.
+            points: Coordinates by input node, shape (n, dim), [length].
+        """
+        from fenics_contact._fem.mechanics import HyperelasticMechanics, LinearMechanics
+
+        if not any(self.varies(material, cell_type) for material in parts.materials):
+            points = points - points[0]  # as exact far from the origin as near it
+        if not any(map(is_nonlinear, parts.materials)):
+            return LinearMechanics(self.stiffness(parts, cell_type, space), space.mesh, points)
+        remembering = [isinstance(material, HistoryMaterial) for material in parts.materials]
+        others = None
+        if not all(remembering):
+            others = HyperelasticMechanics(self._templates, parts, cell_type, space, points)
+        if others is not None and not any(remembering):
+            return others
+        from fenics_contact._fem.mechanics import HistoryMechanics
+
+        return HistoryMechanics(parts, cell_type, space, points, others)
+
+    def following(
+        self,
+        load: Pressure,
+        cell_type: str,
+        space: _dolfinx.fem.FunctionSpace,
+        points: np.ndarray,
+        facets: tuple[np.ndarray, np.ndarray],
+        acted: np.ndarray,
+    ) -> FollowingPressure:
+        """Return what a pressure that follows its surface adds on one mesh; arguments as for `load`."""
+        from fenics_contact._fem.loads import FollowingPressure
+
+        return FollowingPressure(self._templates, load, cell_type, space, points, facets, acted)
+
+    def varies(self, material: Material, cell_type: str) -> bool:
+        """Return whether the stiffness of a material depends on position."""
+        return self._templates["stiffness", (material,), cell_type].mentions(ufl.geometry.SpatialCoordinate)
+
+    def typical_modulus(self, material: Material, cell_type: str) -> float:
+        """Return the mean diagonal entry of the stiffness of a cell of edge length one.
+
+        [force / length²] times [length^(dim − 2)]; a measure of the relative stiffness of materials.
+        """
+        return self._typical_modulus[material, cell_type]
+
+    def _check(self, material: Material, cell_type: str) -> None:
+        if (material, cell_type) in self._typical_modulus:
+            return
+        parts = Composition((material,))
+
+        def bind(space: _dolfinx.fem.FunctionSpace) -> _dolfinx.fem.Form:
+            return self.stiffness(parts, cell_type, space)
+
+        check_model(material, cell_type, bind)
+        stiffness = unit_cell_stiffness(cell_type, bind)
+        self._typical_modulus[material, cell_type] = float(np.diag(stiffness).mean())
+
+    def _prepare_stiffness(self, materials: tuple[Material, ...], cell_type: str) -> None:
+        def write() -> Written:
+            V = _dolfinx.displacement_space(cell_type)
+            u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+            form, constants = integrate(
+                materials, cell_type, lambda m, c: m.stiffness(u, v, c), volume_measure(cell_type)
+            )
+            return form, constants, ()
+
+        name = ("stiffness", *(type(material) for material in materials), cell_type)
+        self._templates.get(("stiffness", materials, cell_type), name, write)
+
+    def _prepare_load(self, load: Load, materials: tuple[Material, ...], cell_type: str) -> None:
+        def write() -> Written:
+            v = ufl.TestFunction(_dolfinx.displacement_space(cell_type))
+            symbol = Symbol(load, cell_type)
+            form, constants = load_work(load, materials, cell_type, symbol.expression, v)
+            return form, (*symbol.constants, *constants), symbol.coefficients
+
+        self._templates.get(load_key(load, materials, cell_type), load_name(load, cell_type), write)
+
+
+def cell_stiffness(scene: Scene, forms: FormLibrary) -> dict[str, np.ndarray]:
+    """Return a typical nodal stiffness of every cell of every body, [force / length].
+
+    It is a material's stiffness on a unit cell, times the mean cell size of the body: within a body of one
+    material it is the same everywhere.
+
+    Args:
+        scene: The scene.
+        forms: Its prepared forms.
+    """
+    stiffness = {}
+    for name, body in scene.bodies.items():
+        size = (body.mesh.volume / body.mesh.n_cells) ** (1.0 / scene.dim)
+        cell_type = body.mesh.cell_type
+        moduli = np.array([forms.typical_modulus(material, cell_type) for material in body.materials])
+        stiffness[name] = moduli[body.material_of_cells] * size ** (scene.dim - 2)
+    return stiffness
+
+
+@dataclass(frozen=True)
+class Temperature:
+    """The sum of the temperature changes of one body.
+
+    Attributes:
+        loads: The temperature changes; without any, no form depends on temperature.
+    """
+
+    loads: tuple[ThermalStrain, ...] = ()
+
+    @property
+    def key(self) -> tuple[bool, bool, tuple[Ufl, ...]]:
+        """The key of everything on which a form depends."""
+        return bool(self._numbers), bool(self.of_position), tuple(load.value for load in self._ufl)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Values of the constants: the sum of the uniform changes."""
+        return (sum(self._numbers),) if self._numbers else ()
+
+    def write(self, cell_type: str) -> tuple[Expr | None, Constants, tuple[ufl.Coefficient, ...]]:
+        """Return ΔT (UFL, None without loads), its constants and its coefficients."""
+        constants = scalar_constants(cell_type, 1) if self._numbers else ()
+        coefficients: tuple[ufl.Coefficient, ...] = ()
+        if self.of_position:
+            coefficients = (ufl.Coefficient(_dolfinx.nodal_space(cell_type), count=FIRST_COUNT),)
+        terms = [*constants, *coefficients, *(from_ufl(load, load.value, cell_type) for load in self._ufl)]
+        return (sum(terms[1:], terms[0]) if terms else None), constants, coefficients
+
+    def fields(self, mesh: _dolfinx.mesh.Mesh, points: np.ndarray) -> tuple[_dolfinx.fem.Function, ...]:
+        """Return the Functions for the coefficients.
+
+        Args:
+            mesh: The mesh.
+            points: Coordinates by input node, shape (n, dim), [length].
+        """
+        if not self.of_position:
+            return ()
+        space = _dolfinx.scalar_space(mesh, 1)
+        nodes, dofs = _dolfinx.node_dofs(space)
+        field = _dolfinx.fem.Function(space, name="temperature")
+        for load in self.of_position:
+            field.x.array[dofs] += evaluate("temperature_change", load.value, points[nodes], ())
+        return (field,)
+
+    @property
+    def _numbers(self) -> list[float]:
+        return [load.value for load in self.loads if isinstance(load.value, float)]
+
+    @property
+    def _ufl(self) -> list[Any]:
+        return [load for load in self.loads if isinstance(load.value, Ufl)]
+
+    @property
+    def of_position(self) -> list[Any]:
+        """The changes given as functions of position."""
+        return [load for load in self.loads if not isinstance(load.value, float | Ufl)]
+
+
+def temperature_of(loads: Iterable[Load], body: str) -> Temperature:
+    """Return the temperature change of a body."""
+    return Temperature(tuple(load for load in loads if isinstance(load, ThermalStrain) and load.body == body))
+
+
+def stress_left(material: Any, u: Expr, constants: Constants, temperature: Expr | None) -> Expr:
+    """Return the stress (dim x dim, UFL) of a displacement at a temperature change.
+
+    Args:
+        material: The material.
+        u: The displacement (UFL).
+        constants: The material's constants.
+        temperature: ΔT (UFL) or None.
+    """
+    stress = material.stress(u, constants)
+    return stress if temperature is None else stress - temperature * material.thermal_stress(constants)
+
+
+def stress_in_space(material: Material, u: Expr, constants: Constants, temperature: Expr | None) -> Expr:
+    """Return the stress (3 x 3, UFL), in the plane including the component normal to it.
+
+    Where the material is nonlinear it is Cauchy's.
+    """
+    if isinstance(material, Hyperelasticity):
+        return material.cauchy(u, constants)
+    stress = stress_left(material, u, constants, temperature)
+    if stress.ufl_shape == (3, 3):
+        return stress
+    normal: Expr | int = 0
+    if isinstance(material, Transverse):
+        normal = material.transverse_stress(u, constants)
+        if temperature is not None:
+            normal = normal - temperature * material.transverse_thermal_stress(constants)
+    rows = [[stress[i, j] for j in range(2)] + [0] for i in range(2)]
+    return ufl.as_tensor([*rows, [0, 0, normal]])

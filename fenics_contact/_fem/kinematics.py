@@ -1,0 +1,380 @@
+"""Changes of volume: the determinant of the deformation gradient in the cells of a mesh.
+
+Changes of volume in the mean of each cell, against locking where plastic flow keeps the volume.
+
+Displacement gradients at the Gauss points of a mesh, and the forces and stiffness of stresses there.
+
+Volume energies of the dilatation of cells, against locking of nearly incompressible bodies.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact import _dolfinx
+from fenics_contact._fem.composition import Composition
+from fenics_contact._fem.deformed_forms import MEAN_FORMS
+from fenics_contact._fem.templates import (
+    UNSEEN,
+    CellPolynomials,
+    Templates,
+    coefficient_shape,
+    quadrature_degree,
+)
+from fenics_contact.materials.hyperelastic import has_mean_dilatation
+from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_gradients
+from fenics_contact.mesh.quality import determinants, jacobians
+
+
+class Dilatation:
+    """det F at the Gauss points of one mesh."""
+
+    def __init__(self, space: _dolfinx.fem.FunctionSpace, cell_type: str, points: np.ndarray) -> None:
+        """Evaluate the Jacobians of the undeformed cells.
+
+        Args:
+            space: Displacements on the mesh.
+            cell_type: Of the mesh.
+            points: Coordinates by block, shape (n, dim), [length].
+        """
+        self._positions, _ = quadrature(CELL_TYPES[cell_type], quadrature_degree(cell_type))
+        self._points, self._cells = points, _dolfinx.vtk_cell_dofs(space)
+        self._undeformed = jacobians(points, self._cells, self._positions)
+        self._cell_type = cell_type
+
+    @cached_property
+    def polynomials(self) -> CellPolynomials:
+        """The polynomials of the undeformed cells."""
+        return CellPolynomials(self._points, self._cells, self._cell_type)
+
+    def least(self, displacement: np.ndarray) -> float:
+        """Return the smallest det F of all Gauss points.
+
+        Args:
+            displacement: By dof, shape (dim n,), [length].
+        """
+        return float(self.at(displacement).min())
+
+    def at(self, displacement: np.ndarray) -> np.ndarray:
+        """Return det F, shape (n_cells, n_gauss), of linear simplices (n_cells, 1)."""
+        moved = self._points + displacement.reshape(self._points.shape)
+        return np.asarray(jacobians(moved, self._cells, self._positions) / self._undeformed)
+
+
+#: Bulk modulus at rest of what is not projected, by the shear modulus, in cells of type `UNSEEN`.
+HELD = 0.02
+
+
+def held_share(moduli: np.ndarray) -> float:
+    """Return the share of a dilatation's variation in a cell that is not projected away, see `HELD`.
+
+    Args:
+        moduli: Of the material at rest, by Voigt components, shape (6, 6), [force / length²].
+    """
+    bulk, shear = moduli[:3, :3].sum() / 9.0, np.trace(moduli[3:, 3:]) / 3.0
+    return float(np.sqrt(min(1.0, HELD * shear / bulk)))
+
+
+class MeanStrain:
+    """Displacement gradients of small strain whose traces are the projections of their cells: B-bar.
+
+    H̄ = H + (1 − s) (Π tr H − tr H) I / 3 with the projection Π on the polynomials of each cell, its mean or
+    linear ones. Linear cells whose points must all keep their volume lock; these ask it of their cells alone.
+    Forces and stiffness are the first and the second derivative of the same energy where there is one. The
+    share s is zero unless deformations would be without energy then.
+
+    References:
+        T. J. R. Hughes, Generalization of selective integration procedures to anisotropic and nonlinear
+        media, International Journal for Numerical Methods in Engineering 15 (1980).
+    """
+
+    def __init__(self, gradients: np.ndarray, polynomials: CellPolynomials, share: float = 0.0) -> None:
+        """Project the divergence of each shape function.
+
+        Args:
+            gradients: Of the shape functions, shape (n_cells, n_gauss, nodes, dim), [1 / length].
+            polynomials: Of the same cells.
+            share: The share s.
+        """
+        self._gradients, self._polynomials, self._part = gradients, polynomials, 1.0 - share
+
+    def averaged(self, tensors: np.ndarray) -> np.ndarray:
+        """Return H̄ of H; of the stress on H̄ that which does the same work on H.
+
+        Args:
+            tensors: H, or the stress, shape (n_cells, n_gauss, 3, 3).
+        """
+        apart = self._apart(np.einsum("cqii->cq", tensors)[..., None])
+        return np.asarray(tensors + apart[..., None] * np.eye(3))
+
+    def _apart(self, traces: np.ndarray) -> np.ndarray:
+        """Return what a third of traces lacks of their projections, shape (n_cells, n_gauss, k)."""
+        return self._part / 3.0 * (self._polynomials.projected(traces) - traces)
+
+    def blocks(self, tangent: np.ndarray) -> np.ndarray:
+        """Return what ∫ ∇v̄ : A : ∇ū has beside ∫ ∇v : A : ∇u, shape (n_cells, dim nodes, dim nodes).
+
+        Args:
+            tangent: A, shape (n_cells, n_gauss, 3, 3, 3, 3), [force / length²].
+        """
+        G, dim = self._gradients, self._gradients.shape[-1]
+        flat = (*G.shape[:2], -1)
+        apart = self._apart(G.reshape(flat))
+        by_trace = np.einsum("cqijkk->cqij", tangent)
+        from_trace = np.einsum("cqiikl->cqkl", tangent)
+        both = np.einsum("cqii->cq", by_trace)
+        left = (G @ by_trace[..., :dim, :dim].swapaxes(2, 3)).reshape(flat)
+        right = (G @ from_trace[..., :dim, :dim].swapaxes(2, 3)).reshape(flat) + both[..., None] * apart
+        w = self._polynomials.weights[..., None]
+        outer = (w * left).swapaxes(1, 2) @ apart
+        return np.asarray(outer + (w * apart).swapaxes(1, 2) @ right)
+
+
+class GaussPoints:
+    """The Gauss points of one mesh: those of the package's forms on cells of this type."""
+
+    def __init__(self, space: _dolfinx.fem.FunctionSpace, cell_type: str, points: np.ndarray) -> None:
+        """Evaluate the gradients of the shape functions.
+
+        Args:
+            space: Displacements on the mesh.
+            cell_type: Of the mesh.
+            points: Coordinates by block, shape (n, dim), [length].
+        """
+        cell = CELL_TYPES[cell_type]
+        positions, weights = quadrature(cell, quadrature_degree(cell_type))
+        reference = shape_gradients(cell, positions)
+        self._shape, self._cells = points.shape, _dolfinx.vtk_cell_dofs(space)
+        self._points, self._cell_type = points, cell_type
+        jacobian = np.einsum("cai,qaj->cqij", points[self._cells], reference)
+        self._gradients = reference @ np.linalg.inv(jacobian)
+        self._weights = weights * determinants(jacobian)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Numbers of cells and of points in each."""
+        return self._gradients.shape[0], self._gradients.shape[1]
+
+    def gradient(self, displacement: np.ndarray) -> np.ndarray:
+        """Return ∂u_i/∂X_j in three dimensions, zero out of the plane, shape (n_cells, n_gauss, 3, 3).
+
+        Args:
+            displacement: By dof, shape (dim n,), [length].
+        """
+        dim = self._shape[1]
+        nodal = displacement.reshape(self._shape)[self._cells]
+        gradient = np.zeros((*self.shape, 3, 3))
+        gradient[..., :dim, :dim] = nodal.swapaxes(1, 2)[:, None] @ self._gradients
+        return gradient
+
+    def force(self, stress: np.ndarray, cells: np.ndarray) -> np.ndarray:
+        """Return ∫ P : ∇v over some cells by dof, shape (dim n,), [force].
+
+        Args:
+            stress: P at their points, shape (n_cells, n_gauss, 3, 3), [force / length²].
+            cells: Numbers of the cells.
+        """
+        dim = self._shape[1]
+        weighted = self._weights[cells][..., None, None] * stress[..., :dim, :dim]
+        nodal = (self._gradients[cells] @ weighted.swapaxes(2, 3)).sum(axis=1)
+        return np.bincount(self._dofs[cells].ravel(), nodal.ravel(), minlength=int(np.prod(self._shape)))
+
+    def mean_strain(self, cells: np.ndarray, moduli: np.ndarray) -> MeanStrain:
+        """Return the means of changes of volume in some cells.
+
+        Args:
+            cells: Numbers of the cells.
+            moduli: Of the material at rest, by Voigt components, shape (6, 6), [force / length²].
+        """
+        share = held_share(moduli) if self._cell_type in UNSEEN else 0.0
+        return MeanStrain(self._gradients[cells], self._polynomials.of(cells), share)
+
+    def stiffness(
+        self, tangent: np.ndarray, cells: np.ndarray, means: MeanStrain | None = None
+    ) -> np.ndarray:
+        """Return ∫ ∇v : A : ∇u over some cells: entries of the matrix of `assembled`.
+
+        Args:
+            tangent: A at their points, shape (n_cells, n_gauss, 3, 3, 3, 3), [force / length²].
+            cells: Numbers of the cells.
+            means: Means of changes of volume in these cells, where A is the tangent by them.
+        """
+        dim, (_, m) = self._shape[1], self.shape
+        G, weights = self._gradients[cells], self._weights[cells]
+        A = weights[..., None, None, None, None] * tangent[..., :dim, :dim, :dim, :dim]
+        half = A.reshape(len(cells), m, dim**3, dim) @ G.swapaxes(2, 3)
+        half = half.reshape(len(cells), m, dim, dim, -1).swapaxes(2, 3).reshape(len(cells), m * dim, -1)
+        left = G.swapaxes(1, 2).reshape(len(cells), -1, m * dim)
+        blocks = (left @ half).reshape(len(cells), left.shape[1], dim, dim, left.shape[1])
+        entries = blocks.swapaxes(3, 4).ravel()
+        if means is not None:
+            entries = entries + means.blocks(tangent).ravel()
+        _, _, places = self._pattern
+        return np.bincount(places[cells].ravel(), entries, minlength=self.entries)
+
+    def assembled(self, entries: np.ndarray, others: sp.csr_matrix | None = None) -> sp.csr_matrix:
+        """Return the matrix with entries from `stiffness`; its pattern is the same whatever is zero in it.
+
+        Args:
+            entries: Sums of `stiffness`.
+            others: A matrix of the same mesh that is added.
+        """
+        indptr, indices, _ = self._pattern
+        size = len(indptr) - 1
+        if others is not None:
+            rows = np.repeat(np.arange(size), np.diff(others.indptr))
+            own = np.repeat(np.arange(size), np.diff(indptr)) * size + indices
+            entries = entries.copy()
+            entries[np.searchsorted(own, rows * size + others.indices)] += others.data
+        return sp.csr_matrix((entries, indices, indptr), shape=(size, size))
+
+    @property
+    def entries(self) -> int:
+        """Number of entries of the matrix."""
+        return len(self._pattern[1])
+
+    @cached_property
+    def _polynomials(self) -> CellPolynomials:
+        """Those on which changes of volume are projected."""
+        return CellPolynomials(self._points, self._cells, self._cell_type)
+
+    @cached_property
+    def _dofs(self) -> np.ndarray:
+        """Dofs of each cell, shape (n_cells, dim nodes of a cell)."""
+        dim = self._shape[1]
+        return np.asarray((dim * self._cells[..., None] + np.arange(dim)).reshape(len(self._cells), -1))
+
+    @cached_property
+    def _pattern(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Row starts and columns of the matrix, and for each cell where its entries belong."""
+        size, dofs = int(np.prod(self._shape)), self._dofs.astype(np.int64)
+        keys, places = np.unique(dofs[:, :, None] * size + dofs[:, None, :], return_inverse=True)
+        indptr = np.searchsorted(keys, np.arange(size + 1) * size)
+        return indptr, keys % size, places.reshape(len(dofs), -1)
+
+
+#: Part of the dilatation that a step led to, below which a foreseen one says nothing.
+FLATTENED = 0.1
+
+
+def assembled(form: _dolfinx.fem.Form, shape: tuple[int, int]) -> sp.csr_matrix:
+    """Assemble a bilinear form on one rank."""
+    indptr, indices, data = _dolfinx.assemble_csr(form)
+    return sp.csr_matrix((data, indices, indptr), shape=shape)
+
+
+def mean_fields(mesh: _dolfinx.mesh.Mesh, cell_type: str) -> list[_dolfinx.fem.Function]:
+    """Return the fields of `MeanDilatation`: dilatations and pressures by coefficients, centres of cells."""
+    shape, dim = coefficient_shape(cell_type), mesh.geometry.dim
+    shapes = (shape, shape, (dim,))
+    return [_dolfinx.fem.Function(_dolfinx.cellwise_space_on(mesh, each)) for each in shapes]
+
+
+class MeanDilatation:
+    """The dilatations θ in the cells of one mesh, which are polynomials, and their part of the tangent.
+
+    With the polynomials ψ_i of a cell and M_ij = ∫ ψ_i ψ_j, the coefficients of θ = Π J and p = Π U'(θ) are
+    M⁻¹ ∫ ψ J and M⁻¹ ∫ ψ U'(θ). With (D v)_i = ∫ ψ_i cof F : ∇v the tangent at fixed θ and p lacks
+    (M⁻¹ D u) · H (M⁻¹ D v), H_ij = ∫ U''(θ) ψ_i ψ_j, summed over the cells. A constant θ is the mean of
+    a cell.
+
+    References:
+        J. C. Simo, R. L. Taylor, K. S. Pister, Variational and projection methods for the volume constraint
+        in finite deformation elasto-plasticity, Comput. Methods Appl. Mech. Eng. 51 (1985) 177-208.
+    """
+
+    def __init__(
+        self,
+        templates: Templates,
+        parts: Composition,
+        cell_type: str,
+        fields: list[_dolfinx.fem.Function],
+        dilatation: Dilatation,
+    ) -> None:
+        """Bind the forms.
+
+        Args:
+            templates: With the prepared forms.
+            parts: Materials of the mesh.
+            cell_type: Of the mesh.
+            fields: Displacement, and the `mean_fields`, which `follow` sets.
+            dilatation: Changes of volume on the mesh.
+        """
+        self._dilatation, self._polynomials = dilatation, dilatation.polynomials
+        self._means, self._pressures, centres = fields[1:]
+        self._size = fields[0].x.array.size
+        space, cellwise = (field.function_space for field in fields[:2])
+        self._cells = _dolfinx.cell_dofs(cellwise).ravel()
+        centres.x.array.reshape(self._polynomials.centres.shape)[self._cells] = self._polynomials.centres
+        self._change, self._pressure, self._modulus = (
+            templates[kind, parts.materials, cell_type].bind(
+                spaces, parts.parameters, fields, cells=parts.cells
+            )
+            for kind, spaces in zip(
+                MEAN_FORMS, ([cellwise, space], [cellwise], [cellwise, cellwise]), strict=True
+            )
+        )
+        self._own = _own_cells(parts, len(self._cells))
+        self._inverse = self._block_diagonal(self._polynomials.inverse)
+
+    def follow(self, displacement: np.ndarray) -> None:
+        """Set dilatations and pressures to those of a displacement."""
+        self._set(self._polynomials.coefficients(self._dilatation.at(displacement)[..., None])[..., 0])
+
+    def foresee(self, origin: np.ndarray, displacement: np.ndarray) -> None:
+        """Set the dilatations to those that a step was expected to lead to, θ + M⁻¹ D δu, and the pressures.
+
+        Where that turns a cell inside out, or nearly so, to those that it led to.
+
+        Args:
+            origin: Displacement at the start of the step, that of the fields.
+            displacement: That at its end.
+        """
+        shape = self._polynomials.centres.shape[0], -1
+        change = (self._inverse @ (self._volume_changes() @ (displacement - origin))).reshape(shape)
+        actual, before = (
+            self._polynomials.coefficients(self._dilatation.at(u)[..., None])[..., 0]
+            for u in (displacement, origin)
+        )
+        foreseen = before + change[self._cells]
+        points, reached = self._polynomials.at(foreseen), self._polynomials.at(actual)
+        possible = (points > FLATTENED * reached).all(axis=1)
+        self._set(np.where(possible[:, None], foreseen, actual))
+
+    def stiffness(self) -> sp.csr_matrix:
+        """Return the growth of the stresses with the dilatations, shape (dim n, dim n)."""
+        D = self._inverse @ self._volume_changes()
+        return (D.T @ assembled(self._modulus, (D.shape[0],) * 2) @ D).tocsr()
+
+    def least(self, displacement: np.ndarray) -> float:
+        """Return the smallest θ at a Gauss point."""
+        given = self._dilatation.at(displacement)[..., None]
+        values = self._polynomials.at(self._polynomials.coefficients(given)[..., 0])
+        return float(values[self._own].min(initial=1.0))
+
+    def _set(self, coefficients: np.ndarray) -> None:
+        """Set the dilatations, by cell, and the pressures."""
+        self._means.x.array.reshape(coefficients.shape)[self._cells] = coefficients
+        self._pressures.x.array[:] = self._inverse @ _dolfinx.assemble_vector(self._pressure)
+
+    def _volume_changes(self) -> sp.csr_matrix:
+        """Return D at the displacement of the fields, shape (n n_cells, dim n_nodes)."""
+        return assembled(self._change, (self._inverse.shape[0], self._size))
+
+    def _block_diagonal(self, blocks: np.ndarray) -> sp.csr_matrix:
+        """Return a matrix by dof of the dilatations from a block for each cell."""
+        ordered = np.empty_like(blocks)
+        ordered[self._cells] = blocks
+        count = np.arange(len(blocks) + 1)
+        return sp.bsr_matrix((ordered, count[:-1], count)).tocsr()
+
+
+def _own_cells(parts: Composition, count: int) -> np.ndarray:
+    """Return the cells of materials with a mean dilatation."""
+    if parts.cells is None:
+        return np.arange(count)
+    tagged = enumerate(parts.materials, start=1)
+    return np.concatenate([parts.cells[tag] for tag, material in tagged if has_mean_dilatation(material)])

@@ -1,0 +1,137 @@
+"""Virtual work of loads in UFL, and the values and fields to bind to it."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from typing import Any
+
+import numpy as np
+import ufl
+from ufl.core.expr import Expr
+
+from fenics_contact import _dolfinx
+from fenics_contact._fem.composition import Composition, integrate
+from fenics_contact._fem.templates import Constants, scalar_constants, surface_measure, volume_measure
+from fenics_contact._scene.fields import Ufl, evaluate
+from fenics_contact._scene.loads import BodyForce, Load, Pressure, ThermalStrain
+from fenics_contact.errors import InvalidInputError, user_code
+from fenics_contact.materials.elastic import Material, strain
+
+#: First number of the coefficients of loads, after those of displacement fields.
+FIRST_COUNT = 4
+KIND = {BodyForce: "body force", ThermalStrain: "thermal strain", Pressure: "pressure"}
+
+
+def is_scalar(load: Load) -> bool:
+    """Return whether the value of a load is a scalar."""
+    return isinstance(load, Pressure | ThermalStrain)
+
+
+def load_name(load: Load, cell_type: str) -> tuple[str, str, str]:
+    """Return the name of the form of a load: kind, type of its value, cell type."""
+    given = "UFL" if isinstance(load.value, Ufl) else "of position" if callable(load.value) else "numbers"
+    return (KIND.get(type(load), "surface load"), given, cell_type)
+
+
+def load_key(load: Load, materials: tuple[Material, ...], cell_type: str) -> tuple[Hashable, ...]:
+    """Return the key of everything on which the form of a load depends."""
+    own = load.value if isinstance(load.value, Ufl) else None
+    return (*load_name(load, cell_type), own, materials if isinstance(load, ThermalStrain) else ())
+
+
+class Symbol:
+    """The value of a load as UFL, with its constants and coefficients."""
+
+    def __init__(self, load: Load, cell_type: str, number: int = 0) -> None:
+        """Write the value of ``load``; ``number`` distinguishes the loads of one form."""
+        dim = _dolfinx.dimension(cell_type)
+        self.constants: Constants = ()
+        self.coefficients: tuple[ufl.Coefficient, ...] = ()
+        if isinstance(load.value, Ufl):
+            self.expression = from_ufl(load, load.value, cell_type)
+        elif callable(load.value):
+            nodal = _dolfinx.nodal_space if is_scalar(load) else _dolfinx.displacement_space
+            self.expression = ufl.Coefficient(nodal(cell_type), count=FIRST_COUNT + number)
+            self.coefficients = (self.expression,)
+        else:
+            self.constants = scalar_constants(cell_type, 1 if is_scalar(load) else dim)
+            self.expression = self.constants[0] if is_scalar(load) else ufl.as_vector(list(self.constants))
+
+
+def from_ufl(load: Load, value: Ufl, cell_type: str) -> Expr:
+    """Return a value given as `Ufl`, written on the template, after a check of its shape."""
+    dim = _dolfinx.dimension(cell_type)
+    shape = () if is_scalar(load) else (dim,)
+    with user_code(f"the function given as Ufl of {type(load).__name__} on body {load.body!r}"):
+        result = value.function(ufl.SpatialCoordinate(_dolfinx.template(cell_type)))
+        result = ufl.as_vector(list(result)) if isinstance(result, list | tuple) else ufl.as_ufl(result)
+    if result.ufl_shape != shape:
+        raise InvalidInputError(
+            f"the UFL value of {type(load).__name__} on body {load.body!r} must have shape {shape}, got "
+            f"{result.ufl_shape}: return {'a scalar' if is_scalar(load) else f'a vector of {dim} components'}"
+        )
+    return result
+
+
+def numbers_of(load: Load) -> tuple[float, ...]:
+    """Return the values of a symbol's constants."""
+    if callable(load.value) or isinstance(load.value, Ufl):
+        return ()
+    return tuple(load.value) if isinstance(load.value, Sequence) else (float(load.value),)
+
+
+def load_fields(
+    load: Load, space: _dolfinx.fem.FunctionSpace, points: np.ndarray, acted: np.ndarray | None = None
+) -> tuple[_dolfinx.fem.Function, ...]:
+    """Return the Functions for a symbol's coefficients.
+
+    Args:
+        load: The load.
+        space: Space of displacements on the mesh.
+        points: Coordinates by input node of that mesh, shape (n, dim), [length].
+        acted: Marks of the nodes on the load's surface, shape (n,); the value is asked for only there.
+    """
+    if isinstance(load.value, Ufl) or not callable(load.value):
+        return ()
+    space = _dolfinx.scalar_space(space.mesh, 1) if is_scalar(load) else space
+    nodes, dofs = _dolfinx.node_dofs(space)
+    dim = points.shape[1]
+    shape = () if is_scalar(load) else (dim,)
+    name = f"{type(load).__name__} on body {load.body!r}"
+    width = 1 if is_scalar(load) else dim
+    here = np.arange(len(nodes)) if acted is None else np.flatnonzero(acted[nodes])
+    field = _dolfinx.fem.Function(space, name="load")
+    given = evaluate(name, load.value, points[nodes[here]], shape)
+    field.x.array.reshape(-1, width)[dofs[here]] = given.reshape(-1, width)
+    return (field,)
+
+
+def load_work(
+    load: Load, materials: tuple[Material, ...], cell_type: str, value: Expr, v: Expr
+) -> tuple[ufl.Form, Constants]:
+    """Return the virtual work of a load along ``v``, a UFL form, and the constants of the materials in it.
+
+    Args:
+        load: A load; a resultant must have been spread.
+        materials: Materials of the cells on which it acts.
+        cell_type: Of the template.
+        value: Value of the load (UFL), see `Symbol`.
+        v: Test function or another field.
+    """
+    if isinstance(load, ThermalStrain):
+
+        def thermal(material: Any, constants: Constants) -> Expr:
+            return value * ufl.inner(material.thermal_stress(constants), strain(v))
+
+        return integrate(materials, cell_type, thermal, volume_measure(cell_type, 2))
+    if isinstance(load, BodyForce):
+        return ufl.dot(value, v) * volume_measure(cell_type, 2), ()
+    if isinstance(load, Pressure):
+        normal = ufl.FacetNormal(_dolfinx.template(cell_type))
+        return -value * ufl.dot(normal, v) * surface_measure(cell_type), ()
+    return ufl.dot(value, v) * surface_measure(cell_type), ()
+
+
+def load_parameters(load: Load, parts: Composition) -> tuple[float, ...]:
+    """Return the values of the constants of a load's form: its own, then those of the materials."""
+    return numbers_of(load) + (parts.parameters if isinstance(load, ThermalStrain) else ())

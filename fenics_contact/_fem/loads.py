@@ -1,0 +1,177 @@
+"""Pressure that follows the surface of a body under large deformations.
+
+Forces and moments spread over a surface: the traction that has a given resultant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import scipy.sparse as sp
+import ufl
+from ufl.core.expr import Expr
+
+from fenics_contact import _dolfinx
+from fenics_contact._base.checks import GivenVector, floats
+from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._fem.kinematics import assembled
+from fenics_contact._fem.load_forms import Symbol, load_fields, load_key, load_name, numbers_of
+from fenics_contact._fem.templates import Templates, Written, surface_measure
+from fenics_contact._scene.fields import Ufl
+from fenics_contact._scene.loads import Load, Pressure, TotalForce, Traction
+from fenics_contact._scene.scene import Scene
+from fenics_contact._surfaces.facets import SurfaceMoments, surface_moments
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials.hyperelastic import cofactor, deformation_gradient
+
+#: The forms, by number of arguments less one.
+FORMS = ("growth", "softening")
+
+
+def prepare_following(templates: Templates, scene: Scene) -> None:
+    """Compile the missing forms of a scene's following pressures. Collective."""
+    for load in scene.following_pressures:
+        cell_type = scene.bodies[load.body].mesh.cell_type
+        for kind in FORMS:
+            name = (f"{kind} of", *load_name(load, cell_type))
+            templates.get(_key(kind, load, cell_type), name, partial(_written, kind, load, cell_type))
+
+
+def _key(kind: str, load: Pressure, cell_type: str) -> tuple[object, ...]:
+    return (kind, *load_key(load, (), cell_type))
+
+
+def _written(kind: str, load: Pressure, cell_type: str) -> Written:
+    (u,) = _dolfinx.field_symbols(cell_type, 1)
+    space, symbol = u.ufl_function_space(), Symbol(load, cell_type)
+    v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
+    normal = ufl.FacetNormal(_dolfinx.template(cell_type))
+
+    def growth(along: Expr) -> Expr:
+        change = cofactor(deformation_gradient(u)) - ufl.Identity(len(u))
+        return -symbol.expression * ufl.dot(change * normal, along)
+
+    density = growth(v)
+    if kind == "softening":
+        density = -ufl.derivative(growth(v), u, du)
+    return density * surface_measure(cell_type), symbol.constants, (u, *symbol.coefficients)
+
+
+class FollowingPressure:
+    """A pressure on the surface of one mesh: how it changes as the surface moves.
+
+    Of an even pressure the unsymmetric part of the stiffness is an integral along the edge of the surface: it
+    cancels between neighbours, and does no work on edges that are held or slide in planes of symmetry.
+
+    References:
+        K. Schweizerhof, E. Ramm, Displacement dependent pressure loads in nonlinear finite element analyses,
+        Comput. Struct. 18 (1984) 1099-1114.
+    """
+
+    def __init__(
+        self,
+        templates: Templates,
+        load: Pressure,
+        cell_type: str,
+        space: _dolfinx.fem.FunctionSpace,
+        points: np.ndarray,
+        facets: tuple[np.ndarray, np.ndarray],
+        acted: np.ndarray,
+    ) -> None:
+        """Bind the forms; arguments as in `FormLibrary.load`, of which the forms are prepared."""
+        self._mesh = space.mesh
+        self._points = points if isinstance(load.value, Ufl) else points - points[0]
+        self._displacement = _dolfinx.fem.Function(space)
+        fields = (self._displacement, *load_fields(load, space, points, acted))
+        self._growth, self._softening = (
+            templates[_key(kind, load, cell_type)].bind([space] * number, numbers_of(load), fields, facets)
+            for number, kind in enumerate(FORMS, start=1)
+        )
+
+    def at(self, displacement: np.ndarray) -> tuple[np.ndarray, sp.csr_matrix]:
+        """Return what the force is more than on the undeformed surface, and its stiffness.
+
+        Args:
+            displacement: By dof, shape (dim n,), [length].
+
+        Returns:
+            Force, shape (dim n,), [force]; less its growth with the displacement, shape (dim n, dim n),
+            [force / length].
+        """
+        _dolfinx.update_coordinates(self._mesh, self._points)
+        self._displacement.x.array[:] = displacement
+        return (
+            _dolfinx.assemble_vector(self._growth),
+            assembled(self._softening, (displacement.size,) * 2),
+        )
+
+
+@dataclass(frozen=True)
+class LinearTraction:
+    """A traction a + b × (x − c) that grows linearly with the distance from a point; a function of position.
+
+    Attributes:
+        even: a, shape (dim,), [force / length²].
+        turning: b, shape (3,), in the plane (1,), [force / length³].
+        centre: c, shape (dim,), [length].
+    """
+
+    even: GivenVector
+    turning: GivenVector
+    centre: GivenVector
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Return the traction at points, both of shape (n, dim)."""
+        arm = points - self.centre
+        around: np.ndarray
+        if len(self.centre) == 2:
+            around = self.turning[0] * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
+        else:
+            around = np.cross(self.turning, arm)
+        return np.asarray(self.even + around)
+
+
+def as_tractions(scene: Scene) -> tuple[Load, ...]:
+    """Return the scene's loads with every resultant spread over the present shape of its surface."""
+    return tuple(
+        spread_traction(scene, load) if isinstance(load, TotalForce) else load for load in scene.loads
+    )
+
+
+def spread_traction(scene: Scene, load: TotalForce) -> Traction:
+    """Return the traction a + b × (x − c), c the centroid, that has the resultant of a load.
+
+    With the area A and J b = ∫ (x − c) × (b × (x − c)): a = F / A and J b = M + (p − c) × F.
+    """
+    mesh = scene.bodies[load.body].mesh
+    surface = surface_moments(mesh.points, mesh.surfaces[load.surface])
+    even = tuple(component / surface.area for component in load.value)
+    if load.moment is None and load.at is None:
+        return Traction(load.body, load.surface, even)
+    force = np.array(load.value)
+    arm = np.zeros(mesh.dim) if load.at is None else load.at - surface.centroid
+    lever = np.cross(arm, force) if mesh.dim == 3 else arm[:1] * force[1] - arm[1:] * force[0]
+    moment = lever + (0.0 if load.moment is None else load.moment)
+    turning = floats(_turning(load, surface, moment))
+    return Traction(load.body, load.surface, LinearTraction(even, turning, floats(surface.centroid)))
+
+
+def _turning(load: TotalForce, surface: SurfaceMoments, moment: np.ndarray) -> np.ndarray:
+    """Return b = J⁻¹ M, shape (3,), in the plane (1,).
+
+    Raises:
+        InvalidInputError: If the surface is so narrow that no traction on it has a moment about its length.
+    """
+    second = surface.second_moment
+    if len(second) == 2:
+        return moment / np.trace(second)
+    size, axes = np.linalg.eigh(np.trace(second) * np.eye(3) - second)
+    along = axes.T @ moment
+    if size[0] <= ROUNDING * size[-1]:
+        raise InvalidInputError(
+            f"a moment needs a surface that is no line, surface {load.surface!r} of body {load.body!r} is "
+            f"{np.sqrt(size[0] / size[-1]):.1e} times as wide as long: choose a wider one"
+        )
+    return np.asarray(axes @ (along / size))

@@ -1,0 +1,382 @@
+"""What every mesh with materials of nonlinear stress offers: internal forces and tangent.
+
+What the materials of a scene remember, at the Gauss points of its bodies.
+
+Internal forces and tangent of meshes with materials that have a history.
+
+Internal forces and tangent of hyperelastic materials.
+
+Internal forces of linear bodies beside nonlinear ones.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact import _dolfinx
+from fenics_contact._base.display import displayed
+from fenics_contact._base.libraries import MPI
+from fenics_contact._fem.composition import Composition, material_sets
+from fenics_contact._fem.deformed_forms import FORMS, have_mean_energy, prepare_forms
+from fenics_contact._fem.kinematics import Dilatation, GaussPoints, MeanDilatation, assembled, mean_fields
+from fenics_contact._fem.templates import Templates, quadrature_degree
+from fenics_contact._scene.body import Body
+from fenics_contact._scene.scene import Scene
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_nonlinear
+from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature
+from fenics_contact.mesh.quality import determinants
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class History:
+    """Internal variables of the bodies whose materials have some, replicated on all ranks.
+
+    They are kept by the cells of the bodies' meshes, so that they do not depend on subdomains and ranks. A
+    body that moves keeps them.
+
+    Attributes:
+        values: Name of a body to its internal variables, shape (n_cells, n_gauss, k); where several
+            materials have different numbers of them, the first ones count.
+    """
+
+    values: Mapping[str, np.ndarray]
+    _cells: Mapping[str, str] = field(repr=False)
+
+    @classmethod
+    def unloaded(cls, scene: Scene) -> History:
+        """Return the history of a scene to which nothing has happened: zeros."""
+        bodies = {name: body for name, body in scene.bodies.items() if history_size(body)}
+        values = {name: np.zeros(_shape(body)) for name, body in bodies.items()}
+        return cls(values, {name: _described(body.mesh) for name, body in bodies.items()})
+
+    def require(self, scene: Scene) -> None:
+        """Reject a scene to which the history does not belong.
+
+        Raises:
+            InvalidInputError: If its bodies, their cells or the numbers of internal variables are others.
+        """
+        needed = {name: _shape(body) for name, body in scene.bodies.items() if history_size(body)}
+        if set(needed) != set(self.values):
+            raise InvalidInputError(
+                f"a history must be that of the bodies with such materials, {sorted(needed)}, got one of "
+                f"{sorted(self.values)}: take the one that came with the last state of this scene, or none"
+            )
+        for name, shape in needed.items():
+            if self.values[name].shape != shape or self._cells[name] != _described(scene.bodies[name].mesh):
+                raise InvalidInputError(
+                    f"the history of body {name!r} must belong to its mesh and materials, with shape {shape} "
+                    f"(cells, Gauss points, internal variables), got that of other cells, shape "
+                    f"{self.values[name].shape}: take the one that came with the last state of this scene; "
+                    "from mesh to mesh none is transferred"
+                )
+
+    def on(self, body: str, cells: np.ndarray) -> np.ndarray | None:
+        """Return what some cells of a body remember, (n_cells, n_gauss, k); None where nothing does."""
+        return self.values[body][cells] if body in self.values else None
+
+    def advanced(self, comm: MPI.Comm, parts: Iterable[tuple[str, np.ndarray, np.ndarray | None]]) -> History:
+        """Return the history after a step. Collective on ``comm``.
+
+        Args:
+            comm: Communicator of the ranks that hold the subdomains.
+            parts: For each of this rank's subdomains its body, its cells of the body's mesh and what they
+                remember, as in `on`.
+        """
+        values = {name: array.copy() for name, array in self.values.items()}
+        mine = [part for part in parts if part[0] in values]
+        for every in comm.allgather(mine) if comm.size > 1 else [mine]:
+            for body, cells, new in every:
+                values[body][cells] = new
+        return History(values, self._cells)
+
+
+def history_size(body: Body) -> int:
+    """Return the largest number of internal variables of a body's materials, 0 without any."""
+    return max((each.history_size for each in body.materials if isinstance(each, HistoryMaterial)), default=0)
+
+
+def _shape(body: Body) -> tuple[int, int, int]:
+    cell_type = body.mesh.cell_type
+    points = len(quadrature(CELL_TYPES[cell_type], quadrature_degree(cell_type))[1])
+    return body.mesh.n_cells, points, history_size(body)
+
+
+def _described(mesh: BodyMesh) -> str:
+    """Describe the cells of a mesh, whatever their coordinates."""
+    return hashlib.sha256(np.ascontiguousarray(mesh.cells).tobytes()).hexdigest()
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """What a mesh with nonlinear materials answers to a displacement.
+
+    Where cells are turned inside out, `least_jacobian` says so and the other numbers mean nothing; with most
+    models they are NaN.
+
+    Attributes:
+        force: Internal force f(u), by dof, shape (dim n,), [force].
+        tangent: Assembles `stiffness`.
+        energy: Stored energy, [force · length]; None where materials dissipate.
+        least_jacobian: Smallest det F at a Gauss point; 0 or less is an inverted cell.
+        history: Internal variables at the end of the step, shape (n_cells, n_gauss, k); None without any.
+        stress: Cauchy stress at the Gauss points of materials with a history, [force / length²], shape
+            (n_cells, n_gauss, 3, 3), NaN in cells of other materials; None without any.
+    """
+
+    force: np.ndarray
+    tangent: Callable[[], sp.csr_matrix]
+    energy: float | None
+    least_jacobian: float
+    history: np.ndarray | None = None
+    stress: np.ndarray | None = None
+
+    @cached_property
+    def stiffness(self) -> sp.csr_matrix:
+        """Tangent ∂f/∂u, shape (dim n, dim n), [force / length]; assembled on first use."""
+        return self.tangent()
+
+
+class Mechanics(Protocol):
+    """Internal forces and tangent of one mesh with nonlinear materials."""
+
+    def at(
+        self,
+        displacement: np.ndarray,
+        history: np.ndarray | None = None,
+        duration: float = np.nan,
+        origin: np.ndarray | None = None,
+    ) -> Response:
+        """Return the response to a displacement.
+
+        Args:
+            displacement: By dof of the mesh's space, block after block, shape (dim n,), [length].
+            history: Internal variables at the start of the step, for materials that have some, shape
+                (n_cells, n_gauss, k) by the mesh's cells; None for an unloaded body.
+            duration: Of the step; NaN where it is not known, which materials that need it refuse.
+            origin: Displacement at the start of the Newton step that led here, None where there was none:
+                tangents of mean dilatations have the pressures that this step foresaw.
+        """
+
+    def least_jacobian(self, displacement: np.ndarray) -> float:
+        """Return the smallest det F at a Gauss point, which takes no assembly."""
+
+
+class HistoryMechanics:
+    """`Mechanics` of materials with a history; others on the same mesh are added."""
+
+    def __init__(
+        self,
+        parts: Composition,
+        cell_type: str,
+        space: _dolfinx.fem.FunctionSpace,
+        points: np.ndarray,
+        others: Mechanics | None,
+    ) -> None:
+        """Evaluate shape functions.
+
+        Args:
+            parts: Materials of the mesh.
+            cell_type: Of the mesh.
+            space: Displacements on the mesh.
+            points: Coordinates by input node, shape (n, dim), [length].
+            others: The mechanics of the materials without history, None where there are none.
+        """
+        nodes, dofs = _dolfinx.node_dofs(space)
+        by_block = np.empty_like(points)
+        by_block[dofs] = points[nodes]
+        self._gauss = GaussPoints(space, cell_type, by_block)
+        self._dilatation = Dilatation(space, cell_type, by_block)
+        self._others = others
+        every = np.arange(self._gauss.shape[0])
+        self._parts = [
+            (material, every if parts.cells is None else parts.cells[tag])
+            for tag, material in enumerate(parts.materials, start=1)
+            if isinstance(material, HistoryMaterial)
+        ]
+        self._size = max(material.history_size for material, _ in self._parts)
+
+    @property
+    def history_shape(self) -> tuple[int, int, int]:
+        """Shape of a history: cells, Gauss points of a cell, internal variables."""
+        return *self._gauss.shape, self._size
+
+    def at(
+        self,
+        displacement: np.ndarray,
+        history: np.ndarray | None = None,
+        duration: float = np.nan,
+        origin: np.ndarray | None = None,
+    ) -> Response:
+        """Evaluate the materials and assemble; see `Mechanics.at`.
+
+        Raises:
+            InvalidInputError: If the history has another shape, or a material answers what it must not.
+            UserCodeError: If a material raises.
+        """
+        before, gradient = self._before(history), self._gauss.gradient(displacement)
+        after, stress = before.copy(), np.full(gradient.shape, np.nan)
+        force, entries = np.zeros(displacement.size), np.zeros(self._gauss.entries)
+        for material, cells in self._parts:
+            if not len(cells):
+                continue
+            shape, size = (len(cells), gradient.shape[1]), material.history_size
+            means = None
+            if has_mean_dilatation(material):
+                means = self._gauss.mean_strain(cells, material.moduli)
+            given = gradient[cells] if means is None else means.averaged(gradient[cells])
+            end = material.answer(
+                given.reshape(-1, 3, 3), before[cells, :, :size].reshape(-1, size), duration
+            )
+            after[cells, :, :size] = end.history.reshape(*shape, size)
+            nominal = end.stress.reshape(*shape, 3, 3)
+            stress[cells] = cauchy(nominal, gradient[cells]) if material.finite else nominal
+            force += self._gauss.force(nominal if means is None else means.averaged(nominal), cells)
+            entries += self._gauss.stiffness(end.tangent.reshape(*shape, 3, 3, 3, 3), cells, means)
+        rest = None if self._others is None else self._others.at(displacement, origin=origin)
+        return Response(
+            force=force if rest is None else force + rest.force,
+            tangent=lambda: self._gauss.assembled(entries, None if rest is None else rest.stiffness),
+            energy=None,
+            least_jacobian=self.least_jacobian(displacement),
+            history=after,
+            stress=stress,
+        )
+
+    def least_jacobian(self, displacement: np.ndarray) -> float:
+        """Return the smallest det F; see `Mechanics.least_jacobian`."""
+        return self._dilatation.least(displacement)
+
+    def _before(self, history: np.ndarray | None) -> np.ndarray:
+        if history is None:
+            return np.zeros(self.history_shape)
+        if history.shape != self.history_shape:
+            raise InvalidInputError(
+                f"the history of this mesh must have shape {self.history_shape} (cells, Gauss points, "
+                f"internal variables), got {history.shape}: it belongs to another mesh or other materials; "
+                "start with None"
+            )
+        return history
+
+
+def cauchy(nominal: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    """Return P Fᵀ / det F by the first Piola-Kirchhoff stress and the displacement gradient, (..., 3, 3)."""
+    F = np.eye(3) + gradient
+    return np.asarray(nominal @ F.swapaxes(-1, -2) / determinants(F)[..., None, None])
+
+
+class HyperelasticMechanics:
+    """`Mechanics` of materials with an energy; linear ones among them stay small-strain."""
+
+    def __init__(
+        self,
+        templates: Templates,
+        parts: Composition,
+        cell_type: str,
+        space: _dolfinx.fem.FunctionSpace,
+        points: np.ndarray,
+    ) -> None:
+        """Bind the forms; arguments as in `FormLibrary.mechanics`."""
+        nodes, dofs = _dolfinx.node_dofs(space)
+        by_block = np.empty_like(points)
+        by_block[dofs] = points[nodes]
+        self._mesh, self._points = space.mesh, points
+        self._dilatation = Dilatation(space, cell_type, by_block)
+        self._displacement = _dolfinx.fem.Function(space)
+        fields = [self._displacement, *mean_fields(space.mesh, cell_type)]
+        self._energy, self._force, self._tangent = (
+            templates[kind, parts.materials, cell_type].bind(
+                [space] * number, parts.parameters, fields, mesh=space.mesh, cells=parts.cells
+            )
+            for number, kind in enumerate(FORMS)
+        )
+        self._mean: MeanDilatation | None = None
+        if have_mean_energy(parts.materials):
+            self._mean = MeanDilatation(templates, parts, cell_type, fields, self._dilatation)
+
+    def at(
+        self,
+        displacement: np.ndarray,
+        history: np.ndarray | None = None,
+        duration: float = np.nan,
+        origin: np.ndarray | None = None,
+    ) -> Response:
+        """Assemble; see `Mechanics.at`."""
+        _dolfinx.update_coordinates(self._mesh, self._points)
+        self._displacement.x.array[:] = displacement
+        if self._mean is not None:
+            self._mean.follow(displacement)
+        force, energy = _dolfinx.assemble_vector(self._force), _dolfinx.assemble_scalar(self._energy)
+        tangent = partial(self._stiffness, displacement.copy(), origin)
+        return Response(force, tangent, energy, self.least_jacobian(displacement))
+
+    def _stiffness(self, displacement: np.ndarray, origin: np.ndarray | None) -> sp.csr_matrix:
+        """Return the tangent.
+
+        Pressures that grow with the bulk modulus overshoot within a Newton step, by the square of its
+        displacements: the tangent has those that the step foresaw.
+        """
+        _dolfinx.update_coordinates(self._mesh, self._points)
+        if self._mean is not None and origin is not None:
+            self._displacement.x.array[:] = origin
+            self._mean.foresee(origin, displacement)
+        elif self._mean is not None:
+            self._mean.follow(displacement)
+        self._displacement.x.array[:] = displacement
+        stiffness = assembled(self._tangent, (displacement.size,) * 2)
+        return stiffness if self._mean is None else (stiffness + self._mean.stiffness()).tocsr()
+
+    def least_jacobian(self, displacement: np.ndarray) -> float:
+        """Return the smallest det F; see `Mechanics.least_jacobian`."""
+        least = self._dilatation.least(displacement)
+        return least if self._mean is None else min(least, self._mean.least(displacement))
+
+
+def prepare_mechanics(templates: Templates, scene: Scene) -> None:
+    """Compile the missing forms of a scene's nonlinear materials. Collective."""
+    for body in scene.bodies.values():
+        for materials in material_sets(body):
+            others = [material for material in materials if not isinstance(material, HistoryMaterial)]
+            if others and any(map(is_nonlinear, materials)):
+                prepare_forms(templates, materials, body.mesh.cell_type)
+
+
+class LinearMechanics:
+    """`Mechanics` of linear materials alone: small strains, whatever the displacement."""
+
+    def __init__(self, stiffness: _dolfinx.fem.Form, mesh: _dolfinx.mesh.Mesh, points: np.ndarray) -> None:
+        """Assemble.
+
+        Args:
+            stiffness: The bilinear form, bound to the mesh.
+            mesh: The mesh.
+            points: Coordinates by input node, shape (n, dim), [length].
+        """
+        _dolfinx.update_coordinates(mesh, points)
+        indptr, indices, data = _dolfinx.assemble_csr(stiffness)
+        self._stiffness = sp.csr_matrix((data, indices, indptr), shape=(points.size,) * 2)
+
+    def at(
+        self,
+        displacement: np.ndarray,
+        history: np.ndarray | None = None,
+        duration: float = np.nan,
+        origin: np.ndarray | None = None,
+    ) -> Response:
+        """Return K u and K; see `Mechanics.at`."""
+        force = self._stiffness @ displacement
+        return Response(force, lambda: self._stiffness, float(force @ displacement) / 2, 1.0)
+
+    def least_jacobian(self, displacement: np.ndarray) -> float:
+        """Return 1: in small strain no volume changes."""
+        return 1.0

@@ -1,0 +1,1 @@
+"""Large deformations and nonlinear materials: Newton's method on the torn system."""

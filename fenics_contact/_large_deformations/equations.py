@@ -1,0 +1,423 @@
+"""The equilibrium of a torn system with nonlinear materials: its residuals and its linearisation.
+
+How far a configuration is from equilibrium, relative to its forces and displacements.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._base.display import displayed
+from fenics_contact._base.progress import PhaseTimer
+from fenics_contact._fem.composition import composition
+from fenics_contact._fem.mechanics import Mechanics, Response
+from fenics_contact._large_deformations.loading import Loading
+from fenics_contact._large_deformations.moving_contact import (
+    NO_ROWS,
+    Contact,
+    ContactConfiguration,
+    FurtherRows,
+    MovingContact,
+    StillContact,
+    stiffened,
+    unsymmetric_at,
+    with_added,
+)
+from fenics_contact._large_deformations.rigid_start import RigidStart
+from fenics_contact._large_deformations.tangent import TangentSystem, linearised
+from fenics_contact._large_deformations.tangent_step import TangentProblem
+from fenics_contact._scene.scene import Scene
+from fenics_contact.errors import ConvergenceError, together
+from fenics_contact.feti.decomposition import Decomposition
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.qp.reductions import Vector, global_max, global_min, global_sum
+from fenics_contact.qp.solution import Residuals, contact_step
+
+#: Forces below this fraction of those that would strain bodies by their displacement are none.
+FORCE_FLOOR = 1e-4
+#: Rounding of strains and of positions, relative to one and to the size of a body.
+ROUNDED = 4.0 * float(np.finfo(float).eps)
+
+
+def beyond(values: Vector, rounding: float | Vector) -> Vector:
+    """Return how far values, of either sign, are beyond rounding."""
+    return np.asarray(np.sign(values) * np.maximum(np.abs(values) - rounding, 0.0))
+
+
+def relative_residuals(
+    torn: TornSystem,
+    natural: Vector,
+    violation: float,
+    forces: tuple[Vector, Vector, Vector, Vector],
+    constraint_residual: Vector,
+    displacement: Vector,
+    largest: float,
+    stiff: float,
+) -> Residuals:
+    """Return the relative residuals of a configuration: forces out of balance as `coarse`. Collective.
+
+    Args:
+        torn: The system.
+        natural: λ − P(λ − ρ r), owned, [force].
+        violation: Largest violation of a bound or disc by this rank's multipliers, [force].
+        forces: Out of balance, internal, Bᵀλ, loads; each torn, shape (torn_size,), [force].
+        constraint_residual: c − B u, owned, [length].
+        displacement: u of this rank, torn, shape (torn_size,), [length].
+        largest: A norm that displacements have had on the way, with which small ones are compared, [length].
+        stiff: Largest entry of the tangents' diagonals, [force / length].
+    """
+    comm, contact = torn.numbering.comm, torn.numbering.owned >= torn.n_equality
+    lengths = displacement, constraint_residual[~contact], torn.right[~contact]
+    squares = (x @ x for x in (*forces, *lengths, natural[contact]))
+    *sums, count = global_sum(comm, *squares, len(displacement))
+    unbalanced, internal, bound, load, moved, open_, given, wrong = np.sqrt(sums)
+    moved = max(moved, given, largest)
+    floor = FORCE_FLOOR * stiff * moved / np.sqrt(count)
+    # Before anything acts, what is to act is all there is: a tool in a body at rest is no equilibrium.
+    force = max(min(internal, bound) if internal > 0 else bound, load, floor) or max(unbalanced, wrong)
+    ratio = 1.0 / force if force > 0.0 else 0.0
+    return Residuals(
+        wrong * ratio,
+        open_ / moved if moved > 0.0 else 0.0,
+        unbalanced * ratio,
+        global_max(comm, violation) * ratio,
+        force,
+        moved,
+    )
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Configuration:
+    """A displacement with the forces and the histories of materials that belong to it.
+
+    Attributes:
+        displacement: u of this rank, torn, shape (torn_size,), [length].
+        multiplier: λ, owned, [force]; empty where nothing is known yet.
+        history: Internal variables of each of this rank's subdomains; None without any.
+        time: The time at which it was reached.
+        largest: Size of the largest displacement that there has been, as in `Residuals.gluing_scale`: where
+            bodies return to rest, residuals are relative to that.
+        contact: The contact points whose rows the multiplier has; None at the start.
+        diagonal: Of F on these rows, at a configuration near this one, owned; None where it is not known.
+    """
+
+    displacement: Vector
+    multiplier: Vector
+    history: tuple[np.ndarray | None, ...]
+    time: float
+    largest: float
+    contact: ContactConfiguration | None
+    diagonal: Vector | None = None
+
+    def natural_step(self, caution: float = 1.0) -> Vector:
+        """Return ρ of the natural map, owned, times a factor; zero where the diagonal of F is not known."""
+        assert self.contact is not None
+        layout = self.contact.torn.layout
+        if self.diagonal is None:
+            return np.zeros(layout.size)
+        return caution * contact_step(layout, self.diagonal)
+
+    def on(self, contact: ContactConfiguration) -> Configuration:
+        """Return the configuration with its forces on the rows of other contact points. Collective."""
+        multiplier, diagonal = np.zeros(len(contact.torn.numbering.owned)), None
+        if self.contact is not None:
+            multiplier = contact.carried(self.multiplier, self.contact)
+            if self.diagonal is not None:
+                diagonal = contact.carried(self.diagonal, self.contact, spread=True)
+        return replace(self, multiplier=multiplier, diagonal=diagonal, contact=contact)
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class ResidualState:
+    """The equations at a configuration, under a load.
+
+    Attributes:
+        equations: Internal forces, and how bodies meet.
+        load: What acts.
+        at: The configuration; its history and its time are those before the load step.
+        responses: Internal forces and tangents of this rank's subdomains.
+        external: f(u) of this rank, torn, [force].
+        softening: −∂f/∂u of this rank, torn; None where all loads are dead.
+        unbalanced: f(u) − f_int(u) − Bᵀλ of this rank, torn, [force].
+        constraint_residual: c − B u, owned, [length]: gaps, minus the slip, and openings of glued rows.
+        residuals: Their size, relative.
+        least_jacobian: Smallest det F of all bodies; 1 where none is strained much.
+    """
+
+    equations: Equations
+    load: Loading
+    at: Configuration
+    responses: tuple[Response, ...]
+    external: Vector
+    softening: sp.csr_matrix | None
+    unbalanced: Vector
+    constraint_residual: Vector
+    residuals: Residuals
+    least_jacobian: float
+
+    def evaluate(self, displacement: Vector, multiplier: Vector, caution: float = 1.0) -> ResidualState:
+        """Return the equations after a Newton step from here. Collective.
+
+        Args:
+            displacement: u of this rank, torn, shape (torn_size,), [length].
+            multiplier: λ on the rows of the present contact points, owned, [force].
+            caution: Factor on ρ of the natural map.
+        """
+        at = replace(self.at, displacement=displacement, multiplier=multiplier)
+        return self.equations.evaluate(self.load, at, caution, self.at.displacement)
+
+    @property
+    def contact(self) -> ContactConfiguration:
+        """The contact points, with the system of their rows."""
+        assert self.at.contact is not None
+        return self.at.contact
+
+    @property
+    def rubbing(self) -> float:
+        """Work of friction Σ τ·slip since histories began their step, [force · length]. Collective."""
+        _, friction = self.contact.at_points(self.at.multiplier)
+        _, against = self.contact.at_points(self.constraint_residual)
+        return -float(np.sum(friction * against))
+
+    @property
+    def torn(self) -> TornSystem:
+        """The system with load, supports and the rows of the contact points."""
+        return self.contact.torn
+
+    @property
+    def loaded(self) -> TornSystem:
+        """The system with the load as it is on the deformed bodies."""
+        each = zip(self.torn.subdomains, self.torn.decomposition.parts, strict=True)
+        subdomains = tuple(replace(subdomain, load=self.external[part]) for subdomain, part in each)
+        return replace(self.torn, subdomains=subdomains)
+
+    @property
+    def history(self) -> tuple[np.ndarray | None, ...]:
+        """Internal variables after the displacement, of each subdomain."""
+        return tuple(response.history for response in self.responses)
+
+    @property
+    def _tangents(self) -> list[sp.csr_matrix]:
+        """Growth of the internal forces with the displacement, less that of the loads, by subdomain.
+
+        That of the loads is made symmetric; for the other part there are `passed_on` and rows of its own.
+        """
+        tangents = [response.stiffness for response in self.responses]
+        if self.softening is None:
+            return tangents
+        return with_added(self.torn.decomposition, tangents, (self.softening + self.softening.T) / 2)
+
+    def _require_finite_tangents(self) -> None:
+        """Reject tangents with NaN or infinity, which no factorisation survives. Collective."""
+        with together(self.torn.numbering.comm):
+            parts = zip(self.torn.subdomains, self.responses, strict=True)
+            bad = {s.mesh.body for s, response in parts if not np.isfinite(response.stiffness.data).all()}
+            if bad:
+                raise ConvergenceError(
+                    f"tangents must be finite, got NaN or infinity in body {min(bad)!r} at a smallest "
+                    f"det F of {self.least_jacobian:.2g}: take smaller load steps, or check where the "
+                    "energy or stress of its material has a derivative"
+                )
+
+    def passed_on(self, moved: Vector) -> Vector:
+        """Return what neighbours and supports take of the unsymmetric part of the loads' growth. Collective.
+
+        Args:
+            moved: A change of the displacement of this rank, torn, shape (torn_size,), [length].
+
+        Returns:
+            Change of multipliers, owned, zero but in gluing rows and those of supports, [force].
+        """
+        torn = self.torn
+        taken = np.zeros(len(self.constraint_residual))
+        if self.softening is None:
+            return taken
+        left = 0.5 * (self.softening.T - self.softening) @ moved
+        flexibility = 1.0 / torn.decomposition.torn_stiffness
+        # Of these rows B D⁻¹ Bᵀ is diagonal.
+        size = torn.numbering.to_owned(torn.B.multiply(torn.B) @ flexibility)
+        glued = torn.numbering.owned < torn.n_gluing
+        taken[glued] = torn.jump(flexibility * left)[glued] / size[glued]
+        return taken
+
+    def linearised(self, timer: PhaseTimer, known: Linearisation | None) -> Linearisation:
+        """Factor the tangents. Collective.
+
+        Args:
+            timer: Collects the wall time.
+            known: That of a neighbouring configuration, or None.
+
+        Raises:
+            ConvergenceError: If the tangents are not finite, or have no factors.
+        """
+        self._require_finite_tangents()
+        uneven = None
+        if self.softening is not None:
+            uneven = unsymmetric_at(self.torn.decomposition, self.softening, self.load.rim)
+        turning = self.contact.turning(self.at.multiplier, uneven)
+        tangents = self._tangents
+        torn, further = self.torn, NO_ROWS
+        if turning is not None:
+            if turning.normal is not None:
+                tangents = stiffened(torn, tangents, turning.normal)
+            if turning.count:
+                torn = self.contact.with_rows_of(turning)
+                further = FurtherRows.of(torn, self.torn, turning)
+        right = np.concatenate([self.constraint_residual, np.zeros(further.count)])
+        increments = linearised(torn, self.at.displacement, tangents, self.unbalanced, right)
+        diagonal = self.at.diagonal
+        if diagonal is not None:
+            diagonal = np.concatenate([diagonal, np.ones(further.count)])
+        earlier = {} if known is None else known.system.operators
+        return Linearisation(TangentSystem(increments, timer, diagonal=diagonal, earlier=earlier), further)
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """Factored tangents, with rows for the stiffness of forces that turn with their surfaces.
+
+    Attributes:
+        system: The factored system; rows of turning forces come after all others.
+        further: The rows of turning forces.
+    """
+
+    system: TangentSystem
+    further: FurtherRows
+
+    def release_factors(self) -> None:
+        """Hand the factorisation to the next linearisation; do not use this one afterwards."""
+        for operator in self.system.inverse.tangents:
+            operator.release_factors()
+
+    def of(self, evaluation: ResidualState) -> ResidualState:
+        """Return the equations that were linearised with the diagonal of F that is known since."""
+        diagonal = self.system.problem.diagonal[: len(evaluation.constraint_residual)]
+        return replace(evaluation, at=replace(evaluation.at, diagonal=diagonal))
+
+    def problem(self, evaluation: ResidualState) -> TangentProblem:
+        """Return the problem of one Newton step from the configuration of the linearisation."""
+        nothing, stiff = np.zeros(self.further.count), evaluation.equations.stiffness
+        return TangentProblem(
+            self.system.problem.with_law(self.system.torn.law),
+            self.system.stiffness,
+            np.concatenate([evaluation.at.multiplier, nothing]),
+            np.concatenate([evaluation.constraint_residual, nothing]),
+            self.further,
+            1.0 / stiff if stiff > 0.0 else 1.0,
+        )
+
+
+@displayed
+class Equations:
+    """Internal forces of the bodies of a scene, whose meshes and numbering do not change, and their contact.
+
+    Attributes:
+        decomposition: The subdomains.
+        rigid_start: Moves bodies as their supports do.
+        contact: How bodies meet: at their undeformed places unless some deform much.
+    """
+
+    def __init__(self, scene: Scene, decomposition: Decomposition) -> None:
+        """Bind the forms of every subdomain, and prepare the surfaces of contact pairs. Collective."""
+        self.decomposition, self.rigid_start = decomposition, RigidStart(scene, decomposition)
+        forms = decomposition.forms
+        forms.prepare_mechanics(scene)
+        with together(decomposition.comm):
+            self._mechanics = tuple(self._of(scene, number) for number in range(len(decomposition.meshes)))
+        meshes = [body.mesh for body in scene.bodies.values()]
+        self.contact: Contact = StillContact()
+        if scene.contacts and scene.deforms_much:
+            self.contact = MovingContact(scene, decomposition)
+        self._reach = max(float(np.abs(mesh.points).max()) for mesh in meshes)
+        self._cell = max(float(mesh.volume / mesh.n_cells) ** (1.0 / scene.dim) for mesh in meshes)
+
+    def _of(self, scene: Scene, number: int) -> Mechanics:
+        mesh = self.decomposition.meshes[number]
+        body = scene.bodies[mesh.body]
+        points = body.mesh.points[np.sort(mesh.nodes)]
+        parts = composition(body, mesh.cells)
+        return self.decomposition.forms.mechanics(parts, body.mesh.cell_type, mesh.space, points)
+
+    def _facts(self) -> dict[str, object]:
+        return {"subdomains": f"{len(self._mechanics)} on this rank"}
+
+    @cached_property
+    def stiffness(self) -> float:
+        """The largest entry of the tangents' diagonals at rest, [force / length]. Collective on first use."""
+        return global_max(self.decomposition.comm, float(self.diagonal.max(initial=0.0)))
+
+    @cached_property
+    def diagonal(self) -> Vector:
+        """The tangents' diagonals at rest, of this rank, torn, [force / length]. Collective on first use."""
+        sizes = [mesh.size for mesh in self.decomposition.meshes]
+        with together(self.decomposition.comm):
+            pairs = zip(self._mechanics, sizes, strict=True)
+            at_rest = [m.at(np.zeros(size), duration=1.0).stiffness.diagonal() for m, size in pairs]
+        return np.concatenate([np.zeros(0), *at_rest])
+
+    def at_rest(self) -> Configuration:
+        """Return the undeformed configuration without forces."""
+        nothing = (None,) * len(self._mechanics)
+        return Configuration(np.zeros(self.decomposition.torn_size), np.zeros(0), nothing, 0.0, 0.0, None)
+
+    def least_jacobian(self, displacement: Vector) -> float:
+        """Return the smallest det F at a torn displacement of all ranks. Collective."""
+        comm = self.decomposition.comm
+        with together(comm):
+            each = zip(self._mechanics, self.decomposition.parts, strict=True)
+            least = min((m.least_jacobian(displacement[part]) for m, part in each), default=1.0)
+        return global_min(comm, least)
+
+    def evaluate(
+        self, load: Loading, near: Configuration, caution: float = 1.0, origin: Vector | None = None
+    ) -> ResidualState:
+        """Search for the contact points at a displacement; return forces, openings and residuals. Collective.
+
+        Args:
+            load: What acts.
+            near: The displacement, with contact points of a neighbouring one, whose rows the forces have.
+            caution: Factor on ρ of the natural map.
+            origin: Displacement before the last Newton step, torn; None where there was none.
+        """
+        contact = self.contact.at(load, near.displacement, near.contact)
+        return self.evaluate_at(load, near.on(contact), caution, origin)
+
+    def evaluate_at(
+        self, load: Loading, at: Configuration, caution: float = 1.0, origin: Vector | None = None
+    ) -> ResidualState:
+        """Return forces, openings and residuals at contact points that are known. Collective."""
+        comm, contact = self.decomposition.comm, at.contact
+        assert contact is not None
+        torn = contact.torn
+        with together(comm):
+            each = zip(self._mechanics, self.decomposition.parts, at.history, strict=True)
+            duration = load.time - at.time
+            responses = tuple(
+                m.at(at.displacement[part], history, duration, None if origin is None else origin[part])
+                for m, part, history in each
+            )
+            external, softening = load.at(at.displacement)
+        internal = np.concatenate([np.zeros(0), *(response.force for response in responses)])
+        bound = torn.B.T @ torn.numbering.to_local(at.multiplier)
+        # What is no more than rounding of strains and of positions is none.
+        unbalanced = beyond(external - internal - bound, ROUNDED * self.stiffness * self._cell)
+        least = global_min(comm, min((r.least_jacobian for r in responses), default=1.0))
+        open_ = contact.constraint_residual(at.displacement)
+        step, feasible = at.natural_step(caution), torn.law.feasible(at.multiplier)
+        mapped = feasible.project(at.multiplier - step * open_)
+        natural = beyond(at.multiplier - mapped, ROUNDED * self._reach * step)
+        forces = unbalanced, internal, bound, external
+        residuals = relative_residuals(
+            torn, natural, feasible.violation(at.multiplier), forces, open_, at.displacement, at.largest,
+            self.stiffness,
+        )  # fmt: skip
+        return ResidualState(
+            self, load, at, responses, external, softening, unbalanced, open_, residuals, least
+        )

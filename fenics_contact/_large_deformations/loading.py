@@ -1,0 +1,283 @@
+"""What acts on the bodies, at the end of a load step and on the way there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._base.display import displayed
+from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.supports import RigidSurface
+from fenics_contact.errors import together
+from fenics_contact.feti.decomposition import Decomposition
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.mesh.faces import corners_of
+from fenics_contact.qp.reductions import Vector
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Loading:
+    """What acts on the bodies at one time.
+
+    Attributes:
+        torn: The system with loads and supports; pressures that follow their surfaces act as on undeformed
+            ones.
+        prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
+        time: The time, for obstacles that move.
+        following: Pressures that follow their surfaces, each with the part of them that acts.
+        turned: Surfaces that turn as rigid pieces.
+        course: Loads and supports that are functions of time; None without any.
+        drag: A viscous medium; None without any.
+    """
+
+    torn: TornSystem
+    prescribed: np.ndarray
+    time: float
+    following: tuple[tuple[float, FollowingPressures], ...] = ()
+    turned: tuple[TurnedSurface, ...] = ()
+    course: LoadHistory | None = None
+    drag: Drag | None = None
+
+    def between(self, first: Loading, part: float) -> Loading:
+        """Return the load at a part of the way from another one to this. Collective.
+
+        Numbers change in proportion to the part, those of rotations are angles; functions of time have their
+        values.
+        """
+        if part == 1.0:
+            return self
+        mixed = self._mixed(first, part)
+        if self.course is None:
+            return mixed
+        now = self.course.at(mixed.time)
+        if self.course.loads:
+            pairs = zip(mixed.torn.subdomains, now.torn.subdomains, strict=True)
+            subdomains = tuple(replace(a, load=b.load) for a, b in pairs)
+            torn = replace(mixed.torn, subdomains=subdomains)
+            mixed = replace(mixed, torn=torn, following=now.following)
+        if self.course.supports:
+            torn = replace(mixed.torn, right=now.torn.right, supported=now.torn.supported)
+            mixed = replace(mixed, torn=torn, prescribed=now.prescribed, turned=now.turned)
+        return mixed
+
+    def _mixed(self, first: Loading, part: float) -> Loading:
+        """Return the load at a part of the way, in proportion to it."""
+        parts = zip(first.torn.subdomains, self.torn.subdomains, strict=True)
+        subdomains = tuple(replace(b, load=(1.0 - part) * a.load + part * b.load) for a, b in parts)
+
+        def mixed(name: str) -> np.ndarray:
+            return np.asarray((1.0 - part) * getattr(first.torn, name) + part * getattr(self.torn, name))
+
+        torn = replace(self.torn, subdomains=subdomains, right=mixed("right"), supported=mixed("supported"))
+        prescribed = (1.0 - part) * first.prescribed + part * self.prescribed
+        weighted = [((1.0 - part) * weight, each) for weight, each in first.following]
+        weighted += [(part * weight, each) for weight, each in self.following]
+        time = (1.0 - part) * first.time + part * self.time
+        before = {each.place: each for each in first.turned}
+        turned = tuple(each.between(before.get(each.place), part) for each in self.turned)
+        bent = prescribed.copy()
+        for surface in turned:
+            bent[surface.nodes] = surface.displacement
+        if turned:
+            torn = _moved_further(torn, np.nan_to_num(bent - prescribed))
+        return Loading(torn, bent, time, tuple(weighted), turned)
+
+    def removed(self) -> Loading:
+        """Return the same supports without movement, at time zero, and no loads."""
+        torn = self.torn
+        equality = torn.numbering.owned < torn.n_equality
+        right = np.where(equality, 0.0, torn.right + torn.supported)
+        subdomains = tuple(replace(part, load=np.zeros_like(part.load)) for part in torn.subdomains)
+        torn = replace(torn, subdomains=subdomains, right=right, supported=np.zeros_like(torn.supported))
+        still = tuple(each.between(None, 0.0) for each in self.turned)
+        return Loading(torn, 0.0 * self.prescribed, 0.0, turned=still)
+
+    @property
+    def rim(self) -> np.ndarray:
+        """Marks of the nodes near the rims of surfaces that pressures follow, shape (n_nodes,)."""
+        marks = np.zeros(len(self.prescribed), dtype=bool)
+        for _, pressures in self.following:
+            marks |= pressures.rim
+        return marks
+
+    def at(self, displacement: Vector) -> tuple[Vector, sp.csr_matrix | None]:
+        """Return the forces on deformed bodies, and the stiffness of those that follow their surfaces.
+
+        Args:
+            displacement: u of this rank, torn, shape (torn_size,), [length].
+
+        Returns:
+            Forces of this rank, torn, shape (torn_size,), [force]; less their growth with u, shape
+            (torn_size, torn_size), None where all are dead.
+        """
+        force, softening = self.torn.load, None
+        for weight, pressures in self.following:
+            more, matrix = pressures.at(displacement)
+            force, matrix = force + weight * more, weight * matrix
+            softening = matrix if softening is None else softening + matrix
+        if self.drag is not None:
+            force = force - self.drag.on(displacement)
+            matrix = sp.diags(self.drag.viscosity, format="csr")
+            softening = matrix if softening is None else softening + matrix
+        return force, softening
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Drag:
+    """A viscous medium, in which bodies move on where no equilibrium is near.
+
+    Attributes:
+        viscosity: By how much its forces grow with the way, of this rank, torn, [force / length].
+        origin: Displacement at which it exerts none, torn, shape (torn_size,), [length].
+    """
+
+    viscosity: Vector
+    origin: Vector
+
+    def on(self, displacement: Vector) -> Vector:
+        """Return the forces against a displacement of this rank, torn, shape (torn_size,), [force]."""
+        return self.viscosity * (displacement - self.origin)
+
+
+class LoadHistory(Protocol):
+    """Loads and supports that are functions of time.
+
+    Attributes:
+        loads: Whether loads are.
+        supports: Whether supports are.
+    """
+
+    loads: bool
+    supports: bool
+
+    def at(self, time: float) -> Loading:
+        """Return what acts at a time. Collective."""
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class TurnedSurface:
+    """A surface that turns as a rigid piece by a large angle.
+
+    Attributes:
+        surface: Where, and about which point.
+        motion: U, [length], then θ, in radians.
+        nodes: Its nodes, of those of all bodies, shape (n,).
+        points: Their undeformed coordinates, shape (n, dim), [length].
+    """
+
+    surface: RigidSurface
+    motion: np.ndarray
+    nodes: np.ndarray
+    points: np.ndarray
+
+    @classmethod
+    def all_of(cls, scene: Scene, decomposition: Decomposition) -> tuple[TurnedSurface, ...]:
+        """Return those of a scene."""
+        found = []
+        for support in scene.supports:
+            body = scene.bodies[support.body]
+            if isinstance(support, RigidSurface) and body.deforms_much:
+                own = np.unique(body.mesh.surfaces[support.surface])
+                nodes = decomposition.tearing.global_nodes(support.body, own)
+                found.append(cls(support, support.prescribed, nodes, body.mesh.points[own]))
+        return tuple(found)
+
+    def between(self, first: TurnedSurface | None, part: float) -> TurnedSurface:
+        """Return it at a part of the way from another motion, by default from rest."""
+        start = 0.0 if first is None else first.motion
+        return replace(self, motion=(1.0 - part) * start + part * self.motion)
+
+    @property
+    def place(self) -> tuple[str, str]:
+        """Names of the body and of the surface."""
+        return self.surface.body, self.surface.surface
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Displacement of the nodes, shape (n, dim), [length]."""
+        return self.surface.turned(self.points, self.motion)
+
+
+@displayed
+class FollowingPressures:
+    """The pressures of a scene that follow their surfaces, on this rank's subdomains."""
+
+    def __init__(self, scene: Scene, decomposition: Decomposition) -> None:
+        """Bind the forms. Collective."""
+        forms = decomposition.forms
+        self._scene, self._tearing = scene, decomposition.tearing
+        forms.prepare_mechanics(scene)
+        self._parts = decomposition.parts
+        self._acting = []
+        with together(decomposition.comm):
+            for number, mesh in enumerate(decomposition.meshes):
+                body, order = scene.bodies[mesh.body], np.argsort(mesh.nodes)
+                for load in scene.following_pressures:
+                    if load.body != mesh.body:
+                        continue
+                    facets = mesh.facets_of(body, load.surface)
+                    if not len(facets[0]):
+                        continue
+                    nodes = mesh.nodes[order]
+                    acted = np.isin(nodes, body.mesh.surfaces[load.surface])
+                    points, kind = body.mesh.points[nodes], body.mesh.cell_type
+                    self._acting.append(
+                        (number, forms.following(load, kind, mesh.space, points, facets, acted))
+                    )
+
+    @cached_property
+    def rim(self) -> np.ndarray:
+        """Marks of the nodes of facets at the rims of the surfaces, shape (n_nodes,), replicated."""
+        scene, tearing = self._scene, self._tearing
+        marks = np.zeros(tearing.n_nodes, dtype=bool)
+        for load in scene.following_pressures:
+            facets = scene.bodies[load.body].mesh.surfaces[load.surface]
+            marks[tearing.global_nodes(load.body, np.unique(_at_rim(facets, scene.dim)))] = True
+        return marks
+
+    def _facts(self) -> dict[str, object]:
+        return {"pressures": f"{len(self._acting)} on this rank"}
+
+    def at(self, displacement: Vector) -> tuple[Vector, sp.csr_matrix]:
+        """Return what forces are more than on undeformed surfaces, and their stiffness; see `Loading.at`."""
+        parts = self._parts
+        force, size = np.zeros(displacement.size), displacement.size
+        blocks = [sp.csr_matrix((part.stop - part.start,) * 2) for part in parts]
+        for number, pressure in self._acting:
+            more, softening = pressure.at(displacement[parts[number]])
+            force[parts[number]] += more
+            blocks[number] = blocks[number] + softening
+        matrix = sp.block_diag(blocks, format="csr") if blocks else sp.csr_matrix((size, size))
+        return force, sp.csr_matrix(matrix)
+
+
+def _at_rim(facets: np.ndarray, dim: int) -> np.ndarray:
+    """Return the facets with a side that no other one has."""
+    corners = corners_of(facets, dim)
+    if dim == 2:
+        sides = corners[..., None]
+    else:
+        sides = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1), axis=-1)
+    _, number, count = np.unique(
+        sides.reshape(-1, sides.shape[-1]), axis=0, return_inverse=True, return_counts=True
+    )
+    alone = count[number.reshape(corners.shape)] == 1
+    return np.asarray(facets[alone.any(axis=1)])
+
+
+def _moved_further(torn: TornSystem, change: np.ndarray) -> TornSystem:
+    """Return a system whose supports have moved further, shape (n_nodes, dim), zero where free."""
+    gluing = torn.decomposition.gluing
+    supported = np.concatenate([relation.of_supports(change) for relation in torn.relations])
+    supported = np.concatenate([np.zeros(torn.n_gluing), supported])
+    right = -supported
+    right[: torn.n_gluing] = change.ravel()[gluing.dof]
+    owned = torn.numbering.owned
+    return replace(torn, right=torn.right + right[owned], supported=torn.supported + supported[owned])

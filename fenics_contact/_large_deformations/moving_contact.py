@@ -1,0 +1,536 @@
+"""Forces that turn with their surfaces: how they change as these do.
+
+Where bodies meet: at the points of the undeformed bodies, or wherever they have moved to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._base.display import displayed
+from fenics_contact._base.sparse import ROUNDING, scaled_columns, scaled_rows
+from fenics_contact._large_deformations.loading import Loading
+from fenics_contact._pairing.sliding_contact import sliding_contact
+from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidPlane
+from fenics_contact._scene.pairs import Surface
+from fenics_contact._scene.scene import Scene
+from fenics_contact._surfaces.facets import share_areas
+from fenics_contact.errors import together
+from fenics_contact.feti.averages import nodal_mean_at
+from fenics_contact.feti.contact_rows import on_copies
+from fenics_contact.feti.decomposition import Decomposition
+from fenics_contact.feti.torn import TornSystem, meeting_at
+from fenics_contact.qp.reductions import Vector
+
+if TYPE_CHECKING:
+    from fenics_contact._pairing.sliding.points import SlidingPoints
+    from fenics_contact._pairing.sliding.slip import MaterialPoints
+    from fenics_contact._pairing.sliding.stiffness import GeometricStiffness
+
+
+_NONE = np.zeros(0, dtype=np.int64)
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class UnevenStiffness:
+    """An unsymmetric stiffness L Rᵀ of few columns.
+
+    Attributes:
+        left: L, shape (n_dofs, k); dof dim · node + component of all nodes.
+        right: R, shape (n_dofs, k), [force / length].
+        owner: Node whose rank owns the rows of a column, shape (k,).
+    """
+
+    left: sp.csr_matrix
+    right: sp.csr_matrix
+    owner: np.ndarray
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class RowCorrections:
+    """The differences of derivatives of gap and slip from the rows of their forces.
+
+    Attributes:
+        columns: Of each row that is not the derivative, shape (n_dofs, m); dof dim · node + component of all
+            nodes.
+        corrected: Number of that row among those of contact, shape (m,).
+        owner: Node whose rank owns both, shape (m,).
+    """
+
+    columns: sp.csr_matrix
+    corrected: np.ndarray
+    owner: np.ndarray
+
+    @classmethod
+    def of(cls, rows: sp.csr_matrix, owner: np.ndarray) -> RowCorrections:
+        """Return those that are not zero, of all rows of contact, shape (n, n_dofs), with their owners."""
+        corrected = np.flatnonzero(_lengths(rows.T.tocsr()) > ROUNDING)
+        return cls(rows[corrected].T.tocsr(), corrected, owner[corrected])
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class TurningForces:
+    """How forces change as surfaces turn under them, at fixed multipliers, and gaps other than by their rows.
+
+    Attributes:
+        normal: Of the normal forces of contact, symmetric; None where contact points do not move.
+        normal_owner: Node whose rank owns the row of each of its columns.
+        forces: Directions of changes of friction forces and pressures, columns of length one, shape (n_dofs,
+            k).
+        displacements: The displacements that change them, columns of length one, shape (n_dofs, k).
+        stiffness: Change of force for a displacement of one, shape (k,), [force / length].
+        owner: Node whose rank owns the rows of each of these, shape (k,).
+        corrections: Those of rows of contact; None where contact points do not move.
+    """
+
+    normal: GeometricStiffness | None
+    normal_owner: np.ndarray
+    forces: sp.csr_matrix
+    displacements: sp.csr_matrix
+    stiffness: np.ndarray
+    owner: np.ndarray
+    corrections: RowCorrections | None
+
+    @classmethod
+    def of(
+        cls,
+        normal: GeometricStiffness | None,
+        others: Sequence[UnevenStiffness],
+        normal_owner: np.ndarray = _NONE,
+        corrections: RowCorrections | None = None,
+    ) -> TurningForces:
+        """Return those of several stiffnesses, with at least one unsymmetric one."""
+        others = [each for each in others if each.left.shape[1]] or others[:1]
+        L, R = (_joined([getattr(each, side) for each in others]) for side in ("left", "right"))
+        owner = np.concatenate([each.owner for each in others])
+        left, right = _lengths(L), _lengths(R)
+        kept = np.flatnonzero(left * right > ROUNDING * (left * right).max(initial=0.0))
+        forces, displacements = (
+            scaled_columns(columns[:, kept], 1.0 / lengths[kept])
+            for columns, lengths in ((L, left), (R, right))
+        )
+        stiffness = (left * right)[kept]
+        return cls(normal, normal_owner, forces, displacements, stiffness, owner[kept], corrections)
+
+    @property
+    def compliance(self) -> np.ndarray:
+        """Of the rows of normal forces, of either sign, shape (m,), [length / force]."""
+        return np.zeros(0) if self.normal is None else 1.0 / self.normal.values
+
+    @property
+    def columns(self) -> list[tuple[sp.csr_matrix, np.ndarray]]:
+        """Columns of all rows with the nodes whose ranks own them, in the order of `FurtherRows`."""
+        parts = [] if self.normal is None else [(self.normal.columns, self.normal_owner)]
+        parts += [(self.forces, self.owner), (self.displacements, self.owner)]
+        if self.corrections is not None:
+            parts.append((self.corrections.columns, self.corrections.owner))
+        return parts
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return sum(len(owner) for _, owner in self.columns)
+
+    @property
+    def corrected(self) -> np.ndarray:
+        """Numbers of rows of contact that are corrected, shape (m,)."""
+        return _NONE if self.corrections is None else self.corrections.corrected
+
+
+def _joined(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
+    return parts[0] if len(parts) == 1 else sp.hstack(parts, "csr")
+
+
+def _lengths(columns: sp.csr_matrix) -> np.ndarray:
+    return np.sqrt(np.bincount(columns.indices, columns.data**2, columns.shape[1]))
+
+
+def unsymmetric_at(
+    decomposition: Decomposition, stiffness: sp.csr_matrix, nodes: np.ndarray
+) -> UnevenStiffness:
+    """Return the unsymmetric part of a torn stiffness on the free dofs of some nodes. Collective.
+
+    Args:
+        decomposition: The subdomains.
+        stiffness: This rank's, torn, shape (torn_size, torn_size), [force / length].
+        nodes: Marks of the nodes, shape (n_nodes,).
+    """
+    tearing, dim = decomposition.tearing, decomposition.tearing.dim
+    here, block = decomposition.held
+    node = np.empty(len(here), dtype=np.int64)
+    node[block] = tearing.copy_node[here]
+    dof = (dim * node[:, None] + np.arange(dim)).ravel()
+    skew = sp.coo_matrix((stiffness - stiffness.T) / 2)
+    row, column = dof[skew.row], dof[skew.col]
+    free = (~decomposition.fixed).ravel()
+    kept = nodes[row // dim] & free[row] & free[column]
+    mine = (row[kept], column[kept], skew.data[kept], float(np.abs(stiffness.data).max(initial=0.0)))
+    parts = decomposition.comm.allgather(mine)
+    rows, columns, values = (np.concatenate([part[place] for part in parts]) for place in range(3))
+    matrix = sp.csr_matrix((values, (rows, columns)), shape=(len(free),) * 2)
+    # Between neighbours it cancels but for rounding.
+    matrix.data[np.abs(matrix.data) <= ROUNDING * max(part[3] for part in parts)] = 0.0
+    matrix.eliminate_zeros()
+    changed = np.flatnonzero(np.diff(matrix.indptr))
+    entries = np.ones(len(changed)), (changed, np.arange(len(changed)))
+    left = sp.csr_matrix(entries, shape=(len(free), len(changed)))
+    return UnevenStiffness(left, matrix[changed].T.tocsr(), changed // dim)
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class FurtherRows:
+    """The rows of turning forces, after all others; positions are among all owned rows.
+
+    Attributes:
+        compliance: Of rows of normal forces, of either sign, zero of others, owned, shape (count,).
+        force_rows: Positions of rows whose multipliers act without being measured: each is what the row of
+            `displacement_rows` of the same number measures, an unsymmetric stiffness; shape (k,).
+        displacement_rows: Positions of these rows, which have no multipliers, shape (k,).
+        share: What each of them measures for a multiplier of one, shape (k,).
+        correction_rows: Positions of rows without multipliers that others need where displacements are
+            measured: the derivative of a gap need not be the row of its force; shape (m,).
+        corrected_rows: Positions of these others, shape (m,).
+        correction: The factor with which the former are added to the latter, shape (m,).
+    """
+
+    compliance: Vector
+    force_rows: np.ndarray
+    displacement_rows: np.ndarray
+    share: Vector
+    correction_rows: np.ndarray
+    corrected_rows: np.ndarray
+    correction: Vector
+
+    @classmethod
+    def of(cls, torn: TornSystem, before: TornSystem, turning: TurningForces) -> FurtherRows:
+        """Return those of a system, given the one before without them."""
+        begin, normal = len(before.numbering.owned), len(turning.compliance)
+        number = torn.numbering.owned[begin:] - before.numbering.total
+        pairs = len(turning.stiffness)
+        compliance = np.concatenate([turning.compliance, np.zeros(turning.count - normal)])
+        place, ends = begin + np.arange(len(number)), normal + pairs * np.arange(3)
+        forces, displacements = ((number >= first) & (number < last) for first, last in pairwise(ends))
+        correcting = number >= ends[-1]
+        row = before.n_equality + turning.corrected[number[correcting] - ends[-1]]
+        return cls(
+            compliance[number],
+            place[forces],
+            place[displacements],
+            1.0 / turning.stiffness[number[forces] - normal],
+            place[correcting],
+            np.searchsorted(before.numbering.owned, row),
+            np.ones(np.count_nonzero(correcting)),
+        )
+
+    @property
+    def count(self) -> int:
+        """Number of rows of this rank."""
+        return len(self.compliance)
+
+    def scaled(self, s: Vector) -> FurtherRows:
+        """Return the rows for multipliers λ / s, with s of all owned rows."""
+        return replace(
+            self,
+            compliance=np.asarray(self.compliance * s[len(s) - self.count :] ** 2),
+            share=np.asarray(self.share * s[self.displacement_rows] * s[self.force_rows]),
+            correction=np.asarray(self.correction * s[self.corrected_rows] / s[self.correction_rows]),
+        )
+
+
+NO_ROWS = FurtherRows(np.zeros(0), _NONE, _NONE, np.zeros(0), _NONE, _NONE, np.zeros(0))
+
+
+def stiffened(
+    torn: TornSystem, tangents: list[sp.csr_matrix], geometric: GeometricStiffness
+) -> list[sp.csr_matrix]:
+    """Add blocks on single nodes, shared by their copies, to the tangents of this rank's subdomains."""
+    if len(geometric.block_node) == 0:
+        return tangents
+    decomposition, dim = torn.decomposition, torn.dim
+    entry, copy, place = decomposition.copies_here(geometric.block_node)
+    block = geometric.blocks[entry] * decomposition.tearing.copy_share[copy, None, None]
+    dofs = dim * place[:, None] + np.arange(dim)
+    row, column = np.repeat(dofs, dim, axis=1).ravel(), np.tile(dofs, dim).ravel()
+    size = decomposition.torn_size
+    added = sp.csr_matrix((block.ravel(), (row, column)), shape=(size, size))
+    return with_added(decomposition, tangents, added)
+
+
+def with_added(
+    decomposition: Decomposition, tangents: Sequence[sp.csr_matrix], added: sp.csr_matrix
+) -> list[sp.csr_matrix]:
+    """Return the tangents of this rank's subdomains with the blocks of a torn matrix added to them."""
+    each = zip(tangents, decomposition.parts, strict=True)
+    return [(K + added[part, part]).tocsr() for K, part in each]
+
+
+#: Number of facets that supports and obstacles may pass within a step: contact is searched where nodes stand.
+FACETS = 2.0
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class ContactConfiguration:
+    """The contact points at a displacement.
+
+    Attributes:
+        torn: The system with the rows of these points.
+        points: The points of bodies that have moved; None where those of the undeformed bodies are used.
+        start: The points at the start of the load step, in material coordinates of the master; None likewise.
+        prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
+    """
+
+    torn: TornSystem
+    points: SlidingPoints | None
+    start: MaterialPoints | None
+    prescribed: np.ndarray
+
+    @property
+    def material_points(self) -> MaterialPoints | None:
+        """The points in material coordinates of the master; None for those of the undeformed bodies."""
+        return None if self.points is None else self.points.material_points()
+
+    def from_here(self) -> ContactConfiguration:
+        """Return the same points with slip that begins here."""
+        return replace(self, start=self.material_points)
+
+    def constraint_residual(self, displacement: Vector) -> Vector:
+        """Return c − B u of contact, friction and gluing rows, owned, [length]. Collective.
+
+        Gaps, minus the slip, and openings of glued rows.
+        """
+        residual = self.torn.right - self.torn.jump(displacement)
+        if self.points is None or self.start is None:
+            return residual
+        return self._with_contact_rows(residual, self.points.points.gap, -self.slip(self.start))
+
+    def slip(self, start: MaterialPoints) -> np.ndarray:
+        """Return the slip since other material points, none across planes of symmetry, shape (n, dim − 1)."""
+        assert self.points is not None
+        return np.where(self._across, 0.0, self.points.slip(start))
+
+    @cached_property
+    def _across(self) -> np.ndarray:
+        """Marks tangents across planes of symmetry, which supports hold, shape (n, dim − 1).
+
+        Means over the master that change along it would slip, and friction act on nothing but supports.
+        """
+        torn, points = self.torn, self.torn.points
+        across = np.einsum("nad,nd->na", points.tangents**2, points.symmetric) > 0.5
+        held = np.zeros_like(across)
+        held[torn.frictional] = torn.relations[2].held(torn.decomposition.fixed).reshape(-1, torn.dim - 1)
+        return np.asarray(across & held)
+
+    def turning(self, multiplier: Vector, pressure: UnevenStiffness | None) -> TurningForces | None:
+        """Return the stiffness of forces that turn with their surfaces; None without any. Collective.
+
+        Args:
+            multiplier: λ, owned.
+            pressure: The unsymmetric stiffness of pressures.
+        """
+        further = [] if pressure is None else [pressure]
+        if self.points is None or self.start is None:
+            return TurningForces.of(None, further) if further else None
+        normal, friction = self.at_points(multiplier)
+        points, slave, normal = self.points, self.points.points.slave, np.maximum(normal, 0.0)
+        stiffness, means = points.stiffness(normal), points.mean_tangents(normal, friction, self.start)
+        further += [
+            UnevenStiffness(each.left, each.right, slave[each.point])
+            for each in (points.friction_stiffness(friction), means.stiffness)
+        ]
+        width, frictional = self.torn.dim - 1, self.torn.frictional
+        rubbed = (width * frictional[:, None] + np.arange(width)).ravel()
+        # In the order of the rows of contact, of which those of gaps measure −n·[u].
+        slips = scaled_rows(means.slip, 1.0 - self._across.ravel())
+        rows = sp.vstack([-means.gap, slips[rubbed]], "csr")
+        point = np.concatenate([np.arange(len(slave)), rubbed // width])
+        corrections = RowCorrections.of(rows, slave[point])
+        return TurningForces.of(stiffness, further, slave[stiffness.point], corrections)
+
+    def carried(self, values: Vector, other: ContactConfiguration, spread: bool = False) -> Vector:
+        """Return a vector on the rows of other points on the rows of these. Collective.
+
+        Args:
+            values: By row, owned there.
+            other: The other points.
+            spread: Whether points that are new get the mean of the others, rather than zero.
+        """
+        if self.points is None or other.points is None:
+            return values
+        torn, before = self.torn, other.torn
+        normal, friction = other.at_points(values)
+        if spread:
+            normal, friction = (self._filled(x, other) for x in (normal, friction))
+        else:
+            normal = self.points.carry(normal, other.points)
+            friction = self.points.carry_tangential(friction, other.points)
+            friction[self._across] = 0.0
+        result = np.empty(len(torn.numbering.owned))
+        equality = torn.numbering.owned < torn.n_equality
+        result[equality] = values[before.numbering.owned < before.n_equality]
+        return self._with_contact_rows(result, normal, friction)
+
+    def at_points(self, values: Vector) -> tuple[np.ndarray, np.ndarray]:
+        """Return the part of a vector on normal rows, shape (n,), and on tangents, (n, dim − 1). Collective.
+
+        That of points without friction is zero.
+        """
+        torn = self.torn
+        count, width = torn.points.count, torn.dim - 1
+        rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])
+        gathered = torn.numbering.gather(values, rows)
+        tangential = np.zeros((count, width))
+        tangential[torn.frictional] = gathered[count:].reshape(-1, width)
+        return gathered[:count], tangential
+
+    def _with_contact_rows(self, values: Vector, normal: np.ndarray, tangential: np.ndarray) -> Vector:
+        """Write values at points into the contact rows of a vector, and return it."""
+        torn = self.torn
+        contact = np.concatenate([normal, tangential[torn.frictional].ravel()])
+        mine = torn.numbering.owned >= torn.n_equality
+        values[mine] = contact[torn.numbering.owned[mine] - torn.n_equality]
+        return values
+
+    def _filled(self, values: np.ndarray, other: ContactConfiguration) -> np.ndarray:
+        assert self.points is not None
+        assert other.points is not None
+        carried = self.points.carry(values, other.points)
+        usual = values[values > 0.0].mean() if np.any(values > 0.0) else 1.0
+        return np.where(carried > 0.0, carried, usual)
+
+    def with_rows_of(self, turning: TurningForces) -> TornSystem:
+        """Return the system with the rows of turning forces after all others, in lengths. Collective."""
+        decomposition = self.torn.decomposition
+        points = self.torn.points if self.points is None else self.points.points
+        further = []
+        for columns, owner in turning.columns:
+            entries = columns.T.tocoo()
+            node, component = np.divmod(entries.col, self.torn.dim)
+            free = ~decomposition.fixed[node, component]
+            further.append(
+                on_copies(
+                    decomposition.tearing, entries.row[free], node[free], component[free],
+                    entries.data[free], owner,
+                )
+            )  # fmt: skip
+        return meeting_at(self.torn, points, self.prescribed, further)
+
+
+class Contact(Protocol):
+    """How bodies meet."""
+
+    def longest_part(self, first: Loading, last: Loading) -> float:
+        """Return the part of the way between two loads that one step may take. Collective.
+
+        What moves must be found again.
+        """
+
+    def at(
+        self, load: Loading, displacement: Vector, last: ContactConfiguration | None
+    ) -> ContactConfiguration:
+        """Return the contact points at a displacement. Collective.
+
+        Args:
+            load: What acts.
+            displacement: u of this rank, torn, shape (torn_size,), [length].
+            last: The points at a neighbouring displacement, with the start of their slip; None where slip
+                starts here.
+        """
+
+
+class StillContact:
+    """Contact at the points of the undeformed bodies: small displacements."""
+
+    def longest_part(self, first: Loading, last: Loading) -> float:
+        """Return the whole way."""
+        return 1.0
+
+    def at(
+        self, load: Loading, displacement: Vector, last: ContactConfiguration | None
+    ) -> ContactConfiguration:
+        """Return the points of the undeformed bodies."""
+        return ContactConfiguration(load.torn, None, None, load.prescribed)
+
+
+class MovingContact:
+    """Contact wherever the bodies have moved to."""
+
+    def __init__(self, scene: Scene, decomposition: Decomposition) -> None:
+        """Prepare the surfaces of all pairs. Collective."""
+        self._sliding = sliding_contact(scene, decomposition.fixed, decomposition.comm)
+        self._places = scene.points
+        surfaces = [
+            side for pair in scene.contacts for side in (pair.slave, pair.master) if isinstance(side, Surface)
+        ]
+        numbers = [decomposition.tearing.global_nodes(s.body, np.unique(scene.facets(s))) for s in surfaces]
+        self._nodes = np.unique(np.concatenate(numbers))
+        # No node passes through a half space: it is known everywhere on which side of a plane a node lies.
+        searched = [pair for pair in scene.contacts if not isinstance(_shape(pair.master), RigidPlane)]
+        sides = [side for pair in searched for side in (pair.slave, pair.master) if isinstance(side, Surface)]
+        self._obstacles = [pair.master for pair in searched if isinstance(pair.master, MovingObstacle)]
+        self._facet = min((_facet_size(scene, side) for side in sides), default=np.inf)
+
+    def longest_part(self, first: Loading, last: Loading) -> float:
+        """Return the part in which what nodes may pass moves by a few facets. Collective."""
+        if np.isinf(self._facet):
+            return 1.0
+        way = np.nan_to_num(last.prescribed - first.prescribed)
+        moved = float(np.linalg.norm(way, axis=1).max(initial=0.0))
+        corners = np.array([self._places[self._nodes].min(axis=0), self._places[self._nodes].max(axis=0)])
+        with together(last.torn.numbering.comm):
+            times = first.time, last.time
+            paths = [[obstacle.frame(time) for time in times] for obstacle in self._obstacles]
+        for path in paths:
+            before, after = (corners @ rotation.T + translation for rotation, translation in path)
+            moved = max(moved, float(np.linalg.norm(after - before, axis=1).max()))
+        return min(1.0, FACETS * self._facet / moved) if moved > 0.0 else 1.0
+
+    def at(
+        self, load: Loading, displacement: Vector, last: ContactConfiguration | None
+    ) -> ContactConfiguration:
+        """Search for the points at a displacement. Collective."""
+        known, start = (None, None) if last is None else (last.points, last.start)
+        found = self._sliding.at(self._coordinates(load, displacement), known, load.time, start)
+        here = found.material_points()
+        start = here if start is None else start.extended(here)
+        torn = meeting_at(load.torn, found.points, load.prescribed)
+        return ContactConfiguration(torn, found, start, load.prescribed)
+
+    def found_again(
+        self, load: Loading, displacement: Vector, stored: Mapping[str, np.ndarray]
+    ) -> ContactConfiguration:
+        """Return the points that were stored by `SlidingPoints.stored`. Collective."""
+        coordinates = self._coordinates(load, displacement)
+        found, start = self._sliding.found_again(stored, coordinates, load.time)
+        torn = meeting_at(load.torn, found.points, load.prescribed)
+        return ContactConfiguration(torn, found, start, load.prescribed)
+
+    def _coordinates(self, load: Loading, displacement: Vector) -> np.ndarray:
+        """Return where all nodes are that may meet, shape (n_nodes, dim), [length]. Collective."""
+        coordinates = self._places.copy()
+        coordinates[self._nodes] += nodal_mean_at(load.torn.decomposition, displacement, self._nodes)
+        # Prescribed components reach their values within the step: gaps are those after it.
+        return np.where(np.isnan(load.prescribed), coordinates, self._places + load.prescribed)
+
+
+def _shape(master: Surface | RigidObstacle) -> Surface | RigidObstacle:
+    """Return the obstacle that moves, where one does, else the master itself."""
+    return master.obstacle if isinstance(master, MovingObstacle) else master
+
+
+def _facet_size(scene: Scene, side: Surface) -> float:
+    """Return the usual size of the facets of a surface, [length]."""
+    mesh = scene.bodies[side.body].mesh
+    area = float(share_areas(mesh, side.name).sum()) / len(mesh.surfaces[side.name])
+    return area ** (1.0 / (scene.dim - 1))

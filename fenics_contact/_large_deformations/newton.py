@@ -1,0 +1,371 @@
+"""Newton's method for one load step: geometry, materials and contact in one loop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fenics_contact._base.checks import check_count, checked
+from fenics_contact._base.display import counted, displayed
+from fenics_contact._base.progress import PhaseTimer
+from fenics_contact._large_deformations.equations import (
+    Configuration,
+    Equations,
+    Linearisation,
+    ResidualState,
+)
+from fenics_contact._large_deformations.loading import Loading
+from fenics_contact._large_deformations.starts import Effort, NonlinearEquilibrium, starts
+from fenics_contact._large_deformations.tangent_step import TangentStep, tangent_step, whole_step
+from fenics_contact.errors import ConvergenceError, FoldedFacetsError, InfeasibleError, InvalidInputError
+from fenics_contact.qp.face_newton import FaceNewton
+from fenics_contact.qp.krylov import Stop
+from fenics_contact.qp.newton_steps import Damped, Forcing, damp, run_newton
+from fenics_contact.qp.reductions import Vector, global_sum
+from fenics_contact.qp.solution import Residuals, SolverStep
+
+#: Least factor on the residual of linear systems, see `TangentNewton.care`.
+LEAST_CARE = 1e-3
+#: Errors at contact below this part of the forces out of balance say nothing of the active set.
+HIDDEN = 1e-2
+#: Residual below which a step without progress is reason enough for that care.
+NEAR = 1e-2
+#: Part of the slip bound within which a disc counts as slipping at the start of a load step.
+SLIPPED = 1e-6
+#: Residual of a linear system that is small enough, relative to the tolerance of the step.
+FINE = 1e-4
+#: Residual of contact problems that are solved as a whole, at the start of a history.
+NESTED = 1e-2
+#: What to do where closed contacts and supports leave some body free to move.
+HOLD = (
+    "give each body that slides or turns freely a support in that direction, or its contacts friction; take "
+    "smaller load steps only where contacts open that held it"
+)
+
+
+class NotHeldError(ConvergenceError):
+    """Contact could not be solved as a whole: perhaps nothing holds some body."""
+
+
+@displayed
+@dataclass(frozen=True)
+@checked()
+class TangentNewton:
+    """Newton's method with exact tangents; every step solves one face of the linearised contact problem.
+
+    The face is that which the natural map selects at the present displacement; its linear system is solved
+    as accurately as progress warrants. A step is shortened where it would invert cells.
+
+    Attributes:
+        tolerance: All relative residuals end below it: forces out of balance, openings of glued rows and
+            supports, contact.
+        max_steps: Largest number of Newton steps of a load step.
+        max_products: Largest number of F-products of one Newton step.
+        forcing: Largest residual of a linear system, relative to its start.
+        care: Factor on that after each step that does not halve the residual: near a loss of stability a
+            small residual may hide a large error.
+        patience: Steps in which the residual must halve; else this care begins, and from the second time on
+            the natural map becomes more cautious.
+        caution: Factor on ρ of the natural map then.
+        room: Part of the smallest det F that a step must leave.
+
+    References:
+        S. C. Eisenstat, H. F. Walker, Choosing the forcing terms in an inexact Newton method, SIAM J. Sci.
+        Comput. 17 (1996), choice 2.
+    """
+
+    tolerance: float = 1e-8
+    max_steps: int = 25
+    max_products: int = 400
+    forcing: float = 0.1
+    care: float = 0.1
+    patience: int = 4
+    caution: float = 0.2
+    room: float = 0.2
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            InvalidInputError: If one is not between 0 and 1, or a count is not positive.
+        """
+        for name in ("tolerance", "forcing", "care", "caution", "room"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise InvalidInputError(
+                    f"{name} of TangentNewton must lie between 0 and 1, got {getattr(self, name)!r}: it is a "
+                    f"ratio, by default {getattr(TangentNewton, name)}"
+                )
+        for name in ("max_steps", "max_products", "patience"):
+            check_count(getattr(self, name), f"{name} of TangentNewton")
+
+    def solve(
+        self,
+        equations: Equations,
+        load: Loading,
+        start: Configuration,
+        timer: PhaseTimer,
+        known: Linearisation | None,
+        moved: Vector | None = None,
+    ) -> NonlinearEquilibrium:
+        """Return the equilibrium next to a configuration. Collective.
+
+        Args:
+            equations: Internal forces, and how bodies meet.
+            load: What acts, with the origin of slip where bodies do not move far.
+            start: Where Newton's method starts, with the start of slip and with the history of materials
+                before the load step.
+            timer: Collects the wall time.
+            known: A linearisation near the start, or None.
+            moved: Displacement to which supports take bodies, see `starts`, torn, shape (torn_size,),
+                [length]; None for that of the configuration.
+
+        Raises:
+            ConvergenceError: With the history, which ends with the reason.
+        """
+        run = _Run(self, equations, load, timer)
+        return run_newton(run, run.init(start, known, moved))
+
+
+@dataclass(frozen=True)
+class _Pace:
+    """How accurately a step is solved, and how cautiously its face is chosen.
+
+    Attributes:
+        forcing: η, residual of the linear system relative to its start.
+        late: The last residuals since the last stall, oldest first.
+        care: Factor on η.
+        caution: Factor on ρ of the natural map.
+        stalls: How often residuals have not halved in time.
+    """
+
+    forcing: float
+    late: tuple[float, ...] = ()
+    care: float = 1.0
+    caution: float = 1.0
+    stalls: int = 0
+
+    def after(self, method: TangentNewton, worst: float) -> _Pace:
+        """Return the pace of the next step, given the residual at its start."""
+        last, care = self.late[-1] if self.late else None, self.care
+        if last and (self.stalls or worst < NEAR):
+            care = 1.0 if worst < 0.5 * last else max(method.care * care, LEAST_CARE)
+        rule = Forcing(method.forcing, np.inf, method.tolerance)
+        forcing = rule.by_reduction(worst, last, self.forcing, care)
+        late = (*self.late, worst)[-method.patience - 1 :]
+        if len(late) <= method.patience or min(late[1:]) <= 0.5 * late[0]:
+            return _Pace(forcing, late, care, self.caution, self.stalls)
+        caution = self.caution * (method.caution if self.stalls else 1.0)
+        return _Pace(forcing, (worst,), care, caution, self.stalls + 1)
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """The data passed from one Newton step to the next.
+
+    Attributes:
+        evaluation: The equations at the start of the next step.
+        near: The last linearisation; None before the first.
+        pace: That of the last step.
+        before: Residuals before the last step; None before the first.
+        instead: Where to start from if the first step fails; None otherwise.
+        loose: Whether contact had to be solved as a whole since its face did not hold every body.
+        effort: That of all steps.
+    """
+
+    evaluation: ResidualState
+    near: Linearisation | None
+    pace: _Pace
+    before: Residuals | None = None
+    instead: Configuration | None = None
+    loose: bool = False
+    effort: Effort = field(default_factory=Effort)
+
+    @property
+    def history(self) -> tuple[SolverStep, ...]:
+        """One line for each step."""
+        return self.effort.history
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """One load step: the data that all its steps share; a `NewtonMethod`."""
+
+    method: TangentNewton
+    equations: Equations
+    load: Loading
+    timer: PhaseTimer
+
+    def init(self, start: Configuration, known: Linearisation | None, moved: Vector | None) -> _State:
+        """Return the state before the first step. Collective."""
+        evaluation, instead = starts(self._started, start, moved)
+        first = evaluation.residuals
+        state = _State(evaluation, known, _Pace(self.method.forcing), instead=instead)
+        if known is None and first.force_scale > 0.0 and first.within(self.method.tolerance):
+            # Gaps are measured by the diagonal of F, which is known only now.
+            near = evaluation.linearised(self.timer, None)
+            with self.timer.phase("assemble"):
+                evaluation = self.equations.evaluate_at(self.load, near.of(evaluation).at)
+            state = replace(state, evaluation=evaluation, near=near, effort=Effort(factorisations=1))
+        return state
+
+    def terminate(self, state: _State) -> NonlinearEquilibrium | None:
+        """Return the equilibrium, None if a further step is needed. Collective.
+
+        Raises:
+            ConvergenceError: Steps are used up, or residuals grow without bound.
+        """
+        residuals, method, history = state.evaluation.residuals, self.method, state.history
+        if state.near is not None and residuals.within(method.tolerance):
+            return NonlinearEquilibrium(state.evaluation, state.near, state.effort)
+        if len(history) >= method.max_steps or not residuals.worst < 1e6:
+            raise ConvergenceError(
+                f"Newton's method needs residuals below {method.tolerance:.1e}, got after "
+                f"{counted(len(history), 'step')}: {history[-1] if history else 'no step'}: "
+                f"{HOLD if state.loose else 'take smaller load steps'}",
+                history,
+            )
+        return None
+
+    def step(self, state: _State) -> _State:
+        """Take one step. Collective."""
+        # (a) The forcing term and ρ.
+        pace = state.pace.after(self.method, state.evaluation.residuals.worst)
+        # The tangents; factors of those before are refilled, unless they belong to the load step before.
+        if state.near is not None and state.effort.factorisations:
+            state.near.release_factors()
+        near = state.evaluation.linearised(self.timer, state.near)
+        evaluation = near.of(state.evaluation)
+        state = replace(state, evaluation=evaluation, near=near, pace=pace)
+        # (b), (c) The face and its linear system.
+        with self.timer.phase("solve"):
+            taken, whole = self._solved(state)
+            change = taken.multiplier[: len(evaluation.at.multiplier)] - evaluation.at.multiplier
+            further = taken.multiplier[len(change) :]
+            moved = near.system.displacement(np.concatenate([change, further]), taken.motions)
+            change = change + evaluation.passed_on(moved)
+        # (d) The step, as far as cells and the active set allow.
+        damped = self._damped(state, moved, change)
+        # (e) The next state, or the other start if the first step has failed.
+        line = self._line(state, damped, taken, whole)
+        promising = damped.fraction == 1.0 and line.residuals.worst < evaluation.residuals.worst
+        again = state.instead if not promising else None
+        if again is not None:
+            line = replace(line, note=f"{line.note}, begun again")
+        loose = whole and self._forces_known(evaluation)
+        effort = state.effort.followed_by(Effort((line,), taken.products, 1))
+        state = replace(state, instead=None, loose=loose, effort=effort)
+        if again is not None:
+            return replace(
+                state, evaluation=self._started(again, effort.history), pace=_Pace(self.method.forcing)
+            )
+        return replace(state, evaluation=damped.point, before=evaluation.residuals)
+
+    def _started(self, at: Configuration, history: tuple[SolverStep, ...] = ()) -> ResidualState:
+        """Return the equations where Newton's method starts. Collective."""
+        with self._assembling(history):
+            return self.equations.evaluate(self.load, at)
+
+    @contextmanager
+    def _assembling(self, history: tuple[SolverStep, ...]) -> Iterator[None]:
+        """Time an evaluation of the equations, which must not fold facets."""
+        try:
+            with self.timer.phase("assemble"):
+                yield
+        except FoldedFacetsError as folded:
+            raise ConvergenceError(
+                "a Newton step must not fold facets that meet, but after "
+                f"{counted(len(history), 'step')} {folded}; or take smaller load steps",
+                history,
+            ) from folded
+
+    def _forces_known(self, evaluation: ResidualState) -> bool:
+        comm = evaluation.torn.numbering.comm
+        return global_sum(comm, np.count_nonzero(evaluation.at.multiplier))[0] > 0.0
+
+    def _solved(self, state: _State) -> tuple[TangentStep, bool]:
+        """Solve the face at the present point, or contact as a whole; return whether that was. Collective.
+
+        At the start of a history nothing is known of the active set.
+        """
+        evaluation, method, near = state.evaluation, self.method, state.near
+        assert near is not None
+        step = np.concatenate([evaluation.at.natural_step(state.pace.caution), np.zeros(near.further.count)])
+        if state.history or evaluation.torn.points.count == 0 or self._forces_known(evaluation):
+            floor = FINE * method.tolerance * evaluation.residuals.gluing_scale
+            # What slipped in the last load step will mostly go on: its forces are at the bound.
+            margin = 0.0 if state.history else SLIPPED
+            problem, forcing = near.problem(evaluation), state.pace.forcing
+            taken = tangent_step(problem, step, forcing, floor, method.max_products, margin=margin)
+            if taken is not None:
+                return taken, False
+        try:
+            return whole_step(near.system, evaluation.at.multiplier, step, self._whole(evaluation)), True
+        except InfeasibleError as reason:
+            if not self._forces_known(evaluation):  # bodies at rest: nothing holds them from the start
+                raise
+            raise NotHeldError(
+                f"Newton's method needs tangents that the rows of supports and contacts hold, got after "
+                f"{counted(len(state.history), 'step')}: {reason}: {HOLD}",
+                state.history,
+            ) from reason
+        except ConvergenceError as reason:
+            raise NotHeldError(str(reason), reason.history) from reason
+
+    def _whole(self, evaluation: ResidualState) -> FaceNewton:
+        """Return the solver of contact as a whole: where forces are known a failure cuts the load step."""
+        if not self._forces_known(evaluation):
+            return FaceNewton(NESTED)
+        return FaceNewton(NESTED, max_products=self.method.max_products, doubts=False)
+
+    def _damped(self, state: _State, moved: Vector, change: Vector) -> Damped[ResidualState]:
+        """Return the end of a step as long as cells allow, or a better point of it. Collective.
+
+        Forces out of balance are no reason for that: a step that turns a body strains it until the next one.
+        """
+        start = state.evaluation
+        at, caution = start.at, state.pace.caution
+        longest = self._room(state, moved)
+
+        def after(part: float) -> ResidualState:
+            part *= longest
+            with self._assembling(state.history):
+                return start.evaluate(at.displacement + part * moved, at.multiplier + part * change, caution)
+
+        full, before = after(1.0), start.residuals
+        if full.residuals.natural <= max(before.natural, HIDDEN * full.residuals.coarse):
+            return Damped(full, longest)
+        earlier = (None if old is None else old.at_rows for old in (before, state.before))
+        found = damp(full, after, lambda each: each.residuals.at_rows, earlier)
+        return replace(found, fraction=found.fraction * longest)
+
+    def _room(self, state: _State, moved: Vector) -> float:
+        """Return the part of a step that keeps cells from being inverted. Collective."""
+        part, start = 1.0, state.evaluation
+        while part > 1e-3:
+            least = self.equations.least_jacobian(start.at.displacement + part * moved)
+            if least > self.method.room * start.least_jacobian:
+                return part
+            part *= 0.5
+        raise ConvergenceError(
+            "a Newton step must not turn cells inside out, but every part of this one does: take smaller "
+            "load steps, or refine the mesh where cells are flattened",
+            state.history,
+        )
+
+    def _line(
+        self, state: _State, damped: Damped[ResidualState], taken: TangentStep, whole: bool
+    ) -> SolverStep:
+        """Return the line of history of a step. Collective."""
+        assert state.near is not None
+        face, comm, softened = taken.face, state.evaluation.torn.numbering.comm, state.near.system.softened
+        counts = global_sum(comm, *(np.count_nonzero(m) for m in (face.closed, face.stick, face.slip)))
+        closed, stick, slip = (round(float(count)) for count in counts)
+        notes = ["contact solved as a whole"] if whole else [f"forcing {state.pace.forcing:.1e}"]
+        notes += [f"cut to {damped.fraction:g} of the step"] if damped.fraction < 1.0 else []
+        notes += [taken.stop.value] if taken.stop is not Stop.CONVERGED else []
+        notes += [f"{softened} soft motions held"] if softened else []
+        number, residuals = len(state.history), damped.point.residuals
+        return SolverStep("Newton", number, taken.products, residuals, closed, stick, slip, ", ".join(notes))

@@ -1,0 +1,1 @@
+"""Minimise a nonsmooth function, of which one subgradient at a point is known, over constraints."""

@@ -1,0 +1,557 @@
+"""Reverse mode through the dual functions of partly covered facets and the integrals with them.
+
+Reverse mode through the heights of true surfaces at the quadrature points of a mortar coupling.
+
+Reverse mode through the mortar coupling: from areas, weights, normals and gaps back to the surfaces.
+
+The derivative of each mortar weight by the nodes of both surfaces, for tangents of moving bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._base.libraries import MPI
+from fenics_contact._base.sparse import scaled_rows
+from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
+from fenics_contact._pairing.mortar.cells import (
+    CellDerivatives,
+    Cells,
+    Overlaps,
+    candidate_pairs,
+    cells_of,
+    cells_pulled_back,
+    overlaps_of,
+)
+from fenics_contact._pairing.mortar.coupling import (
+    DualBasis,
+    MortarCoupling,
+    chunks,
+    inverted_pulled_back,
+    relief_of_cells,
+)
+from fenics_contact._pairing.mortar.planes import Planes, planes_of, planes_pulled_back
+from fenics_contact._pairing.mortar.sums import SumsBy
+from fenics_contact._surfaces.facets import FacetedSurface, heights
+from fenics_contact._surfaces.projection import interpolated_normal
+from fenics_contact.errors import together
+from fenics_contact.mesh.faces import computed_rounding
+
+
+def integrals_pulled_back(
+    basis: DualBasis, field: np.ndarray, by_coverage: np.ndarray, by_integrals: np.ndarray
+) -> tuple[CellDerivatives, np.ndarray]:
+    """Vector-Jacobian product of `dual_integrals` with respect to the cells and the field.
+
+    Args:
+        basis: The dual functions.
+        field: Values at the quadrature points, shape (n, q).
+        by_coverage: Derivative by D_e, shape (n_facets, corners).
+        by_integrals: By the integrals with the master's shape functions and, last, with the field, shape
+            (n_pairs, corners, master corners + 1).
+
+    Returns:
+        By the cells, and by the field, shape (n, q).
+    """
+    cells, facet = basis.cells, basis.facet
+    functions = np.concatenate([cells.master, field[:, :, None]], axis=2)
+    moments = basis.moments(functions)
+    over_facet, area = SumsBy(facet, len(basis.area)), basis.area
+    by_coverage = by_coverage + over_facet((by_integrals * basis.values(moments)).sum(axis=2))
+    by_values = basis.coverage[facet][:, :, None] * by_integrals
+    by_mean, means = by_values.sum(axis=1), moments[:, 0] / area[facet][:, None]
+    by_area = -over_facet((by_mean * means).sum(axis=1)) / area
+    projector = basis.at_corners @ basis.inverse
+    by_projector = over_facet(by_values @ moments[:, 1:].transpose(0, 2, 1))
+    by_moments = np.concatenate(
+        [(by_mean / area[facet][:, None])[:, None], projector[facet].transpose(0, 2, 1) @ by_values], axis=1
+    )
+    by_corners = by_projector @ basis.inverse
+    by_second, more = _by_second_moments(basis, basis.at_corners.transpose(0, 2, 1) @ by_projector)
+    # Each quadrature point is in the moments of its pair and in the second moments and areas of its facet.
+    at_points = by_moments[cells.pair]
+    pulled = functions @ at_points.transpose(0, 2, 1)
+    twice = basis.modes @ (by_second + by_second.transpose(0, 2, 1))[cells.facet]
+    by_modes = cells.weight[:, :, None] * (pulled[:, :, 1:] + twice)
+    by_weight = pulled[:, :, 0] + np.einsum("nqa,nqa->nq", pulled[:, :, 1:] + twice / 2, basis.modes)
+    by_weight += np.einsum("nqk,nk->nq", cells.slave, by_coverage[cells.facet])
+    by_weight += (by_area + more)[cells.facet][:, None]
+    by_local, by_centring = _modes_pulled_back(basis, by_modes, by_corners)
+    weighted = (
+        np.concatenate([np.ones_like(field)[:, :, None], basis.modes], axis=2) * cells.weight[:, :, None]
+    )
+    by_functions = weighted @ at_points
+    by = CellDerivatives(
+        by_weight + by_centring, by_local, np.zeros_like(cells.opposite),
+        cells.weight[:, :, None] * by_coverage[cells.facet][:, None], by_functions[:, :, :-1],
+    )  # fmt: skip
+    return by, by_functions[:, :, -1]
+
+
+def _by_second_moments(basis: DualBasis, by_inverse: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the derivatives by the second moments, shape (n_facets, m, m), and by the areas, (n_facets,)."""
+    area = basis.area[:, None, None]
+    by_covariance = inverted_pulled_back(basis.covariance, by_inverse / area)
+    by_area = -(by_inverse * basis.inverse + by_covariance * basis.covariance).sum(axis=(1, 2)) / basis.area
+    return by_covariance / area, by_area
+
+
+def _modes_pulled_back(
+    basis: DualBasis, by_modes: np.ndarray, by_corners: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the derivatives by local coordinates, shape (n, q, dim − 1), and by weights, shape (n, q)."""
+    cells, plain = basis.cells, basis.cells.local.shape[2]
+
+    def centring(which: slice, by: np.ndarray, at_corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        # The mean is zero, its derivative is not.
+        by_mean = -(basis.over_facet(by.sum(axis=1)) + at_corners.sum(axis=1)) / basis.area[:, None]
+        by_mean = by_mean[cells.facet]
+        by_weight = np.einsum("nqa,na->nq", basis.modes[:, :, which], by_mean)
+        return by + cells.weight[:, :, None] * by_mean[:, None], by_weight
+
+    by_local, corners = by_modes[:, :, :plain], by_corners[:, :, :plain]
+    by_weight = np.zeros(cells.weight.shape)
+    if basis.modes.shape[2] > plain:
+        mixed = slice(plain, None)
+        by_product, by_weight = centring(mixed, by_modes[:, :, mixed], by_corners[:, :, mixed])
+        # The product of both coordinates is derived by one of them to the other.
+        by_local = by_local + by_product * basis.modes[:, :, 1::-1]
+        corners = corners + by_corners[:, :, mixed] * basis.at_corners[:, :, 1::-1]
+    by_local, more = centring(slice(plain), by_local, corners)
+    return by_local, by_weight + more
+
+
+@dataclass(frozen=True)
+class SurfaceDerivatives:
+    """Derivatives of a scalar by what a faceted surface is made of.
+
+    Attributes:
+        points: By its nodes, shape (n, dim).
+        normals: By its true unit normals, shape (n, dim).
+        slopes: By the slopes of the true surface at the corners of facets, see `surfaces.slopes`, shape
+            (n_facets, corners, 2).
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    slopes: np.ndarray
+
+    @classmethod
+    def zero(cls, surface: FacetedSurface) -> SurfaceDerivatives:
+        """Return derivatives to be summed up."""
+        shape = surface.points.shape
+        return cls(np.zeros(shape), np.zeros(shape), np.zeros((*surface.facets.shape, 2)))
+
+    def summed(self, comm: MPI.Comm) -> SurfaceDerivatives:
+        """Return the sums over all ranks. Collective."""
+        return SurfaceDerivatives(
+            *(np.asarray(comm.allreduce(getattr(self, each.name))) for each in fields(self))
+        )
+
+
+def relief_pulled_back(
+    cells: Cells,
+    surfaces: tuple[FacetedSurface, FacetedSurface],
+    pairs: tuple[np.ndarray, np.ndarray],
+    along: np.ndarray,
+    by_relief: np.ndarray,
+    into: tuple[SurfaceDerivatives, SurfaceDerivatives],
+) -> tuple[CellDerivatives, np.ndarray]:
+    """Vector-Jacobian product of `relief_of_cells` with respect to cells and directions.
+
+    Args:
+        cells: Quadrature points.
+        surfaces: Slave and master.
+        pairs: Slave facet and master facet of each pair, shape (n_pairs,) each.
+        along: Direction of the heights at each cell, shape (n, dim).
+        by_relief: Derivative by the heights, shape (n, q).
+        into: Derivatives by slave and master, which grow by those through normals and slopes.
+
+    Returns:
+        By the cells, and by the direction at each, shape (n, dim).
+    """
+    at_slave, at_master = (facet[cells.pair] for facet in pairs)
+    by_local, by_slave, by_along = _heights_pulled_back(
+        surfaces[0], at_slave, (cells.local, cells.slave), along, by_relief, into[0]
+    )
+    by_opposite, by_master, more = _heights_pulled_back(
+        surfaces[1], at_master, (cells.opposite, cells.master), along, -by_relief, into[1]
+    )
+    by = CellDerivatives(np.zeros_like(cells.weight), by_local, by_opposite, by_slave, by_master)
+    return by, by_along + more
+
+
+def _heights_pulled_back(
+    surface: FacetedSurface,
+    facet: np.ndarray,
+    places: tuple[np.ndarray, np.ndarray],
+    direction: np.ndarray,
+    by_height: np.ndarray,
+    into: SurfaceDerivatives,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the derivatives by local coordinates, shape functions and direction of each cell."""
+    local, values = places
+    if surface.relief is None:
+        return np.zeros_like(local), np.zeros_like(values), np.zeros_like(direction)
+    cells, points = by_height.shape
+    facet, by_height = np.repeat(facet, points), by_height.ravel()
+    direction, weights = np.repeat(direction, points, axis=0), values.reshape(len(facet), -1)
+    nodes = surface.facets[facet]
+    normals = surface.normals[nodes]
+    normal, length = interpolated_normal(weights, normals)
+    height = heights(surface, facet, local.reshape(len(facet), -1))
+    cosine = np.einsum("nd,nd->n", normal, direction)
+    by_value = by_height / cosine
+    by_cosine = (-by_value * height.value / cosine)[:, None]
+    by_normal = by_cosine * direction
+    by_mean = (by_normal - np.einsum("nd,nd->n", by_normal, normal)[:, None] * normal) / length[:, None]
+    np.add.at(into.normals, nodes, weights[:, :, None] * by_mean[:, None])
+    np.add.at(into.slopes, facet, by_value[:, None, None] * height.by_slopes)
+    by_weights = np.einsum("nkd,nd->nk", normals, by_mean)
+    by_local = by_value[:, None] * height.by_local
+    by_direction = (by_cosine * normal).reshape(cells, points, -1).sum(axis=1)
+    return by_local.reshape(local.shape), by_weights.reshape(values.shape), by_direction
+
+
+def mortar_pulled_back(
+    slave: FacetedSurface,
+    master: FacetedSurface,
+    coupling: MortarCoupling,
+    by: CouplingDerivatives,
+    comm: MPI.Comm | None = None,
+    *,
+    beside: float = 1e-9,
+) -> tuple[SurfaceDerivatives, SurfaceDerivatives]:
+    """Vector-Jacobian product of a coupling with respect to both surfaces. Collective on ``comm``.
+
+    Nodes and facets are fixed: which nodes face the master, and which facets face each other. Only slave
+    facets next to nodes with a derivative are integrated again.
+
+    While an edge of one surface passes over an edge of the other, the integrals change smoothly: what one
+    pair of facets loses, the next one gains. For both to be counted, the derivative is that of the master
+    ``beside`` its place. Kinks are left where the rim of the master passes over an edge between slave facets,
+    whose dual functions differ on both sides, and jumps where one layer of the master hides another: there
+    the derivative is that of one side.
+
+    Args:
+        slave: Surface that carries the multipliers.
+        master: The opposite surface.
+        coupling: The coupling of both.
+        by: Derivatives by its results.
+        comm: Communicator of the ranks that share the work; this one by default. All have the same arguments.
+        beside: Distance beside the place, relative to the smallest radius of a master facet.
+
+    Returns:
+        By slave and by master, the same on all ranks.
+    """
+    comm = comm or MPI.COMM_SELF
+    into = SurfaceDerivatives.zero(slave), SurfaceDerivatives.zero(master)
+    sums = _sums_pulled_back(slave, master, coupling, by)
+    touched = np.flatnonzero(sums.felt[slave.facets].any(axis=1))
+    part = touched[comm.rank :: comm.size]
+    with together(comm):
+        if len(part):
+            _add_integrals(slave, moved_aside(master, beside), part, sums, into)
+    by_slave, by_master = (side.summed(comm) for side in into)
+    along = by.gap[:, None] * coupling.normal
+    apart = slave.points[coupling.node] - coupling.weight @ master.points + coupling.relief
+    by_slave.normals[coupling.node] -= by.normal + by.gap[:, None] * apart
+    by_slave.points[coupling.node] += along
+    by_master.points[:] -= coupling.weight.T @ along
+    return by_slave, by_master
+
+
+def moved_aside(master: FacetedSurface, beside: float = 1e-9) -> FacetedSurface:
+    """Return the master beside its place, so that no edge lies exactly over one of the slave.
+
+    Args:
+        master: The surface.
+        beside: Distance relative to the smallest radius of a facet.
+    """
+    corners = master.points[master.facets]
+    size = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max(axis=1).min()
+    step = beside * size + 100 * computed_rounding(master.points)
+    aside = np.array([0.5351, 0.3889, 0.7499])[: master.dim]  # along no edges of usual meshes
+    return replace(master, points=master.points + step * aside)
+
+
+@dataclass(frozen=True)
+class _BySums:
+    """Derivatives by the sums over facets, at each slave node; zero where there is no multiplier.
+
+    Attributes:
+        area: By D, shape (n,).
+        left: Factors of the derivatives by M, shape (n, r).
+        right: Factors at each master node, shape (n_master, r).
+        relief: By ∫ ψ_i times the heights, shape (n, dim).
+    """
+
+    area: np.ndarray
+    left: np.ndarray
+    right: np.ndarray
+    relief: np.ndarray
+
+    @property
+    def felt(self) -> np.ndarray:
+        """Nodes with a derivative, shape (n,)."""
+        return (self.area != 0.0) | self.left.any(axis=1) | self.relief.any(axis=1)
+
+
+def _sums_pulled_back(
+    slave: FacetedSurface, master: FacetedSurface, coupling: MortarCoupling, by: CouplingDerivatives
+) -> _BySums:
+    """Differentiate the weights M_ij / Σ_j M_ij and gaps."""
+    middle = slave.points.mean(axis=0)
+    along = by.gap[:, None] * coupling.normal
+    left = np.concatenate([by.left, -along], axis=1)
+    right = np.concatenate([by.right, master.points - middle], axis=1)
+    mean = np.einsum("nr,nr->n", left, coupling.weight @ right)
+    left = np.concatenate([left, -mean[:, None]], axis=1) / coupling.area[:, None]
+    right = np.concatenate([right, np.ones((len(right), 1))], axis=1)
+    by_relief = along if by.relief is None else along + by.relief
+    by_area = by.area - np.einsum("nd,nd->n", by_relief, coupling.relief) / coupling.area
+
+    def spread(values: np.ndarray) -> np.ndarray:
+        everywhere = np.zeros((len(slave.nodes), *values.shape[1:]))
+        everywhere[coupling.node] = values
+        return everywhere
+
+    return _BySums(spread(by_area), spread(left), right, spread(by_relief / coupling.area[:, None]))
+
+
+def _add_integrals(
+    slave: FacetedSurface,
+    master: FacetedSurface,
+    chosen: np.ndarray,
+    sums: _BySums,
+    into: tuple[SurfaceDerivatives, SurfaceDerivatives],
+) -> None:
+    """Add the derivatives of the integrals over the chosen slave facets."""
+    planes = planes_of(slave, chosen)
+    pairs = candidate_pairs(planes, planes_of(master, np.arange(len(master.facets))))
+    for pair_slave, pair_master in chunks(*pairs):
+        overlaps = overlaps_of(planes, pair_slave, pair_master, master)
+        if len(overlaps.pair) == 0:
+            continue
+        own, cells = planes.part(overlaps.facets), cells_of(overlaps)
+        facets = chosen[overlaps.facets]
+        by, by_normal = _cells_of_sums((slave, master), facets, own.normal, overlaps, cells, sums, into)
+        by_subject, by_window = cells_pulled_back(overlaps, cells, by)
+        by_flat = SumsBy(overlaps.facet, len(facets))(by_window)
+        nodes, opposite = slave.facets[facets], master.facets[overlaps.master]
+        by_corners, by_opposite = planes_pulled_back(
+            own, slave.points[nodes], by_flat, by_normal,
+            (master.points[opposite], overlaps.facet, by_subject),
+        )  # fmt: skip
+        np.add.at(into[0].points, nodes, by_corners)
+        np.add.at(into[1].points, opposite, by_opposite)
+
+
+def _cells_of_sums(
+    surfaces: tuple[FacetedSurface, FacetedSurface],
+    facets: np.ndarray,
+    normal: np.ndarray,
+    overlaps: Overlaps,
+    cells: Cells,
+    sums: _BySums,
+    into: tuple[SurfaceDerivatives, SurfaceDerivatives],
+) -> tuple[CellDerivatives, np.ndarray]:
+    """Return the derivatives by cells and by the mean normals of the slave facets, shape (n_facets, dim).
+
+    Args:
+        surfaces: Slave and master.
+        facets: The slave's facets, shape (n_facets,).
+        normal: Their mean normals, shape (n_facets, dim).
+        overlaps: Overlaps of these facets.
+        cells: Their cells.
+        sums: Derivatives by the sums of integrals.
+        into: Derivatives by both surfaces, which grow by those through the heights of true surfaces.
+    """
+    slave, master = surfaces
+    nodes, pairs = slave.facets[facets], (facets[overlaps.facet], overlaps.master)
+    of_pair, along = nodes[overlaps.facet], normal[overlaps.facet]
+    by_raised = np.einsum("pkd,pd->pk", sums.relief[of_pair], along)
+    felt, field = by_raised.any(axis=1)[cells.pair], np.zeros(cells.weight.shape)
+    basis, some = DualBasis.on(cells), cells.part(felt)
+    if felt.any():
+        field[felt] = relief_of_cells(some, slave, master, pairs, along)
+    by_weights = sums.left[of_pair] @ sums.right[master.facets[overlaps.master]].transpose(0, 2, 1)
+    by_integrals = np.concatenate([by_weights, by_raised[:, :, None]], axis=2)
+    by, by_field = integrals_pulled_back(basis, field, sums.area[nodes], by_integrals)
+    if not felt.any():
+        return by, np.zeros(normal.shape)
+    over_facets = SumsBy(overlaps.facet, len(facets))
+    by_normal = over_facets((basis.integrals(field[:, :, None]) * sums.relief[of_pair]).sum(axis=1))
+    more, by_along = relief_pulled_back(some, surfaces, pairs, along[some.pair], by_field[felt], into)
+    return by.grown(felt, more), by_normal + SumsBy(some.facet, len(facets))(by_along)
+
+
+#: Pairs of facets up to which reverse mode runs for several corners and nodes at once.
+AT_ONCE = 2000
+
+
+@dataclass(frozen=True)
+class WeightDerivatives:
+    """Derivatives of the weights of a coupling.
+
+    Attributes:
+        point: Point of the coupling of each weight, ascending, shape (m,).
+        node: Its node of the master, shape (m,).
+        rows: Derivatives by the nodes of the slave and, after them, of the master, shape (m, dim · (n_slave +
+            n_master)), [1 / length].
+    """
+
+    point: np.ndarray
+    node: np.ndarray
+    rows: sp.csr_matrix
+
+
+def weight_derivatives(
+    slave: FacetedSurface,
+    master: FacetedSurface,
+    coupling: MortarCoupling,
+    wanted: np.ndarray,
+    comm: MPI.Comm | None = None,
+) -> WeightDerivatives:
+    """Differentiate the weights of some points of a coupling. Collective on ``comm``.
+
+    As in `mortar_pulled_back` nodes and facets are fixed, and the derivative is that of the master beside its
+    place.
+
+    Args:
+        slave: Surface that carries the multipliers.
+        master: The opposite surface.
+        coupling: The coupling of both.
+        wanted: Points whose weights are differentiated, a mask, shape (n,).
+        comm: Communicator of the ranks that share the work; this one by default. All have the same arguments.
+    """
+    comm = comm or MPI.COMM_SELF
+    marked = np.zeros(len(slave.nodes), dtype=bool)
+    marked[coupling.node[wanted]] = True
+    mine = np.flatnonzero(marked[slave.facets].any(axis=1))[comm.rank :: comm.size]
+    part: tuple[np.ndarray, np.ndarray, sp.csr_matrix] | None = None
+    with together(comm):
+        part = _integrals(slave, moved_aside(master), mine)
+    parts = [each for each in comm.allgather(part) if each is not None]
+    key, integral, rows = _joined(parts)
+    node, opposite = np.divmod(key, len(master.nodes))
+    kept = np.flatnonzero(marked[node])
+    point, opposite = np.searchsorted(coupling.node, node[kept]), opposite[kept]
+    return WeightDerivatives(
+        point, opposite, _normalised(point, integral[kept], rows[kept], len(coupling.node))
+    )
+
+
+def _normalised(point: np.ndarray, integral: np.ndarray, rows: sp.csr_matrix, count: int) -> sp.csr_matrix:
+    """Return the derivative of M_ij / Σ_j M_ij."""
+    entries = np.ones(len(point)), (point, np.arange(len(point)))
+    over = sp.csr_matrix(entries, shape=(count, len(point)))
+    area = (over @ integral)[point]
+    share = scaled_rows((over @ rows)[point], integral / area)
+    return scaled_rows((rows - share).tocsr(), 1.0 / area)
+
+
+def _joined(
+    parts: Sequence[tuple[np.ndarray, np.ndarray, sp.csr_matrix]],
+) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
+    """Return parts of which each has every number once as one."""
+    return parts[0] if len(parts) == 1 else _summed(*(list(column) for column in zip(*parts, strict=True)))
+
+
+def _summed(
+    keys: list[np.ndarray], integrals: list[np.ndarray], rows: list[sp.csr_matrix]
+) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
+    """Add entries with the same number."""
+    key, place = np.unique(np.concatenate(keys), return_inverse=True)
+    place = place.ravel()
+    add = sp.csr_matrix((np.ones(len(place)), (place, np.arange(len(place)))), shape=(len(key), len(place)))
+    return key, add @ np.concatenate(integrals), (add @ sp.vstack(rows, format="csr")).tocsr()
+
+
+def _integrals(
+    slave: FacetedSurface, master: FacetedSurface, chosen: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
+    """Return numbers (slave node · n_master + master node), integrals M and their derivatives, of facets."""
+    width = slave.dim * (len(slave.nodes) + len(master.nodes))
+    parts = []
+    if len(chosen) and len(master.facets):
+        planes = planes_of(slave, chosen)
+        pairs = candidate_pairs(planes, planes_of(master, np.arange(len(master.facets))))
+        for pair_slave, pair_master in chunks(*pairs):
+            overlaps = overlaps_of(planes, pair_slave, pair_master, master)
+            if len(overlaps.pair) == 0:
+                continue
+            parts.append(_of_facets(overlaps, planes, slave, chosen, master))
+    if not parts:
+        return np.zeros(0, dtype=np.int64), np.zeros(0), sp.csr_matrix((0, width))
+    return _joined(parts)
+
+
+def _of_facets(
+    overlaps: Overlaps, planes: Planes, slave: FacetedSurface, chosen: np.ndarray, master: FacetedSurface
+) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
+    """Return the same of some overlaps that have all pairs of their slave facets.
+
+    The dual functions of a facet depend on all that covers it. So reverse mode runs once for each corner and
+    each node of the master over a facet, in all facets at the same time; where these are few, several times
+    at once.
+    """
+    over, count = _over_facets(overlaps.facet, master.facets[overlaps.master]), len(overlaps.master)
+    corner, number = (part.ravel() for part in np.indices((slave.facets.shape[1], over.shape[1])))
+    parts, width = [], max(1, AT_ONCE // count)
+    for begin in range(0, len(corner), width):
+        some = slice(begin, begin + width)
+        repeated = overlaps.repeated(len(corner[some]))
+        node = over[overlaps.facet][:, number[some]].T.ravel()
+        parts.append(_of_nodes(repeated, planes, slave, chosen, master, np.repeat(corner[some], count), node))
+    return _summed(*(list(column) for column in zip(*parts, strict=True)))
+
+
+def _of_nodes(
+    overlaps: Overlaps,
+    planes: Planes,
+    slave: FacetedSurface,
+    chosen: np.ndarray,
+    master: FacetedSurface,
+    corner: np.ndarray,
+    node: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
+    """Return the same for one corner and one node of the master of each pair's slave facet, −1 for none."""
+    dim, n_slave, n_master = slave.dim, len(slave.nodes), len(master.nodes)
+    nodes, opposite = slave.facets[chosen[overlaps.slave]], master.facets[overlaps.master]
+    cells, each = cells_of(overlaps), np.arange(len(nodes))
+    basis, own = DualBasis.on(cells), planes.part(overlaps.slave)
+    integrals, meant = basis.integrals(cells.master), opposite == node[:, None]
+    seed = np.zeros((*integrals.shape[:2], integrals.shape[2] + 1))
+    seed[each, corner, :-1] = meant
+    by, _ = integrals_pulled_back(basis, np.zeros_like(cells.weight), np.zeros_like(basis.coverage), seed)
+    by_subject, by_window = cells_pulled_back(overlaps, cells, by)
+    places = master.points[opposite], each, by_subject
+    both = planes_pulled_back(own, slave.points[nodes], by_window, np.zeros_like(own.normal), places)
+    slopes = np.concatenate(both, axis=1).reshape(len(nodes), -1)
+    felt = np.flatnonzero(slopes.any(axis=1))
+    met = np.concatenate([nodes, n_slave + opposite], axis=1)[felt]
+    column = (dim * met[:, :, None] + np.arange(dim)).reshape(len(felt), slopes.shape[1])
+    entries = slopes[felt].ravel(), column.ravel(), slopes.shape[1] * np.arange(len(felt) + 1)
+    rows = sp.csr_matrix(entries, shape=(len(felt), dim * (n_slave + n_master)))
+    corner, node = corner[felt], node[felt]
+    return nodes[felt, corner] * n_master + node, (integrals[felt, corner] * meant[felt]).sum(axis=1), rows
+
+
+def _over_facets(facet: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Return the nodes of the master over each slave facet, −1 beyond their number, (n_facets, most).
+
+    Args:
+        facet: Slave facet of each pair, shape (n_pairs,).
+        nodes: Nodes of the master's facet, shape (n_pairs, master corners).
+    """
+    count = int(nodes.max()) + 1
+    which, node = np.divmod(np.unique(facet[:, None] * count + nodes), count)
+    number = np.arange(len(which)) - np.searchsorted(which, which)
+    over = np.full((int(facet.max()) + 1, int(number.max()) + 1), -1)
+    over[which, number] = node
+    return over

@@ -1,0 +1,435 @@
+"""Contact points: nodes of one surface with their counterparts on another surface or an obstacle.
+
+The friction law of each contact point.
+
+Common numbering of the nodes of all bodies of a scene.
+
+Contact points whose condition a tie beside the contact, or another contact pair, has as well.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._base.display import counted, displayed
+from fenics_contact._base.fingerprint import described, require_alike
+from fenics_contact._base.libraries import MPI
+from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tie, Tresca
+from fenics_contact._scene.scene import Scene
+from fenics_contact.errors import safe_log, together
+
+#: Weights of nodes below this fraction of all are rounding, which must not keep a supported point free.
+HELD = 1e-6
+
+
+@displayed
+@dataclass(frozen=True)
+class ContactPoints:
+    """Contact points of a scene, replicated on all ranks, in the order pair by pair, node by node.
+
+    Attributes:
+        pair: Contact pair of the scene, shape (n,).
+        slave: Slave node among all bodies' nodes, shape (n,).
+        master: Weights of the nodes of all bodies in the node's counterpart on the master, shape (n,
+            n_nodes); a row sums to one, and is empty on a rigid obstacle.
+        normal: Unit normal from master to slave, shape (n, dim).
+        tangents: Unit tangents, shape (n, dim - 1, dim).
+        gap: Gap before anything moves, positive when open: the distance, or what the pair gives in its place,
+            shape (n,), [length].
+        area: Area of the slave surface that belongs to the node, shape (n,), [length^(dim - 1)].
+        facet: Facet of the master surface that a node projects on; −1 on a rigid obstacle and where a point
+            represents a mean over facets, shape (n,).
+        local: Local coordinates on it, shape (n, dim - 1).
+        axes: Coordinate axis nearest to the first tangent, as a unit vector, shape (n, dim).
+        symmetric: Components normal to a plane of symmetry that cuts both surfaces there, or the one on an
+            obstacle: the mirror images move opposite, so that there is no slip across the plane, shape (n,
+            dim).
+        distance: Measured distance of the surfaces along the normal, positive when apart, shape (n,),
+            [length].
+        given: Whether the pair says what the gap is, by a value or by declaring the measured overlap an
+            interference, shape (n,).
+        taken: Slave nodes plus one of other pairs that have a point in the same place, which is left out, on
+            a surface beside: their areas are part of that of the point. Shape (n, n_pairs); None: none are.
+    """
+
+    pair: np.ndarray
+    slave: np.ndarray
+    master: sp.csr_matrix
+    normal: np.ndarray
+    tangents: np.ndarray
+    gap: np.ndarray
+    area: np.ndarray
+    facet: np.ndarray
+    local: np.ndarray
+    axes: np.ndarray
+    symmetric: np.ndarray
+    distance: np.ndarray
+    given: np.ndarray
+    taken: sp.csr_matrix | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of contact points."""
+        return len(self.slave)
+
+    def part(self, chosen: np.ndarray) -> ContactPoints:
+        """Return some of the points, by indices or a mask."""
+        names = [each.name for each in fields(self) if getattr(self, each.name) is not None]
+        return ContactPoints(**{name: getattr(self, name)[chosen] for name in names})
+
+    def of_surface(self, pair: int, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return slave nodes of a pair whose areas belong to points, ascending, with values of these points.
+
+        Args:
+            pair: Number of the pair.
+            values: A value for each point, shape (n,).
+        """
+        mine = np.flatnonzero(self.pair == pair)
+        if self.taken is None:
+            return self.slave[mine], values[mine]
+        other = self.taken[:, [pair]].tocoo()
+        nodes = np.concatenate([self.slave[mine], other.data - 1])
+        order = np.argsort(nodes)
+        return nodes[order], np.concatenate([values[mine], values[other.row]])[order]
+
+    @cached_property
+    def jump(self) -> sp.csr_matrix:
+        """Weights of the nodes in slave minus master displacement, shape (n, n_nodes)."""
+        entries = np.ones(self.count), self.slave, np.arange(self.count + 1)
+        return (sp.csr_matrix(entries, shape=self.master.shape) - self.master).tocsr()
+
+
+def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> ContactPoints:
+    """Concatenate the points of several pairs; empty if there are no parts."""
+    if not parts:
+        integer = np.zeros(0, dtype=np.int64)
+        return ContactPoints(
+            integer, integer, sp.csr_matrix((0, n_nodes)), np.zeros((0, dim)), np.zeros((0, dim - 1, dim)),
+            np.zeros(0), np.zeros(0), integer, np.zeros((0, dim - 1)), np.zeros((0, dim)),
+            np.zeros((0, dim), dtype=bool), np.zeros(0), np.zeros(0, dtype=bool),
+        )  # fmt: skip
+
+    if len(parts) == 1:
+        return parts[0]
+
+    def strung(name: str) -> np.ndarray:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    taken = None
+    if some := [part.taken for part in parts if part.taken is not None]:
+        none = [sp.csr_matrix((part.count, some[0].shape[1])) for part in parts]
+        each = [zero if part.taken is None else part.taken for part, zero in zip(parts, none, strict=True)]
+        taken = sp.vstack(each, format="csr")
+
+    return ContactPoints(
+        strung("pair"), strung("slave"), sp.vstack([part.master for part in parts], format="csr"),
+        strung("normal"), strung("tangents"), strung("gap"), strung("area"), strung("facet"), strung("local"),
+        strung("axes"), strung("symmetric"), strung("distance"), strung("given"), taken,
+    )  # fmt: skip
+
+
+def reference_axes(normals: np.ndarray) -> np.ndarray:
+    """Return for each normal the coordinate axis that is least aligned with it, shape (n, dim)."""
+    # Rounding first: symmetric geometries have ties, which must not be decided by the last bit.
+    return np.eye(normals.shape[1])[np.argmin(np.round(np.abs(normals), 6), axis=1)]
+
+
+def movable(points: ContactPoints, fixed: np.ndarray) -> np.ndarray:
+    """Return the components of the relative displacement that supports leave free, shape (n_points, dim).
+
+    Args:
+        points: The points.
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+    """
+    jump = points.jump
+    squares = sp.csr_matrix((jump.data**2, jump.indices, jump.indptr), shape=jump.shape)
+    free, every = squares @ (~fixed).astype(float), squares @ np.ones(fixed.shape)
+    return np.asarray((free > HELD**2 * every) & ~points.symmetric)
+
+
+def in_free_frames(points: ContactPoints, fixed: np.ndarray) -> ContactPoints:
+    """Return points whose second tangent is the only direction of slip where supports leave one.
+
+    Where one component is held, closed points can slip only normal to that axis and the normal.
+
+    Args:
+        points: Points in frames that depend only on the normals.
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+    """
+    if points.normal.shape[1] == 2:
+        return points
+    held = ~movable(points, fixed)
+    single = (held.sum(axis=1) == 1) & (np.einsum("nd,nd->n", held, points.normal**2) < 0.5)
+    axes = np.where(single[:, None], held.astype(float), points.axes)
+    return replace(points, axes=axes, tangents=tangent_frames(points.normal, axes))
+
+
+def tangent_frames(normals: np.ndarray, axes: np.ndarray | None = None) -> np.ndarray:
+    """Return the unit tangents of each unit normal, shape (n, dim - 1, dim).
+
+    In space (t1, t2, n) is right-handed, in the plane (t, n).
+
+    Args:
+        normals: Unit normals, shape (n, dim).
+        axes: Axes nearest to the first tangents, shape (n, dim); `reference_axes` by default.
+    """
+    if normals.shape[1] == 2:
+        return np.stack([normals[:, 1], -normals[:, 0]], axis=1)[:, None]
+    axes = reference_axes(normals) if axes is None else axes
+    first = axes - np.einsum("nd,nd->n", axes, normals)[:, None] * normals
+    first = first / np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([first, np.cross(normals, first)], axis=1)
+
+
+def friction_data(
+    scene: Scene, points: ContactPoints, comm: MPI.Comm
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the friction data of each contact point. Collective on ``comm``.
+
+    Returns:
+        Whether it has friction, shape (n,); its Coulomb coefficient (zero under Tresca), shape (n,); its
+        Tresca bound as a nodal force (zero under Coulomb), shape (n,), [force].
+
+    Raises:
+        InvalidInputError: If friction given as a function is negative somewhere, no number, or not the same
+            on all ranks.
+        UserCodeError: If such a function raises.
+    """
+    has, coefficient, bound = np.zeros(points.count, dtype=bool), *np.zeros((2, points.count))
+    places = scene.points[points.slave]
+    with together(comm):
+        for number, pair in enumerate(scene.contacts):
+            mine = np.flatnonzero(points.pair == number)
+            has[mine] = pair.has_friction
+            if isinstance(pair.friction, Coulomb):
+                coefficient[mine] = pair.friction_at(places[mine])
+            elif isinstance(pair.friction, Tresca):
+                bound[mine] = pair.friction_at(places[mine]) * points.area[mine]
+    if comm.size > 1 and any(pair.friction_varies for pair in scene.contacts):
+        values = np.stack([coefficient, bound])
+        require_alike(comm, described(values, "friction given as functions of position"))
+    return has, coefficient, bound
+
+
+@displayed
+@dataclass(frozen=True)
+class NodeNumbers:
+    """Numbers of the nodes of all bodies, body after body.
+
+    Attributes:
+        body_names: Names of the bodies, in numbering order.
+        node_offset: First node of each body and the total, shape (n_bodies + 1,).
+    """
+
+    body_names: tuple[str, ...]
+    node_offset: np.ndarray
+
+    @classmethod
+    def of(cls, scene: Scene) -> NodeNumbers:
+        """Number the nodes of a scene."""
+        names = scene.body_names
+        return NodeNumbers(names, np.cumsum([0] + [scene.bodies[name].mesh.n_nodes for name in names]))
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes of all bodies."""
+        return int(self.node_offset[-1])
+
+    def first_of(self, body: str) -> int:
+        """Return the number of a body's first node."""
+        return int(self.node_offset[self.body_names.index(body)])
+
+    def global_nodes(self, body: str, nodes: np.ndarray) -> np.ndarray:
+        """Number nodes of one body among those of all bodies."""
+        return nodes + self.first_of(body)
+
+
+#: Cosine between weights of nodes above which two points compare the same places.
+SAME_PLACE = 0.95
+#: Cosine between normals above which two points act in the same direction: corners stay what they are.
+PARALLEL = 0.9
+
+_LOG = logging.getLogger(__name__)
+
+
+def without_tied(
+    points: ContactPoints, ties: ContactPoints, scene: Scene, fixed: np.ndarray, *, told: bool
+) -> ContactPoints:
+    """Return the contact points that no tie has as well.
+
+    Where an edge belongs to a tie and to a contact, both hold the same relative displacement. Their normal
+    forces would be split at will, and friction would follow. The tie alone has them: it keeps closed.
+
+    Args:
+        points: The contact points.
+        ties: Points of the ties.
+        scene: Their scene.
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+        told: Whether nothing is to be logged.
+    """
+    point, tied = _tied(points, ties, scene, fixed)
+    if not told:
+        words = "the contact of %s leaves out %s, where the force is that of %s, which ties the same places"
+        _tell(words, (scene.contacts, points, point), (scene.ties, ties, tied))
+    return points.part(np.setdiff1d(np.arange(points.count), point))
+
+
+def tied_keys(
+    points: ContactPoints, ties: ContactPoints, scene: Scene, fixed: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return pair and slave node of the points that `without_tied` leaves out."""
+    point = np.unique(_tied(points, ties, scene, fixed)[0])
+    return points.pair[point], points.slave[point]
+
+
+def tied_once(ties: ContactPoints, scene: Scene, fixed: np.ndarray) -> ContactPoints:
+    """Return the points of ties without those of which another tie holds all, the first one of equals.
+
+    Where an edge belongs to two ties, their forces would be split at will.
+    """
+    one, other, _ = _same_places(ties, ties)
+    sliding = np.array([tie.sliding for tie in scene.ties], dtype=bool)[ties.pair]
+    held = _held(ties.normal[one], ties, other, scene, fixed)
+    first = np.where(sliding[one] == sliding[other], ties.pair[other] < ties.pair[one], sliding[one])
+    lost = one[held & first & (sliding[one] | ~sliding[other])]
+    return ties.part(np.setdiff1d(np.arange(ties.count), lost))
+
+
+def shared_once(points: ContactPoints, scene: Scene, *, told: bool) -> ContactPoints:
+    """Return the contact points, of those that compare the same places in one direction only one.
+
+    Where an edge belongs to two contact pairs, or two pairs have the same surfaces, their normal forces would
+    be split at will, and friction would follow. The pair whose gap is smaller has them, of equal ones the
+    one named first, with its friction and the area of the surfaces of both.
+
+    Args:
+        points: The contact points.
+        scene: Their scene.
+        told: Whether nothing is to be logged.
+    """
+    kept, lost = _shared(points, scene)
+    if not told:
+        words = "the contact of %s leaves out %s, where force and friction are those of %s at the same places"
+        _tell(words, (scene.contacts, points, lost), (scene.contacts, points, kept))
+    area, taken = areas_taken(points, (kept, lost), scene)
+    points = replace(points, area=points.area + area, taken=taken)
+    return points.part(np.setdiff1d(np.arange(points.count), lost))
+
+
+def areas_taken(
+    points: ContactPoints, couples: tuple[np.ndarray, np.ndarray], scene: Scene
+) -> tuple[np.ndarray, sp.csr_matrix]:
+    """Return the areas that points take over from others, and whose they are, see `ContactPoints.taken`.
+
+    Args:
+        points: All points.
+        couples: Numbers of points and of those that they stand for, shape (n,) each.
+        scene: Their scene.
+    """
+    kept, lost = couples
+    beside = np.zeros(len(kept), dtype=bool)
+    for one, other, which in _by_pairs(points.pair[kept], points.pair[lost]):
+        beside[which] = are_beside(scene, scene.contacts[one], scene.contacts[other])
+    # A node that two points could stand for gives its area to one of them.
+    _, first = np.unique(np.where(beside, lost, -1), return_index=True)
+    first = first[beside[first]]
+    kept, lost = kept[first], lost[first]
+    area = np.bincount(kept, points.area[lost], points.count)
+    entries = points.slave[lost] + 1, (kept, points.pair[lost])
+    return area, sp.csr_matrix(entries, shape=(points.count, len(scene.contacts)))
+
+
+def are_beside(scene: Scene, pair: ContactPair, other: ContactPair) -> bool:
+    """Return whether the slave surface of another pair has no facet of the surfaces of a pair."""
+    mesh = scene.bodies[other.slave.body].mesh
+    theirs = np.sort(mesh.surfaces[other.slave.name], axis=1)
+    for side in (pair.slave, pair.master):
+        if isinstance(side, Surface) and side.body == other.slave.body:
+            every = np.vstack([theirs, np.sort(mesh.surfaces[side.name], axis=1)])
+            if len(np.unique(every, axis=0)) < len(every):
+                return False
+    return True
+
+
+def _shared(points: ContactPoints, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Return the numbers of points, and of others for which each of them stands."""
+    if points.count == 0:
+        return points.pair, points.pair
+    one, other, sign = _same_places(points, points)
+    towards = sign[:, None] * points.normal[other]
+    cosine = np.einsum("nd,nd->n", points.normal[one], towards)
+    # Of two in one direction the one with the larger gap never closes; turned ones differ by their facets.
+    size = points.area ** (1.0 / (scene.dim - 1))
+    equal = HELD * size.mean()
+    turned = np.linalg.norm(points.normal[one] - towards, axis=1)
+    as_far = np.abs(points.gap[one] - points.gap[other]) <= equal + turned * size[one]
+    rank = np.argsort(np.lexsort((points.pair, np.round(points.gap / (2.0 * equal)))))
+    differ = points.pair[one] != points.pair[other]
+    chosen = differ & (cosine > PARALLEL) & as_far & (rank[one] < rank[other])
+    one, other = one[chosen], other[chosen]
+    kept, lost = [one[:0]], [one[:0]]
+    while len(one):
+        stays = ~np.isin(one, other)
+        kept.append(one[stays])
+        lost.append(other[stays])
+        left = ~np.isin(one, lost[-1]) & ~np.isin(other, lost[-1])
+        one, other = one[left], other[left]
+    return np.concatenate(kept), np.concatenate(lost)
+
+
+def _tied(
+    points: ContactPoints, ties: ContactPoints, scene: Scene, fixed: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the numbers of contact points and tied ones that hold the same displacement."""
+    point, tied, _ = _same_places(points, ties)
+    held = _held(points.normal[point], ties, tied, scene, fixed)
+    return point[held], tied[held]
+
+
+def _held(
+    normal: np.ndarray, ties: ContactPoints, tied: np.ndarray, scene: Scene, fixed: np.ndarray
+) -> np.ndarray:
+    """Return whether tied points hold displacements along normals, shape (n, dim)."""
+    sliding = np.array([tie.sliding for tie in scene.ties], dtype=bool)[ties.pair[tied]]
+    along = np.abs(np.einsum("nd,nd->n", normal, ties.normal[tied]))
+    # A fixed tie holds all components but those that a support has on its slave.
+    bonded = np.linalg.norm(np.where(fixed[ties.slave[tied]], 0.0, normal), axis=1)
+    return np.asarray(np.where(sliding, along, bonded) > PARALLEL)
+
+
+def _same_places(points: ContactPoints, others: ContactPoints) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the numbers of points and others that compare the same places, and −1 where slaves swap."""
+    left, right = (_unit_rows(each.jump) for each in (points, others))
+    cosine = (left @ right.T).tocoo()
+    same = np.abs(cosine.data) > SAME_PLACE
+    row, column = cosine.row[same].astype(np.int64), cosine.col[same].astype(np.int64)
+    return row, column, np.sign(cosine.data[same])
+
+
+def _unit_rows(jump: sp.csr_matrix) -> sp.csr_matrix:
+    size = np.sqrt(np.asarray(jump.multiply(jump).sum(axis=1)).ravel())
+    return sp.diags(1.0 / np.maximum(size, np.finfo(float).tiny)) @ jump
+
+
+#: Pairs, their points, and numbers of some of them.
+_Side = tuple[Sequence[ContactPair | Tie], ContactPoints, np.ndarray]
+
+
+def _tell(words: str, lost: _Side, kept: _Side) -> None:
+    """Log how many points of which pair are left out for which other pair."""
+    (pairs, points, one), (others, those, other) = lost, kept
+    for here, there, which in _by_pairs(points.pair[one], those.pair[other]):
+        left_out = counted(len(np.unique(one[which])), "node")
+        safe_log(_LOG.info, words, pairs[here].place, left_out, others[there].place)
+
+
+def _by_pairs(left: np.ndarray, right: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:
+    """Yield each combination of pairs that occurs, with its places in the lists."""
+    for one, other in np.unique(np.column_stack([left, right]), axis=0):
+        yield int(one), int(other), (left == one) & (right == other)

@@ -1,0 +1,506 @@
+"""Gaps between true surfaces that linear displacements can close, at the points of a mortar coupling.
+
+Where the gap g closes, the slave moves by (1 − s) g and the master by s g, s its share of the compliance, up
+to rigid motions. The constraint contains linear interpolants of that, I g on the slave and J g on the master:
+it can close (1 − s) g(x_i) + s ∫ ψ_i J g. The mean of g itself includes its curvature between nodes. Nodes
+that are partly beside the other surface keep that mean, and so do points with several nodes of the slave.
+
+Gaps that a contact pair gives in place of measured ones: clearances, interferences, adjusted points.
+
+Points of mortar contact and the reverse mode through them; the coupling is loaded where there are any.
+
+Contact points of a scene: the counterpart on the master, normal and gap of each slave node.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._base.display import displayed
+from fenics_contact._base.fingerprint import described, require_alike
+from fenics_contact._base.libraries import MPI
+from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
+from fenics_contact._pairing.points import (
+    ContactPoints,
+    NodeNumbers,
+    in_free_frames,
+    join_points,
+    reference_axes,
+    tangent_frames,
+)
+from fenics_contact._pairing.projection import (
+    shared_projection,
+    warn_of_edge,
+    warn_of_surface,
+    warn_of_uneven_pressure,
+)
+from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact._scene.pair_geometry import master_share
+from fenics_contact._scene.pairs import ContactPair, Surface, Tie
+from fenics_contact._scene.parts import surface_of
+from fenics_contact._scene.scene import Scene
+from fenics_contact._surfaces.facets import FacetedSurface
+from fenics_contact._surfaces.projection import Projection, node_weights
+from fenics_contact._surfaces.true_surface import Geometry
+from fenics_contact.errors import InvalidDesignError, InvalidInputError, safe_log, together
+from fenics_contact.mesh.faces import computed_rounding, coordinate_rounding
+from fenics_contact.shapes.simple import evaluate_shape
+
+if TYPE_CHECKING:
+    from fenics_contact._pairing.mortar.coupling import MortarCoupling
+    from fenics_contact._pairing.mortar.derivatives import SurfaceDerivatives
+    from fenics_contact._pairing.mortar.gathering import Gathering
+
+
+@dataclass(frozen=True)
+class ClosableGaps:
+    """Gaps of a coupling and what they consist of.
+
+    Attributes:
+        value: The gaps, shape (n,), [length].
+        kept: Whether it is the coupling's own mean, shape (n,).
+        share: Part of each that comes from the nodes of the master, s or zero, shape (n,).
+        here: Projections of the slave nodes onto the master, numbered as the coupling's nodes.
+        there: Projections of master nodes onto the slave, numbered as ``master.nodes``.
+        opposite: Their gaps, zero where there is none, shape (len(master.nodes),), [length].
+    """
+
+    value: np.ndarray
+    kept: np.ndarray
+    share: np.ndarray
+    here: Projection
+    there: Projection
+    opposite: np.ndarray
+
+
+def closable_gaps(
+    slave: FacetedSurface,
+    master: FacetedSurface,
+    coupling: MortarCoupling,
+    share: float,
+    comm: MPI.Comm,
+    alone: np.ndarray,
+) -> ClosableGaps:
+    """Return the gaps that linear displacements can close. Collective.
+
+    Args:
+        slave: The slave surface.
+        master: The master surface.
+        coupling: Coupling of both, or some of its nodes.
+        share: s, the master's share of the motion that closes the gap.
+        comm: Communicator of the ranks that share the work.
+        alone: Whether a point has no node of the slave but its own, shape (n,); others keep their mean.
+    """
+    weight = coupling.weight
+    nodes = np.flatnonzero(np.bincount(weight.indices, minlength=weight.shape[1]))
+    here = shared_projection(slave, coupling.node, master, comm)
+    there = shared_projection(master, nodes, slave, comm)
+    there = replace(there, point=nodes[there.point], lost=nodes[there.lost])
+    own, opposite = np.full(len(coupling.node), np.nan), np.full(weight.shape[1], np.nan)
+    own[here.point], opposite[there.point] = here.gap, there.gap
+    lost = abs(weight) @ np.isnan(opposite).astype(np.float64) > 0
+    opposite = np.nan_to_num(opposite)
+    across = np.where(lost, own, weight @ opposite)
+    closable = (1.0 - share) * own + share * across
+    kept = np.isnan(closable) | ~alone
+    value = np.where(kept, coupling.gap, closable)
+    return ClosableGaps(value, kept, np.where(lost | kept, 0.0, share), here, there, opposite)
+
+
+_LOG = logging.getLogger(__name__)
+
+
+def with_given_gaps(
+    points: ContactPoints, first: ContactPoints, pair: ContactPair, place: np.ndarray, comm: MPI.Comm
+) -> ContactPoints:
+    """Return points with the gaps that their pair gives. Collective on ``comm``.
+
+    A given gap holds in the geometry that was given. Where a design has moved the surfaces since then, the
+    change of their distance is added: g = g_given + d − d_first.
+
+    Args:
+        points: Points of the pair with measured gaps.
+        first: The same before any design moved the surfaces.
+        pair: The pair.
+        place: Coordinates of the slave nodes of ``first``, shape (n, dim), [length].
+        comm: Communicator of the ranks; all have the same points.
+
+    Raises:
+        InvalidDesignError: If a design has brought nodes to the master whose first distance is not known.
+        InvalidInputError: If a function returns anything but lengths, or not the same on all ranks.
+    """
+    with together(comm):
+        _, now, then = np.intersect1d(points.slave, first.slave, return_indices=True)
+        if len(now) < points.count:
+            raise InvalidDesignError(
+                "where a pair gives its gap, each slave node must face the master from the start, but "
+                f"{points.count - len(now)} of {points.count} nodes do so only in this design: move the rim "
+                "of the surfaces less, or leave the gap of the pair to measurement"
+            )
+        measured, place = first.distance[then], place[then]
+        near = in_reach(pair, measured, place)
+        if comm.rank == 0 and pair.adjust is not None:
+            _tell_of_adjusted(pair, near, measured)
+        wanted = pair.gap_at(place)
+        target = np.where(near, 0.0 if wanted is None else wanted, measured)
+    require_alike(comm, described(target, f"the gap given between {pair.place}"))
+    moved = points.distance[now] - measured
+    moved[np.abs(moved) <= computed_rounding(place)] = 0.0
+    declared = near | (pair.interference == "measured")
+    gap, given = points.gap.copy(), points.given.copy()
+    gap[now], given[now] = target + moved, declared
+    return replace(points, gap=gap, given=given)
+
+
+def in_reach(pair: ContactPair, measured: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Return at which points a pair replaces the gap, shape (n,).
+
+    Args:
+        pair: The pair.
+        measured: Distances of its slave nodes from the master, shape (n,), [length].
+        place: Their coordinates, shape (n, dim), [length].
+    """
+    if pair.adjust is None:
+        return np.full(len(measured), pair.gives_all_gaps)
+    return np.abs(measured) <= pair.adjust + computed_rounding(place)
+
+
+def _tell_of_adjusted(pair: ContactPair, near: np.ndarray, measured: np.ndarray) -> None:
+    if near.any():
+        log, words = (
+            _LOG.info,
+            "%d of %d points of %s lie within %g of the master and get the gap of the pair",
+        )
+        safe_log(log, words, np.count_nonzero(near), len(near), pair.place, pair.adjust)
+        return
+    safe_log(
+        _LOG.warning,
+        "no point of %s lies within adjust=%g of the master, the nearest has a distance of %.3g: nothing is "
+        "put in touch; give a larger adjust, or move the bodies",
+        pair.place, pair.adjust, measured[np.argmin(np.abs(measured))],
+    )  # fmt: skip
+
+
+@displayed
+@dataclass(frozen=True)
+class MortarPoints:
+    """Slave nodes with the mean of the master that each of them meets.
+
+    Attributes:
+        slave: Surface that carries the multipliers.
+        master: The opposite surface.
+        coupling: Their coupling, at some of its nodes.
+        gathering: What the nodes gather of others that hardly face the master; None if there are none.
+        closable: Gaps that linear displacements can close; None where both surfaces are their facets.
+    """
+
+    slave: FacetedSurface
+    master: FacetedSurface
+    coupling: MortarCoupling
+    gathering: Gathering | None
+    closable: ClosableGaps | None
+
+    @classmethod
+    def of(
+        cls,
+        slave: FacetedSurface,
+        master: FacetedSurface,
+        bearing: np.ndarray,
+        share: float,
+        comm: MPI.Comm | None = None,
+    ) -> MortarPoints:
+        """Couple two surfaces. Collective on ``comm``.
+
+        Args:
+            slave: Surface that carries the multipliers.
+            master: The opposite surface.
+            bearing: Which slave nodes may carry one, shape (n_nodes,).
+            share: The master's share of the motion that closes the gap.
+            comm: Communicator of the ranks that share the work; this one by default.
+        """
+        from fenics_contact._pairing.mortar.coupling import mortar_coupling
+        from fenics_contact._pairing.mortar.gathering import Gathering
+
+        comm = comm or MPI.COMM_SELF
+        coupling = mortar_coupling(slave, master, comm)
+        gathering = Gathering.of(coupling, slave)
+        if gathering is not None:
+            coupling = gathering.coupling(slave, master)
+        chosen = np.flatnonzero(bearing[coupling.node])
+        coupling = coupling.part(chosen)
+        gathering = None if gathering is None else gathering.chosen(chosen)
+        flat, closable = slave.relief is None and master.relief is None, None
+        if not flat:
+            alone = np.ones(len(chosen), dtype=bool) if gathering is None else ~gathering.gathers
+            closable = closable_gaps(slave, master, coupling, share, comm, alone)
+        return cls(slave, master, coupling, gathering, closable)
+
+    @property
+    def gap(self) -> np.ndarray:
+        """The gaps, shape (n,), [length]."""
+        return self.coupling.gap if self.closable is None else self.closable.value
+
+    @property
+    def weight(self) -> sp.csr_matrix:
+        """Weights of the nodes of slave and, after them, of master in the point that a slave node meets.
+
+        Nodes of the slave have such weights where several of them are in its mean, which takes the place of
+        the node. Rows add up to one, shape (n, len(slave.nodes) + len(master.nodes)).
+        """
+        count, n_slave = len(self.coupling.node), len(self.slave.nodes)
+        lacking = sp.csr_matrix((count, n_slave))
+        if self.gathering is not None:
+            entries = np.ones(count), self.coupling.node, np.arange(count + 1)
+            lacking = sp.csr_matrix(entries, shape=lacking.shape) - self.gathering.weights(n_slave)
+            lacking.eliminate_zeros()
+        return sp.hstack([lacking, self.coupling.weight], format="csr")
+
+    def pulled_back(
+        self, by: CouplingDerivatives, comm: MPI.Comm | None = None
+    ) -> tuple[SurfaceDerivatives, SurfaceDerivatives]:
+        """Vector-Jacobian product of the coupling by slave and master. Collective on ``comm``."""
+        from fenics_contact._pairing.mortar.derivatives import mortar_pulled_back
+
+        slave, master, coupling, gathering = self.slave, self.master, self.coupling, self.gathering
+        if gathering is None:
+            return mortar_pulled_back(slave, master, coupling, by, comm)
+        whole, places = gathering.whole, (slave.points, master.points)
+        by_whole = gathering.pulled_back(coupling, by, places)
+        by_slave, by_master = mortar_pulled_back(slave, master, whole, by_whole, comm)
+        along = by.gap[:, None] * coupling.normal
+        apart = gathering.own @ slave.points[whole.node] - coupling.weight @ master.points + coupling.relief
+        by_slave.normals[coupling.node] -= by.normal + by.gap[:, None] * apart
+        by_slave.points[whole.node] += gathering.own.T @ along
+        by_master.points[:] -= coupling.weight.T @ along
+        return by_slave, by_master
+
+
+def find_contact_points(
+    scene: Scene,
+    fixed: np.ndarray,
+    comm: MPI.Comm | None = None,
+    *,
+    finer: bool = False,
+    told: bool = False,
+) -> ContactPoints:
+    """Find the contact points of every contact pair. Collective on ``comm``.
+
+    Each rank searches a share of the nodes, and all receive all points. Nodes whose displacement is
+    prescribed in all components cannot move and are omitted.
+
+    Args:
+        scene: The scene.
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+        comm: Communicator of the ranks that share the work; this rank alone by default.
+        finer: Use better representations of surfaces than requested by the scene, see `true_surface`.
+        told: Whether doubts about the surfaces were told.
+
+    Raises:
+        InvalidInputError: If no node of a slave surface faces its master.
+    """
+    return _points_of_pairs(scene, scene.contacts, fixed, comm or MPI.COMM_SELF, finer, told)
+
+
+def find_tied_points(
+    scene: Scene, fixed: np.ndarray, comm: MPI.Comm | None = None, *, told: bool = False
+) -> ContactPoints:
+    """Find the points of tied surfaces, as `find_contact_points`; ``pair`` numbers the ties. Collective."""
+    return _points_of_pairs(scene, scene.ties, fixed, comm or MPI.COMM_SELF, told=told)
+
+
+def without_rounding(gap: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return gaps, zero where surfaces touch up to the rounding of their coordinates.
+
+    Otherwise bodies that only touch would be pressed apart by that rounding.
+
+    Args:
+        gap: Gaps, shape (n,), [length].
+        points: Coordinates of one of the surfaces, shape (m, dim), [length].
+    """
+    return np.where(np.abs(gap) <= computed_rounding(points), 0.0, gap)
+
+
+@dataclass(frozen=True)
+class _Side:
+    """One of two surfaces of a pair.
+
+    Attributes:
+        surface: The surface.
+        nodes: Its nodes among those of all bodies, shape (n,).
+        n_nodes: Number of nodes of all bodies.
+    """
+
+    surface: FacetedSurface
+    nodes: np.ndarray
+    n_nodes: int
+
+    @classmethod
+    def of(
+        cls, scene: Scene, surface: Surface, geometry: Geometry, numbers: NodeNumbers, finer: bool
+    ) -> _Side:
+        """Return a named surface as a side."""
+        own = surface_of(scene, surface, geometry, finer=finer)
+        return cls(own, numbers.global_nodes(surface.body, own.nodes), numbers.n_nodes)
+
+    def weights(self, hit: Projection) -> sp.csr_matrix:
+        """Return the weights of the nodes of all bodies at projections on this side, (n, n_nodes)."""
+        own = node_weights(self.surface, hit)
+        return sp.csr_matrix((own.data, self.nodes[own.indices], own.indptr), (own.shape[0], self.n_nodes))
+
+
+def _points_of_pairs(
+    scene: Scene,
+    pairs: Sequence[ContactPair | Tie],
+    fixed: np.ndarray,
+    comm: MPI.Comm,
+    finer: bool = False,
+    told: bool = False,
+) -> ContactPoints:
+    parts, told = [], told or finer
+    for index, pair in enumerate(pairs):
+        if isinstance(pair, ContactPair) and pair.within_body:
+            continue  # no part of an undeformed body is near another one
+        points = _measured(scene, pair, index, fixed, comm, finer, told=told)
+        if isinstance(pair, ContactPair) and pair.given_gap:
+            origin, mesh = scene.origin, scene.bodies[pair.slave.body].mesh.origin
+            first = points
+            if origin is not scene:
+                first = _measured(origin, pair, index, fixed, comm, finer, told=True)
+            slave = first.slave - NodeNumbers.of(scene).first_of(pair.slave.body)
+            points = with_given_gaps(points, first, pair, mesh.points[slave], comm)
+        parts.append(in_free_frames(points, fixed))
+    return join_points(parts, scene.dim, len(fixed))
+
+
+def _measured(
+    scene: Scene,
+    pair: ContactPair | Tie,
+    index: int,
+    fixed: np.ndarray,
+    comm: MPI.Comm,
+    finer: bool,
+    told: bool,
+) -> ContactPoints:
+    """Return the points of one pair with the gaps between its surfaces. Collective."""
+    numbers = NodeNumbers.of(scene)
+    slave = _Side.of(scene, pair.slave, pair.geometry, numbers, finer)
+    movable = ~fixed[slave.nodes].all(axis=1)
+    bearing = movable & (slave.surface.areas > 0.0) if isinstance(pair, ContactPair) else movable
+    if not told:
+        warn_of_surface(scene, pair.slave, pair.geometry, slave.surface, comm)
+    if not isinstance(pair.master, Surface):
+        with together(comm):
+            points = _on_obstacle(slave, bearing, pair.master)
+        name = f"what ContactPair {index} asks its obstacle, {type(pair.master).__name__}"
+        require_alike(comm, described((points.slave, points.normal, points.gap), name))
+    else:
+        master = _Side.of(scene, pair.master, pair.geometry, numbers, finer)
+        if not told:
+            warn_of_surface(scene, pair.master, pair.geometry, master.surface, comm)
+        if pair.discretisation == "mortar":
+            points = _by_mortar(slave, bearing, master, comm, master_share(scene, pair))
+        else:
+            points = _by_projection(slave, bearing, master, comm)
+            if not told:
+                warn_of_uneven_pressure(scene, pair, slave.surface, master.surface, comm)
+            if isinstance(pair, Tie):
+                held = ~movable | np.isin(slave.nodes, points.slave)
+                warn_of_edge(pair, slave.surface, held, master.surface, comm)
+        points = replace(points, symmetric=_symmetric(points, slave, master))
+    if comm.rank == 0 and not movable.all():
+        safe_log(
+            _LOG.info,
+            "%d of %d nodes of %s %d are left out as supports hold them in all directions",
+            np.count_nonzero(~movable), len(movable), type(pair).__name__, index,
+        )  # fmt: skip
+    if points.count == 0:
+        raise InvalidInputError(
+            f"{type(pair).__name__} {index} needs slave nodes that face the master, but none of the "
+            f"{np.count_nonzero(movable)} movable nodes of {pair.slave.name!r} meets it: check the "
+            "surfaces' names and where the bodies lie"
+        )
+    gap = without_rounding(points.gap, slave.surface.points)
+    return replace(points, pair=np.full(points.count, index), gap=gap, distance=gap)
+
+
+def _symmetric(points: ContactPoints, slave: _Side, master: _Side) -> np.ndarray:
+    """Return the components normal to symmetry planes that cut both surfaces at a point, (n_points, dim)."""
+    place = np.zeros((slave.n_nodes, points.normal.shape[1]))
+    cut = np.zeros((2, *place.shape), dtype=bool)
+    for here, side in zip(cut, (slave, master), strict=True):
+        place[side.nodes], here[side.nodes] = side.surface.points, side.surface.mirrored
+    met = points.master.tocoo()
+    node, other = points.slave[met.row], met.col
+    same = np.abs(place[node] - place[other]) <= coordinate_rounding(place)
+    symmetric = np.zeros(points.normal.shape, dtype=bool)
+    np.logical_or.at(symmetric, met.row, cut[0][node] & cut[1][other] & same)
+    return symmetric
+
+
+def _by_projection(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm) -> ContactPoints:
+    """Pair each slave node with the master facet on which it projects. Collective."""
+    candidates = np.flatnonzero(movable)
+    hit = shared_projection(slave.surface, candidates, master.surface, comm)
+    if len(hit.lost) and comm.rank == 0:
+        _tell_of_lost(slave.surface.points[candidates[hit.lost]], len(candidates))
+    points = _points(slave, candidates[hit.point], hit.normal, hit.gap, master.weights(hit))
+    return replace(points, facet=hit.facet, local=hit.local)
+
+
+def _tell_of_lost(places: np.ndarray, count: int) -> None:
+    where = ", ".join(f"{x:.6g}" for x in places[0])
+    safe_log(
+        _LOG.warning,
+        "%d of %d slave nodes face their master, but no point of it was found for them, the first at (%s): "
+        "nothing keeps them out of it; refine the master there, or let the other surface be the slave",
+        len(places), count, where,
+    )  # fmt: skip
+
+
+def _by_mortar(
+    slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm, share: float
+) -> ContactPoints:
+    """Pair each slave node with the mean of the master weighted by its dual basis function. Collective.
+
+    Args:
+        slave: Side whose nodes carry multipliers.
+        movable: Which of them can move.
+        master: The other side.
+        comm: Communicator of the ranks that share the work.
+        share: The master's share of the motion that closes the gap.
+    """
+    met = MortarPoints.of(slave.surface, master.surface, movable, share, comm)
+    coupling, nodes = met.coupling, np.concatenate([slave.nodes, master.nodes])
+    count = len(nodes)
+    spread = sp.csr_matrix((np.ones(count), (np.arange(count), nodes)), shape=(count, master.n_nodes))
+    points = _points(slave, coupling.node, coupling.normal, met.gap, (met.weight @ spread).tocsr())
+    return replace(points, area=coupling.area)
+
+
+def _on_obstacle(slave: _Side, movable: np.ndarray, obstacle: RigidObstacle) -> ContactPoints:
+    """Pair each slave node that faces a rigid obstacle with it."""
+    candidates = np.flatnonzero(movable)
+    normals = evaluate_shape(obstacle, "normals", slave.surface.points[candidates])
+    facing = np.einsum("nd,nd->n", slave.surface.normals[candidates], normals) < 0
+    chosen = candidates[facing]
+    gap = evaluate_shape(obstacle, "distance", slave.surface.points[chosen])
+    points = _points(slave, chosen, normals[facing], gap, sp.csr_matrix((len(chosen), slave.n_nodes)))
+    return replace(points, symmetric=slave.surface.mirrored[chosen])
+
+
+def _points(
+    slave: _Side, chosen: np.ndarray, normal: np.ndarray, gap: np.ndarray, weight: sp.csr_matrix
+) -> ContactPoints:
+    """Return points on chosen nodes of a slave, not yet numbered by pair and without facets."""
+    count, axes = len(chosen), reference_axes(normal)
+    return ContactPoints(
+        np.zeros(count, dtype=np.int64), slave.nodes[chosen], weight, normal, tangent_frames(normal, axes),
+        gap, slave.surface.areas[chosen], np.full(count, -1), np.zeros((count, normal.shape[1] - 1)), axes,
+        np.zeros(normal.shape, dtype=bool), gap, np.zeros(count, dtype=bool),
+    )  # fmt: skip

@@ -1,0 +1,406 @@
+"""The contact points of moved bodies with their derivatives and slip.
+
+What is added to the gaps of bodies that move far, where their pair says what these are at first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+
+from fenics_contact._base.fingerprint import described, require_alike
+from fenics_contact._base.libraries import MPI
+from fenics_contact._base.sparse import scaled_rows
+from fenics_contact._pairing.points import ContactPoints
+from fenics_contact._pairing.search import find_contact_points, in_reach
+from fenics_contact._pairing.sliding.means import MeanTangents, MovingMeans, PointAreas, interleaved, placed
+from fenics_contact._pairing.sliding.meeting import Meeting
+from fenics_contact._pairing.sliding.slip import LAST, MaterialPoints, slip_by_start, slip_by_start_of_means
+from fenics_contact._pairing.sliding.stiffness import (
+    Differential,
+    GeometricStiffness,
+    LowRank,
+    frame_changes,
+    friction_stiffness,
+    geometric_stiffness,
+    point_motion,
+    spread,
+)
+from fenics_contact._scene.pairs import ContactPair
+from fenics_contact._scene.scene import Scene
+from fenics_contact.errors import together
+
+
+def with_given_offsets(
+    meetings: tuple[Meeting, ...], scene: Scene, stood: ContactPoints, fixed: np.ndarray, comm: MPI.Comm
+) -> tuple[Meeting, ...]:
+    """Return the pairs with the offsets that their given gaps need. Collective.
+
+    The gap of a node counts from its distance as it is measured while bodies move, which by mortar is one
+    between facets and may differ from that of the true surfaces: in the given geometry, undeformed, it is
+    what the pair says.
+
+    Args:
+        meetings: The pairs of a scene without offsets.
+        scene: That scene before any design moved its surfaces.
+        stood: Its points there, with the distances that are measured while bodies move.
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+        comm: Communicator of the ranks; all have the same pairs and points.
+    """
+    first = find_contact_points(scene, fixed, comm, told=True)
+    result = []
+    for index, (meeting, pair) in enumerate(zip(meetings, scene.contacts, strict=True)):
+        if not pair.given_gap:
+            result.append(meeting)
+            continue
+        place = scene.points[meeting.nodes]
+        with together(comm):
+            offset, given = _offsets(meeting, pair, place, first, stood, index)
+        require_alike(comm, described(offset, f"the gap given between {pair.place}"))
+        result.append(replace(meeting, offset=offset, given=given))
+    return tuple(result)
+
+
+def _offsets(
+    meeting: Meeting,
+    pair: ContactPair,
+    place: np.ndarray,
+    first: ContactPoints,
+    stood: ContactPoints,
+    index: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what is added to the gap of each candidate, and whether the pair gives its gap."""
+    measured, moving = (_of_candidates(meeting, points, index) for points in (first, stood))
+    faced = ~np.isnan(measured)
+    near = faced & in_reach(pair, np.where(faced, measured, np.inf), place)
+    moving = np.where(np.isnan(moving), measured, moving)
+    if pair.gives_all_gaps:  # nodes that meet the master only later continue what is next to them
+        _, next_to = cKDTree(place[faced]).query(place[~faced])
+        moving[~faced] = moving[faced][next_to]
+        near[:] = True
+    wanted = pair.gap_at(place) if near.any() else None
+    target = np.zeros(len(place)) if wanted is None else wanted
+    return np.where(near, target - moving, 0.0), near | (pair.interference == "measured")
+
+
+def _of_candidates(meeting: Meeting, points: ContactPoints, index: int) -> np.ndarray:
+    """Return the distances of a pair's points at its candidates, NaN where these have none, [length]."""
+    distance, mine = np.full(len(meeting.candidates), np.nan), points.pair == index
+    mine &= np.isin(points.slave, meeting.nodes)  # tied nodes are no candidates
+    distance[np.searchsorted(meeting.nodes, points.slave[mine])] = points.distance[mine]
+    return distance
+
+
+@dataclass(frozen=True)
+class SlidingPoints:
+    """Contact points of bodies where they lie now, replicated.
+
+    Attributes:
+        points: The points; gap, normal and weights are those of the present coordinates, areas those of the
+            reference configuration. The weights reach the nodes around a facet.
+        coordinates: Present coordinates of all nodes, shape (n_nodes, dim), [length].
+        means: The coupling of each pair of mortar contact; None for other pairs.
+        placements: Rotation and translation of each pair's moving obstacle; None for other masters.
+        differential: What derivatives need.
+        lost: Slave nodes that face a facet but for which no closest point was found.
+    """
+
+    points: ContactPoints
+    coordinates: np.ndarray
+    means: tuple[MovingMeans | None, ...]
+    placements: tuple[tuple[np.ndarray, np.ndarray] | None, ...]
+    differential: Differential
+    lost: np.ndarray
+
+    @cached_property
+    def key(self) -> np.ndarray:
+        """Number of each point that stays the same from call to call, ascending, shape (n,)."""
+        return np.asarray(self.points.pair * len(self.coordinates) + self.points.slave)
+
+    def carry(self, values: np.ndarray, other: SlidingPoints) -> np.ndarray:
+        """Return values of another set of points at these, zero where it has no such point.
+
+        Args:
+            values: Values at the other points, shape (n_other, ...).
+            other: The other points.
+        """
+        result = np.zeros((self.points.count, *values.shape[1:]), dtype=values.dtype)
+        _, here, there = np.intersect1d(self.key, other.key, assume_unique=True, return_indices=True)
+        result[here] = values[there]
+        return result
+
+    def carry_tangential(self, friction: np.ndarray, other: SlidingPoints) -> np.ndarray:
+        """Return tangential forces of another set of points in these points' frames, shape (n, dim − 1).
+
+        They turn with the normals, by the smallest rotation.
+
+        Args:
+            friction: Forces in the other points' tangents, shape (n_other, dim − 1).
+            other: The other points.
+        """
+        vectors = np.einsum("na,nad->nd", friction, other.points.tangents)
+        return self._in_frames(self.carry(vectors, other), self.carry(other.points.normal, other))
+
+    def carry_slip(self, slip: np.ndarray, other: SlidingPoints) -> np.ndarray:
+        """Return the slip at another set of points in these points' frames, shape (n, dim − 1).
+
+        It turns with the master where the nodes stand now, from there by the smallest rotation of normals:
+        what bodies that turn together have slipped before stays what it is beside them.
+
+        Args:
+            slip: Slip in the other points' tangents, shape (n_other, dim − 1), [length].
+            other: The other points.
+        """
+        turn = self._turned_masters(other)
+        vectors = self.carry(np.einsum("na,nad->nd", slip, other.points.tangents), other)
+        normals = self.carry(other.points.normal, other)
+        return self._in_frames(*(np.einsum("nde,ne->nd", turn, each) for each in (vectors, normals)))
+
+    def _in_frames(self, vectors: np.ndarray, before: np.ndarray) -> np.ndarray:
+        """Return vectors across earlier normals, both (n, dim), in the present frames, (n, dim − 1)."""
+        normal = self.points.normal
+        cosine = np.einsum("nd,nd->n", before, normal)
+        along = np.einsum("nd,nd->n", vectors, normal) / np.maximum(1.0 + cosine, 1e-12)
+        turned = vectors - along[:, None] * (before + normal)
+        return np.asarray(np.einsum("nd,nad->na", turned, self.points.tangents))
+
+    def _turned_masters(self, other: SlidingPoints, least: float = 1e-6) -> np.ndarray:
+        """Return the rotations of the masters since another set of points, shape (n, dim, dim).
+
+        On a body it is the one that turns the nodes which a point meets now from their places then, about
+        their mean. Where these lie on a line, normals decide, with the weight ``least``.
+        """
+        met = abs(self.points.master).tocsr()
+        count, dim = self.points.normal.shape
+        row = np.repeat(np.arange(count), np.diff(met.indptr))
+        size = np.maximum(np.asarray(met.sum(axis=1)), np.finfo(float).tiny)
+        now, then = (
+            places[met.indices] - (met @ places / size)[row]
+            for places in (self.coordinates, other.coordinates)
+        )
+        of_rows = sp.csr_matrix((met.data, np.arange(len(row)), met.indptr), shape=(count, len(row)))
+        products = (now[:, :, None] * then[:, None, :]).reshape(len(row), dim * dim)
+        moment = np.asarray(of_rows @ products).reshape(count, dim, dim)
+        normals = self.points.normal[:, :, None] * self.carry(other.points.normal, other)[:, None]
+        scale = least * np.abs(moment).sum(axis=(1, 2))[:, None, None]
+        left, _, right = np.linalg.svd(moment + scale * normals)
+        left[:, :, -1] *= np.linalg.det(left @ right)[:, None]
+        rotation = np.asarray(left @ right)
+        rotation[np.diff(met.indptr) == 0] = np.eye(dim)
+        for index, (new, old) in enumerate(zip(self.placements, other.placements, strict=True)):
+            if new is not None and old is not None:
+                rotation[self.points.pair == index] = new[0] @ old[0].T
+        return rotation
+
+    def areas(self, scene: Scene) -> PointAreas:
+        """Return the areas that belong to the points, given the scene in its reference configuration."""
+        return PointAreas.of(scene, self.points, self.coordinates, self.means)
+
+    def met_areas_pulled_back(self, by_met: np.ndarray) -> np.ndarray:
+        """Vector-Jacobian product of parts that face masters with respect to the coordinates. Collective.
+
+        Args:
+            by_met: Derivative by the areas of the slave that face the master, of mortar contact alone, (n,).
+
+        Returns:
+            Shape (n_nodes, dim).
+        """
+        result = np.zeros_like(self.coordinates)
+        for mine, means in self._by_means:
+            if by_met[mine].any():
+                by_slave, by_master = means.areas_pulled_back(by_met[mine])
+                result[means.slave_nodes] += by_slave
+                result[means.master_nodes] += by_master
+        return result
+
+    def stiffness(self, multiplier: np.ndarray) -> GeometricStiffness:
+        """Return the derivative of the normal forces by the coordinates, see `geometric_stiffness`."""
+        return geometric_stiffness(self.points, self.differential, multiplier)
+
+    def friction_stiffness(self, friction: np.ndarray) -> LowRank:
+        """Return the derivative of the friction forces by the coordinates, see `friction_stiffness`."""
+        return friction_stiffness(self.points, self.differential, friction)
+
+    def material_points(self) -> MaterialPoints:
+        """Return where the nodes stand on their masters, for the slip from now on."""
+        points = self.points
+        foot = self.coordinates[points.slave] - points.distance[:, None] * points.normal
+        foot[np.diff(points.master.indptr) > 0] = 0.0
+        for index, placement in enumerate(self.placements):
+            if placement is not None:
+                rotation, translation = placement
+                mine = points.pair == index
+                foot[mine] = (foot[mine] - translation) @ rotation
+        return MaterialPoints(self.key, points.pair, points.master, foot)
+
+    def stored(self, start: MaterialPoints) -> dict[str, np.ndarray]:
+        """Return the arrays from which `SlidingContact.found_again` finds the same points.
+
+        Args:
+            start: Where the nodes stood.
+        """
+        found = {f"found.{name}": getattr(self.points, name) for name in LAST}
+        return found | start.stored()
+
+    def mean_tangents(self, normal: np.ndarray, friction: np.ndarray, start: MaterialPoints) -> MeanTangents:
+        """Return what derivatives of mortar contact have beside the rows of its forces. Collective.
+
+        Args:
+            normal: λ_N, shape (n,), [force].
+            friction: τ in the points' tangents, shape (n, dim − 1), [force].
+            start: Where the nodes stood, see `material_points`.
+        """
+        (way, weights), count = self._way(start), self.points.count
+        total = MeanTangents.none(count, friction.shape[1], self.coordinates.size)
+        for mine, means in self._by_means:
+            forces = normal[mine], friction[mine]
+            found = means.tangents(
+                self.points.part(mine), self.coordinates, forces, (way[mine], weights[mine])
+            )
+            total = found if len(mine) == count else total.with_points(mine, found)
+        # In the plane a slipping force does not turn with the slip, of which nothing is needed then.
+        if friction.shape[1] == 2 and friction.any():
+            total = replace(total, slip=total.slip + self._slip_beyond_rows(start, np.any(friction, axis=1)))
+        return total
+
+    def _slip_beyond_rows(self, start: MaterialPoints, rubbed: np.ndarray) -> sp.csr_matrix:
+        """Return the derivative of the slip of nodes less the rows of their friction forces."""
+        chosen = rubbed.copy()
+        for mine, _ in self._by_means:
+            chosen[mine] = False
+        points, width = self.points, self.points.normal.shape[1] - 1
+        rows = interleaved([spread(points.tangents[:, c], points.jump) for c in range(width)])
+        return scaled_rows((self.slip_rows(start) - rows).tocsr(), np.repeat(chosen, width).astype(float))
+
+    def means_pulled_back(
+        self, normal: np.ndarray, friction: np.ndarray, by_gap: np.ndarray, field: np.ndarray
+    ) -> np.ndarray:
+        """Return the derivative of −fᵀ field + by_gapᵀ g by the coordinates, of means alone. Collective.
+
+        That is, of the contact forces f of mortar contact at fixed multipliers, and of its gaps g beside
+        `gap_rows`.
+
+        Args:
+            normal: λ_N, shape (n,), [force].
+            friction: τ in the points' tangents, shape (n, dim − 1), [force].
+            by_gap: Shape (n,).
+            field: By dof of all nodes, shape (n_dofs,).
+        """
+        total = np.zeros(self.coordinates.size)
+        for mine, means in self._by_means:
+            some, by, forces = self.points.part(mine), by_gap[mine], (normal[mine], friction[mine])
+            motion = means.motion(some, (by != 0.0) | (forces[0] != 0.0) | forces[1].any(axis=1))
+            stiffness = motion.stiffness(some, *forces)
+            total += motion.gap_rows(some, self.coordinates).T @ by
+            total -= stiffness.right @ (stiffness.left.T @ field)
+        return total
+
+    @property
+    def moving_nodes(self) -> np.ndarray:
+        """Nodes on whose coordinates points depend, among those of all bodies, ascending."""
+        reached = [self.points.jump.indices, *(slopes.indices for slopes in self.differential.slopes)]
+        for _, means in self._by_means:
+            reached += [means.slave_nodes, means.master_nodes]
+        return np.unique(np.concatenate(reached))
+
+    def slip(self, start: MaterialPoints) -> np.ndarray:
+        """Return t_a·(x_s − x_m), x_m where the node stood at the start, carried along by the master.
+
+        Unchanged when everything moves as one rigid piece. Nodes without a point at the start have no slip,
+        see `MaterialPoints.extended`.
+
+        Args:
+            start: Where the nodes stood, see `material_points`.
+
+        Returns:
+            Slip in the present tangents, shape (n, dim − 1), [length].
+        """
+        way, _ = self._way(start)
+        return np.asarray(np.einsum("nd,nad->na", way, self.points.tangents))
+
+    @property
+    def gap_rows(self) -> sp.csr_matrix:
+        """Derivative of the gaps by all coordinates, shape (n, n_dofs), dof dim · node + component."""
+        return spread(self.points.normal, self.points.jump)
+
+    def slip_rows(self, start: MaterialPoints) -> sp.csr_matrix:
+        """Return the derivative of `slip` by all coordinates, (n · (dim − 1), n_dofs), dof dim · node + a.
+
+        It differs from the rows t_a·(δx_s − Σ W_j δx_j) of the friction forces, by the weights at the start
+        and by the turning of the tangents, as far as nodes slip.
+        """
+        points, (way, weights) = self.points, self._way(start)
+        motion = point_motion(points, self.differential)
+        turned = frame_changes(points.normal, points.axes, motion.directions)
+        count, width = points.count, points.normal.shape[1] - 1
+        jump, parts = (self._standing - weights).tocsr(), []
+        for c in range(width):
+            rows = spread(points.tangents[:, c], jump)
+            for a in range(width):
+                rows = rows + scaled_rows(motion.turn[a], np.einsum("nd,nd->n", turned[:, c, a], way))
+            parts.append(rows)
+        for mine, means in self._by_means:
+            some = points.part(mine)
+            moved = means.motion(some, np.ones(len(mine), dtype=bool))
+            for c, rows in enumerate(moved.slip_rows(some, self.coordinates, way[mine])):
+                parts[c] = parts[c] + placed(mine, count) @ rows
+        return interleaved(parts)
+
+    def slip_by_start(self, start: SlidingPoints) -> sp.csr_matrix:
+        """Return the derivative of `slip` by the coordinates at its start, shaped as `slip_rows`.
+
+        Args:
+            start: The points there.
+        """
+        _, here, there = np.intersect1d(self.key, start.key, assume_unique=True, return_indices=True)
+        plain: list[np.ndarray | None] = [
+            np.eye(self.coordinates.shape[1]) if now is None or then is None else now[0] @ then[0].T
+            for now, then in zip(self.placements, start.placements, strict=True)
+        ]
+        turned = [None if means else each for each, means in zip(plain, start.means, strict=True)]
+        result = slip_by_start(
+            self.points, self.coordinates, start.points, start.differential, (here, there), turned
+        )
+        for mine, means in start._by_means:
+            moved = slip_by_start_of_means(
+                self.points, self.coordinates, (start.points, mine), means, (here, there)
+            )
+            result = result + moved
+        return result.tocsr()
+
+    def _way(self, start: MaterialPoints) -> tuple[np.ndarray, sp.csr_matrix]:
+        """Return x_s − x_m, shape (n, dim), and the weights of nodes in x_m, shape (n, n_nodes)."""
+        if not np.isin(self.key, start.key).all():
+            start = start.extended(self.material_points())
+        start = start.part(np.searchsorted(start.key, self.key))
+        place = start.place.copy()
+        for index, placement in enumerate(self.placements):
+            if placement is not None:
+                rotation, translation = placement
+                mine = np.flatnonzero(start.pair == index)
+                place[mine] = place[mine] @ rotation.T + translation
+        way = self._standing @ self.coordinates - place - start.weights @ self.coordinates
+        return np.asarray(way), start.weights
+
+    @cached_property
+    def _standing(self) -> sp.csr_matrix:
+        """Weights of nodes in where each point stands: its node, with mortar the mean that it meets."""
+        at_node = np.ones(self.points.count)
+        for mine, _ in self._by_means:
+            at_node[mine] = 0.0
+        place = np.arange(self.points.count), self.points.slave
+        own = sp.csr_matrix((at_node, place), shape=self.points.master.shape)
+        return (own + scaled_rows(self.points.master, 1.0 - at_node)).tocsr()
+
+    @property
+    def _by_means(self) -> list[tuple[np.ndarray, MovingMeans]]:
+        """The points of each pair of mortar contact with its coupling."""
+        return [
+            (np.flatnonzero(self.points.pair == index), means)
+            for index, means in enumerate(self.means)
+            if means is not None
+        ]

@@ -1,0 +1,1 @@
+"""Scenes: bodies, materials, supports, loads and contact pairs."""

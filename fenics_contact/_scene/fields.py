@@ -1,0 +1,398 @@
+"""Values of loads and supports: numbers, functions of position, or UFL.
+
+A field known at some points, measured or computed by another program, as a function of position.
+
+Fields from files: tables of points, and values on the nodes or cells of a mesh.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.interpolate import RBFInterpolator
+from scipy.spatial import KDTree
+from ufl.core.expr import Expr
+
+from fenics_contact._base.checks import checked, require_file
+from fenics_contact._base.display import displayed
+from fenics_contact.errors import InvalidInputError, together, user_code
+from fenics_contact.readers.meshio import read_with_meshio
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+#: A function of points, shape (n, dim), [length], with a row (a vector) or a number (a scalar) for each.
+OfPosition = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+@checked()
+class Ufl:
+    """A value written in UFL: compiled into the form and evaluated at its quadrature points.
+
+    Numbers in it are compiled in, too: for a load that changes from step to step a function of position,
+    which needs no compiler, is cheaper. Derivatives by the shape of a body are exact for numbers and UFL;
+    gradients of functions of position are central differences, see `gradients_of`.
+
+    Attributes:
+        function: Takes the spatial coordinate (UFL), returns a UFL vector or scalar.
+
+    Example:
+        Hydrostatic pressure:
+
+        >>> Pressure("dam", "front", Ufl(lambda x: 9.81e-6 * (2e4 - x[2]))).surface
+        'front'
+    """
+
+    function: Callable[[Expr], Expr | float | Sequence[Expr | float]]
+
+
+#: A vector: numbers, a function of positions, or UFL.
+VectorValue = Sequence[float] | OfPosition | Ufl
+#: A number, a function of positions, or UFL.
+ScalarValue = float | OfPosition | Ufl
+
+
+def checked_vector(name: str, value: Any) -> Any:
+    """Return numbers as a tuple of floats, a function or UFL as it is.
+
+    Raises:
+        InvalidInputError: If it is not a vector of two or three components.
+    """
+    if isinstance(value, Ufl) or callable(value):
+        return value
+    array = finite_numbers(value)
+    if array is None or array.shape not in ((2,), (3,)):
+        raise InvalidInputError(
+            f"{name} must be three finite numbers (two for a plane body), got {value!r}: give one for x, y "
+            "and z, or a function of the points"
+        )
+    return tuple(float(component) for component in array)
+
+
+def checked_scalar(name: str, value: Any) -> Any:
+    """Return a number as a float, a function or UFL as it is.
+
+    Raises:
+        InvalidInputError: If it is none of them.
+    """
+    if isinstance(value, Ufl) or callable(value):
+        return value
+    array = finite_numbers(value)
+    if array is None or array.shape != ():
+        raise InvalidInputError(
+            f"{name} must be a finite number, got {value!r}: give a number or a function of the points"
+        )
+    return float(array)
+
+
+def finite_numbers(value: Any) -> np.ndarray | None:
+    """Return a value as an array of floats, None if it is something other than finite numbers."""
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    return array if np.isfinite(array).all() else None
+
+
+def evaluate(name: str, function: OfPosition, points: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Evaluate a function of position.
+
+    Args:
+        name: Name of the values in messages.
+        function: The function.
+        points: Points, shape (n, dim), [length].
+        shape: Shape of one value: () or (dim,).
+
+    Raises:
+        InvalidInputError: If it returns another shape or something other than finite numbers.
+        UserCodeError: If it raises.
+    """
+    with user_code(f"the function given as {name}"):
+        values = finite_numbers(function(points.copy()))
+    wanted = (len(points), *shape)
+    if values is None or values.shape != wanted:
+        given = "something other than finite numbers" if values is None else f"shape {values.shape}"
+        raise InvalidInputError(
+            f"the function given as {name} must return finite numbers of shape {wanted} for points of shape "
+            f"{points.shape}, got {given}: it receives all points at once, one row each"
+        )
+    return values
+
+
+def gradients_of(name: str, function: OfPosition, points: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Return the gradients of a function of position by central differences.
+
+    The step is 1e-5 of the extent of the points, at which the error of smooth functions is about 1e-10 of
+    their values; at a kink the slope is the mean of both sides. The function is asked for at points that lie
+    outside the body by one step.
+
+    Args:
+        name: Name of the values in messages.
+        function: The function.
+        points: Points, shape (n, dim), [length].
+        shape: Shape of one value: () or (dim,).
+
+    Returns:
+        Shape ``(n, *shape, dim)``, the derivatives last.
+
+    Raises:
+        InvalidInputError: If it returns another shape or something other than finite numbers.
+        UserCodeError: If it raises.
+    """
+    step = 1e-5 * (float(np.ptp(points, axis=0).max(initial=0.0)) or 1.0)
+    beside = f"{name}, asked {step:.1e} beside the nodes for its gradient"
+    columns = [
+        evaluate(beside, function, points + way, shape) - evaluate(beside, function, points - way, shape)
+        for way in step * np.eye(points.shape[1])
+    ]
+    return np.stack(columns, axis=-1) / (2.0 * step)
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+@checked("points", "values")
+class SampledField:
+    """A field given by its values at points; use it wherever a function of position is accepted.
+
+    It has the given values at the points. Between them it is interpolated through the nearest ones, by radial
+    functions that do not mind how the points lie: on a line, on a curved surface or in a volume. Beyond the
+    points it stays near the value of the nearest one, and only as far as ``reach``.
+
+    Attributes:
+        points: Coordinates, shape (n, dim), [length]. Points with three of which the last is the same
+            everywhere suit plane bodies, too.
+        values: A number for each, shape (n,), or a vector, shape (n, dim).
+        reach: Largest distance from the nearest point at which it may be asked for, [length]; by default
+            twice the largest distance of a point from its nearest neighbour.
+
+    Raises:
+        InvalidInputError: If shapes do not fit, numbers are not finite, or a point is given twice.
+
+    Example:
+        >>> heights = SampledField([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [0.0, 0.5, 2.0])
+        >>> heights(np.array([[1.0, 0.0, 0.0], [0.5, 0.0, 0.0]]))
+        array([0.5 , 0.25])
+    """
+
+    points: np.ndarray
+    values: np.ndarray
+    reach: float | None = None
+
+    def __post_init__(self) -> None:
+        """Convert to arrays of numbers and reject what is no field."""
+        points, values = finite_numbers(self.points), finite_numbers(self.values)
+        if points is None or points.ndim != 2 or points.shape[1] not in (2, 3) or len(points) == 0:
+            raise InvalidInputError(
+                f"SampledField.points must be rows of two or three finite numbers, got "
+                f"{_shape(points)}: give one row for each point"
+            )
+        if values is None or values.shape not in ((len(points),), points.shape):
+            raise InvalidInputError(
+                f"SampledField.values must be {len(points)} finite numbers, or rows of {points.shape[1]}, "
+                f"one for each point, got {_shape(values)}: give a value for each point"
+            )
+        if self.reach is not None and not (np.isfinite(self.reach) and self.reach > 0):
+            raise InvalidInputError(
+                f"SampledField.reach must be a length above zero, got {self.reach!r}: give the largest "
+                "distance from a point at which its value still holds, or none"
+            )
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "values", values)
+        self._refuse_doubles()
+
+    def _refuse_doubles(self) -> None:
+        order = np.lexsort(self.points.T)
+        same = np.flatnonzero((np.diff(self.points[order], axis=0) == 0).all(axis=1))
+        if same.size:
+            one, other = sorted(order[same[0] : same[0] + 2])
+            raise InvalidInputError(
+                f"SampledField.points must differ, points {one} and {other} are the same, "
+                f"{self.points[one]}, and so are {len(same) - 1} more: give each point once"
+            )
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Evaluate at points, shape (n, dim) -> (n,), or (n, dim) for a vector.
+
+        Raises:
+            InvalidInputError: If one is farther than ``reach`` from all given ones, or in another space.
+        """
+        known, values = self._in_space(points.shape[1])
+        self._refuse_far(points, known)
+        if len(points) == 0 or len(known) == 1:
+            return np.repeat(values[:1], len(points), axis=0)
+        return np.asarray(_through(known, values, points))
+
+    def _in_space(self, dim: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return points and values for bodies of a dimension."""
+        own = self.points.shape[1]
+        flat = own == 3 and np.ptp(self.points[:, 2]) == 0
+        if own == dim:
+            return self.points, self.values
+        if dim == 3 or not flat:
+            raise InvalidInputError(
+                f"SampledField.points must lie in the space of the bodies, they have {own} coordinates and "
+                f"the bodies {dim}: give {dim}"
+            )
+        return self.points[:, :2], self.values[:, :2] if self.values.ndim == 2 else self.values
+
+    def _refuse_far(self, points: np.ndarray, known: np.ndarray) -> None:
+        reach = self._reach if self.reach is None else self.reach
+        far, _ = KDTree(known).query(points)
+        if np.any(far > reach):
+            worst = int(np.argmax(far))
+            place = ", ".join(f"{x:.6g}" for x in points[worst])
+            raise InvalidInputError(
+                f"a sampled field must be known where it is used, its nearest point is {far[worst]:.6g} from "
+                f"({place}), and it reaches only {reach:.6g}: give values there, or a larger reach"
+            )
+
+    @cached_property
+    def _reach(self) -> float:
+        if len(self.points) == 1:
+            return np.inf
+        return 2.0 * float(KDTree(self.points).query(self.points, 2)[0][:, 1].max())
+
+
+def _through(known: np.ndarray, values: np.ndarray, points: np.ndarray, neighbours: int = 32) -> np.ndarray:
+    """Return the values at points, interpolated through some nearest known ones."""
+    # A kernel of distances alone, with a constant: solvable however the points lie.
+    form = RBFInterpolator(known, values, min(neighbours, len(known)), kernel="linear", degree=0)
+    return np.asarray(form(points))
+
+
+def _shape(array: np.ndarray | None) -> str:
+    return "something other than finite numbers" if array is None else f"shape {array.shape}"
+
+
+TABLES = (".csv", ".txt", ".dat", ".tsv")
+AXES = ("x", "y", "z")
+
+
+def read_field(
+    path: str | Path,
+    field: str | Sequence[str] | None = None,
+    *,
+    reach: float | None = None,
+    comm: MPI.Comm | None = None,
+) -> SampledField:
+    """Read a field as a function of position, for loads, supports, friction coefficients and gaps.
+
+    Example:
+        ``Pressure("shell", "outer", read_field("wind.csv", "pressure"))``; the file begins with a line of
+        names, ``x, y, z, pressure``. ``ThermalStrain("disc", read_field("heat.vtu", "temperature"))`` takes
+        values at the nodes of another program's mesh, which need not be the body's.
+
+    Args:
+        path: A table (.csv, .txt, .dat, .tsv) with one row a point, whose first line names the columns x, y,
+            z (z may be missing) and others, separated by commas, semicolons, tabs or blanks, after remarks
+            that begin with "#"; or a mesh of any format that meshio reads, with fields at its nodes or its
+            cells, which count at their centres.
+        field: Name of the column or field; several, one for each axis, for a vector made of numbers. Needed
+            if there is more than one.
+        reach: See `SampledField`.
+        comm: If given, rank 0 reads the file and all ranks receive the field.
+
+    Raises:
+        InvalidInputError: If the file is missing or cannot be read, lacks coordinates or the field, or has
+            something other than finite numbers.
+
+    Note:
+        Collective on ``comm`` if given.
+    """
+    if comm is None:
+        return SampledField(*_read(Path(path), field), reach)
+    read = None
+    with together(comm):
+        read = _read(Path(path), field) if comm.rank == 0 else None
+    points, values = comm.bcast(read)
+    return SampledField(points, values, reach)
+
+
+def _read(path: Path, field: str | Sequence[str] | None) -> tuple[np.ndarray, np.ndarray]:
+    """Return points and values."""
+    require_file(path, "a field")
+    if path.suffix.lower() in TABLES:
+        columns = _table(path)
+        points = np.column_stack([columns.pop(axis) for axis in AXES if axis in columns])
+        places = dict.fromkeys(columns, points)
+    else:
+        places, columns = _of_mesh(path)
+    names = _chosen(path, columns, field)
+    values = [columns[name] for name in names]
+    return places[names[0]], values[0] if len(values) == 1 else np.column_stack(values)
+
+
+def _table(path: Path) -> dict[str, np.ndarray]:
+    """Return the columns of a table by name."""
+    try:
+        lines = [line for line in path.read_text(encoding="utf-8-sig").splitlines() if line.strip()]
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidInputError(f"the field '{path}' must be readable text: {error}") from error
+    while len(lines) > 1 and lines[0].startswith("#") and not _is_number(lines[1]):
+        del lines[0]  # a remark before the line of names
+    mark = next((mark for mark in ",;\t" if lines and mark in lines[0]), None)
+    rows = [line.split() for line in lines] if mark is None else list(csv.reader(lines, delimiter=mark))
+    names = [name.strip().lstrip("#").strip() for name in rows[0]] if rows else []
+    named = [name.lower() if name.lower() in AXES else name for name in names]
+    if not {"x", "y"} <= set(named) or len(set(named)) < len(named):
+        raise InvalidInputError(
+            f"the first line of '{path}' must name its columns, x, y, z and others, each once, got "
+            f"{', '.join(names) or 'nothing'}: write a line such as x, y, z, pressure"
+        )
+    return dict(zip(named, _numbers(path, rows[1:], len(named)).T, strict=True))
+
+
+def _is_number(line: str) -> bool:
+    return line.lstrip()[0] in "+-.0123456789"
+
+
+def _numbers(path: Path, rows: Sequence[Sequence[str]], count: int) -> np.ndarray:
+    """Return the rows of a table as numbers, shape (n, count)."""
+    uneven = next((number for number, row in enumerate(rows) if len(row) != count), None)
+    if uneven is not None or not rows:
+        got = "no rows" if uneven is None else f"{len(rows[uneven])} in row {uneven + 1}"
+        raise InvalidInputError(
+            f"every row of '{path}' must have {count} entries, as many as its first line names, got {got}: "
+            "complete the table"
+        )
+    try:
+        return np.array(rows, dtype=np.float64)
+    except ValueError as error:
+        raise InvalidInputError(
+            f"all rows of '{path}' but the first must be numbers ({error}): write them with a point as "
+            "decimal mark"
+        ) from error
+
+
+def _of_mesh(path: Path) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Return points and values of every field of a mesh by name."""
+    mesh = read_with_meshio(path)
+    places = dict.fromkeys(mesh.point_data, np.asarray(mesh.points, dtype=np.float64))
+    fields = dict(mesh.point_data)
+    centres = [mesh.points[block.data].mean(axis=1) for block in mesh.cells]
+    for name, values in mesh.cell_data.items():
+        if name not in fields:
+            places[name], fields[name] = np.concatenate(centres), np.concatenate(values)
+    return places, fields
+
+
+def _chosen(
+    path: Path, columns: Mapping[str, np.ndarray], field: str | Sequence[str] | None
+) -> tuple[str, ...]:
+    """Return the names of the columns that make the field."""
+    wanted = (field,) if isinstance(field, str) else tuple(columns if field is None else field)
+    if not wanted or not set(wanted) <= set(columns) or (field is None and len(columns) > 1):
+        asked = "none was named" if field is None else f"{', '.join(wanted)} was asked for"
+        raise InvalidInputError(
+            f"'{path}' must have the field that is wanted, it has {', '.join(columns) or 'none'}, and "
+            f"{asked}: give field, one of these names, or several for a vector"
+        )
+    return wanted

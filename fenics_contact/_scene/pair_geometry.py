@@ -1,0 +1,537 @@
+"""Between which surfaces the gaps of contact pairs are measured, and the error of flat facets.
+
+How far the bodies of a contact pair may come closer, estimated before anything is computed.
+
+Bodies that nothing keeps from passing through each other, for want of a pair or of a larger surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fenics_contact._base.display import counted, displayed
+from fenics_contact._scene.loads import BodyForce, Load, Pressure, ThermalStrain, TotalForce
+from fenics_contact._scene.pairs import ContactPair, Surface, Tie
+from fenics_contact._scene.parts import in_words, surface_of
+from fenics_contact._scene.supports import RigidSurface
+from fenics_contact._surfaces.facets import FacetedSurface, heights, quadrature_areas
+from fenics_contact._surfaces.projection import project
+from fenics_contact.materials.elastic import PlaneStress
+from fenics_contact.materials.kernels import rigid_body_modes
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.cell_types import cell_type_of
+from fenics_contact.mesh.faces import boundary_faces, corners_of, vector_areas
+from fenics_contact.shapes.combined import Joined, Placed
+from fenics_contact.shapes.simple import SurfaceShape, evaluate_shape, tangent_bases
+from fenics_contact.theory import contact_modulus, hertz_line, hertz_point
+
+if TYPE_CHECKING:
+    from fenics_contact._scene.body import Body
+    from fenics_contact._scene.parts import SceneParts
+
+
+#: Nodes around the smallest gap to which the gap is fitted.
+AROUND = 30
+#: Contact is taken as line contact if one relative curvature is below this fraction of the other.
+LINE = 1e-2
+#: A gap counts as flat if its curvature times the size of the surface is below this.
+FLAT = 1e-6
+
+
+def displacement_along(scene: SceneParts, normal: np.ndarray) -> float:
+    """Return the largest displacement along a direction that a support prescribes as a number, [length]."""
+    sizes = [0.0]
+    for support in scene.supports:
+        given = support.motion[: scene.dim] if isinstance(support, RigidSurface) else support.value
+        value = [0.0 if number is None or callable(number) else number for number in given]
+        sizes.append(abs(float(np.array(value) @ normal)))
+    return max(sizes)
+
+
+def force_along(scene: SceneParts, normal: np.ndarray) -> float | None:
+    """Return the largest resultant, over the bodies, of the loads along a direction, [force].
+
+    None if a load is given as a function or in UFL.
+    """
+    total = {name: np.zeros(scene.dim) for name in scene.body_names}
+    for load in scene.loads:
+        resultant = _resultant(scene, load)
+        if resultant is None:
+            return None
+        total[load.body] += resultant
+    return max(abs(float(force @ normal)) for force in total.values())
+
+
+def _resultant(scene: SceneParts, load: Load) -> np.ndarray | None:
+    """Return the resultant of a load that is given by numbers, shape (dim,), [force]."""
+    if isinstance(load, ThermalStrain):
+        return np.zeros(scene.dim)
+    if callable(load.value) or not isinstance(load.value, float | tuple):
+        return None
+    mesh, value = scene.bodies[load.body].mesh, np.array(load.value)
+    if isinstance(load, TotalForce):
+        return value
+    if isinstance(load, BodyForce):
+        return value * mesh.volume
+    facets = mesh.surfaces[load.surface]
+    if isinstance(load, Pressure):
+        return np.asarray(-value * vector_areas(mesh.points, facets).sum(axis=0))
+    return value * float(quadrature_areas(mesh.points, facets).sum())
+
+
+def modulus_of(scene: SceneParts, pair: ContactPair) -> float | None:
+    """Return the contact modulus E* of a pair, of the softest materials of its bodies; None if not isotropic.
+
+    Rigid obstacles count as infinitely stiff.
+    """
+    sides = [_constants(scene.bodies[pair.slave.body]), (np.inf, 0.0)]
+    if isinstance(pair.master, Surface):
+        sides[1] = _constants(scene.bodies[pair.master.body])
+    if None in sides:
+        return None
+    (young_1, poisson_1), (young_2, poisson_2) = sides  # type: ignore[misc]
+    return contact_modulus(young_1, poisson_1, young_2, poisson_2)
+
+
+def master_share(scene: SceneParts, pair: ContactPair | Tie) -> float:
+    """Return the master's share of the compliance 1/E* of two bodies; a half where one is not isotropic."""
+    assert isinstance(pair.master, Surface)
+    own, other = (_constants(scene.bodies[surface.body]) for surface in (pair.slave, pair.master))
+    if own is None or other is None:
+        return 0.5
+    moduli = [contact_modulus(*constants, np.inf, 0.0) for constants in (own, other)]
+    return moduli[0] / sum(moduli)
+
+
+def _constants(body: Body) -> tuple[float, float] | None:
+    """Return Young's modulus and Poisson's ratio, the latter 0 where a thin slice strains freely."""
+    constants = []
+    for material in body.materials:
+        if not (hasattr(material, "young_modulus") and hasattr(material, "poisson_ratio")):
+            return None
+        ratio = 0.0 if isinstance(material, PlaneStress) else float(material.poisson_ratio)
+        constants.append((float(material.young_modulus), ratio))
+    return min(constants)
+
+
+def hertz_approach(
+    force: float, modulus: float, place: np.ndarray, normal: np.ndarray, gap: np.ndarray
+) -> float | None:
+    """Return how far two bodies come closer by Hertz's theory; None where it does not hold, [length].
+
+    The relative curvatures are those of a quadratic polynomial through the gaps around the smallest one; the
+    theory holds if they are positive and the contact is smaller than the surfaces. Along a line, where the
+    approach depends on the whole bodies, it is the depth κ a²/2 by which they would overlap undeformed.
+
+    Args:
+        force: Force that presses the bodies together, [force], in the plane [force / length].
+        modulus: E*, [force / length²].
+        place: Coordinates of the nodes of one surface that face the other, shape (n, dim), [length].
+        normal: Normals of the gaps there, shape (n, dim).
+        gap: Gaps, shape (n,), [length].
+    """
+    curvatures, reach = _relative_curvatures(place, normal[np.argmin(gap)], gap)
+    if force <= 0.0 or len(curvatures) == 0:
+        return None
+    low, high, size = curvatures[0], curvatures[-1], reach.max()
+    if high * size <= FLAT or low < -LINE * high:
+        return None
+    if len(curvatures) == 1 or low <= LINE * high:
+        line = hertz_line(force / (1.0 if len(curvatures) == 1 else reach[0]), high, modulus)
+        return float(high * line.half_width**2 / 2) if line.half_width < size else None
+    point = hertz_point(force, (low, high), modulus)
+    return point.approach if max(point.semi_axes) < size else None
+
+
+def _relative_curvatures(
+    place: np.ndarray, normal: np.ndarray, gap: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Fit a quadratic polynomial to the gap around its minimum.
+
+    Returns:
+        The relative curvatures, ascending, shape (dim − 1,), [1 / length], and how far the nodes reach along
+        their directions, shape (dim − 1,), [length]; nothing if there are too few nodes.
+    """
+    dim = place.shape[1]
+    axes = tangent_bases(normal[None])[0]
+    along = (place - place[np.argmin(gap)]) @ axes.T
+    near = np.argsort((along**2).sum(axis=1))[:AROUND]
+    if len(near) < dim * (dim + 1) // 2:
+        return np.zeros(0), np.zeros(0)
+    size = float(np.abs(along[near]).max())
+    x = along[near] / size
+    one, other = np.triu_indices(dim - 1)
+    terms = np.column_stack([np.ones(len(x)), x, x[:, one] * x[:, other]])
+    bend = np.zeros((dim - 1, dim - 1))
+    bend[one, other] = np.linalg.lstsq(terms, gap[near], rcond=1e-10)[0][dim:] / size**2
+    values, directions = np.linalg.eigh(bend + bend.T)
+    return values, np.ptp(along @ directions, axis=0)
+
+
+#: Number of slave nodes that are examined, those nearest to the master.
+MOST = 2000
+
+
+@displayed
+@dataclass(frozen=True)
+class PairGeometry:
+    """Between which surfaces the gaps of a contact pair are measured, and the error of flat facets.
+
+    Attributes:
+        slave: The slave's surface: the name of its shape (``"Torus"``), ``"reconstructed"``, ``"flat"`` where
+            a surface through the nodes is that of the facets, or ``"facets"`` where these were requested.
+        master: The same of the master; of a rigid obstacle the name of its class.
+        height: Largest height of the true surface over the middles of its facets, [length], where the gap
+            exceeds the smallest one by no more than the approach; everywhere if that is unknown. Of the
+            master and, with mortar contact, also of the slave; zero on obstacles, as nodes lie on true
+            surfaces, and where the pair gives all gaps.
+        approach: Estimate of how far the bodies come closer, [length]: by Hertz's theory under the largest
+            resultant of the loads on one body, or by the largest displacement along the normal that a support
+            prescribes, if that is larger. None if neither is known.
+        discretisation: Where contact is enforced, and why, see `ContactPair.reason`.
+        given: What the pair gives in place of measured gaps, in words, see `ContactPair.given_gap`.
+    """
+
+    slave: str
+    master: str
+    height: float
+    approach: float | None
+    discretisation: str
+    given: str = ""
+
+    @property
+    def share(self) -> float | None:
+        """Error of the facets relative to the approach; None if that is unknown."""
+        return None if not self.approach else self.height / self.approach
+
+    def __str__(self) -> str:
+        """Describe it in one line."""
+        parts = f"{self.slave} on {self.master}", self.discretisation, self.given, "facets "
+        words = "; ".join(filter(None, parts))
+        if self.height == 0.0:
+            return words + "miss nothing"
+        share = self.share
+        known = "of an unknown part" if share is None else f"{100 * share:.2g} %"
+        by = "" if self.approach is None else f" (about {self.approach:.2g})"
+        return words + f"miss it by up to {self.height:.2g}, {known} of the approach{by}"
+
+
+@dataclass(frozen=True)
+class _Meeting:
+    """Nodes of a slave that face the master.
+
+    Attributes:
+        node: Which of the slave's, shape (n,).
+        normal: Normals of the gaps, shape (n, dim).
+        gap: Gaps, shape (n,), [length].
+        facet: Facets of the master that they meet, shape (n,); none on an obstacle.
+    """
+
+    node: np.ndarray
+    normal: np.ndarray
+    gap: np.ndarray
+    facet: np.ndarray
+
+
+def pair_geometry(scene: SceneParts, pair: ContactPair) -> PairGeometry:
+    """Return between which surfaces the gaps of a pair are measured."""
+    geometry = "best" if pair.geometry == "faceted" else pair.geometry
+    slave = surface_of(scene, pair.slave, geometry)
+    name = _name(scene, pair, pair.slave, slave)
+    if not isinstance(pair.master, Surface):
+        met = _meeting_obstacle(slave, pair.master)
+        approach = _approach(scene, pair, slave, met)
+        return PairGeometry(name, _shape_name(pair.master), 0.0, approach, in_words(pair), pair.given_gap)
+    master = surface_of(scene, pair.master, geometry)
+    met = _meeting(slave, master)
+    approach = _approach(scene, pair, slave, met)
+    near = met.gap <= met.gap.min(initial=np.inf) + (np.inf if approach is None else approach)
+    height = _largest_height(master, np.unique(met.facet[near]))
+    if pair.by_mortar:
+        touching = np.flatnonzero(np.isin(slave.facets, met.node[near]).any(axis=1))
+        height = max(height, _largest_height(slave, touching))
+    if pair.gives_all_gaps:
+        height = 0.0
+    names = name, _name(scene, pair, pair.master, master)
+    return PairGeometry(*names, height, approach, in_words(pair), pair.given_gap)
+
+
+def _name(scene: SceneParts, pair: ContactPair, surface: Surface, faceted: FacetedSurface) -> str:
+    if pair.geometry == "faceted":
+        return "facets"
+    shape = scene.bodies[surface.body].mesh.origin.shapes.get(surface.name)
+    if pair.geometry == "best" and shape is not None:
+        return _shape_name(shape)
+    return "flat" if faceted.relief is None else "reconstructed"
+
+
+def _shape_name(shape: SurfaceShape) -> str:
+    if isinstance(shape, Placed):
+        return _shape_name(shape.shape)
+    if isinstance(shape, Joined):
+        return " and ".join(sorted({_shape_name(part) for part in shape.shapes}))
+    return type(shape).__name__
+
+
+def _meeting(slave: FacetedSurface, master: FacetedSurface) -> _Meeting:
+    away, _ = cKDTree(master.points).query(slave.points)
+    chosen = np.sort(np.argsort(away)[:MOST])
+    hit = project(slave.points[chosen], slave.normals[chosen], master)
+    return _Meeting(chosen[hit.point], hit.normal, hit.gap, hit.facet)
+
+
+def _meeting_obstacle(slave: FacetedSurface, obstacle: SurfaceShape) -> _Meeting:
+    normal = evaluate_shape(obstacle, "normals", slave.points)
+    facing = np.flatnonzero(np.einsum("nd,nd->n", slave.normals, normal) < 0)
+    gap = evaluate_shape(obstacle, "distance", slave.points[facing])
+    return _Meeting(facing, normal[facing], gap, np.zeros(len(facing), dtype=np.int64))
+
+
+def _approach(scene: SceneParts, pair: ContactPair, slave: FacetedSurface, met: _Meeting) -> float | None:
+    """Return the estimate of `PairGeometry.approach`."""
+    if len(met.node) == 0:
+        return None
+    middle = np.argmin(met.gap)
+    normal, node = met.normal[middle], met.node[middle]
+    sizes = [displacement_along(scene, normal)]
+    force, modulus = force_along(scene, normal), modulus_of(scene, pair)
+    if force is not None and modulus is not None:
+        # Each plane of symmetry through the contact halves the force.
+        whole = force * 2.0 ** np.count_nonzero(slave.mirrored[node])
+        sizes.append(hertz_approach(whole, modulus, slave.points[met.node], met.normal, met.gap) or 0.0)
+    return max(sizes) or None
+
+
+def _largest_height(surface: FacetedSurface, facets: np.ndarray) -> float:
+    middle = 1.0 / 3.0 if surface.corners == 3 else 0.0
+    local = np.full((len(facets), surface.dim - 1), middle)
+    return float(np.abs(heights(surface, facets, local).value).max(initial=0.0))
+
+
+#: Part of a facet within which surfaces touch, and by which they overlap before loads more than facets do.
+TOUCHING, OVERLAPPING = 1e-3, 0.05
+#: Part of the largest displacement by which a facet counts as inside another body.
+DEEP = 1e-3
+#: Barycentric coordinates down to this are inside.
+ROUNDING = -1e-12
+
+#: The boundary of a body, in linear facets, with the cell behind each, and its inside, in simplices.
+Outline: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Unpaired:
+    """Two bodies that no pair or tie keeps apart, or whose surfaces of these are too small.
+
+    Attributes:
+        bodies: Their names.
+        paired: Whether a pair or tie names surfaces of both.
+        counts: Facets outside of these surfaces that touch the other body before loads, those that lie in it,
+            and those that displacements move into it.
+    """
+
+    bodies: tuple[str, str]
+    paired: bool
+    counts: tuple[int, int, int]
+
+    def in_words(self, entering: str = "pass into each other") -> str:
+        """Return what is wrong and what to do, or "" if nothing is."""
+        touching, overlapping, entered = self.counts
+        if self.paired:
+            touching = 0
+        count, what = next(
+            (each for each in ((entered, entering), (overlapping, "overlap unloaded")) if each[0]),
+            (touching, "touch"),
+        )
+        if not count:
+            return ""
+        where, mend = (
+            ("outside the surfaces of their pairs and ties", "name more of their facets in these")
+            if self.paired
+            else (
+                "without a pair or tie between them",
+                "add a ContactPair or a Tie, or take AutomaticContact()",
+            )
+        )
+        one, other = self.bodies
+        return f"bodies {one!r} and {other!r} {what} at {counted(count, 'facet')}, {where}: {mend}"
+
+
+def outline_of(mesh: BodyMesh) -> Outline:
+    """Return the boundary and the inside of a body, which depend on its cells alone."""
+    cells = mesh.linear.cells
+    facets, behind = boundary_faces(cells, mesh.dim)
+    return facets, cells[behind], cells[:, cell_type_of(cells, mesh.dim).simplices].reshape(-1, mesh.dim + 1)
+
+
+def unpaired_bodies(scene: SceneParts) -> tuple[str, ...]:
+    """Return in words which bodies nothing keeps apart, unloaded or where supports move them as if rigid.
+
+    Bodies with a pair are looked at unloaded, as it keeps them from moving as if rigid.
+    """
+    moved = {name: _moved_by_supports(scene, name) for name in scene.body_names}
+    reach = max(float(np.linalg.norm(each, axis=1).max()) for each in moved.values())
+    near = bodies_near(scene, reach)
+    names = {name for both in near for name in both}
+    outlines = {name: outline_of(scene.bodies[name].mesh) for name in names}
+    found = (unpaired(scene, both, outlines, moved, reach) for both in near)
+    entering = "pass into each other as their supports move them"
+    told = (replace(each, counts=(*each.counts[:2], 0)) if each.paired else each for each in found)
+    return tuple(words for each in told if (words := each.in_words(entering)))
+
+
+def bodies_near(scene: SceneParts, reach: float) -> list[tuple[str, str]]:
+    """Return the bodies whose bounding boxes meet, where each moves by no more than a reach, [length]."""
+    boxes = {
+        name: (body.mesh.points.min(axis=0) - reach, body.mesh.points.max(axis=0) + reach)
+        for name, body in scene.bodies.items()
+    }
+    slack = TOUCHING * max(float(np.max(high - low)) for low, high in boxes.values())
+
+    def meet(one: str, other: str) -> bool:
+        return bool((boxes[one][0] <= boxes[other][1] + slack).all())
+
+    return [(a, b) for a, b in combinations(boxes, 2) if meet(a, b) and meet(b, a)]
+
+
+def unpaired(
+    scene: SceneParts,
+    both: tuple[str, str],
+    outlines: Mapping[str, Outline],
+    moved: Mapping[str, np.ndarray],
+    reach: float,
+    share: slice = slice(None),
+) -> Unpaired:
+    """Count the facets of two bodies that nothing keeps out of each other.
+
+    Only facets outside of the surfaces that pairs and ties of the two name are looked for in the cells of the
+    other. Those that go there behind a named surface are left out: how far that passes is the pair's matter.
+
+    Args:
+        scene: The scene.
+        both: Names of the bodies.
+        outlines: Body name -> its boundary and inside.
+        moved: Body name -> displacement of its nodes, shape (n_nodes, dim), [length].
+        reach: The largest displacement of all bodies, [length].
+        share: Which of the facets are looked at, for ranks to share them.
+    """
+    named = _named(scene, both)
+    counts, deep = np.zeros(3, dtype=int), DEEP * reach
+    for body, into in (both, both[::-1]):
+        before, wall = scene.bodies[body].mesh.points, scene.bodies[into].mesh.points
+        facets, behind, _ = outlines[body]
+        mine = np.isin(facets, named[body]).all(axis=1)
+        own, mine = facets[mine], np.flatnonzero(~mine)[share]
+        facets, behind, inside = facets[mine], behind[mine], outlines[into][2]
+        size = np.ptp(before[facets], axis=1).max(axis=1)
+        here, there = _Facets.of(before, facets, behind), _Facets.of(before + moved[body], facets, behind)
+        passed = wall + moved[into]
+        touching = here.within(TOUCHING * size, wall, inside)
+        overlapping = here.within(-OVERLAPPING * size, wall, inside)
+        overlapping &= ~here.follow(_Facets.of(before, own), overlapping, wall, inside)
+        entered = there.within(-deep, passed, inside) & ~here.within(-deep, wall, inside)
+        entered &= ~there.follow(_Facets.of(before + moved[body], own), entered, passed, inside)
+        counts += [np.count_nonzero(each) for each in (touching, overlapping, entered)]
+    return Unpaired(both, any(len(nodes) for nodes in named.values()), tuple(counts.tolist()))
+
+
+def _moved_by_supports(scene: SceneParts, name: str) -> np.ndarray:
+    """Return the rigid motion of a body's nodes nearest to what its supports prescribe, (n_nodes, dim)."""
+    points = scene.bodies[name].mesh.points
+    modes = rigid_body_modes(points)
+    prescribed = scene.prescribed(name)
+    given = ~np.isnan(prescribed)
+    motion = np.linalg.lstsq(modes[given], prescribed[given], rcond=None)[0]
+    return np.asarray(modes @ motion)
+
+
+def _named(scene: SceneParts, both: tuple[str, str]) -> dict[str, np.ndarray]:
+    """Return for each of two bodies its nodes on surfaces of the pairs and ties between them."""
+    nodes: dict[str, list[np.ndarray]] = {name: [] for name in both}
+    pairs: list[ContactPair | Tie] = [*scene.contacts, *scene.ties]
+    for pair in pairs:
+        sides = [side for side in (pair.slave, pair.master) if isinstance(side, Surface)]
+        if {side.body for side in sides} == set(both):
+            for side in sides:
+                nodes[side.body].append(np.unique(scene.bodies[side.body].mesh.surfaces[side.name]))
+    return {name: np.concatenate([*found, np.zeros(0, dtype=np.int64)]) for name, found in nodes.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class _Facets:
+    """Facets of a body.
+
+    Attributes:
+        middle: Shape (n, dim), [length].
+        normal: Outwards, of unit length, shape (n, dim).
+        depth: How far they are from the middles of their cells, shape (n,), [length].
+    """
+
+    middle: np.ndarray
+    normal: np.ndarray
+    depth: np.ndarray
+
+    @classmethod
+    def of(cls, points: np.ndarray, facets: np.ndarray, cells: np.ndarray | None = None) -> _Facets:
+        """Return facets, with the cells behind them, given by their nodes."""
+        area = vector_areas(points, facets)
+        normal = area / np.linalg.norm(area, axis=1)[:, None]
+        middle = points[corners_of(facets, points.shape[1])].mean(axis=1)
+        inner = middle if cells is None else points[cells].mean(axis=1)
+        return cls(middle, normal, np.einsum("nd,nd->n", middle - inner, normal))
+
+    def within(self, out: np.ndarray | float, wall: np.ndarray, simplices: np.ndarray) -> np.ndarray:
+        """Return which middles, moved outwards, are inside a body; inwards only as far as their cells go."""
+        places = self.middle + np.maximum(out, -self.depth)[:, None] * self.normal
+        found: np.ndarray = ((places >= wall.min(axis=0)) & (places <= wall.max(axis=0))).all(axis=1)
+        if found.any():
+            found[found] = _in_simplices(places[found], wall, simplices)
+        return found
+
+    def follow(
+        self, leading: _Facets, chosen: np.ndarray, wall: np.ndarray, simplices: np.ndarray
+    ) -> np.ndarray:
+        """Return which of the chosen facets are behind leading ones that go as deep into a body as they do.
+
+        Those beside them, in one surface with them, lead themselves.
+        """
+        found = np.zeros(len(chosen), dtype=bool)
+        at = np.flatnonzero(chosen)
+        if len(at) and len(leading.middle):
+            near = cKDTree(leading.middle).query(self.middle[at])[1]
+            middle, normal = leading.middle[near], leading.normal[near]
+            behind = np.maximum(np.einsum("nd,nd->n", middle - self.middle[at], normal), 0.0)
+            found[at] = np.einsum("nd,nd->n", self.normal[at], normal) < 0.5
+            found[at] &= _in_simplices(middle - behind[:, None] * normal, wall, simplices)
+        return found
+
+
+def _in_simplices(places: np.ndarray, points: np.ndarray, simplices: np.ndarray) -> np.ndarray:
+    """Return which places are in simplices, (n,)."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    for axis in np.argsort((high - low) / np.ptp(points, axis=0)):  # what leaves out most comes first
+        along = points[simplices.T, axis]
+        simplices = simplices[(along.min(axis=0) <= high[axis]) & (along.max(axis=0) >= low[axis])]
+    inside = np.zeros(len(places), dtype=bool)
+    if not len(simplices):
+        return inside
+    corners = points[simplices]
+    middle = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+    close = cKDTree(places).query_ball_point(middle, radius)
+    count = np.array([len(each) for each in close])
+    place = np.concatenate([*close, np.zeros(0)]).astype(np.int64)
+    start, sides = corners[:, 0], np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    simplex = np.repeat(np.arange(len(corners)), count)
+    full = np.abs(np.linalg.det(sides)) > 0.0
+    kept = full[simplex]
+    place, simplex = place[kept], simplex[kept]
+    rest = np.linalg.solve(sides[simplex], (places[place] - start[simplex])[..., None])[..., 0]
+    inside[place[np.minimum(rest.min(axis=1), 1.0 - rest.sum(axis=1)) >= ROUNDING]] = True
+    return inside

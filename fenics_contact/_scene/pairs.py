@@ -1,0 +1,302 @@
+"""Contact pairs with their friction laws, and tied surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from fenics_contact._base.checks import checked
+from fenics_contact._base.display import name_in_words
+from fenics_contact._scene.fields import OfPosition, evaluate
+from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact._surfaces.true_surface import Geometry
+from fenics_contact.errors import InvalidInputError
+
+#: Where contact is enforced: at the slave's nodes, or weighted by its shape functions (mortar).
+Discretisation: TypeAlias = Literal["node", "mortar"]
+#: What a pair may be given: one of them, or the better one of its scene, see `chosen_discretisation`.
+AnyDiscretisation: TypeAlias = Literal["best"] | Discretisation
+
+
+@dataclass(frozen=True)
+@checked()
+class Surface:
+    """A named surface of a named body.
+
+    Attributes:
+        body: Name of the body in the scene.
+        name: Name of the surface in the body's mesh.
+    """
+
+    body: str
+    name: str
+
+
+@dataclass(frozen=True)
+@checked()
+class Coulomb:
+    """Coulomb friction: ‖τ‖ ≤ friction_coefficient · λ_N.
+
+    Slip is that of the whole load step, of points that were open at its start as well, see `LoadStep`.
+
+    Attributes:
+        friction_coefficient: Friction coefficient μ ≥ 0, dimensionless. Zero is frictionless contact. A
+            function receives points of the slave, shape (n, dim), and returns μ there, shape (n,).
+    """
+
+    friction_coefficient: float | OfPosition
+
+    def __post_init__(self) -> None:
+        """Refuse a negative coefficient."""
+        given = self.friction_coefficient
+        if not (callable(given) or (np.isfinite(given) and given >= 0)):
+            raise InvalidInputError(
+                f"friction_coefficient must be zero or positive, got {given!r}: "
+                "steel on steel has about 0.3; omit friction for a frictionless pair"
+            )
+
+
+@dataclass(frozen=True)
+@checked()
+class Tresca:
+    """Friction with a slip bound that does not depend on the pressure.
+
+    It also acts on points across an open gap, as in the classical problem with given friction. Use it where
+    surfaces are known to touch.
+
+    Attributes:
+        traction: Largest tangential traction by undeformed area, ≥ 0, [force / length²]; a number, or a
+            function of points as for `Coulomb`.
+    """
+
+    traction: float | OfPosition
+
+    def __post_init__(self) -> None:
+        """Refuse a negative bound."""
+        if not (callable(self.traction) or (np.isfinite(self.traction) and self.traction >= 0)):
+            raise InvalidInputError(
+                f"Tresca.traction must be zero or positive, got {self.traction!r}: give the largest "
+                "tangential force per unit area that the surfaces can carry"
+            )
+
+
+#: A law of friction, or none.
+Friction: TypeAlias = Coulomb | Tresca | None
+
+
+@dataclass(frozen=True)
+@checked()
+class ContactPair:
+    """Two surfaces that may touch. The slave may not penetrate the master.
+
+    Attributes:
+        slave: Surface whose nodes carry the contact forces: the finer or softer one.
+        master: Surface of another body, or a rigid obstacle; another one of the same body where it
+            deforms so much that these meet.
+        friction: Law of friction; without one (None) contact is frictionless.
+        discretisation: ``"node"`` keeps the gap of every slave node non-negative; ``"mortar"`` does so for
+            weighted means of the gap. The former is simple. The latter (dual basis, integration over the
+            common segments of both meshes) passes the contact patch test on non-matching meshes. By default,
+            ``"best"``, the scene takes mortar between bodies of linear cells whose meshes do not match, and
+            nodes elsewhere. Contact with a rigid obstacle is always nodal.
+        geometry: What gaps and normals are measured between: ``"best"``, true shapes that the meshes know,
+            else smooth surfaces through the nodes; ``"reconstructed"``, always the latter; ``"faceted"``, the
+            flat facets, for comparison. Between round bodies the error of facets is often larger than the
+            approach of the bodies. For the shapes of meshes see `BodyMesh`.
+        gap: Clearance in place of the measured one, ≥ 0, [length]: a number, or a function of the slave
+            nodes, shape (n, dim), that returns one for each, shape (n,). None: as measured.
+        interference: Overlap in place of the measured gap, ≥ 0, [length], given like ``gap``;
+            ``"measured"`` takes the one that the geometry has, which counts as a mistake otherwise.
+        adjust: Slave points whose measured clearance or overlap is at most this, [length], are put in touch
+            without strain, or get ``gap`` or ``interference`` if these are given; all others keep the
+            measured gap. None: no point is put in touch, and ``gap`` and ``interference`` hold at all points.
+        reason: Why the scene chose the discretisation that it has, in words; empty where it was given.
+
+    Raises:
+        InvalidInputError: If the discretisation or geometry is unknown, or both gap and interference, or
+            negative lengths, are given.
+
+    Example:
+        >>> pair = ContactPair(Surface("punch", "bottom"), Surface("block", "z1"), Coulomb(0.3), "mortar")
+        >>> pair.has_friction
+        True
+    """
+
+    slave: Surface
+    master: Surface | RigidObstacle
+    friction: Friction = None
+    discretisation: AnyDiscretisation = "best"
+    geometry: Geometry = "best"
+    gap: float | OfPosition | None = None
+    interference: float | OfPosition | Literal["measured"] | None = None
+    adjust: float | None = None
+    reason: str = field(default="", repr=False)
+
+    def __post_init__(self) -> None:
+        """Reject gaps that contradict each other or are no lengths."""
+        if self.gap is not None and self.interference is not None:
+            raise InvalidInputError(
+                f"a contact pair has a gap or an interference, got gap={self.gap!r} and interference="
+                f"{self.interference!r}: keep one of them; a function that changes its sign is no gap but "
+                "two pairs"
+            )
+        for name in ("gap", "interference", "adjust"):
+            _check_length(f"ContactPair.{name}", getattr(self, name))
+        _forget_other_reason(self)
+
+    @property
+    def within_body(self) -> bool:
+        """Whether a body meets itself, which needs large deformations."""
+        return isinstance(self.master, Surface) and self.master.body == self.slave.body
+
+    @property
+    def by_mortar(self) -> bool:
+        """Whether weighted means are compared: contact with a rigid obstacle is always nodal."""
+        return isinstance(self.master, Surface) and self.discretisation == "mortar"
+
+    @property
+    def place(self) -> str:
+        """Its surfaces: "upper z0 on lower z1", "block z0 on rigid plane"."""
+        return _place(self.slave, self.master)
+
+    @property
+    def given_gap(self) -> str:
+        """What the pair gives in place of measured gaps, in words; empty if nothing."""
+        words = {"gap": self.gap, "interference": self.interference, "in touch within": self.adjust}
+        given = [(name, value) for name, value in words.items() if value is not None]
+        return ", ".join(f"{name} {_in_words(value)}" for name, value in given)
+
+    def gap_at(self, points: np.ndarray) -> np.ndarray | None:
+        """Return the gap or, as a negative number, the interference that the pair gives; None if none.
+
+        Args:
+            points: Coordinates of slave nodes, shape (n, dim), [length].
+
+        Returns:
+            Shape (n,), [length].
+
+        Raises:
+            InvalidInputError: If a function returns anything but lengths of zero or more.
+        """
+        if self.gap is not None:
+            return _not_negative(f"gap of {self.place}", self.gap, points)
+        if self.interference is None or isinstance(self.interference, str):
+            return None
+        return -_not_negative(f"interference of {self.place}", self.interference, points)
+
+    @property
+    def gives_all_gaps(self) -> bool:
+        """Whether no gap of the pair is measured."""
+        value = self.interference if self.gap is None else self.gap
+        return self.adjust is None and value not in (None, "measured")
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether tangential forces can be transmitted at all."""
+        return self.friction_varies or self.friction_value > 0
+
+    @property
+    def friction_varies(self) -> bool:
+        """Whether friction is given as a function of position."""
+        return callable(self.friction_value)
+
+    @property
+    def friction_value(self) -> Any:
+        """Friction coefficient, or Tresca's traction, as given; zero without friction."""
+        match self.friction:
+            case Coulomb(friction_coefficient=value) | Tresca(traction=value):
+                return value
+        return 0.0
+
+    def friction_at(self, points: np.ndarray) -> np.ndarray:
+        """Return the friction coefficient, or Tresca's traction, at points of the slave, shape (n,).
+
+        Raises:
+            InvalidInputError: If a function returns something other than numbers of at least zero.
+        """
+        return _not_negative(f"friction of {self.place}", self.friction_value, points)
+
+
+@dataclass(frozen=True)
+@checked()
+class Tie:
+    """Two surfaces that stay together: they neither separate nor, unless ``sliding``, shift.
+
+    An initial gap between their meshes stays as it is.
+
+    Attributes:
+        slave: Surface whose nodes carry the forces; the finer mesh is the better slave.
+        master: Surface of another body.
+        sliding: Whether the surfaces may slide along each other: contact known to be closed.
+        discretisation: ``"node"`` ties every slave node to its master facet, ``"mortar"`` ties weighted
+            means, ``"best"``, the default, leaves it to the scene. See `ContactPair`.
+        reason: As in `ContactPair`.
+    """
+
+    slave: Surface
+    master: Surface
+    sliding: bool = False
+    discretisation: AnyDiscretisation = "best"
+    reason: str = field(default="", repr=False)
+
+    def __post_init__(self) -> None:
+        """Reject a body that is tied to itself."""
+        if self.master.body == self.slave.body:
+            raise InvalidInputError(
+                f"body {self.slave.body!r} cannot be tied to itself: a tie joins two bodies; mesh its parts "
+                "together, or as two bodies"
+            )
+        _forget_other_reason(self)
+
+    @property
+    def geometry(self) -> Geometry:
+        """Facets, as the gap between tied surfaces is not used."""
+        return "faceted"
+
+    @property
+    def place(self) -> str:
+        """Its surfaces: "upper z0 on lower z1"."""
+        return _place(self.slave, self.master)
+
+
+def _forget_other_reason(pair: ContactPair | Tie) -> None:
+    """Drop the reason for a choice in whose place another discretisation was given."""
+    if not pair.reason.startswith(f"{pair.discretisation}, "):
+        object.__setattr__(pair, "reason", "")
+
+
+def _check_length(name: str, value: float | OfPosition | str | None) -> None:
+    number = not (value is None or isinstance(value, str) or callable(value))
+    if number and not (np.isfinite(value) and value >= 0):  # type: ignore[arg-type, operator]
+        raise InvalidInputError(
+            f"{name} must be zero or positive and finite, got {value!r}: clearances are given by gap, "
+            "overlaps by interference, both as positive lengths"
+        )
+
+
+def _not_negative(name: str, given: float | OfPosition, points: np.ndarray) -> np.ndarray:
+    """Return a number or the values of a function at points, shape (n,), if none is negative."""
+    if not callable(given):
+        return np.full(len(points), float(given))
+    values = evaluate(name, given, points, ())
+    if (values < 0).any():
+        worst = int(np.argmin(values))
+        raise InvalidInputError(
+            f"{name} must be zero or positive everywhere, got {values[worst]:.6g} at "
+            f"({', '.join(f'{x:.6g}' for x in points[worst])}): give a function that is"
+        )
+    return values
+
+
+def _in_words(value: float | OfPosition | str) -> str:
+    if callable(value):
+        return "by a function"
+    return value if isinstance(value, str) else f"{value:g}"
+
+
+def _place(slave: Surface, master: Surface | RigidObstacle) -> str:
+    if isinstance(master, Surface):
+        return f"{slave.body} {slave.name} on {master.body} {master.name}"
+    return f"{slave.body} {slave.name} on {name_in_words(type(master).__name__)}"

@@ -1,0 +1,470 @@
+"""The parts of a scene, and the checks that they fit together.
+
+Where contact and ties are enforced, by nodes or by mortar: the choice of a scene, with its reason.
+
+Planes of symmetry: flat sides on rollers, beyond which the body continues as its mirror image.
+
+The surfaces of a scene as contact sees them.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Self, TypeVar
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fenics_contact._base.checks import checked
+from fenics_contact._scene.body import Body
+from fenics_contact._scene.loads import Load, Pressure, SurfaceLoad, ThermalStrain, TotalForce
+from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface, Tie
+from fenics_contact._scene.supports import AnySupport, RigidSurface, Support
+from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
+from fenics_contact._surfaces.projection import project
+from fenics_contact._surfaces.true_surface import Geometry, true_surface
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials.elastic import Material, can_expand
+from fenics_contact.materials.hyperelastic import is_nonlinear
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.faces import coordinate_rounding, vector_areas
+
+
+@dataclass(frozen=True)
+@checked()
+class SceneParts:
+    """The parts of a `Scene`; its attributes are documented there."""
+
+    bodies: Mapping[str, Body]
+    supports: Sequence[AnySupport] = field(default=())
+    loads: Sequence[Load] = field(default=())
+    contacts: Sequence[ContactPair] = field(default=())
+    ties: Sequence[Tie] = field(default=())
+
+    def __post_init__(self) -> None:
+        """Reject names that do not exist, and loads and supports that do not suit their bodies."""
+        if not self.bodies:
+            raise InvalidInputError(
+                "a scene needs at least one body, got none: pass bodies={'name': Body(...)}"
+            )
+        self._require_one_dimension()
+        for part in (*self.supports, *self.loads):
+            surface = part.surface if isinstance(part, SurfaceLoad | AnySupport) else None
+            self._require(part.body, surface, type(part).__name__)
+        object.__setattr__(self, "supports", tuple(map(self._in_space, self.supports)))
+        for part in (*self.supports, *self.loads):
+            if not isinstance(part, RigidSurface):
+                self._require_components(part)
+            if isinstance(part, TotalForce):
+                self._require_lever(part)
+            if isinstance(part, ThermalStrain):
+                self._require_expansion(part)
+        pairs: list[ContactPair | Tie] = [*self.contacts, *self.ties]
+        for pair in pairs:
+            kind = type(pair).__name__
+            self._require(pair.slave.body, pair.slave.name, f"{kind}.slave")
+            if isinstance(pair, ContactPair) and pair.within_body:
+                self._require_deforming(pair)
+            if isinstance(pair.master, Surface):
+                self._require(pair.master.body, pair.master.name, f"{kind}.master")
+                self._require_linear(pair, pair.master)
+            else:
+                self._require_dimension(pair.master)
+        _require_different(self.contacts)
+        _require_different(self.ties)
+
+    @property
+    def deforms_much(self) -> bool:
+        """Whether one of its bodies does."""
+        return any(body.deforms_much for body in self.bodies.values())
+
+    @property
+    def following_pressures(self) -> tuple[Pressure, ...]:
+        """The pressures that follow their surfaces, those on bodies that deform much."""
+        return tuple(
+            load
+            for load in self.loads
+            if isinstance(load, Pressure) and not load.dead and self.bodies[load.body].deforms_much
+        )
+
+    def _require_one_dimension(self) -> None:
+        """Reject plane bodies beside solid ones."""
+        plane = [name for name, body in self.bodies.items() if body.mesh.dim == 2]
+        solid = [name for name in self.bodies if name not in plane]
+        if plane and solid:
+            raise InvalidInputError(
+                f"the bodies of a scene must all be plane or all be solid, got plane {plane} and solid "
+                f"{solid}: give the plane ones a thickness, as block(...) or an extruded mesh, or describe "
+                "two scenes"
+            )
+
+    def _require(self, body: str, surface: str | None, user: str) -> None:
+        if body not in self.bodies:
+            raise InvalidInputError(
+                f"{user} names body {body!r}, the scene has {sorted(self.bodies)}: use one of them"
+            )
+        if surface is None:
+            return
+        surfaces = self.bodies[body].mesh.surfaces
+        if surface not in surfaces:
+            raise InvalidInputError(
+                f"{user} names surface {surface!r} of body {body!r}, which has {sorted(surfaces)}: "
+                "use one of them"
+            )
+
+    def _in_space(self, support: AnySupport) -> AnySupport:
+        """Return a support with as many components as its body has; reject a point in another space."""
+        dim = self.bodies[support.body].mesh.dim
+        if isinstance(support, Support):
+            return support.held_in(dim)
+        if support.dim != dim:
+            raise InvalidInputError(
+                f"RigidSurface.at on surface {support.surface!r} of body {support.body!r} must have {dim} "
+                f"coordinates, got {support.at!r}: give {dim} of them, and as many displacements"
+            )
+        return support
+
+    def _require_components(self, part: Load | Support) -> None:
+        """Reject a vector whose dimension is not that of its body."""
+        dim = self.bodies[part.body].mesh.dim
+        if isinstance(part.value, tuple) and len(part.value) != dim:
+            needed = "two entries, for x and y, as the body is plane" if dim == 2 else "three, for x, y and z"
+            raise InvalidInputError(
+                f"{type(part).__name__}.value of body {part.body!r} must hold {needed}, got {part.value!r}: "
+                f"give {dim} of them"
+            )
+
+    def _require_lever(self, load: TotalForce) -> None:
+        """Reject a moment or a point whose dimension is not that of the body."""
+        dim = self.bodies[load.body].mesh.dim
+        where = f"surface {load.surface!r} of body {load.body!r}"
+        if load.moment is not None and np.shape(load.moment) != (() if dim == 2 else (3,)):
+            needed = "one number, as the body is plane" if dim == 2 else "three numbers, about x, y and z"
+            raise InvalidInputError(
+                f"TotalForce.moment on {where} must be {needed}, got {load.moment!r}: in the plane "
+                "a moment is positive from x to y"
+            )
+        if load.at is not None and len(load.at) != dim:
+            raise InvalidInputError(
+                f"TotalForce.at of the force on {where} must have {dim} coordinates, got {load.at!r}: give a "
+                "point, or none for the centroid of the surface"
+            )
+
+    def _require_dimension(self, obstacle: RigidObstacle) -> None:
+        """Reject an obstacle whose dimension, if it has one, is not that of the bodies."""
+        dim = getattr(obstacle, "dim", self.dim)
+        if dim != self.dim:
+            raise InvalidInputError(
+                f"an obstacle must lie in the space of the bodies, {type(obstacle).__name__} is for {dim} "
+                f"dimensions and the bodies have {self.dim}: give it {self.dim} coordinates, or in the plane "
+                "a RigidSphere for a round bar"
+            )
+
+    def _require_deforming(self, pair: ContactPair) -> None:
+        """Reject contact of a body with itself unless it may deform much."""
+        deforming = (is_nonlinear(m) and getattr(m, "finite", True) for m in self._materials(pair.slave))
+        if pair.discretisation == "mortar" or pair.given_gap or not any(deforming):
+            raise InvalidInputError(
+                f"contact of body {pair.slave.body!r} with itself needs a material for large deformations, "
+                "discretisation='node' and gaps as they are: change the material, such as to NeoHooke, or "
+                "split the body where its parts may touch"
+            )
+
+    def _materials(self, surface: Surface) -> tuple[Material, ...]:
+        return self.bodies[surface.body].materials
+
+    def _require_linear(self, pair: ContactPair | Tie, master: Surface) -> None:
+        """Reject mortar coupling of quadratic facets, unless a scene of other meshes chose it."""
+        orders = {side.name: self.bodies[side.body].mesh.order for side in (pair.slave, master)}
+        if pair.discretisation == "mortar" and not pair.reason and max(orders.values()) > 1:
+            raise InvalidInputError(
+                f"{type(pair).__name__} with discretisation='mortar' needs linear cells on both sides, got "
+                f"cells of order {orders}: mean gaps of linear facets do not pass the patch test between "
+                "quadratic cells; use discretisation='node', or linear cells"
+            )
+
+    def _require_expansion(self, load: ThermalStrain) -> None:
+        stiff = [material for material in self.bodies[load.body].materials if not can_expand(material)]
+        if stiff:
+            raise InvalidInputError(
+                f"ThermalStrain needs a thermal expansion of every material of body {load.body!r}, got none "
+                f"for {stiff[0]!r}: give the material its thermal_expansion"
+            )
+
+    @property
+    def dim(self) -> int:
+        """Dimension of space, 2 or 3."""
+        return int(next(iter(self.bodies.values())).mesh.points.shape[1])
+
+    def fixed(self, body: str, supports: Sequence[AnySupport] | None = None) -> np.ndarray:
+        """Return which components of a body's nodes supports prescribe, shape (n_nodes, dim).
+
+        Args:
+            body: Name of the body.
+            supports: Those that count, all by default.
+        """
+        return ~np.isnan(self.prescribed(body, supports))
+
+    def prescribed(self, body: str, supports: Sequence[AnySupport] | None = None) -> np.ndarray:
+        """Return what supports prescribe at the nodes of a body, NaN where free, (n_nodes, dim), [length].
+
+        Args:
+            body: Name of the body.
+            supports: Those that count, all by default; where they disagree the last one.
+        """
+        values = np.full(self.bodies[body].mesh.points.shape, np.nan)
+        for support in self.supports if supports is None else supports:
+            if support.body == body:
+                nodes, given = self.given(support)
+                values[nodes] = np.where(np.isnan(given), values[nodes], given)
+        return values
+
+    def given(self, support: AnySupport) -> tuple[np.ndarray, np.ndarray]:
+        """Return the nodes of a support, ascending, and what it prescribes, NaN where free, (n, dim)."""
+        body = self.bodies[support.body]
+        nodes = np.unique(body.mesh.surfaces[support.surface])
+        points = body.mesh.points[nodes]
+        if isinstance(support, RigidSurface) and body.deforms_much:
+            return nodes, support.turned(points, support.prescribed)
+        return nodes, support.values(points)
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Names of the bodies in the order in which everything is numbered."""
+        return tuple(self.bodies)
+
+    def facets(self, surface: Surface) -> np.ndarray:
+        """Return the linear facets through the nodes of a surface, rows of node numbers of its body."""
+        return self.bodies[surface.body].mesh.linear.surfaces[surface.name]
+
+    @property
+    def points(self) -> np.ndarray:
+        """Coordinates of the nodes of all bodies in their order, shape (n_nodes, dim), [length]."""
+        return np.concatenate([body.mesh.points for body in self.bodies.values()])
+
+    def has_meshes_of(self, other: SceneParts) -> bool:
+        """Return whether its bodies have the very meshes of those of another scene."""
+        meshes = [[body.mesh for body in each.bodies.values()] for each in (self, other)]
+        return len(meshes[0]) == len(meshes[1]) and all(map(operator.is_, *meshes))
+
+    def has_surfaces_of(self, other: SceneParts) -> bool:
+        """Return whether both have the same pairs, on meshes that were `reshaped` from the same ones."""
+        pairs = [[*each.contacts, *each.ties] for each in (self, other)]
+        meshes = [[body.mesh.origin for body in each.bodies.values()] for each in (self, other)]
+        alike = len(meshes[0]) == len(meshes[1]) and all(map(operator.is_, *meshes))
+        return alike and pairs[0] == pairs[1]
+
+    def moved(self, points: Mapping[str, np.ndarray]) -> Self:
+        """Return the scene with new coordinates for some bodies; topology and names stay.
+
+        Args:
+            points: Body name -> coordinates, shape (n_nodes, dim), [length].
+
+        Raises:
+            InvalidInputError: If a body is unknown, a coordinate is not finite or a cell is inverted.
+        """
+        for name in points:
+            self._require(name, None, "moved")
+        return self._with_meshes({name: self.bodies[name].mesh.moved(x) for name, x in points.items()})
+
+    def reshaped(self, points: Mapping[str, np.ndarray]) -> Self:
+        """Return the scene with slightly changed coordinates; surfaces follow, see `BodyMesh.reshaped`.
+
+        Args:
+            points: Body name -> coordinates, shape (n_nodes, dim), [length].
+
+        Raises:
+            InvalidInputError: As `moved`.
+        """
+        for name in points:
+            self._require(name, None, "reshaped")
+        return self._with_meshes({name: self.bodies[name].mesh.reshaped(x) for name, x in points.items()})
+
+    @property
+    def origin(self) -> Self:
+        """The scene before it was `reshaped`; the scene itself if it was not."""
+        meshes = {name: body.mesh.origin for name, body in self.bodies.items()}
+        changed = {name: mesh for name, mesh in meshes.items() if mesh is not self.bodies[name].mesh}
+        return self._with_meshes(changed) if changed else self
+
+    def _with_meshes(self, meshes: Mapping[str, BodyMesh]) -> Self:
+        changed = {name: replace(self.bodies[name], mesh=mesh) for name, mesh in meshes.items()}
+        return replace(self, bodies={**self.bodies, **changed})
+
+
+def _require_different(pairs: Sequence[ContactPair | Tie]) -> None:
+    """Reject two pairs of the same slave and master: how they share the force is not determined."""
+    for number, pair in enumerate(pairs):
+        for earlier in range(number):
+            other = pairs[earlier]
+            if pair.slave == other.slave and pair.master == other.master:
+                kind = type(pair).__name__
+                raise InvalidInputError(
+                    f"the surfaces of {kind} {number}, {pair.place}, are those of {kind} {earlier}: how both "
+                    "share the force is not determined; keep one of them, or give them different parts"
+                )
+
+
+#: Nodes match where they lie over each other within this fraction of the shortest edge of their facets.
+MATCHING = 1e-3
+#: Number of nodes that are projected first, those nearest to the master: one that meets it decides.
+FIRST = 50
+#: Why every contact with an obstacle is by nodes.
+RIGID = "as the master is rigid"
+#: Reason of a choice that other meshes do not change.
+REMESHED = "as on the meshes before the last one"
+
+Pair = TypeVar("Pair", ContactPair, Tie)
+AnyScene = TypeVar("AnyScene", bound="SceneParts")
+
+_KNOWN: WeakKeyDictionary[BodyMesh, WeakKeyDictionary[BodyMesh, dict[tuple[str, str], bool]]] = (
+    WeakKeyDictionary()
+)
+"""Whether surfaces of two meshes match, shared with reshaped meshes."""
+
+
+def with_discretisation(scene: SceneParts, pairs: Sequence[Pair]) -> tuple[Pair, ...]:
+    """Return pairs with the discretisation that they were given, or with the better one of the scene.
+
+    It is that of the undeformed meshes before any design moved them, the same for all loads.
+
+    Args:
+        scene: The scene.
+        pairs: Its contact pairs or ties.
+    """
+    return tuple(_with_choice(scene, pair) for pair in pairs)
+
+
+def keeping_discretisation(scene: AnyScene) -> AnyScene:
+    """Return the scene with choices that stay when its bodies get other meshes."""
+    return replace(scene, contacts=[*map(_kept, scene.contacts)], ties=[*map(_kept, scene.ties)])
+
+
+def in_words(pair: ContactPair | Tie) -> str:
+    """Return the discretisation of a pair and, where the scene chose it, why."""
+    if not isinstance(pair.master, Surface):
+        return f"node, {RIGID}"
+    return pair.reason or pair.discretisation
+
+
+def _with_choice(scene: SceneParts, pair: Pair) -> Pair:
+    chosen = pair.discretisation == "best" or bool(pair.reason)
+    if not chosen or pair.reason.endswith(REMESHED):
+        return pair
+    found, why = _choice(scene, pair)
+    reason = f"{found}, {why}"
+    return pair if pair.reason == reason else replace(pair, discretisation=found, reason=reason)
+
+
+def _kept(pair: Pair) -> Pair:
+    """Return a pair whose choice does not depend on meshes any more."""
+    return replace(pair, reason=f"{pair.discretisation}, {REMESHED}") if pair.reason else pair
+
+
+def _choice(scene: SceneParts, pair: ContactPair | Tie) -> tuple[Discretisation, str]:
+    """Return the better discretisation of a pair, and why."""
+    if not isinstance(pair.master, Surface):
+        return "node", RIGID
+    if pair.master.body == pair.slave.body:
+        return "node", "as the body meets itself"
+    sides = pair.slave, pair.master
+    slave, master = (scene.bodies[side.body].mesh.origin for side in sides)
+    if max(slave.order, master.order) > 1:
+        return "node", "as there is no mortar for quadratic cells"
+    known = _KNOWN.setdefault(slave, WeakKeyDictionary()).setdefault(master, {})
+    names = pair.slave.name, pair.master.name
+    if names not in known:
+        known[names] = surfaces_match(*map(_faceted, (slave, master), names))
+    return ("node", "as the meshes match") if known[names] else ("mortar", "as the meshes do not match")
+
+
+def _faceted(mesh: BodyMesh, surface: str) -> FacetedSurface:
+    return faceted_surface(mesh.points, mesh.surfaces[surface])
+
+
+def surfaces_match(slave: FacetedSurface, master: FacetedSurface) -> bool:
+    """Return whether the facets of two surfaces are the same where the surfaces meet.
+
+    Their nodes lie over each other along the slave's normals within `MATCHING`, also across a gap, and no
+    slave node without such a partner meets the master. Then contact by nodes passes the patch test.
+
+    Args:
+        slave: The slave.
+        master: The master.
+    """
+    if slave.corners != master.corners:
+        return False
+    away, partner = cKDTree(master.points).query(slave.points)
+    apart = master.points[partner] - slave.points
+    apart -= np.einsum("nd,nd->n", apart, slave.normals)[:, None] * slave.normals
+    reach = MATCHING * _shortest_edges(master)[partner] + coordinate_rounding(master.points)
+    over = np.linalg.norm(apart, axis=1) <= reach
+    if not _same_facets(slave.facets[over[slave.facets].all(axis=1)], partner, master.facets):
+        return False
+    others = np.flatnonzero(~over)
+    others = others[np.argsort(away[others], kind="stable")]
+    parts = others[:FIRST], others[FIRST:]
+    return not any(len(part) and _meet(slave, part, master) for part in parts)
+
+
+def _same_facets(facets: np.ndarray, partner: np.ndarray, master: np.ndarray) -> bool:
+    """Return whether facets of a slave, at least one, are facets of the master between partners."""
+    mine = np.unique(np.sort(partner[facets], axis=1), axis=0)
+    known = np.unique(np.sort(master, axis=1), axis=0)
+    return len(mine) > 0 and len(np.unique(np.concatenate([known, mine]), axis=0)) == len(known)
+
+
+def _meet(slave: FacetedSurface, nodes: np.ndarray, master: FacetedSurface) -> bool:
+    return len(project(slave.points[nodes], slave.normals[nodes], master).point) > 0
+
+
+def _shortest_edges(surface: FacetedSurface) -> np.ndarray:
+    """Return the length of the shortest edge at each node, shape (n,), [length]."""
+    corners = surface.points[surface.facets]
+    shortest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).min(axis=1)
+    result = np.full(len(surface.points), np.inf)
+    np.minimum.at(result, surface.facets, shortest[:, None])
+    return result
+
+
+#: A facet is normal to an axis if the cosine of its normal differs from one by no more than this.
+ACROSS = 1e-9
+
+
+def mirrored(scene: SceneParts, body: str) -> np.ndarray:
+    """Return which nodes of a body lie on a plane of symmetry normal to each axis, shape (n_nodes, dim).
+
+    A plane of symmetry is a flat side normal to an axis on which a support prescribes only that component.
+    """
+    mesh = scene.bodies[body].mesh
+    marks = np.zeros(mesh.points.shape, dtype=bool)
+    for support in scene.supports:
+        if isinstance(support, RigidSurface):
+            continue
+        given = [axis for axis, value in enumerate(support.value) if value is not None]
+        if support.body != body or len(given) != 1 or callable(support.value[given[0]]):
+            continue
+        facets = mesh.surfaces[support.surface]
+        areas = vector_areas(mesh.points, facets)
+        across = np.abs(areas[:, given[0]]) >= (1.0 - ACROSS) * np.linalg.norm(areas, axis=1)
+        marks[facets[across].ravel(), given[0]] = True
+    return marks
+
+
+def surface_of(
+    scene: SceneParts, surface: Surface, geometry: Geometry, *, finer: bool = False
+) -> FacetedSurface:
+    """Return a named surface; its normals lie in the planes of symmetry that cut it.
+
+    Args:
+        scene: The scene.
+        surface: The surface.
+        geometry: How it is represented between its nodes, see `ContactPair`.
+        finer: Use a better representation than that if there is one, see `true_surface`.
+    """
+    mesh = scene.bodies[surface.body].mesh
+    return true_surface(mesh, surface.name, geometry, mirrored=mirrored(scene, surface.body), finer=finer)

@@ -1,0 +1,348 @@
+"""What will be built for a scene, known before anything is computed.
+
+The physical effects in a scene. Only what these need is built.
+
+Which rigid motions of a body its supports resist.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fenics_contact._base.display import counted, displayed
+from fenics_contact._base.sparse import expected_bytes
+from fenics_contact._scene.loads import BodyForce, ThermalStrain
+from fenics_contact._scene.pair_geometry import PairGeometry, pair_geometry, unpaired_bodies
+from fenics_contact._scene.pairs import Coulomb, Surface, Tresca
+from fenics_contact._scene.parts import in_words
+from fenics_contact._scene.supports import RigidSurface
+from fenics_contact._surfaces.facets import has_midside_pressure
+from fenics_contact.materials.hyperelastic import is_nonlinear
+from fenics_contact.materials.kernels import rigid_body_modes
+from fenics_contact.mesh.body_mesh import BodyMesh
+
+if TYPE_CHECKING:
+    from fenics_contact._scene.parts import SceneParts
+
+
+class EffectName(StrEnum):
+    """The effects that a scene can contain."""
+
+    ELASTICITY = "elasticity"
+    NONLINEAR_MATERIAL = "nonlinear material"
+    PRESCRIBED_DISPLACEMENT = "prescribed displacement"
+    RIGID_SURFACE = "rigid surface"
+    BODY_FORCE = "body force"
+    SURFACE_LOAD = "surface load"
+    FOLLOWING_PRESSURE = "following pressure"
+    THERMAL_STRAIN = "thermal strain"
+    TIE = "tied surfaces"
+    CONTACT = "contact"
+    TRESCA = "Tresca friction"
+    COULOMB = "Coulomb friction"
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One physical effect in a scene, and the reason for it.
+
+    Attributes:
+        name: Which one.
+        reason: What in the scene causes it.
+    """
+
+    name: EffectName
+    reason: str
+
+
+def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
+    """List the effects in a scene, in the order of `EffectName`."""
+    return tuple(_effects_in(scene))
+
+
+def _effects_in(scene: SceneParts) -> Iterator[Effect]:
+    names = EffectName
+    yield Effect(names.ELASTICITY, counted(len(scene.bodies), "elastic body", "elastic bodies"))
+    nonlinear = sum(any(map(is_nonlinear, body.materials)) for body in scene.bodies.values())
+    if nonlinear:
+        yield Effect(names.NONLINEAR_MATERIAL, counted(nonlinear, "body deforms much or yields", "bodies do"))
+    rigid = sum(isinstance(support, RigidSurface) for support in scene.supports)
+    if len(scene.supports) > rigid:
+        yield Effect(
+            names.PRESCRIBED_DISPLACEMENT, counted(len(scene.supports) - rigid, "support", "supports")
+        )
+    if rigid:
+        yield Effect(names.RIGID_SURFACE, counted(rigid, "surface stays rigid", "surfaces stay rigid"))
+    volume = [load for load in scene.loads if isinstance(load, BodyForce)]
+    thermal = [load for load in scene.loads if isinstance(load, ThermalStrain)]
+    surface = len(scene.loads) - len(volume) - len(thermal)
+    if volume:
+        yield Effect(names.BODY_FORCE, counted(len(volume), "load on a volume", "loads on volumes"))
+    if surface:
+        yield Effect(names.SURFACE_LOAD, counted(surface, "load on a surface", "loads on surfaces"))
+    following = len(scene.following_pressures)
+    if following:
+        words = counted(following, "pressure follows its surface", "pressures follow their surfaces")
+        yield Effect(names.FOLLOWING_PRESSURE, words)
+    if thermal:
+        yield Effect(names.THERMAL_STRAIN, counted(len(thermal), "change of temperature", "temperatures"))
+    if scene.ties:
+        yield Effect(names.TIE, counted(len(scene.ties), "pair stays together", "pairs stay together"))
+    if scene.contacts:
+        yield Effect(names.CONTACT, counted(len(scene.contacts), "pair may touch", "pairs may touch"))
+    for name, law, what in (
+        (names.TRESCA, Tresca, "a fixed slip bound"),
+        (names.COULOMB, Coulomb, "a friction coefficient above zero"),
+    ):
+        count = sum(pair.has_friction and isinstance(pair.friction, law) for pair in scene.contacts)
+        if count:
+            yield Effect(name, counted(count, f"pair has {what}", f"pairs have {what}"))
+
+
+#: A motion counts as unresisted if it moves supported nodes by less than this fraction of the other motions.
+RANK_TOLERANCE = 1e-9
+
+
+def held_components(scene: SceneParts, body: str, modes: np.ndarray) -> np.ndarray:
+    """Return what motions of a body move of the components that supports prescribe, shape (n, n_modes).
+
+    Of a rigid surface with free components the others count, as displacement and rotation of its point.
+
+    Args:
+        scene: The scene.
+        body: Name of the body.
+        modes: Motions at its nodes, shape (n_nodes, dim, n_modes).
+    """
+    mesh = scene.bodies[body].mesh
+    loose = [each for each in scene.supports if isinstance(each, RigidSurface) and each.free.any()]
+    firm = [each for each in scene.supports if each not in loose]
+    rows = [modes[scene.fixed(body, firm)]]
+    for surface in loose:
+        if surface.body == body:
+            rows.append(_of_point(surface, mesh, modes)[~surface.free])
+    return np.concatenate(rows)
+
+
+def point_loads(scene: SceneParts, body: str, modes: np.ndarray) -> np.ndarray:
+    """Return the work of the loads at points of rigid surfaces of a body on its rigid motions, (n_modes,)."""
+    total = np.zeros(modes.shape[2])
+    for surface in scene.supports:
+        if isinstance(surface, RigidSurface) and surface.body == body and surface.load.any():
+            total += surface.load @ _of_point(surface, scene.bodies[body].mesh, modes)
+    return total
+
+
+def _of_point(surface: RigidSurface, mesh: BodyMesh, modes: np.ndarray) -> np.ndarray:
+    """Return displacement and rotation of the point for motions of its body, (n_components, n_modes)."""
+    nodes = np.unique(mesh.surfaces[surface.surface])
+    moved = surface.modes(mesh.points[nodes]).reshape(-1, len(surface.motion))
+    size = np.linalg.norm(moved, axis=0)
+    fitted = np.linalg.lstsq(moved / size, modes[nodes].reshape(len(moved), -1), rcond=None)[0]
+    return np.asarray(fitted / size[:, None])
+
+
+def resisted_motions(held: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of the rigid motions that supports resist.
+
+    Args:
+        held: What the motions move of prescribed components, shape (n, n_modes), see `held_components`.
+
+    Returns:
+        Coefficients of the modes as columns, shape (n_modes, rank).
+    """
+    # The edge of a thin plate moves little when the plate turns about it: singular values resolve how much,
+    # their squares would be lost in rounding.
+    _, size, motions = np.linalg.svd(held, full_matrices=False)
+    return np.asarray(motions[size > RANK_TOLERANCE * size.max(initial=0.0)].T)
+
+
+def held_by_supports(scene: SceneParts, body: str) -> bool:
+    """Return whether the supports of a body resist all its rigid motions."""
+    modes = rigid_body_modes(scene.bodies[body].mesh.points)
+    return resisted_motions(held_components(scene, body, modes)).shape[1] == modes.shape[2]
+
+
+#: Bytes per torn unknown besides the factors: meshes, rows of B, vectors and their history.
+BYTES_PER_UNKNOWN = 1200
+
+
+class SolverKind(StrEnum):
+    """How the equilibrium is computed."""
+
+    DIRECT = "sparse factorisation of one body"
+    PROJECTED_CG = "projected conjugate gradients"
+    FACE_NEWTON = "semismooth Newton on faces"
+    TANGENT_NEWTON = "Newton's method with tangents of the deformed bodies"
+
+
+class ConeKind(StrEnum):
+    """Which inequalities the multipliers obey."""
+
+    NONE = "none"
+    BOUNDS = "half lines"
+    DISCS = "half lines and discs of given radius"
+    COULOMB = "friction cones"
+
+
+@displayed
+@dataclass(frozen=True)
+class Plan:
+    """What the solution of a scene needs; nothing else is built.
+
+    Attributes:
+        effects: The effects in the scene.
+        subdomains: Subdomains of all bodies.
+        unknowns: Displacement unknowns of all subdomains.
+        multipliers: Number of multipliers by kind; those of ties and contact are upper bounds, as only nodes
+            that face their master have one.
+        solver: How the equilibrium is computed.
+        cone: Which inequalities the multipliers obey.
+        fixed_point: Whether slip bounds follow the normal forces (Coulomb's law).
+        coarse_motions: Rigid motions of the subdomains and free ones of rigid surfaces, the size of the
+            coarse problem; 0 without one.
+        adjoint: Whether sensitivities are requested, which need one adjoint solve per design.
+        memory: Expected memory of all ranks together without their libraries, [bytes].
+        contacts: Between which surfaces the gaps of each contact pair are measured, and where it is enforced.
+        ties: Where each tie is enforced, and why.
+        unpaired: Which bodies touch or overlap without a pair or tie, or will where supports move them as if
+            they were rigid, and what to do.
+    """
+
+    effects: tuple[Effect, ...]
+    subdomains: int
+    unknowns: int
+    multipliers: Mapping[str, int]
+    solver: SolverKind
+    cone: ConeKind
+    fixed_point: bool
+    coarse_motions: int
+    adjoint: bool
+    memory: float
+    contacts: tuple[PairGeometry, ...]
+    ties: tuple[str, ...]
+    unpaired: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """Return one line for each decision."""
+        return "\n".join(f"{name:15s} {value}" for name, value in self._facts().items())
+
+    def _facts(self) -> dict[str, str]:
+        kinds = ", ".join(f"{count} {kind}" for kind, count in self.multipliers.items() if count)
+        coarse = f"{self.coarse_motions} rigid motions" if self.coarse_motions else "none"
+        bounds = "follow the normal forces" if self.fixed_point else "given"
+        return {
+            "effects": "; ".join(f"{effect.name} ({effect.reason})" for effect in self.effects),
+            "unknowns": f"{self.unknowns} in {counted(self.subdomains, 'subdomain')}",
+            "multipliers": kinds or "none",
+            "solver": self.solver.value,
+            "cone": self.cone.value,
+            "slip bounds": bounds if self.cone in (ConeKind.DISCS, ConeKind.COULOMB) else "none",
+            "coarse problem": coarse,
+            "adjoint": "one solve per design" if self.adjoint else "none",
+            "memory": f"{self.memory / 1e6:.0f} MB",
+            **{f"pair {number}": str(pair) for number, pair in enumerate(self.contacts)},
+            **{f"tie {number}": tie for number, tie in enumerate(self.ties)},
+            **({"no pair": "; ".join(self.unpaired)} if self.unpaired else {}),
+        }
+
+
+def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensitivity: bool = False) -> Plan:
+    """Decide what a scene needs.
+
+    Args:
+        scene: The scene.
+        partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
+        sensitivity: Whether derivatives by the shape are wanted.
+    """
+    effects = effects_of(scene)
+    names = {effect.name for effect in effects}
+    counts = [_node_counts(body.mesh, partitions[name]) for name, body in scene.bodies.items()]
+    nodes, shared = (np.concatenate(column) for column in zip(*counts, strict=True))
+    subdomains, unknowns = len(nodes), scene.dim * int(nodes.sum())
+    solver = choose_solver(scene, subdomains, sensitivity=sensitivity)
+    direct = solver is SolverKind.DIRECT
+    loose = sum(int(s.free.sum()) for s in scene.supports if isinstance(s, RigidSurface))
+    motions = 0 if direct else subdomains * scene.dim * (scene.dim + 1) // 2 + loose
+    sizes = zip(scene.dim * nodes, scene.dim * shared, strict=True)
+    factors = sum(expected_bytes(int(size), int(interface)) for size, interface in sizes)
+    return Plan(
+        effects=effects,
+        subdomains=subdomains,
+        unknowns=unknowns,
+        multipliers={} if direct else _multipliers(scene, unknowns),
+        solver=solver,
+        cone=_cone(names),
+        fixed_point=EffectName.COULOMB in names,
+        coarse_motions=motions,
+        adjoint=sensitivity,
+        memory=factors + BYTES_PER_UNKNOWN * unknowns + 8.0 * motions**2,
+        contacts=tuple(pair_geometry(scene, pair) for pair in scene.contacts),
+        ties=tuple(f"{tie.place}; {in_words(tie)}" for tie in scene.ties),
+        unpaired=unpaired_bodies(scene),
+    )
+
+
+def choose_solver(scene: SceneParts, subdomains: int, *, sensitivity: bool = False) -> SolverKind:
+    """Return how the equilibrium of a scene is computed.
+
+    Args:
+        scene: The scene.
+        subdomains: Subdomains of all bodies.
+        sensitivity: Whether derivatives are wanted, which need the dual system.
+    """
+    effects = {effect.name for effect in effects_of(scene)}
+    if EffectName.NONLINEAR_MATERIAL in effects:
+        return SolverKind.TANGENT_NEWTON
+    if EffectName.CONTACT in effects:
+        return SolverKind.FACE_NEWTON
+    # A body that its supports alone do not hold has a singular stiffness.
+    loose = any(isinstance(support, RigidSurface) and support.free.any() for support in scene.supports)
+    if subdomains == 1 and not (sensitivity or loose) and held_by_supports(scene, scene.body_names[0]):
+        return SolverKind.DIRECT
+    return SolverKind.PROJECTED_CG
+
+
+def _cone(names: set[EffectName]) -> ConeKind:
+    if EffectName.COULOMB in names:
+        return ConeKind.COULOMB
+    if EffectName.TRESCA in names:
+        return ConeKind.DISCS
+    return ConeKind.BOUNDS if EffectName.CONTACT in names else ConeKind.NONE
+
+
+def _multipliers(scene: SceneParts, unknowns: int) -> dict[str, int]:
+    nodes = sum(body.mesh.n_nodes for body in scene.bodies.values())
+    fixed = sum(int(np.count_nonzero(scene.fixed(name))) for name in scene.body_names)
+    slaves = [_bearing_nodes(scene, pair.slave) for pair in scene.contacts]
+    rubbing = [count for pair, count in zip(scene.contacts, slaves, strict=True) if pair.has_friction]
+    tied = [(1 if tie.sliding else scene.dim) * _slave_nodes(scene, tie.slave) for tie in scene.ties]
+    return {
+        "gluing": unknowns - scene.dim * nodes,
+        "prescribed": fixed,
+        "tied": sum(tied),
+        "normal": sum(slaves),
+        "tangential": (scene.dim - 1) * sum(rubbing),
+    }
+
+
+def _bearing_nodes(scene: SceneParts, surface: Surface) -> int:
+    facets = scene.bodies[surface.body].mesh.surfaces[surface.name]
+    return len(np.unique(facets[:, 3:])) if has_midside_pressure(facets) else _slave_nodes(scene, surface)
+
+
+def _slave_nodes(scene: SceneParts, surface: Surface) -> int:
+    return len(np.unique(scene.facets(surface)))
+
+
+def _node_counts(mesh: BodyMesh, partition: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes of each subdomain, and how many of them it shares, shape (n_subdomains,) each."""
+    keys = np.unique(partition[:, None] * np.int64(mesh.n_nodes) + mesh.cells)
+    subdomain, node = keys // mesh.n_nodes, keys % mesh.n_nodes
+    torn = np.bincount(node)[node] > 1
+    count = int(partition.max()) + 1
+    return np.bincount(subdomain, minlength=count), np.bincount(subdomain[torn], minlength=count)

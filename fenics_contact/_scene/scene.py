@@ -1,0 +1,265 @@
+"""A scene: bodies, supports, loads and contact pairs. Nothing numerical has happened yet.
+
+Bodies of a scene from the meshes of a file, materials by name.
+
+A sequence of loads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from fenics_contact._base.checks import checked
+from fenics_contact._base.display import displayed
+from fenics_contact._scene.automatic import AutomaticContact
+from fenics_contact._scene.body import Body
+from fenics_contact._scene.loads import Load
+from fenics_contact._scene.parts import SceneParts, with_discretisation
+from fenics_contact._scene.plan import Effect, Plan, effects_of, make_plan
+from fenics_contact._scene.supports import AnySupport
+from fenics_contact.errors import InvalidInputError, user_code
+from fenics_contact.materials.elastic import Material
+from fenics_contact.materials.hyperelastic import is_nonlinear
+from fenics_contact.mesh.bisection import default_partition
+from fenics_contact.mesh.body_mesh import BodyMesh
+
+OfBody = Material | Mapping[str, Material]
+"""A material, or a mapping from region to material."""
+
+
+def bodies_from(
+    meshes: Mapping[str, BodyMesh], materials: Material | Mapping[str, OfBody]
+) -> dict[str, Body]:
+    """Give the meshes of a file their materials.
+
+    Example:
+        >>> meshes = read_msh("chain.msh")  # doctest: +SKIP
+        >>> of = {"link *": steel, "pin": {"core": steel, "coat": zinc}}  # doctest: +SKIP
+        >>> bodies = bodies_from(meshes, of)  # doctest: +SKIP
+
+    Args:
+        meshes: Name to mesh.
+        materials: One material for all bodies; or name of the body, or pattern of names with ``*`` and ``?``,
+            to its material, or to a mapping from its regions to theirs. Names take precedence over patterns,
+            earlier patterns over later ones.
+
+    Returns:
+        Name to body, in the order of the meshes.
+
+    Raises:
+        InvalidInputError: If a body has no material, or a material no body.
+    """
+    if not isinstance(materials, Mapping):
+        return {name: Body(mesh, materials) for name, mesh in meshes.items()}
+    chosen = {}
+    for name in meshes:
+        fitting = [key for key in materials if key == name] or [k for k in materials if fnmatchcase(name, k)]
+        if not fitting:
+            raise InvalidInputError(
+                f"every body must have a material, {name!r} has none of {list(materials)}: name it, or give "
+                "a pattern such as 'link *' or '*'"
+            )
+        chosen[name] = fitting[0]
+    for key in materials:
+        if key not in chosen.values():
+            raise InvalidInputError(
+                f"materials must be those of bodies, {key!r} matches none of {list(meshes)}: check its "
+                "spelling, or leave it out"
+            )
+    return {name: Body(mesh, materials[chosen[name]]) for name, mesh in meshes.items()}
+
+
+@displayed
+@dataclass(frozen=True)
+class Scene(SceneParts):
+    """Elastic bodies that may touch.
+
+    Attributes:
+        bodies: Bodies by name.
+        supports: Prescribed displacements.
+        loads: Forces.
+        contacts: Pairs of surfaces that may touch; `AutomaticContact` finds them, and names the surfaces.
+            Each has the discretisation that it was given or that the scene chose for it, see `plan`.
+        ties: Pairs of surfaces that stay together, likewise.
+
+    Raises:
+        InvalidInputError: If a part names a body or a surface that is not there, does not suit the body's
+            dimension or material, or a load is not one of the package's.
+
+    Example:
+        >>> from fenics_contact.gallery import block
+        >>> from fenics_contact import Coulomb, RigidPlane, Traction
+        >>> from fenics_contact.materials import IsotropicElasticity
+        >>> steel = IsotropicElasticity(2.1e5, 0.3)  # N/mm²
+        >>> floor = RigidPlane((0, 0, 0), (0, 0, 1))
+        >>> scene = Scene(
+        ...     bodies={"block": Body(block((0, 0, 0), (2, 1, 1), (4, 2, 2)), steel)},  # mm
+        ...     supports=[Support("block", "x0")],
+        ...     loads=[Traction("block", "z1", (0.0, 0.0, -500.0))],  # N/mm²
+        ...     contacts=[ContactPair(Surface("block", "z0"), floor, Coulomb(0.3))],
+        ... )
+        >>> [effect.name.value for effect in scene.effects()]
+        ['elasticity', 'prescribed displacement', 'surface load', 'contact', 'Coulomb friction']
+    """
+
+    def __post_init__(self) -> None:
+        """Check the parts, and find the contact pairs if that is wanted."""
+        super().__post_init__()
+        if isinstance(self.contacts, AutomaticContact):
+            bodies, pairs = self.contacts.found(self)
+            object.__setattr__(self, "bodies", bodies)
+            object.__setattr__(self, "contacts", pairs)
+            super().__post_init__()
+        object.__setattr__(self, "contacts", with_discretisation(self, self.contacts))
+        object.__setattr__(self, "ties", with_discretisation(self, self.ties))
+
+    def partition(self, ranks: int = 1) -> dict[str, np.ndarray]:
+        """Cut every body into subdomains of a suitable size.
+
+        Args:
+            ranks: Number of ranks that need a subdomain each.
+
+        Returns:
+            Body name -> subdomain of every cell, numbered from 0 within the body.
+        """
+        each = -(-ranks // len(self.bodies))
+        return {name: default_partition(body.mesh, each, body=name) for name, body in self.bodies.items()}
+
+    @property
+    def is_nonlinear(self) -> bool:
+        """Whether some material's stress is no linear function of the displacement."""
+        return any(is_nonlinear(each) for body in self.bodies.values() for each in body.materials)
+
+    def _facts(self) -> dict[str, Any]:
+        return {
+            "bodies": {name: body.in_words for name, body in self.bodies.items()},
+            "nodes": f"{sum(body.mesh.n_nodes for body in self.bodies.values())} in {self.dim} dimensions",
+            "supports": [support.in_words for support in self.supports],
+            "loads": [
+                f"{type(load).__name__} {load.body} {getattr(load, 'surface', '')}".rstrip()
+                for load in self.loads
+            ],
+            "contacts": [
+                f"{pair.place}, {pair.friction or 'without friction'}, {pair.given_gap}".removesuffix(", ")
+                for pair in self.contacts
+            ],
+            "ties": [tie.place for tie in self.ties],
+        }
+
+    def effects(self) -> tuple[Effect, ...]:
+        """List the effects in the scene; only what these need is built."""
+        return effects_of(self)
+
+    def plan(
+        self,
+        partitions: Mapping[str, np.ndarray] | None = None,
+        *,
+        ranks: int = 1,
+        sensitivity: bool = False,
+    ) -> Plan:
+        """Return what will be built: unknowns, multipliers, solver, memory.
+
+        Args:
+            partitions: Body name -> subdomain of every cell; by default what `partition` returns.
+            ranks: Number of ranks, if the partition is left open.
+            sensitivity: Whether derivatives by the shape are wanted.
+
+        Example:
+            >>> print(scene.plan())  # doctest: +SKIP
+        """
+        cut = self.partition(ranks) if partitions is None else partitions
+        return make_plan(self, cut, sensitivity=sensitivity)
+
+
+#: Loads or supports as functions of time.
+LoadsInTime: TypeAlias = Callable[[float], Sequence[Load]]
+SupportsInTime: TypeAlias = Callable[[float], Sequence[AnySupport]]
+
+
+@displayed
+@dataclass(frozen=True)
+@checked()
+class LoadStep:
+    """Loads and supports at the end of a step; what is not given stays as it was.
+
+    Friction and histories of materials are those of one step, by backward Euler: slip counts from the start
+    of the step to its end, also the way of points before they touch, so that a step ends best where bodies
+    touch, turn back or change their direction.
+
+    Where a step is followed in parts, as large deformations are, values change in proportion to the time,
+    rotations of rigid surfaces by their angles. Functions of time have their values at every part: ramps and
+    cycles are steps with the same function. Parts are no finer history, unless
+    `AutomaticSteps.finer_history` says so.
+
+    Attributes:
+        name: What the step does, for records.
+        loads: All loads that act at the end of the step, a function that returns them at a time, or None.
+        supports: All supports with their values at the end of the step, a function that returns them at a
+            time, or None; they must hold the same components in every step.
+        time: Time at the end of the step in any unit, for records, functions of time, obstacles that move
+            and materials that creep; None: the number of the step, from 1.
+
+    Raises:
+        InvalidInputError: If there are functions of time, and no time, or it is not finite.
+
+    Example:
+        >>> def turned(t):
+        ...     return [RigidSurface("rod", "top", (0, 0, 9), (0, 0, 0), (0, 0, np.sin(t)))]
+        >>> twist = [LoadStep(f"twist {t:.1f}", supports=turned, time=t) for t in np.linspace(0.1, 6.3, 63)]
+    """
+
+    name: str
+    loads: Sequence[Load] | LoadsInTime | None = None
+    supports: Sequence[AnySupport] | SupportsInTime | None = None
+    time: float | None = None
+
+    def __post_init__(self) -> None:
+        """Reject functions of time without a time, and a time that is none."""
+        if self.time is not None and not np.isfinite(self.time):
+            raise InvalidInputError(
+                f"time of LoadStep {self.name!r} must be a finite number or None, got {self.time!r}: give "
+                "the time at its end"
+            )
+        if self.time is None and (callable(self.loads) or callable(self.supports)):
+            raise InvalidInputError(
+                f"LoadStep {self.name!r} must have the time at its end, its loads or supports are functions "
+                "of it: give time=..."
+            )
+
+    def applied_to(self, scene: Scene) -> Scene:
+        """Return the scene at the end of the step.
+
+        Raises:
+            InvalidInputError: If a function of time returns no loads or supports.
+            UserCodeError: If it raises.
+        """
+        loads = scene.loads if self.loads is None else self.loads
+        supports = scene.supports if self.supports is None else self.supports
+        end = 0.0 if self.time is None else self.time
+        return self._with(scene, loads, supports, end)
+
+    def at(self, scene: Scene, time: float) -> Scene:
+        """Return a scene with the functions of time at another time; the rest stays as it is."""
+        loads = self.loads if callable(self.loads) else scene.loads
+        supports = self.supports if callable(self.supports) else scene.supports
+        return self._with(scene, loads, supports, time)
+
+    def _with(
+        self,
+        scene: Scene,
+        loads: Sequence[Load] | LoadsInTime,
+        supports: Sequence[AnySupport] | SupportsInTime,
+        time: float,
+    ) -> Scene:
+        if callable(loads):
+            with user_code(f"the loads of LoadStep {self.name!r} at time {time:g}"):
+                loads = tuple(loads(time))
+        if callable(supports):
+            with user_code(f"the supports of LoadStep {self.name!r} at time {time:g}"):
+                supports = tuple(supports(time))
+        return replace(scene, loads=loads, supports=supports)

@@ -1,0 +1,241 @@
+"""Supports: displacements prescribed on surfaces.
+
+Surfaces that move as one rigid piece, driven by a point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from fenics_contact._base.checks import GivenVector, checked, floats
+from fenics_contact._scene.fields import OfPosition, evaluate
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials.kernels import motions_about
+
+#: What a support does with one component: leave it free (None), or prescribe a number or a function of the
+#: points.
+Component = float | OfPosition | None
+
+
+@dataclass(frozen=True)
+@checked()
+class Support:
+    """Displacement prescribed on a surface, component by component.
+
+    Attributes:
+        body: Name of the body.
+        surface: Name of its surface.
+        value: Displacement [length] for x, y, z (for x, y on a plane body), by default zero in all directions
+            of the body's space. None leaves a component free; a function receives points, shape (n, dim), and
+            returns the component there, shape (n,).
+
+    Raises:
+        InvalidInputError: If nothing is prescribed, or something other than a finite number or a function.
+
+    Example:
+        >>> clamped = Support("block", "x0")
+        >>> roller = Support("block", "z0", (None, None, 0.0))
+        >>> pushed = Support("block", "x1", (0.5, None, None))  # mm
+    """
+
+    body: str
+    surface: str
+    value: tuple[Component, ...] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Reject a support that prescribes nothing or something other than a number."""
+        given = [component for component in self.value if component is not None]
+        numbers = [component for component in given if not callable(component)]
+        if len(self.value) not in (2, 3) or not given or not np.all(np.isfinite(numbers)):
+            raise InvalidInputError(
+                "Support.value must hold three entries (two for a plane body), each a finite number, a "
+                f"function of the points or None, and at least one that is not None, got {self.value!r}: use "
+                "(0.0, 0.0, 0.0) to clamp, (None, None, 0.0) for a roller"
+            )
+        object.__setattr__(self, "value", tuple(self.value))
+
+    def held_in(self, dim: int) -> Support:
+        """Return the support of a body of a dimension: zeros for three directions hold a plane body, too."""
+        plane = dim == 2 and self.value == (0.0, 0.0, 0.0)
+        return replace(self, value=(0.0, 0.0)) if plane else self
+
+    @property
+    def in_words(self) -> str:
+        """Where it is and what it prescribes."""
+        given = ("free" if v is None else "function" if callable(v) else f"{v:g}" for v in self.value)
+        return f"{self.body} {self.surface} ({', '.join(given)})"
+
+    def values(self, points: np.ndarray) -> np.ndarray:
+        """Return the prescribed displacement, NaN where a component is free.
+
+        Args:
+            points: Coordinates of nodes on the surface, shape (n, dim), [length].
+
+        Returns:
+            Shape (n, dim), [length].
+
+        Raises:
+            InvalidInputError: If a function does not return one finite number per point.
+        """
+        result = np.full(points.shape, np.nan)
+        for component, given in enumerate(self.value):
+            if callable(given):
+                name = f"component {component} of the support of surface {self.surface!r}"
+                result[:, component] = evaluate(name, given, points, ())
+            elif given is not None:
+                result[:, component] = given
+        return result
+
+
+#: Components of a motion: a number prescribes one, None leaves it free.
+Motion: TypeAlias = tuple[float | None, ...]
+
+
+@dataclass(frozen=True)
+@checked()
+class RigidSurface:
+    """A surface that moves as one rigid piece: u = U + θ × (x − p), U and θ being the motion of a point p.
+
+    Components of U and θ that are given are prescribed; the others follow from the equilibrium of the surface
+    with a force and a moment at the point. Rotations are small, as all displacements, but on bodies of
+    materials for large deformations: there the surface turns about the axis θ by the angle ‖θ‖, however
+    large, u = U + (R(θ) − I)(x − p), along arcs on the way, and everything must be prescribed. Other programs
+    call it a remote displacement or a kinematic coupling; for a force that leaves the surface flexible see
+    `TotalForce`.
+
+    Attributes:
+        body: Name of the body.
+        surface: Name of its surface.
+        at: The point p, which need not belong to the body, [length].
+        displacement: U, [length]: for each direction a number, or None where it is free; all free by default.
+        rotation: θ about each axis, in the plane one number, positive from x to y, in radians; a number
+            prescribes a component, None leaves it free; all free by default.
+        force: Force at the point along free directions, [force] (in the plane: per unit of thickness).
+        moment: Moment about the point around free axes, in the plane one number, [force·length].
+
+    Raises:
+        InvalidInputError: If numbers are missing or not finite, or a load acts on a prescribed component.
+
+    Example:
+        >>> twisted = RigidSurface("shaft", "end", (0, 0, 50), (0, 0, None), (0, 0, 0.01))  # mm, rad
+        >>> half_a_turn = RigidSurface("rubber", "top", (0, 0, 20), (0, 0, 0), (0, 0, np.pi))
+        >>> loaded = RigidSurface("bracket", "plate", (40, 0, 10), force=(0, 0, -500))  # N
+    """
+
+    body: str
+    surface: str
+    at: GivenVector
+    displacement: Motion | None = None
+    rotation: Motion | float | None = None
+    force: GivenVector | None = None
+    moment: GivenVector | float | None = None
+
+    def __post_init__(self) -> None:
+        """Reject what has not as many finite numbers as the space of the point, and loads without effect."""
+        if len(self.at) not in (2, 3) or not np.isfinite(self.at).all():
+            raise InvalidInputError(
+                f"RigidSurface.at must be three finite coordinates (two for a plane body), got {self.at!r}: "
+                "give the point whose motion is prescribed or loaded"
+            )
+        object.__setattr__(self, "at", floats(np.asarray(self.at, dtype=np.float64)))
+        counts = {"displacement": self.dim, "rotation": self.turns, "force": self.dim, "moment": self.turns}
+        for name, count in counts.items():
+            object.__setattr__(self, name, self._checked(name, count))
+        idle = (self.load != 0.0) & ~self.free
+        if idle.any():
+            raise InvalidInputError(
+                f"a load on surface {self.surface!r} of body {self.body!r} must act on free components, got "
+                f"force {self.force!r} and moment {self.moment!r} beside displacement {self.displacement!r} "
+                f"and rotation {self.rotation!r}: leave the component free (None), or the load away"
+            )
+
+    def _checked(self, name: str, count: int) -> Motion | float | None:
+        """Return an attribute as plain numbers; reject other than one finite number for each component."""
+        given = getattr(self, name)
+        if given is None:
+            return None
+        alone, may_be_free = np.ndim(given) == 0, name in ("displacement", "rotation")
+        entries = (given,) if alone else tuple(given)
+        known = [entry for entry in entries if entry is not None]
+        fits = len(entries) == count and alone == (count == 1) and np.isfinite(known).all()
+        if not fits or (len(known) < count and not may_be_free):
+            needed = "one finite number" if count == 1 else f"{count} finite numbers"
+            needed += ", or None for those that are free" if may_be_free and count > 1 else ""
+            raise InvalidInputError(
+                f"RigidSurface.{name} of surface {self.surface!r} of body {self.body!r} must be {needed}, "
+                f"as {self.at!r} is a point in {'the plane' if self.dim == 2 else 'space'}, got {given!r}: "
+                "give them, or nothing"
+            )
+        numbers = tuple(None if entry is None else float(entry) for entry in entries)
+        return numbers[0] if count == 1 else numbers
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space of the point, 2 or 3."""
+        return len(self.at)
+
+    @property
+    def turns(self) -> int:
+        """Number of components of a rotation, 1 or 3."""
+        return 2 * self.dim - 3
+
+    @property
+    def motion(self) -> Motion:
+        """Components of U, then of θ, None where free."""
+        moved = (None,) * self.dim if self.displacement is None else self.displacement
+        turned = (None,) * self.turns if self.rotation is None else self.rotation
+        return (*moved, *(turned if isinstance(turned, tuple) else (turned,)))
+
+    @property
+    def free(self) -> np.ndarray:
+        """Marks of the free components of U, then of θ, shape (3,) in the plane, (6,) in space."""
+        return np.array([component is None for component in self.motion])
+
+    @property
+    def load(self) -> np.ndarray:
+        """Force and moment at the point, zero by default, shape (3,) in the plane, (6,) in space."""
+        force = np.zeros(self.dim) if self.force is None else np.asarray(self.force, dtype=np.float64)
+        moment = np.zeros(self.turns) if self.moment is None else np.atleast_1d(self.moment)
+        return np.concatenate([force, moment])
+
+    @property
+    def in_words(self) -> str:
+        """Where it is and what it prescribes."""
+        given = ["free" if v is None else f"{v:g}" for v in self.motion]
+        moved, turned = ", ".join(given[: self.dim]), ", ".join(given[self.dim :])
+        return f"{self.body} {self.surface} as rigid: displacement ({moved}), rotation ({turned})"
+
+    def modes(self, points: np.ndarray) -> np.ndarray:
+        """Return the displacement of points for each unit component of U and θ.
+
+        Args:
+            points: Coordinates, shape (n, dim), [length].
+
+        Returns:
+            Shape (n, dim, 3) in the plane, (n, dim, 6) in space.
+        """
+        return motions_about(points, np.array(self.at))
+
+    @property
+    def prescribed(self) -> np.ndarray:
+        """U, then θ, zero where free, shape (3,) in the plane, (6,) in space."""
+        return np.array([0.0 if component is None else component for component in self.motion])
+
+    def values(self, points: np.ndarray) -> np.ndarray:
+        """Return the displacement of points, both of shape (n, dim), with zero for free components."""
+        return self.modes(points) @ self.prescribed
+
+    def turned(self, points: np.ndarray, motion: np.ndarray) -> np.ndarray:
+        """Return U + (R(θ) − I)(x − p) of points, both of shape (n, dim), for any U, then θ."""
+        shift, angle = np.split(motion, [self.dim])
+        about = Rotation.from_rotvec(angle if self.dim == 3 else (0.0, 0.0, angle[0]))
+        arms = points - np.array(self.at)
+        return np.asarray(shift + arms @ about.as_matrix()[: self.dim, : self.dim].T - arms)
+
+
+#: What prescribes displacements of a surface.
+AnySupport: TypeAlias = Support | RigidSurface

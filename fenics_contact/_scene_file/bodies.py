@@ -1,0 +1,599 @@
+"""What a scene file chooses for surfaces: groups of a mesh file, or faces of a CAD file by where they lie.
+
+Materials of bodies: those of the package by their constants, and user-defined classes.
+
+Placement of meshes: scaled, rotated, moved.
+
+Meshes from files.
+
+Meshes of built-in shapes: keys are the arguments of their functions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+
+import numpy as np
+from pydantic import AfterValidator, Discriminator, Field, NonNegativeFloat, PositiveFloat, PositiveInt, Tag
+from scipy.spatial.transform import Rotation
+
+from fenics_contact._base.checks import MOST, STEEPEST
+from fenics_contact._scene_file.part import Part, keys_of
+from fenics_contact._scene_file.values import (
+    MARK,
+    Pair,
+    PlaceOfFile,
+    Read,
+    Triple,
+    Vector,
+    is_reference,
+    load,
+    one_of,
+    with_message,
+)
+from fenics_contact.errors import InvalidInputError, scene_file_code
+from fenics_contact.gallery import blocks, bolted, hertz
+from fenics_contact.gallery import links as links_module
+from fenics_contact.gallery.links import DesignSurface, Link
+from fenics_contact.gallery.ring import LinkShape
+from fenics_contact.materials import elastic, hyperelastic
+from fenics_contact.materials import orthotropic as orthotropic_module
+from fenics_contact.materials import plastic as plastic_module
+from fenics_contact.materials.elastic import Material
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.quadratic import quadratic
+from fenics_contact.readers import cad, dolfinx
+from fenics_contact.readers import gmsh as gmsh_module
+from fenics_contact.readers import meshio as meshio_module
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+@keys_of(cad.InBox)
+class InBox(Part):
+    """The faces of a CAD file that lie wholly in a box along the axes."""
+
+    faces: Literal["in_box"]
+
+
+@keys_of(cad.OnPlane)
+class OnPlane(Part):
+    """The plane faces of a CAD file that lie in a plane; of a plane part, the straight edges on a line."""
+
+    faces: Literal["on_plane"]
+
+
+@keys_of(cad.OnCylinder)
+class OnCylinder(Part):
+    """The faces of a CAD file on a cylinder; of a plane part, the arcs of a circle."""
+
+    faces: Literal["on_cylinder"]
+
+
+def _either(kind: type, this: Any, other: Any) -> Any:
+    """Read values of a Python type as one annotation, all others as another."""
+    tag = Discriminator(lambda value: f"{MARK}this" if isinstance(value, kind) else f"{MARK}other")
+    return Annotated[Annotated[this, Tag(f"{MARK}this")] | Annotated[other, Tag(f"{MARK}other")], tag]
+
+
+_LABEL = Annotated[
+    str | int,
+    with_message("the name or number of a group or face, a list of them, or a table that chooses faces"),
+]
+_ONE: Any = _either(dict, Annotated[Any, one_of("faces", InBox, OnPlane, OnCylinder)], _LABEL)
+_SEVERAL = Annotated[list[Annotated[Any, Read(_ONE)]], Field(min_length=1, strict=False)]
+_LIST = Annotated[
+    list[str | int],
+    Field(min_length=1, strict=False),
+    with_message("a list of groups, or a table: surface = group, or surface = [groups]"),
+]
+_OF_SURFACES = dict[str, Annotated[Any, Read(_either(list, _SEVERAL, _ONE))]]
+#: A list of groups, or surface to group, groups, or tables that choose faces.
+SurfaceGroups: TypeAlias = Annotated[Any, Read(_either(dict, _OF_SURFACES, _LIST))]
+
+
+def made_choice(given: Any) -> Any:
+    """Return what the readers of meshes take."""
+    if isinstance(given, Mapping):
+        return {name: made_choice(wanted) for name, wanted in given.items()}
+    if isinstance(given, list):
+        return [made_choice(wanted) for wanted in given]
+    return given.made() if isinstance(given, Part) else given
+
+
+def by_place(given: Any) -> bool:
+    """Return whether any face is chosen by where it lies."""
+    if isinstance(given, Mapping):
+        return any(map(by_place, given.values()))
+    return any(map(by_place, given)) if isinstance(given, list) else isinstance(given, Part)
+
+
+ISOTROPIC: dict[str, Callable[..., Material]] = {
+    "isotropic": elastic.IsotropicElasticity,
+    "plane_strain": elastic.PlaneStrain,
+    "plane_stress": elastic.PlaneStress,
+}
+
+
+class _Material(Part):
+    def build(self, folder: Path) -> Material:
+        """Return the material."""
+        return self.made()
+
+
+@keys_of(elastic.IsotropicElasticity)
+class IsotropicMaterial(_Material):
+    """Isotropic elasticity: of bodies in space, or of plane ones in plane strain or plane stress."""
+
+    model: Literal["isotropic", "plane_strain", "plane_stress"] = Field(
+        "isotropic", description="isotropic for bodies in space, the others for plane bodies"
+    )
+    young_modulus: PositiveFloat
+    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
+
+    def build(self, folder: Path) -> Material:
+        """Return the material."""
+        return ISOTROPIC[self.model](**{name: getattr(self, name) for name in self.given})
+
+
+@keys_of(orthotropic_module.OrthotropicElasticity, without=["orientation"])
+class OrthotropicMaterial(_Material):
+    """Orthotropic elasticity in space by nine engineering constants in material axes 1, 2, 3."""
+
+    model: Literal["orthotropic"]
+    axis_1: Triple = Field((1.0, 0.0, 0.0), description="direction of material axis 1, any length")
+    axis_2: Triple = Field(
+        (0.0, 1.0, 0.0), description="a direction in the plane of the axes 1 and 2, any length"
+    )
+
+    def build(self, folder: Path) -> Material:
+        """Return the material."""
+        return self.made(orientation=orthotropic_module.material_axes(self.axis_1, self.axis_2))
+
+
+@keys_of(orthotropic_module.OrthotropicPlaneStress)
+class OrthotropicPlate(_Material):
+    """A thin orthotropic plate without stress normal to it, for plane bodies."""
+
+    model: Literal["orthotropic_plane_stress"]
+    shear_modulus: PositiveFloat
+
+
+class _Isotropic(_Material):
+    young_modulus: PositiveFloat
+    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
+
+
+class _VonMisesMetal(_Isotropic):
+    yield_stress: PositiveFloat
+    saturation_rate: NonNegativeFloat = 0.0
+
+
+@keys_of(plastic_module.J2Plasticity)
+class J2Material(_VonMisesMetal):
+    """Elastic-plastic metals in small strain: von Mises' yield function with hardening."""
+
+    model: Literal["j2_plasticity"]
+    kinematic_hardening: NonNegativeFloat = 0.0
+
+
+@keys_of(plastic_module.FinitePlasticity)
+class FinitePlasticityMaterial(_VonMisesMetal):
+    """Elastic-plastic metals in large deformations: von Mises' yield function with hardening."""
+
+    model: Literal["finite_plasticity"]
+
+
+@keys_of(hyperelastic.NeoHooke)
+class NeoHookeMaterial(_Isotropic):
+    """Neo-Hookean elasticity for large deformations, in the plane in plane strain."""
+
+    model: Literal["neo_hooke"]
+
+
+@keys_of(hyperelastic.StVenantKirchhoff)
+class StVenantKirchhoffMaterial(_Isotropic):
+    """Small strains under large rotations, in the plane in plane strain."""
+
+    model: Literal["st_venant_kirchhoff"]
+
+
+@keys_of(hyperelastic.MooneyRivlin)
+class MooneyRivlinMaterial(_Material):
+    """Rubber under moderate strains, in the plane in plane strain."""
+
+    model: Literal["mooney_rivlin"]
+    bulk_modulus: PositiveFloat
+
+
+@keys_of(hyperelastic.Ogden)
+class OgdenMaterial(_Material):
+    """Rubber under large strains, in the plane in plane strain."""
+
+    model: Literal["ogden"]
+    bulk_modulus: PositiveFloat
+
+
+def _frozen(value: Any) -> Any:
+    """Convert lists to tuples: materials are hashable."""
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value
+
+
+class OwnMaterial(Part):
+    """A physics model of your own, a class in a Python file."""
+
+    model: str = Field(
+        description='"file.py:Class", relative to the folder of the scene file; the file is run',
+        pattern=r"^.+\.py:[A-Za-z_]\w*$",
+    )
+    parameters: dict[str, Annotated[Any, AfterValidator(_frozen)]] = Field(
+        default_factory=dict, description="what the class takes, by name"
+    )
+
+    def build(self, folder: Path) -> Material:
+        """Return the material; runs the file.
+
+        Raises:
+            InvalidInputError: If the class does not exist or does not take these parameters.
+        """
+        kind = load(self.model, folder)
+        with scene_file_code(f"{self.model!r} with the parameters {sorted(self.parameters)}"):
+            try:
+                return kind(**self.parameters)
+            except TypeError as error:
+                raise InvalidInputError(
+                    f"parameters must be what {self.model!r} takes, got {sorted(self.parameters)}: {error}"
+                ) from error
+
+
+AnyMaterial: TypeAlias = Annotated[
+    Any,
+    one_of(
+        "model",
+        IsotropicMaterial,
+        OrthotropicMaterial,
+        OrthotropicPlate,
+        J2Material,
+        FinitePlasticityMaterial,
+        NeoHookeMaterial,
+        StVenantKirchhoffMaterial,
+        MooneyRivlinMaterial,
+        OgdenMaterial,
+        default="isotropic",
+        other=OwnMaterial,
+        when=lambda table: is_reference(table.get("model")),
+        called="file.py:Class",
+    ),
+]
+
+
+@dataclass(frozen=True, eq=False)
+class Shaped:
+    """A mesh with its shape.
+
+    Attributes:
+        mesh: The mesh.
+        crown: The smooth surface that a design may move, of chain links.
+    """
+
+    mesh: BodyMesh
+    crown: DesignSurface | None = None
+
+    def placed(self, rotation: np.ndarray, translation: np.ndarray, scale: float) -> Shaped:
+        """Return the shape scaled and rotated about the origin, then moved."""
+        mesh = self.mesh.placed(rotation, translation, scale)
+        crown = self.crown
+        if crown is not None:
+            crown = replace(crown, directions=crown.directions @ rotation.T)
+        return Shaped(mesh, crown)
+
+
+class Placed(Part):
+    """Keys that every mesh may have."""
+
+    quadratic: bool = Field(False, description="cells of second order")
+    scale: PositiveFloat = Field(
+        1.0, description="factor on all coordinates, about the origin, applied first"
+    )
+    axis: Triple = Field(
+        (0.0, 0.0, 1.0), description="axis through the origin about which the mesh is turned"
+    )
+    degrees: float = Field(0.0, description="angle by which the mesh is turned about `axis`, in degrees")
+    translate: Vector | None = Field(None, description="displacement of the mesh, applied last, [length]")
+
+    def build(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
+        """Return the bodies by the names that `part` takes, "" for the only one. Collective.
+
+        Raises:
+            InvalidInputError: If they cannot be meshed or placed.
+        """
+        return {name: self.arranged(shape) for name, shape in self.shapes(folder, comm).items()}
+
+    def shapes(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
+        """Return the bodies before placement. Collective."""
+        return {"": Shaped(self.made())}
+
+    def arranged(self, shape: Shaped) -> Shaped:
+        """Return a shape placed by the keys.
+
+        Raises:
+            InvalidInputError: If its cells are quadratic already, or a vector does not fit.
+        """
+        if self.quadratic:
+            shape = replace(shape, mesh=quadratic(shape.mesh))
+        dim = shape.mesh.dim
+        move = np.zeros(dim) if self.translate is None else np.array(self.translate)
+        if len(move) != dim:
+            raise InvalidInputError(
+                f"translate must have {dim} entries like the mesh, got {list(move)}: give {dim} numbers"
+            )
+        if self.degrees == 0.0 and self.scale == 1.0 and not move.any():
+            return shape
+        return shape.placed(_rotation(self.axis, self.degrees)[:dim, :dim], move, self.scale)
+
+
+def _rotation(axis: tuple[float, ...], degrees: float) -> np.ndarray:
+    """Return the rotation matrix, (3, 3)."""
+    length = float(np.linalg.norm(axis))
+    if length == 0.0:
+        raise InvalidInputError(f"axis must not be zero, got {list(axis)}: (0, 0, 1) turns about z")
+    turn = Rotation.from_rotvec(degrees / length * np.array(axis), degrees=True)
+    return np.asarray(np.round(turn.as_matrix(), 15))  # makes quarter turns exact
+
+
+#: CAD files that only contain data; a .geo file is a program, to be run from Python.
+CAD = (".step", ".stp", ".iges", ".igs", ".brep")
+
+_Label = str | int
+_Labels = Annotated[list[_Label], Field(min_length=1, strict=False)]
+_OfBodies = Annotated[dict[str, _Label | _Labels | dict[str, _Label]], Field(min_length=1)]
+BodyGroups: TypeAlias = Annotated[
+    Any,
+    Read(
+        Annotated[
+            _Labels | _OfBodies,
+            with_message(
+                "a list of groups, or a table: body = group, body = [groups], or body = {region = group}, "
+                "where a group is a name or a number"
+            ),
+        ]
+    ),
+]
+
+
+class MeshFile(Placed):
+    """Bodies and surfaces by name from a file: CAD, .msh, .xdmf, or another format that meshio reads."""
+
+    file: PlaceOfFile = Field(description="the file, relative to the folder of the scene file")
+    bodies: BodyGroups | None = Field(
+        None, description="groups of cells that are bodies; or body to group, groups or regions (all)"
+    )
+    surfaces: SurfaceGroups | None = Field(
+        None,
+        description="groups of facets that are surfaces; or surface to group or groups, of CAD files also to "
+        "tables that choose faces (all)",
+    )
+    size: PositiveFloat | None = Field(
+        None, description="largest edge of a cell, for CAD files, which gmsh meshes, [length]"
+    )
+    order: Literal[1, 2] = Field(1, description="order of the cells that CAD files are meshed with")
+    labels: str | None = Field(
+        None,
+        description="not for CAD, .msh and .xdmf: sets, blocks, pieces, or cell data that say which cells "
+        "belong together",
+    )
+    corners_only: bool = Field(
+        False, description="drop all nodes but the corners of quadratic cells (not for CAD, .msh and .xdmf)"
+    )
+
+    def shapes(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
+        """Read the file on rank 0. Collective.
+
+        Raises:
+            InvalidInputError: If it is missing, of unknown format, or lacks the requested groups.
+        """
+        return {name: Shaped(mesh) for name, mesh in self._read(folder / self.file, comm).items()}
+
+    def _read(self, path: Path, comm: MPI.Comm) -> Mapping[str, BodyMesh]:
+        kind, groups = path.suffix.lower(), (self.bodies, made_choice(self.surfaces))
+        if kind in (*CAD, ".msh", ".xdmf") and (self.labels is not None or self.corners_only):
+            raise InvalidInputError(
+                f"labels and corners_only are for other formats than CAD, .msh and .xdmf, got {self.file!r}: "
+                "choose groups with bodies and surfaces"
+            )
+        if kind in CAD:
+            return cad.read_cad(path, self.size, *groups, order=self.order, comm=comm)
+        if by_place(self.surfaces):
+            raise InvalidInputError(
+                f"faces are chosen by where they lie in CAD files ({', '.join(CAD)}), got {self.file!r}: "
+                "choose groups by their names or numbers"
+            )
+        if self.size is not None or self.order > 1:
+            raise InvalidInputError(
+                f"size and order are for CAD files ({', '.join(CAD)}), got {self.file!r}: leave it away, or "
+                "mesh the body anew"
+            )
+        if kind == ".msh":
+            return gmsh_module.read_msh(path, *groups, comm=comm)
+        if kind == ".xdmf":
+            return dolfinx.read_xdmf(path, *groups, comm=comm)
+        return meshio_module.read_mesh(
+            path, *groups, labels=self.labels, corners_only=self.corners_only, comm=comm
+        )
+
+
+SolidCell: TypeAlias = Literal["hexahedron", "tetrahedron"]
+Grading: TypeAlias = Annotated[float, Field(ge=0, le=STEEPEST)]
+
+
+@keys_of(blocks.block)
+class BlockMesh(Placed):
+    """A box of hexahedra or tetrahedra with surfaces x0, x1, y0, y1, z0, z1."""
+
+    shape: Literal["block"]
+    lower: Triple
+    upper: Triple
+    grading: Triple
+    cell: SolidCell
+
+
+@keys_of(blocks.rectangle)
+class RectangleMesh(Placed):
+    """A rectangle of quadrilaterals or triangles with surfaces x0, x1, y0, y1."""
+
+    shape: Literal["rectangle"]
+    lower: Pair
+    upper: Pair
+    grading: Pair
+    cell: Literal["quadrilateral", "triangle"]
+
+
+class _Hertz(Placed):
+    radius: PositiveFloat
+    n: Annotated[int, Field(ge=2)]
+    grading: Grading
+
+
+@keys_of(hertz.hemisphere)
+class HemisphereMesh(_Hertz):
+    """The lower half of a ball on the plane z = 0; surfaces contact, side, top and the cuts x0, y0."""
+
+    shape: Literal["hemisphere"]
+    symmetry: Literal["xy", "x", ""]
+
+
+@keys_of(hertz.half_cylinder)
+class HalfCylinderMesh(_Hertz):
+    """The lower half of a cylinder along y on the plane z = 0; surfaces contact, side, top, y0, y1, x0."""
+
+    shape: Literal["half_cylinder"]
+    length: PositiveFloat
+    n_length: PositiveInt
+    symmetry: Literal["x", ""]
+
+
+@keys_of(hertz.half_disc)
+class HalfDiscMesh(_Hertz):
+    """The lower half of a disc on the line y = 0, plane; surfaces contact, side, top and the cut x0."""
+
+    shape: Literal["half_disc"]
+    symmetry: Literal["x", ""]
+
+
+def _plate(
+    hole: float,
+    half_width: float,
+    ends: tuple[float, float],
+    heights: tuple[float, float],
+    n_layers: int,
+    n: int,
+    n_radial: int | None = None,
+) -> BodyMesh:
+    """Mesh a drilled plate with layers of equal height.
+
+    Args:
+        hole: Radius of the hole, [length].
+        half_width: The strip reaches from y = 0 to this, [length].
+        ends: x of both ends, at or beyond the square around the hole, [length].
+        heights: z of bottom and top, [length].
+        n_layers: Cells through the thickness.
+        n: Cells along an eighth of the hole.
+        n_radial: Cells from the hole to the square around it; n unless given.
+    """
+    levels = np.linspace(*heights, n_layers + 1)
+    return bolted.drilled_plate(hole, half_width, ends, levels, n, n_radial=n_radial)
+
+
+@keys_of(_plate)
+class DrilledPlateMesh(Placed):
+    """Half a strip with a round hole at the z-axis; surfaces bottom, top, hole, x0, x1, y0, y1."""
+
+    shape: Literal["drilled_plate"]
+    hole: PositiveFloat
+    half_width: PositiveFloat
+    n_layers: Annotated[int, Field(ge=1, le=MOST)]
+    n: PositiveInt
+    n_radial: PositiveInt | None
+
+
+@keys_of(bolted.bolt)
+class BoltMesh(Placed):
+    """Half a bolt along the z-axis with head and nut; surfaces head, nut, shank, side, top, bottom, y0."""
+
+    shape: Literal["bolt"]
+    shank: PositiveFloat
+    head: PositiveFloat
+    head_height: PositiveFloat
+    n: PositiveInt
+    n_radial: PositiveInt | None
+
+
+class _Links(Placed):
+    inner_radius: PositiveFloat
+    straight: PositiveFloat
+    thickness: PositiveFloat
+    width: PositiveFloat
+    roundness: Annotated[float, Field(gt=0, le=1)]
+    n_around: Annotated[int, Field(ge=12)]
+    n_a: PositiveInt
+    n_b: Annotated[int, Field(ge=2)]
+    grading: Grading
+    cell: SolidCell
+
+    def shapes(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
+        """Return the links by the names that `part` takes. Collective."""
+        return {name: Shaped(link.mesh, link.crown) for name, link in self.links_of(comm).items()}
+
+    def links_of(self, comm: MPI.Comm) -> Mapping[str, Link]:
+        """Return the links, a single one unless it is overridden. Collective."""
+        return {"": links_module.chain_link(self.made(), comm)}
+
+
+@keys_of(LinkShape)
+class LinkMesh(_Links):
+    """One chain link; surfaces contact (inner side of the contact crown) and grip (of the far crown)."""
+
+    shape: Literal["chain_link"]
+
+
+@keys_of(LinkShape)
+class TwoLinksMesh(_Links):
+    """Two interlocked links that touch, parts "first" and "second"; surfaces contact and grip."""
+
+    shape: Literal["two_links"]
+    gap: NonNegativeFloat = Field(0.0, description="clearance along the pull axis, [length]")
+
+    def links_of(self, comm: MPI.Comm) -> Mapping[str, Link]:
+        """Return both links. Collective."""
+        links = links_module.two_links(self.made(), gap=self.gap, comm=comm)
+        return {"first": links.first, "second": links.second}
+
+
+@keys_of(LinkShape)
+class ChainMesh(_Links):
+    """A straight chain of links, parts "1", "2", ...; each bears with contact on the grip of the next."""
+
+    shape: Literal["chain"]
+    links: Annotated[int, Field(ge=2, le=10_000, description="number of links")]
+    gap: NonNegativeFloat = Field(0.0, description="clearance between neighbours, [length]")
+
+    def links_of(self, comm: MPI.Comm) -> Mapping[str, Link]:
+        """Return all links. Collective."""
+        chain = links_module.chain([self.made()] * self.links, gap=self.gap, comm=comm)
+        return {str(number): link for number, link in enumerate(chain.links, 1)}
+
+
+Mesh: TypeAlias = Annotated[
+    Any,
+    one_of(
+        "shape",
+        BlockMesh, RectangleMesh, HemisphereMesh, HalfCylinderMesh, HalfDiscMesh, DrilledPlateMesh, BoltMesh,
+        LinkMesh, TwoLinksMesh, ChainMesh,
+        other=MeshFile,
+        when=lambda table: "file" in table and "shape" not in table,
+    ),
+]  # fmt: skip

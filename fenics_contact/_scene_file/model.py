@@ -1,0 +1,371 @@
+"""Obstacles of scene files that move: their path as numbers and formulas in t.
+
+Pairs of surfaces that may touch or stay together, and rigid obstacles.
+
+Loads on surfaces and volumes, and prescribed displacements.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+
+import numpy as np
+from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
+from scipy.spatial.transform import Rotation
+
+from fenics_contact._scene import automatic, loads, pairs
+from fenics_contact._scene import obstacles as obstacles_module
+from fenics_contact._scene.loads import Load
+from fenics_contact._scene.obstacles import MovingObstacle
+from fenics_contact._scene.pairs import ContactPair, Surface, Tie
+from fenics_contact._scene.supports import RigidSurface, Support
+from fenics_contact._scene_file.part import Part, keys_of
+from fenics_contact._scene_file.values import (
+    FREE,
+    Components,
+    Expression,
+    FieldOrMeasured,
+    Motion,
+    NotNegativeField,
+    Scalar,
+    ScalarField,
+    Triple,
+    Vector,
+    VectorExpression,
+    at_time,
+    one_of,
+)
+from fenics_contact.errors import InvalidInputError
+
+
+@dataclass(frozen=True)
+class ObstaclePath:
+    """Where an obstacle is at a time.
+
+    Attributes:
+        motion: Displacement, then rotation, in the plane three components, in space six.
+        about: The point about which it turns, [length].
+    """
+
+    motion: tuple[float | Expression, ...]
+    about: tuple[float, ...]
+
+    def __call__(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return rotation and translation at a time."""
+        point = np.array(self.about)
+        now = [at_time(part, time) for part in self.motion]
+        numbers = [float(part(point[None])[0]) if isinstance(part, Expression) else part for part in now]
+        shift, angle = np.split(np.array(numbers), [len(point)])
+        about = Rotation.from_rotvec(angle if len(point) == 3 else (0.0, 0.0, angle[0]))
+        turn = about.as_matrix()[: len(point), : len(point)]
+        return turn, point - turn @ point + shift
+
+
+class ObstaclePart(Part):
+    """A rigid obstacle, which may move."""
+
+    motion: Motion | None = Field(
+        None,
+        description="displacement along x, y and z, [length], then rotation about them, in radians (in the "
+        "plane along x and y, then one rotation): numbers or formulas in t in quotes; large displacements "
+        "follow it through the load steps",
+    )
+    about: Vector | None = Field(None, description="point about which it turns, the origin by default")
+
+    def made(self, **other: Any) -> Any:
+        """Build the obstacle, one that moves if there is a motion."""
+        still = super().made(**other)
+        if self.motion is None:
+            return still
+        dim = 2 if len(self.motion) == 3 else 3
+        about = self.about or (0.0,) * dim
+        if FREE in self.motion or None in self.motion or len(about) != dim:
+            raise InvalidInputError(
+                f"the motion of an obstacle must be {3 * dim - 3} numbers or formulas in t, about a point of "
+                f"{dim} coordinates, got {self.motion!r} about {about!r}: prescribe all of it"
+            )
+        return MovingObstacle(still, ObstaclePath(self.motion, tuple(about)))
+
+
+@keys_of(Surface)
+class SurfaceOfBody(Part):
+    """A surface of a body."""
+
+    body: str = Field(description="name of the body")
+    name: str = Field(alias="surface", description="name of its surface")
+
+    @property
+    def surface(self) -> str:
+        """The name of the surface, under the name of the key."""
+        return self.name
+
+
+@keys_of(obstacles_module.RigidPlane)
+class Plane(ObstaclePart):
+    """A rigid half space, in the plane a half plane."""
+
+    obstacle: Literal["plane"]
+
+
+@keys_of(obstacles_module.RigidSphere)
+class Sphere(ObstaclePart):
+    """A rigid ball, in the plane a disc."""
+
+    obstacle: Literal["sphere"]
+    radius: PositiveFloat
+
+
+@keys_of(obstacles_module.RigidCylinder)
+class Cylinder(ObstaclePart):
+    """A rigid endless round bar."""
+
+    obstacle: Literal["cylinder"]
+    point: Triple
+    axis: Triple
+    radius: PositiveFloat
+
+
+def _function(value: float | Expression) -> Expression:
+    return value if isinstance(value, Expression) else Expression(repr(value))
+
+
+@keys_of(obstacles_module.DistanceObstacle, only=["function"])
+class Distance(ObstaclePart):
+    """A rigid obstacle given by its signed distance."""
+
+    obstacle: Literal["distance"]
+    function: Annotated[Scalar, AfterValidator(_function)] = Field(
+        alias="formula",
+        description="signed distance, negative inside, as a formula in x, y, z whose gradient has length "
+        "one, [length]",
+    )
+
+
+class NoFriction(Part):
+    """Contact without friction."""
+
+    law: Literal["none"]
+
+    def made(self, **other: Any) -> None:
+        """Return None."""
+
+
+@keys_of(pairs.Coulomb)
+class CoulombFriction(Part):
+    """Coulomb's law: the friction force is at most the coefficient times the normal force."""
+
+    law: Literal["coulomb"]
+    friction_coefficient: NotNegativeField = Field(alias="coefficient")
+
+
+@keys_of(pairs.Tresca)
+class TrescaFriction(Part):
+    """Friction with a bound that does not depend on the pressure."""
+
+    law: Literal["tresca"]
+    traction: NotNegativeField
+
+
+Master: TypeAlias = Annotated[
+    Any,
+    one_of(
+        "obstacle",
+        Plane, Sphere, Cylinder, Distance,
+        other=SurfaceOfBody,
+        when=lambda table: "obstacle" not in table,
+    ),
+]  # fmt: skip
+AnyFriction: TypeAlias = Annotated[Any, one_of("law", NoFriction, CoulombFriction, TrescaFriction)]
+
+
+@keys_of(ContactPair, without={"reason"})
+class ContactPart(Part):
+    """Two surfaces that may touch, or a surface and a rigid obstacle."""
+
+    slave: SurfaceOfBody
+    master: Master
+    friction: AnyFriction | None
+    gap: NotNegativeField | None = Field(
+        description="clearance in place of the measured one, [length]: a number, a formula in x, y, z in "
+        "quotes, or a field from a file"
+    )
+    interference: FieldOrMeasured | None = Field(
+        description="overlap in place of the measured gap, [length], given like gap; 'measured' takes the "
+        "one that the geometry has, which counts as a mistake otherwise"
+    )
+    adjust: NonNegativeFloat | None
+
+
+@keys_of(automatic.AutomaticContact)
+class AutomaticPart(Part):
+    """Contact wherever boundaries of different bodies face each other, or those of a body that folds."""
+
+    friction: AnyFriction | None
+    distance: PositiveFloat | None
+
+
+@keys_of(Tie, without={"reason"})
+class TiePart(Part):
+    """Two surfaces that stay together."""
+
+    slave: SurfaceOfBody
+    master: SurfaceOfBody
+
+
+class _Named(Part):
+    """A part that load steps change.
+
+    Attributes:
+        changed: The argument that they change.
+    """
+
+    changed: ClassVar[str] = "value"
+    name: str | None = Field(None, description="how load steps call it")
+
+    @property
+    def size(self) -> Any:
+        """A part that load steps change."""
+        return getattr(self, self.changed)
+
+
+class _Load(_Named):
+    def build(self, dim: int, value: Any = None) -> Load:
+        """Return the load, with the value of a load step if given."""
+        value = self.size if value is None else value
+        if isinstance(value, tuple) and any(map(callable, value)):
+            value = VectorExpression(value)
+        return self.made(**{self.changed: value})
+
+
+@keys_of(loads.Traction)
+class TractionLoad(_Load):
+    """Force a reference area on a surface."""
+
+    kind: Literal["traction"]
+
+
+@keys_of(loads.TotalForce)
+class TotalForceLoad(_Load):
+    """A resultant, spread over a surface."""
+
+    kind: Literal["total_force"]
+
+
+@keys_of(loads.TotalForce, without=("value", "at"))
+class TotalMomentLoad(_Load):
+    """A moment, spread over a surface."""
+
+    changed: ClassVar[str] = "moment"
+    kind: Literal["total_moment"]
+    moment: Vector | float = Field(
+        alias="value", description="three numbers, in the plane one, positive from x to y, [force·length]"
+    )
+
+    def build(self, dim: int, value: Any = None) -> Load:
+        """Return the load, without a force."""
+        moment = self.moment if value is None else value
+        return self.made(value=(0.0,) * dim, moment=moment)
+
+
+@keys_of(loads.Pressure)
+class PressureLoad(_Load):
+    """Pressure, normal to the surface; positive presses on the body."""
+
+    kind: Literal["pressure"]
+
+
+@keys_of(loads.BodyForce)
+class BodyForceLoad(_Load):
+    """Force a volume."""
+
+    kind: Literal["body_force"]
+
+
+@keys_of(loads.gravity)
+class GravityLoad(_Load):
+    """Weight of a body."""
+
+    changed: ClassVar[str] = "acceleration"
+    kind: Literal["gravity"]
+    density: PositiveFloat
+
+
+@keys_of(loads.ThermalStrain)
+class ThermalLoad(_Load):
+    """A change of temperature."""
+
+    changed: ClassVar[str] = "temperature_change"
+    kind: Literal["thermal"]
+    temperature_change: ScalarField = Field(alias="value")
+
+
+@keys_of(Support)
+class SupportPart(_Named):
+    """Displacement prescribed on a surface, component by component."""
+
+    value: Components | None = Field(
+        None,
+        description=f'displacement along x, y and z (x, y of a plane body), [length]: a number, "{FREE}", or '
+        "a formula in x, y, z in quotes, or a field from a file; zero in all directions by default",
+    )
+
+    def build(self, dim: int, value: tuple[Any, ...] | None = None) -> Support:
+        """Return the support.
+
+        Args:
+            dim: Dimension of the bodies.
+            value: What a load step prescribes instead.
+        """
+        return self.made(value=value or self.value or (0.0,) * dim)
+
+
+@keys_of(RigidSurface, without=("displacement", "rotation"))
+class RigidPart(_Named):
+    """A surface that moves as one rigid piece, driven or loaded at a point."""
+
+    kind: Literal["rigid"]
+    value: Motion | None = Field(
+        None,
+        description="displacement of the point along x, y and z, [length], then its rotation about them, in "
+        "radians (in the plane along x and y, then one rotation): a number, a formula in t in quotes, or "
+        f'"{FREE}"; all free by default',
+    )
+
+    @property
+    def size(self) -> Any:
+        """The motion, with its free components."""
+        count = len(self.at)  # type: ignore[attr-defined]
+        return self.value or (None,) * (3 * count - 3)
+
+    def build(self, dim: int, value: tuple[Any, ...] | None = None) -> RigidSurface:
+        """Return the rigid surface, with the motion of a load step if given."""
+        motion = tuple(map(self._number, value or self.size))
+        turned = motion[dim:]
+        return self.made(
+            displacement=motion[:dim], rotation=turned[0] if dim == 2 and len(turned) == 1 else turned
+        )
+
+    def _number(self, component: Any) -> float | None:
+        """Return a component as a number; a formula has its value at the point."""
+        if not isinstance(component, Expression):
+            return component
+        return float(component(np.array([self.at]))[0])  # type: ignore[attr-defined]
+
+
+AnySupportPart: TypeAlias = Annotated[
+    Any, one_of("kind", RigidPart, other=SupportPart, when=lambda part: "kind" not in part)
+]
+AnyLoad: TypeAlias = Annotated[
+    Any,
+    one_of(
+        "kind",
+        TractionLoad,
+        TotalForceLoad,
+        TotalMomentLoad,
+        PressureLoad,
+        BodyForceLoad,
+        GravityLoad,
+        ThermalLoad,
+    ),
+]

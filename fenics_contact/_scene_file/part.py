@@ -1,0 +1,126 @@
+"""Tables of a scene file, whose keys are the arguments of a class or function."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Collection, Sequence
+from typing import Annotated, Any, ClassVar, TypeVar, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, create_model, model_validator
+from pydantic.fields import FieldInfo
+from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
+
+from fenics_contact._base.checks import GivenVector, meaning
+from fenics_contact._scene.fields import ScalarValue, VectorValue
+from fenics_contact._scene_file.values import (
+    CountPair,
+    CountTriple,
+    Names,
+    Pair,
+    ScalarField,
+    Triple,
+    Vector,
+    VectorOrFormulas,
+)
+
+_FORMULAS = "; numbers, formulas in x, y, z in quotes, or fields from files"
+#: Types in files for declared types of arguments, with their descriptions; others are read as declared.
+IN_FILES: list[tuple[Any, Any, str]] = [
+    (Sequence[float], Vector, ""),
+    (tuple[float, ...], Vector, ""),
+    (GivenVector | float | None, Vector | float | None, ""),
+    (GivenVector | None, Vector | None, ""),
+    (tuple[float, float], Pair, ""),
+    (tuple[float, float] | None, Pair | None, ""),
+    (tuple[float, float, float], Triple, ""),
+    (tuple[float, float, float] | None, Triple | None, ""),
+    (tuple[str, ...], Names, ""),
+    (tuple[int, int], CountPair, ""),
+    (tuple[int, int, int], CountTriple, ""),
+    (ScalarValue, ScalarField, _FORMULAS),
+    (VectorValue, VectorOrFormulas, _FORMULAS),
+]
+Table = TypeVar("Table", bound="type[Part]")
+
+
+class Part(BaseModel):
+    """A table of a scene file.
+
+    Attributes:
+        of: The class or function that is called with it.
+        given: Those of its arguments that are keys.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+    of: ClassVar[Callable[..., Any]]
+    given: ClassVar[tuple[str, ...]] = ()
+
+    def made(self, **other: Any) -> Any:
+        """Build the object of the table, with other values for some arguments."""
+        own = {name: getattr(self, name) for name in self.given}
+        parts = {name: value.made() for name, value in own.items() if isinstance(value, Part)}
+        return type(self).of(**{**own, **parts, **other})
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _explained(cls, data: Any, handler: ModelWrapValidatorHandler[Any]) -> Any:
+        """Add the table's keys and the meaning of the wrong one to errors."""
+        try:
+            return handler(data)
+        except ValidationError as error:
+            explained = [cls._explain(each) for each in error.errors()]
+            raise ValidationError.from_exception_data(cls.__name__, explained) from None
+
+    @classmethod
+    def _explain(cls, error: Any) -> InitErrorDetails:
+        context = error.get("ctx", {})
+        if error["type"] != "explained":
+            known = {field.alias or name: field.description for name, field in cls.model_fields.items()}
+            hint = known.get(error["loc"][0]) if error["loc"] else None
+            context = {
+                **context, "kind": error["type"], "text": error["msg"], "keys": list(known), "hint": hint
+            }  # fmt: skip
+        explained = PydanticCustomError("explained", "{kind}", context)
+        return {"type": explained, "loc": error["loc"], "input": error["input"]}
+
+
+def keys_of(
+    of: Any, *, without: Collection[str] = (), only: Collection[str] = ()
+) -> Callable[[Table], Table]:
+    """Add the arguments of a class or function to a table as keys, with their types, defaults and meaning.
+
+    The table's own declaration of a key takes precedence: another type, a default, a description, or an
+    alias, which is then the key.
+
+    Args:
+        of: The class or function.
+        without: Arguments that are not keys.
+        only: Arguments that are keys; all unless given.
+    """
+
+    def derive(table: Table) -> Table:
+        hints, own = get_type_hints(of), table.__pydantic_fields__
+        fields: dict[str, Any] = {}
+        for name, argument in inspect.signature(of).parameters.items():
+            if name not in without and (not only or name in only):
+                fields[name] = _field(own.get(name), hints[name], argument, meaning(of, name))
+        derived: Any = create_model(
+            table.__name__, __base__=table, __doc__=table.__doc__, __module__=table.__module__, **fields
+        )
+        derived.of, derived.given = staticmethod(of), tuple(fields)
+        return derived
+
+    return derive
+
+
+def _field(own: FieldInfo | None, hint: Any, argument: inspect.Parameter, words: str) -> tuple[Any, Any]:
+    """Return type and field data of a key, the table's own if there are any."""
+    default = ... if argument.default is argument.empty else argument.default
+    matches = ((read, beside) for declared, read, beside in IN_FILES if declared == hint)
+    kind, beside = next(matches, (hint, ""))
+    words += beside
+    if own is None:
+        return kind, Field(default, description=words)
+    kind = Annotated[(own.annotation, *own.metadata)] if own.metadata else own.annotation
+    default = default if own.is_required() else own.default
+    return kind, Field(default, description=own.description or words, alias=own.alias)

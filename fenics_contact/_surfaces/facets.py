@@ -1,0 +1,594 @@
+"""Faceted surfaces with a continuous normal field: shape functions, averaged nodal normals, nodal areas.
+
+Areas of facets, linear and quadratic, and moments of area, with the quadrature of the load forms.
+
+Facets of six nodes: a pressure bears on the midpoints of their edges, hardly on their corners.
+
+The shape functions of the corners of a quadratic triangle have the mean zero, those of the midpoints a third:
+a uniform pressure makes forces at the midpoints alone. With the midpoints as points of contact, each with a
+third of the facet, forces are those of a quadrature rule that is exact for quadratic displacements, and a
+uniform pressure is found exactly.
+
+Displacements of quadratic facets at points of the linear pieces that stand for them.
+
+Heights of a true surface over its flat facets, see `fenics_contact._surfaces.facets.Relief`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.cell_types import FACET_TYPES, CellType, quadrature, shape_gradients, shape_values
+
+
+def quadrature_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
+    """Return the areas of facets, in the plane the lengths of edges.
+
+    Args:
+        points: Coordinates, shape (n_nodes, 3 or 2), [length].
+        facets: Node numbers as in `BodyMesh.surfaces`, shape (n_facets, nodes of a facet).
+
+    Returns:
+        Shape (n_facets,), [length²] or [length].
+    """
+    return np.asarray(nodal_areas(points, facets).sum(axis=1), dtype=np.float64)
+
+
+def nodal_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
+    """Integrate the shape functions over every facet: nodal forces of a unit pressure.
+
+    Two Gauss points per direction on linear facets, three on quadratic ones.
+
+    Returns:
+        Shape (n_facets, nodes of a facet), [length²] or [length].
+    """
+    total = np.zeros(facets.shape)
+    for at in gauss_points(points, facets):
+        total += at.areas[:, None] * at.values
+    return total
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceMoments:
+    """Area of a surface and its first moments.
+
+    Attributes:
+        area: A, [length²], in the plane [length].
+        centroid: c = ∫ x / A, shape (dim,), [length].
+        second_moment: ∫ (x − c)(x − c)ᵀ, shape (dim, dim), [length⁴], in the plane [length³].
+    """
+
+    area: float
+    centroid: np.ndarray
+    second_moment: np.ndarray
+
+
+def surface_moments(points: np.ndarray, facets: np.ndarray) -> SurfaceMoments:
+    """Return area, centroid and second moments of a surface; arguments as of `quadrature_areas`."""
+    origin = points[facets[0, 0]]  # moments are as exact far from the origin of coordinates as near it
+    corners = points[facets] - origin
+    rule = [(at.areas, np.einsum("k,nkd->nd", at.values, corners)) for at in gauss_points(points, facets)]
+    areas, places = np.concatenate([area for area, _ in rule]), np.concatenate([place for _, place in rule])
+    area = float(areas.sum())
+    centre = areas @ places / area
+    arms = places - centre
+    return SurfaceMoments(area, origin + centre, (areas[:, None] * arms).T @ arms)
+
+
+@dataclass(frozen=True, eq=False)
+class GaussPoint:
+    """One point of a quadrature rule in every facet.
+
+    Attributes:
+        weight: Its weight in the reference facet.
+        values: Shape functions, shape (nodes of a facet,).
+        gradients: Their derivatives by the reference coordinates, shape (nodes of a facet, dim − 1).
+        tangents: Derivatives of the place by these, shape (n_facets, dim − 1, dim), [length].
+    """
+
+    weight: float
+    values: np.ndarray
+    gradients: np.ndarray
+    tangents: np.ndarray
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Outward normals times the area that belongs to the point, shape (n_facets, dim)."""
+        if self.tangents.shape[2] == 3:
+            return np.asarray(self.weight * np.cross(self.tangents[:, 0], self.tangents[:, 1]))
+        along = self.tangents[:, 0]
+        return np.asarray(self.weight * np.stack([along[:, 1], -along[:, 0]], axis=1))
+
+    def of(self, nodal: np.ndarray, facets: np.ndarray) -> np.ndarray:
+        """Return nodal vectors, or the coordinates, at the point in every facet, shape (n_facets, dim)."""
+        return np.asarray(np.einsum("k,nkd->nd", self.values, nodal[facets]))
+
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """The area that belongs to the point, shape (n_facets,), [length²] or [length]."""
+        return np.asarray(np.linalg.norm(self.normals, axis=1))
+
+
+def gauss_points(points: np.ndarray, facets: np.ndarray) -> Iterator[GaussPoint]:
+    """Return the points of a quadrature rule on facets; arguments as of `quadrature_areas`."""
+    kind = FACET_TYPES[facets.shape[1], points.shape[1]]
+    positions, weights = quadrature(kind, 2 * kind.order)  # as in load forms: resultants are exact
+    values, gradients = shape_values(kind, positions), shape_gradients(kind, positions)
+    corners = points[facets]
+    for weight, value, gradient in zip(weights, values, gradients, strict=True):
+        yield GaussPoint(float(weight), value, gradient, np.einsum("ka,nkd->nad", gradient, corners))
+
+
+#: The nodes of a quadratic triangle.
+_CORNERS, _MIDPOINTS = slice(0, 3), slice(3, 6)
+
+
+def has_midside_pressure(facets: np.ndarray) -> bool:
+    """Return whether facets are quadratic triangles, (n, 6)."""
+    return facets.shape[1] == _MIDPOINTS.stop
+
+
+def bearing_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
+    """Return the area of each facet that bears on each of its nodes.
+
+    It is the nodal force of a unit pressure, but that of the corners of quadratic triangles, which vanishes
+    on flat ones, is shared by their midpoints.
+
+    Returns:
+        Shape (n_facets, nodes of a facet), [length²] or [length].
+    """
+    areas = nodal_areas(points, facets)
+    if has_midside_pressure(facets):
+        areas[:, _MIDPOINTS] += areas[:, _CORNERS].mean(axis=1, keepdims=True)
+        areas[:, _CORNERS] = 0.0
+    return areas
+
+
+def bearing_pulled_back(by_areas: np.ndarray) -> np.ndarray:
+    """Vector-Jacobian product of `bearing_areas` with respect to `nodal_areas`, the shape of facets."""
+    if not has_midside_pressure(by_areas):
+        return by_areas
+    result = by_areas.copy()
+    result[:, _CORNERS] = by_areas[:, _MIDPOINTS].mean(axis=1, keepdims=True)
+    return result
+
+
+def share_areas(mesh: BodyMesh, name: str) -> np.ndarray:
+    """Return areas by which the nodes of a surface share what is on it, (n_nodes of the mesh,), all positive.
+
+    The nodal forces of a unit pressure; on quadratic triangles those on the linear facets between the nodes.
+    """
+    facets = mesh.surfaces[name]
+    if has_midside_pressure(facets):
+        facets = mesh.linear.surfaces[name]
+    return np.bincount(facets.ravel(), nodal_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
+
+
+def filled_at_corners(facets: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Fill in values at the corners of quadratic triangles from those at the midpoints.
+
+    At each corner the mean over the facets around it of ¾ (a + b) − ½ c, where a and b are the values at the
+    midpoints beside it and c is that opposite: between the mean beside it and the linear function through all
+    three, so that quadratic fields on regular meshes are exact.
+
+    Args:
+        facets: Node numbers, (n, nodes of a facet); values stay as they are unless there are six.
+        values: Values at nodes, (n_nodes,) or (n_nodes, k).
+
+    Returns:
+        The same with values at the corners.
+    """
+    if not has_midside_pressure(facets):
+        return values
+    result, corners = values.copy(), facets[:, _CORNERS]
+    after = values[facets[:, _MIDPOINTS]]
+    before, opposite = np.roll(after, 1, axis=1), np.roll(after, -1, axis=1)
+    total, count = np.zeros_like(values), np.bincount(corners.ravel(), minlength=len(values))
+    np.add.at(total, corners, 0.75 * (after + before) - 0.5 * opposite)
+    mine = np.flatnonzero(count)
+    result[mine] = (total[mine].T / count[mine]).T
+    return result
+
+
+#: Local coordinates of the corners of quadrilaterals.
+_S, _T = np.array([-1.0, 1.0, 1.0, -1.0]), np.array([-1.0, -1.0, 1.0, 1.0])
+
+#: A plane of symmetry cuts a surface if this fraction of its normal lies in that plane.
+CUT = 0.5
+
+
+def facet_shape_values(local: np.ndarray, corners: int) -> np.ndarray:
+    """Evaluate only the values of the shape functions, at points of any leading shape; see `shape_functions`.
+
+    Args:
+        local: Local coordinates, shape (..., dim − 1).
+        corners: 4, 3 or 2.
+
+    Returns:
+        Values, shape (..., corners).
+    """
+    if corners == 2:
+        return np.asarray(0.5 * (1 + np.array([-1.0, 1.0]) * local), dtype=np.float64)
+    s, t = local[..., 0], local[..., 1]
+    if corners == 3:
+        return np.stack([1 - s - t, s, t], axis=-1)
+    u, v = 1 + _S * s[..., None], 1 + _T * t[..., None]
+    return np.asarray(0.25 * u * v, dtype=np.float64)
+
+
+def shape_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.ndarray]:
+    """Evaluate the shape functions of facets with 4 (bilinear), 3 or 2 (linear) corners.
+
+    Args:
+        local: Local coordinates, in [−1, 1]² for quadrilaterals, shape (n, 2), in the unit triangle for
+            triangles, shape (n, 2), in [−1, 1] for the edges of plane bodies, shape (n, 1).
+        corners: 4, 3 or 2.
+
+    Returns:
+        Values, shape (n, corners), and derivatives, shape (n, corners, dim − 1).
+    """
+    values = facet_shape_values(local, corners)
+    if corners == 2:
+        return values, np.broadcast_to(np.array([[-0.5], [0.5]]), (len(local), 2, 1))
+    if corners == 3:
+        slopes = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+        return values, np.broadcast_to(slopes, (len(local), 3, 2))
+    u, v = 1 + _S * local[:, :1], 1 + _T * local[:, 1:]
+    return values, 0.25 * np.stack([_S * v, u * _T], axis=2)
+
+
+def corner_places(corners: int) -> np.ndarray:
+    """Return the local coordinates of the corners of a facet, shape (corners, dim − 1)."""
+    if corners == 3:
+        return np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
+    return np.stack([_S, _T], axis=1) if corners == 4 else np.array([(-1.0,), (1.0,)])
+
+
+def outside(local: np.ndarray, corners: int) -> np.ndarray:
+    """Return by how much local coordinates lie outside the facet, shape (n,); zero inside."""
+    if corners == 2:
+        return np.maximum(np.abs(local[:, 0]) - 1, 0)
+    s, t = local[:, 0], local[:, 1]
+    if corners == 4:
+        return np.maximum(np.maximum(np.abs(s), np.abs(t)) - 1, 0)
+    return np.maximum(np.maximum.reduce([-s, -t, s + t - 1]), 0)
+
+
+def edge_distance(local: np.ndarray, corners: int) -> np.ndarray:
+    """Return how far inside facets points are, in local coordinates, negative outside, shape (n,)."""
+    if corners == 2:
+        return 1 - np.abs(local[:, 0])
+    s, t = local[:, 0], local[:, 1]
+    if corners == 4:
+        return 1 - np.maximum(np.abs(s), np.abs(t))
+    return np.minimum.reduce([s, t, 1 - s - t])
+
+
+def corner_products(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
+    """Return the cross product of the two edges at each corner, outward, shape (n_facets, corners, dim).
+
+    In the plane it is at both ends of an edge the edge rotated clockwise: the body lies on its left.
+    """
+    x = points[facets]
+    if facets.shape[1] == 2:
+        along = x[:, 1] - x[:, 0]
+        turned = np.stack([along[:, 1], -along[:, 0]], axis=1)
+        return np.stack([turned, turned], axis=1)
+    return np.cross(np.roll(x, -1, axis=1) - x, np.roll(x, 1, axis=1) - x)
+
+
+@dataclass(frozen=True)
+class Relief:
+    """The true surface over facets, as a height along the interpolated normals of the nodes.
+
+    On each facet the height is a cubic polynomial whose slopes at the corners lie in the true tangent planes
+    (Hermite interpolation along the edges, blended in between), plus corrections at the midpoints of the
+    edges and in the middle of the facet. The error is of the fourth order in the size of the facets, of the
+    sixth along arcs of circles. All entries are relative to the facets, so that they are unchanged when the
+    nodes move slightly: normals then rotate with those of the facets.
+
+    Attributes:
+        normals: True unit normals of the nodes less the averaged ones, shape (n, dim).
+        corners: The same for each corner of the facets, which differ where the surface has a crease, shape
+            (n_facets, corners, dim).
+        rest: Corrections of the cubics at the midpoints of the edges, from each corner to the next, and in
+            the middle, shape (n_facets, corners + 1); in the plane at the midpoint, (n_facets, 1), [length].
+        flattened: Number of facets left flat, as the surface over them would fold.
+    """
+
+    normals: np.ndarray
+    corners: np.ndarray
+    rest: np.ndarray
+    flattened: int = 0
+
+
+@dataclass(frozen=True)
+class FacetedSurface:
+    """Facets with unit nodal normals and, if known, the true surface that they approximate.
+
+    The normal field interpolated between the nodes is continuous across facets, unlike the facets' own.
+
+    Attributes:
+        nodes: Nodes of the body on this surface, ascending, shape (n,).
+        facets: Facets as rows of positions in ``nodes``, shape (n_facets, corners): triangles or
+            quadrilaterals counterclockwise seen from outside, in the plane edges with the body on their left.
+        points: Coordinates of the nodes, shape (n, dim), [length].
+        averaged: Outward unit normals at the nodes, averaged over the facets around each, shape (n, dim).
+        areas: Area, in the plane length, that belongs to each node, shape (n,), [length²] or [length]; zero
+            at the corners of quadratic triangles, on which a pressure does not bear.
+        mirrored: Components that the normals lack on planes of symmetry, shape (n, dim).
+        relief: The true surface relative to the facets; None if it is unknown or coincides with them.
+        whole: The quadratic facets that were cut into these, as rows of positions in ``nodes``; None if they
+            are whole.
+    """
+
+    nodes: np.ndarray
+    facets: np.ndarray
+    points: np.ndarray
+    averaged: np.ndarray
+    areas: np.ndarray
+    mirrored: np.ndarray
+    relief: Relief | None = None
+    whole: np.ndarray | None = None
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Outward unit normals at the nodes, the true ones if known, shape (n, dim)."""
+        if self.relief is None:
+            return self.averaged
+        true = self.averaged + self.relief.normals
+        return np.asarray(true / np.linalg.norm(true, axis=1)[:, None])
+
+    @property
+    def corners(self) -> int:
+        """Corners of a facet: 3 or 4, in the plane 2."""
+        return int(self.facets.shape[1])
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space around it: 3 or 2."""
+        return int(self.points.shape[1])
+
+    def areas_at(self, points: np.ndarray) -> np.ndarray:
+        """Return the areas that belong to the nodes where these lie elsewhere, shape (n,).
+
+        Args:
+            points: Coordinates of the nodes, shape (n, dim), [length].
+        """
+        if self.whole is None:
+            return _linear_areas(points, self.facets)
+        bearing = bearing_areas(points, self.whole)
+        return np.bincount(self.whole.ravel(), bearing.ravel(), minlength=len(points))
+
+
+def faceted_surface(
+    points: np.ndarray, facets: np.ndarray, mirrored: np.ndarray | None = None
+) -> FacetedSurface:
+    """Build the surface from the coordinates of a body and rows of its node numbers.
+
+    On a plane of symmetry the average includes the facets of the mirror image: the normals lie in it.
+
+    Args:
+        points: Coordinates, shape (n_nodes, 3), or (n_nodes, 2) where the facets are edges, [length].
+        facets: Node numbers of triangles, quadrilaterals or edges, shape (n_facets, 3, 4 or 2).
+        mirrored: Which nodes lie on a plane of symmetry normal to each axis, shape (n_nodes, dim); by default
+            none.
+
+    Raises:
+        InvalidInputError: If coordinates and facets are not of the same dimension.
+    """
+    corners, dim = facets.shape[1], points.shape[1]
+    if (corners, dim) not in {(2, 2), (3, 3), (4, 3)}:
+        raise InvalidInputError(
+            "a surface needs edges in the plane or triangles or quadrilaterals in space, got facets with "
+            f"{corners} corners and points with {dim} coordinates: give the points of plane bodies two"
+        )
+    nodes, local = np.unique(facets, return_inverse=True)
+    local = local.reshape(facets.shape)
+    own = points[nodes]
+    products = corner_products(own, local)
+    summed = np.zeros_like(own)
+    np.add.at(summed, local, products)
+    flat = np.zeros(own.shape, dtype=bool) if mirrored is None else mirrored[nodes]
+    within = np.where(flat, 0.0, summed)
+    # A surface that lies in the plane itself is not cut by it.
+    flat &= (np.linalg.norm(within, axis=1) > CUT * np.linalg.norm(summed, axis=1))[:, None]
+    summed[flat] = 0.0
+    areas = _linear_areas(own, local)
+    return FacetedSurface(nodes, local, own, summed / np.linalg.norm(summed, axis=1)[:, None], areas, flat)
+
+
+def _linear_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
+    """Distribute the areas of linear facets evenly over their corners."""
+    corners = facets.shape[1]
+    # The corner products of a quadrilateral add up to four times its area vector, those of a triangle to six,
+    # those of an edge to two.
+    total = np.linalg.norm(corner_products(points, facets).sum(axis=1), axis=1)
+    share = total / {2: 2, 3: 6, 4: 4}[corners] / corners
+    return np.bincount(facets.ravel(), np.repeat(share, corners), minlength=len(points))
+
+
+def shape_weights(
+    facets: np.ndarray, facet: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes of quadratic facets and their weights at points of their linear pieces.
+
+    Args:
+        facets: Node numbers of the quadratic facets, (n, nodes of a facet).
+        facet: Numbers of linear pieces, consecutive ones of a facet, (m,).
+        weights: Linear shape functions of the pieces at the points, (m, corners).
+
+    Returns:
+        Node numbers and quadratic shape functions, (m, nodes of a facet) each.
+    """
+    kind, corners = _pieces(facets, facet)
+    places = np.einsum("mk,mkd->md", weights, corners)
+    return facets[facet // len(kind.pieces)], shape_values(kind, places)
+
+
+def shape_weight_gradients(
+    facets: np.ndarray, facet: np.ndarray, weights: np.ndarray, gradients: np.ndarray
+) -> np.ndarray:
+    """Return the derivatives of the weights that `shape_weights` returns by the pieces' local coordinates.
+
+    Args:
+        facets: Node numbers of the quadratic facets, (n, nodes of a facet).
+        facet: Numbers of linear pieces, (m,).
+        weights: Linear shape functions of the pieces at the points, (m, corners).
+        gradients: Their derivatives, (m, corners, dim − 1).
+
+    Returns:
+        Shape (m, nodes of a facet, dim − 1).
+    """
+    kind, corners = _pieces(facets, facet)
+    by_place = shape_gradients(kind, np.einsum("mk,mkd->md", weights, corners))
+    return np.asarray(by_place @ np.einsum("mka,mkd->mda", gradients, corners))
+
+
+def _pieces(facets: np.ndarray, facet: np.ndarray) -> tuple[CellType, np.ndarray]:
+    """Return the type of quadratic facets and the reference corners of pieces, (m, corners, dim − 1)."""
+    kind = FACET_TYPES[facets.shape[1], 2 if facets.shape[1] == 3 else 3]
+    return kind, kind.nodes[kind.pieces[facet % len(kind.pieces)]]
+
+
+@dataclass(frozen=True)
+class Heights:
+    """Heights of the true surface at some points of facets.
+
+    Attributes:
+        value: The heights, shape (n,), [length].
+        by_local: Their derivatives by the local coordinates, shape (n, dim − 1).
+        by_slopes: Their derivatives by the slopes at the corners, see `slopes`, shape (n, corners, 2).
+    """
+
+    value: np.ndarray
+    by_local: np.ndarray
+    by_slopes: np.ndarray
+
+
+def heights(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> Heights:
+    """Return the heights of the true surface over points of facets, along the interpolated normals.
+
+    Args:
+        surface: The surface.
+        facet: Facet of each point, shape (n,).
+        local: Local coordinates on it, shape (n, dim − 1).
+    """
+    relief = surface.relief
+    if relief is None:
+        shape = (len(facet), surface.corners, 2)
+        return Heights(np.zeros(len(facet)), np.zeros(local.shape), np.zeros(shape))
+    slope, d_slope, rest, d_rest = height_functions(local, surface.corners)
+    at_corners = slopes(surface, facet)
+    value = np.einsum("nke,nke->n", slope, at_corners) + np.einsum("nm,nm->n", rest, relief.rest[facet])
+    by_local = np.einsum("nkea,nke->na", d_slope, at_corners)
+    by_local += np.einsum("nma,nm->na", d_rest, relief.rest[facet])
+    return Heights(value, by_local, slope)
+
+
+def slopes(surface: FacetedSurface, facet: np.ndarray) -> np.ndarray:
+    """Return the slopes of the heights at the corners along both edges, shape (n, corners, 2), [length].
+
+    The derivative of x(ξ) + h n(ξ) along an edge d is d + h' n at its ends; it lies in the tangent plane of
+    the normal c where h' = −d·c / n·c.
+
+    Args:
+        surface: The surface.
+        facet: Facets, shape (n,).
+    """
+    nodes, normals = surface.facets[facet], corner_normals(surface, facet)
+    edges = edges_at_corners(surface.points[nodes])
+    along = np.einsum("nkd,nkd->nk", surface.normals[nodes], normals)
+    return np.asarray(-np.einsum("nked,nkd->nke", edges, normals) / along[:, :, None])
+
+
+def corner_normals(surface: FacetedSurface, facet: np.ndarray) -> np.ndarray:
+    """Return the true normals at the corners of facets, of length close to one, shape (n, corners, dim)."""
+    assert surface.relief is not None
+    return surface.averaged[surface.facets[facet]] + surface.relief.corners[facet]
+
+
+def edges_at_corners(points: np.ndarray) -> np.ndarray:
+    """Return the edges from each corner to the next and to the one before, shape (n, corners, 2, dim)."""
+    return np.stack([np.roll(points, -1, axis=1) - points, np.roll(points, 1, axis=1) - points], axis=2)
+
+
+def height_functions(
+    local: np.ndarray, corners: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Evaluate the polynomials that multiply slopes and rests, and their derivatives.
+
+    Args:
+        local: Local coordinates as for `shape_functions`, shape (n, dim − 1).
+        corners: 4, 3 or 2.
+
+    Returns:
+        Those of the slopes, shape (n, corners, 2), their derivatives, shape (n, corners, 2, dim − 1), those
+        of the rests, shape (n, m), and their derivatives, shape (n, m, dim − 1).
+    """
+    if corners == 3:
+        return _over_triangles(local)
+    t, dt, w, dw = _edge_coordinates(local, corners)
+    after, before = t * (1 - t) ** 2 * w, t**2 * (1 - t) * w
+    d_after = ((1 - t) * (1 - 3 * t) * w)[..., None] * dt + (t * (1 - t) ** 2)[..., None] * dw
+    d_before = (t * (2 - 3 * t) * w)[..., None] * dt + (t**2 * (1 - t))[..., None] * dw
+    bubble, d_bubble = 16 * (t * (1 - t)) ** 2, (32 * t * (1 - t) * (1 - 2 * t))[..., None] * dt
+    rest, d_rest = bubble * w, d_bubble * w[..., None] + bubble[..., None] * dw
+    if corners == 2:
+        none = np.zeros_like(after)
+        slope = np.stack([np.stack([after[:, 0], none[:, 0]], 1), np.stack([none[:, 0], before[:, 0]], 1)], 1)
+        d_slope = np.zeros((*slope.shape, 1))
+        d_slope[:, 0, 0], d_slope[:, 1, 1] = d_after[:, 0], d_before[:, 0]
+        return slope, d_slope, rest[:, :1], d_rest[:, :1]
+    # The edge that ends at a corner starts at the one before.
+    slope = np.stack([after, np.roll(before, 1, axis=1)], axis=2)
+    d_slope = np.stack([d_after, np.roll(d_before, 1, axis=1)], axis=2)
+    s, r = 1 - local[:, :1] ** 2, 1 - local[:, 1:] ** 2
+    middle, d_middle = s * r, -2 * np.concatenate([local[:, :1] * r, local[:, 1:] * s], axis=1)
+    return slope, d_slope, np.hstack([rest, middle]), np.concatenate([d_rest, d_middle[:, None]], axis=1)
+
+
+def _edge_coordinates(local: np.ndarray, corners: int) -> tuple[np.ndarray, ...]:
+    """Return position along each edge and weight of each edge, (n, edges), with their derivatives."""
+    n = len(local)
+    if corners == 2:
+        return (
+            np.broadcast_to((1 + local) / 2, (n, 1)), np.full((n, 1, 1), 0.5), np.ones((n, 1)),
+            np.zeros((n, 1, 1)),
+        )  # fmt: skip
+    s, t = (1 + local[:, 0]) / 2, (1 + local[:, 1]) / 2
+    along = np.array([[0.5, 0], [0, 0.5], [-0.5, 0], [0, -0.5]])
+    position = np.stack([s, t, 1 - s, 1 - t], axis=1)
+    return (
+        position, np.broadcast_to(along, (n, 4, 2)), np.roll(position, 1, axis=1),
+        np.broadcast_to(np.roll(along, 1, axis=0), (n, 4, 2)),
+    )  # fmt: skip
+
+
+def _over_triangles(local: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Evaluate `height_functions` in barycentric coordinates L: L_i² L_j + L_1 L_2 L_3 / 2 and so on."""
+    here, d_here = shape_functions(local, 3)
+    d_here = np.asarray(d_here)
+    others = [np.roll(here, -1, axis=1), np.roll(here, 1, axis=1)]
+    d_others = [np.roll(d_here, -1, axis=1), np.roll(d_here, 1, axis=1)]
+    every = here.prod(axis=1)
+    pairs = here * others[0]
+    d_pairs = d_here * others[0][..., None] + here[..., None] * d_others[0]
+    d_every = sum(d_here[:, k] * np.roll(pairs, -1, axis=1)[:, k, None] for k in range(3))
+    slope = np.stack([here**2 * other + 0.5 * every[:, None] for other in others], axis=2)
+    d_slope = np.stack(
+        [
+            (2 * here * other)[..., None] * d_here + (here**2)[..., None] * d_other + 0.5 * d_every[:, None]
+            for other, d_other in zip(others, d_others, strict=True)
+        ],
+        axis=2,
+    )
+    rest = np.concatenate([16 * pairs**2, 27 * every[:, None]], axis=1)
+    d_rest = np.concatenate([32 * pairs[..., None] * d_pairs, 27 * d_every[:, None]], axis=1)
+    return slope, d_slope, rest, d_rest

@@ -1,0 +1,243 @@
+"""Closest-point projection of slave nodes onto a faceted master surface along its continuous normal field."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+
+from fenics_contact._surfaces.facets import FacetedSurface, heights, outside, shape_functions, shape_weights
+from fenics_contact.mesh.faces import coordinate_rounding
+
+#: Facets tried for each point in the first round, nearest centroids first.
+NEAREST = 9
+#: A facet is tried in the second round if its bounding ball is as near as the nearest centroid times this.
+REACH = 1.1
+NEWTON_STEPS = 25
+#: Number of steps after which a point still a facet's width away belongs to another facet.
+PATIENCE = 8
+#: Tolerance of a projection outside a facet, in local coordinates, for rounding on shared edges. Far from the
+#: origin the rounding of coordinates is added.
+EDGE_TOLERANCE = 1e-9
+#: Residual tolerance of Newton's method, relative to the facet and the gap.
+RESIDUAL = 1e-10
+#: Tolerance beyond the outer edges of the surface. Where a plane of symmetry cuts two round bodies the
+#: averaged normals are slightly inclined to that plane, and nodes of one body would just miss the other.
+MARGIN = 0.1
+
+
+@dataclass(frozen=True)
+class Projection:
+    """Projections of points. Only points that have a projection are listed.
+
+    Attributes:
+        point: Numbers of the points, ascending, shape (n,).
+        facet: Facet hit, shape (n,).
+        local: Local coordinates on it, shape (n, dim − 1).
+        gap: Signed distance from the true surface along the normal, positive outside, shape (n,), [length].
+        normal: Interpolated outward unit normal there, shape (n, dim).
+        beside: Distance outside its facet, in local coordinates, shape (n,); 0 for rounding.
+        lost: Points that face a facet but have no projection, ascending, shape (n_lost,).
+    """
+
+    point: np.ndarray
+    facet: np.ndarray
+    local: np.ndarray
+    gap: np.ndarray
+    normal: np.ndarray
+    beside: np.ndarray
+    lost: np.ndarray
+
+    def part(self, chosen: np.ndarray) -> Projection:
+        """Return some of the projections, by indices or a mask."""
+        return replace(self, **{name: getattr(self, name)[chosen] for name in _EACH})
+
+
+_EACH = ("point", "facet", "local", "gap", "normal", "beside")
+
+
+def node_weights(surface: FacetedSurface, hit: Projection) -> sp.csr_matrix:
+    """Return the weights of nodes in the motion of a surface at projections, shape (n, n_nodes)."""
+    values, _ = shape_functions(hit.local, surface.corners)
+    nodes, whole = surface.facets[hit.facet], surface.whole
+    if whole is not None:
+        nodes, values = shape_weights(whole, hit.facet, values)
+    row = np.repeat(np.arange(len(nodes)), nodes.shape[1])
+    return sp.csr_matrix((values.ravel(), (row, nodes.ravel())), shape=(len(nodes), len(surface.nodes)))
+
+
+def interpolated_normal(weights: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Interpolate unit normals and scale back to unit length.
+
+    Args:
+        weights: Shape functions, shape (n, corners).
+        normals: Nodal normals, shape (n, corners, dim).
+
+    Returns:
+        Unit normals, shape (n, dim), and the lengths before scaling, shape (n,).
+    """
+    mean = np.einsum("nk,nkd->nd", weights, normals)
+    length = np.linalg.norm(mean, axis=1)
+    return mean / length[:, None], length
+
+
+def newton_matrix(
+    points: np.ndarray,
+    normals: np.ndarray,
+    derivatives: np.ndarray,
+    gap: np.ndarray,
+    normal: np.ndarray,
+    length: np.ndarray,
+) -> np.ndarray:
+    """Return ∂(x(ξ) + g n(ξ))/∂(ξ, g), shape (n, dim, dim); see `project` for the symbols."""
+    tangents = np.einsum("nka,nkd->nda", derivatives, points)
+    turned = np.einsum("nka,nkd->nda", derivatives, normals)
+    turned = (turned - normal[:, :, None] * np.einsum("nd,nda->na", normal, turned)[:, None]) / length[
+        :, None, None
+    ]
+    return np.concatenate([tangents + gap[:, None, None] * turned, normal[:, :, None]], axis=2)
+
+
+def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> Projection:
+    """Project points onto a surface: find ξ, g with x(ξ) + (h(ξ) + g) n(ξ) = point.
+
+    x(ξ) is the (bi)linear facet, in the plane a straight edge, and n(ξ) the interpolated, normalised nodal
+    normal; h is the height of the true surface over the facet. Because n is continuous, so are gap, normal
+    and weights while a point slides from facet to facet. Of several projections that with the smallest ``|h +
+    g|`` is used; surfaces that face the same way do not touch. Points without any that lie beside the surface
+    by no more than a twentieth of a facet's width are projected on the facet's continuation.
+
+    Args:
+        points: Slave nodes, shape (n, dim), [length].
+        normals: Their outward unit normals, shape (n, dim).
+        master: The surface to project on.
+    """
+    corners = master.points[master.facets]
+    centroids = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - centroids[:, None], axis=2).max(axis=1)
+    tree, rounding = cKDTree(centroids), coordinate_rounding(master.points)
+    near = _solve(points, normals, master, *nearest_facets(tree, points), rounding)
+    near = best_projections(near.part(near.beside == 0.0), rounding)
+    waiting = np.setdiff1d(np.arange(len(points)), near.point)
+    reached = _solve(points, normals, master, *facets_in_reach(tree, radius, points, waiting), rounding)
+    projection = join([near, best_projections(reached, rounding)])
+    gap = projection.gap - heights(master, projection.facet, projection.local).value
+    return replace(projection, gap=gap, lost=np.setdiff1d(projection.lost, projection.point))
+
+
+def nearest_facets(tree: cKDTree, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pair every point with the facets whose centroids are nearest: numbers of points and of facets."""
+    ranks = np.arange(min(NEAREST, tree.n)) + 1
+    _, facets = tree.query(points, k=ranks)
+    return np.repeat(np.arange(len(points)), len(ranks)), facets.ravel()
+
+
+def facets_in_reach(
+    tree: cKDTree, radius: np.ndarray, points: np.ndarray, waiting: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pair the remaining points with all facets that can be closest, for any grading of the mesh."""
+    if len(waiting) == 0:
+        return waiting, waiting
+    nearest, _ = tree.query(points[waiting])
+    lists = tree.query_ball_point(points[waiting], REACH * nearest + radius.max())
+    pair = np.repeat(np.arange(len(waiting)), [len(facets) for facets in lists])
+    facet = np.concatenate(lists).astype(np.int64)
+    distance = np.linalg.norm(points[waiting[pair]] - tree.data[facet], axis=1)
+    near = distance <= REACH * nearest[pair] + radius[facet]
+    return waiting[pair[near]], facet[near]
+
+
+def _solve(
+    points: np.ndarray,
+    normals: np.ndarray,
+    master: FacetedSurface,
+    point: np.ndarray,
+    facet: np.ndarray,
+    rounding: float,
+) -> Projection:
+    """Solve for each (point, facet) pair by Newton's method; keep those in a facet or barely beside it."""
+    nodes = master.facets[facet]
+    # Relative to the facet's own corner it is as exact far from the origin as near it.
+    start = master.points[nodes[:, 0]]
+    corners, target = master.points[nodes] - start[:, None], points[point] - start
+    corner_normals = master.normals[nodes]
+    size = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max(axis=1)
+    local = np.full((len(point), master.dim - 1), 1 / 3 if master.corners == 3 else 0.0)
+    gap = np.zeros(len(point))
+    at = np.arange(len(point))  # the pairs still iterating
+    for count in range(NEWTON_STEPS):
+        step = _newton_step(corners[at], corner_normals[at], target[at], local[at], gap[at], size[at])
+        # A point far beyond the facet belongs to another one; limiting it keeps its iterates finite.
+        local[at] = np.clip(local[at] + step[:, :-1], -3, 3)
+        gap[at] += step[:, -1]
+        moving = np.abs(step[:, :-1]).max(axis=1) > 1e-8  # quadratic convergence: next comes rounding
+        if count >= PATIENCE:
+            moving &= outside(local[at], master.corners) < 1.0
+        at = at[moving]
+        if len(at) == 0:
+            break
+    values, derivatives = shape_functions(local, master.corners)
+    normal, length = interpolated_normal(values, corner_normals)
+    residual = np.einsum("nk,nkd->nd", values, corners) + gap[:, None] * normal - target
+    matrix = newton_matrix(corners, corner_normals, derivatives, gap, normal, length)
+    solved = np.linalg.norm(residual, axis=1) < RESIDUAL * (size + np.abs(gap))
+    beside = outside(local, master.corners)
+    beside = np.where(beside <= EDGE_TOLERANCE + _local_rounding(matrix, rounding), 0.0, beside)
+    facing = np.einsum("nd,nd->n", normal, normals[point]) < 0
+    near = facing & (beside <= MARGIN * (0.5 if master.corners == 3 else 1.0))
+    lost = np.unique(point[near & ~solved])
+    return Projection(point, facet, local, gap, normal, beside, lost).part(near & solved)
+
+
+def _local_rounding(matrix: np.ndarray, rounding: float) -> np.ndarray:
+    """Return a bound of the rounding of local coordinates, shape (n,)."""
+    # Entries of the inverse are bounded by the product of all but one column norms over the determinant.
+    tangents = np.linalg.norm(matrix[:, :, :-1], axis=1)
+    cofactor = tangents.max(axis=1) if matrix.shape[1] == 3 else np.ones(len(matrix))
+    return np.asarray(rounding * cofactor / np.maximum(np.abs(np.linalg.det(matrix)), 1e-300))
+
+
+def _newton_step(
+    corners: np.ndarray,
+    normals: np.ndarray,
+    target: np.ndarray,
+    local: np.ndarray,
+    gap: np.ndarray,
+    size: np.ndarray,
+) -> np.ndarray:
+    """Return the changes of (ξ, g), shape (n, dim); zero where the facet and its normals are degenerate."""
+    values, derivatives = shape_functions(local, corners.shape[1])
+    normal, length = interpolated_normal(values, normals)
+    residual = np.einsum("nk,nkd->nd", values, corners) + gap[:, None] * normal - target
+    matrix = newton_matrix(corners, normals, derivatives, gap, normal, length)
+    regular = np.abs(np.linalg.det(matrix)) > 1e-12 * size ** (matrix.shape[1] - 1)
+    matrix[~regular] = np.eye(matrix.shape[1])
+    return np.where(regular[:, None], -np.linalg.solve(matrix, residual[:, :, None])[:, :, 0], 0.0)
+
+
+def best_projections(projections: Projection, rounding: float) -> Projection:
+    """Keep the projection least beside its facet for each point; then by smallest abs(gap), then facet.
+
+    Args:
+        projections: Projections, several per point.
+        rounding: Rounding of coordinates, within which gaps at an edge of two facets agree.
+    """
+    distance = np.abs(projections.gap)
+    order = np.lexsort((distance, projections.beside, projections.point))
+    _, first, group = np.unique(projections.point[order], return_index=True, return_inverse=True)
+    nearest = order[first][group.ravel()]  # of the same point, for each in order
+    alike = distance[order] - distance[nearest] <= rounding + coordinate_rounding(distance)
+    order = order[alike & (projections.beside[order] == projections.beside[nearest])]
+    order = order[np.lexsort((projections.facet[order], projections.point[order]))]
+    _, first = np.unique(projections.point[order], return_index=True)
+    return projections.part(order[first])
+
+
+def join(parts: Sequence[Projection]) -> Projection:
+    """Return the projections of several groups of points, ascending by point."""
+    order = np.argsort(np.concatenate([part.point for part in parts]))
+    joined = {name: np.concatenate([getattr(part, name) for part in parts])[order] for name in _EACH}
+    return Projection(**joined, lost=np.unique(np.concatenate([part.lost for part in parts])))

@@ -1,0 +1,73 @@
+"""Shape sensitivity of scenes with contact and friction."""
+
+from fenics_contact._base.checkpoint import Checkpoint
+from fenics_contact._base.files import CheckpointError
+from fenics_contact._optimize.bundle_trust import BundleTrust
+from fenics_contact._optimize.constraints import Bounds, LinearConstraints, nearest_feasible
+from fenics_contact._optimize.manufacture import convex, fixed_rim, monotone, smallest_radius, symmetric
+from fenics_contact._optimize.nonlinear import NonlinearConstraint
+from fenics_contact._optimize.objective import Kinked, Pieced
+from fenics_contact._optimize.result import NotConvergedError, Result
+from fenics_contact._optimize.scipy import ForScipy
+from fenics_contact.design.adjoint import Adjoint, WeakChoice
+from fenics_contact.design.design import MovedSurface
+from fenics_contact.design.memory import AdaptiveTolerance, DesignPoint
+from fenics_contact.design.motion import VolumeIntegral
+from fenics_contact.design.objective import Maximum, Objective, Partials, Weighable
+from fenics_contact.design.objectives import (
+    ContactArea,
+    ContactForces,
+    FrictionWork,
+    LargestPressure,
+    LargestStress,
+    Movement,
+    PressureNorm,
+    PressureUnevenness,
+    StrainEnergy,
+    TotalPotential,
+)
+from fenics_contact.design.remeshed import Remeshed
+from fenics_contact.design.several import LoadCases, LoadPath
+
+__all__ = [
+    "AdaptiveTolerance",
+    "Adjoint",
+    "Bounds",
+    "BundleTrust",
+    "Checkpoint",
+    "CheckpointError",
+    "ContactArea",
+    "ContactForces",
+    "DesignPoint",
+    "ForScipy",
+    "FrictionWork",
+    "Kinked",
+    "LargestPressure",
+    "LargestStress",
+    "LinearConstraints",
+    "LoadCases",
+    "LoadPath",
+    "Maximum",
+    "MovedSurface",
+    "Movement",
+    "NonlinearConstraint",
+    "NotConvergedError",
+    "Objective",
+    "Partials",
+    "Pieced",
+    "PressureNorm",
+    "PressureUnevenness",
+    "Remeshed",
+    "Result",
+    "StrainEnergy",
+    "TotalPotential",
+    "VolumeIntegral",
+    "WeakChoice",
+    "Weighable",
+    "convex",
+    "fixed_rim",
+    "monotone",
+    "nearest_feasible",
+    "smallest_radius",
+    "symmetric",
+]

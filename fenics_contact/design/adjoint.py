@@ -1,0 +1,528 @@
+"""The adjoint of the linearised contact problem: one linear solve with the operators of the state.
+
+The branch of the contact law on which a state is differentiated.
+
+How load steps depend on the one before: slip is measured from where it left the contact points.
+
+Effect of an inexact state on the objective: its residuals weighted by the adjoint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._base.display import displayed
+from fenics_contact._base.libraries import MPI
+from fenics_contact._base.progress import Task
+from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._scene.pairs import Surface
+from fenics_contact._surfaces.facets import edge_distance
+from fenics_contact.design.objective import Partials
+from fenics_contact.errors import ConvergenceError, InvalidInputError
+from fenics_contact.feti.dual import DualSystem
+from fenics_contact.qp.cones import FeasibleSet
+from fenics_contact.qp.face import STEEP, Face, classify
+from fenics_contact.qp.face_system import CoupledSystem, FaceSystems
+from fenics_contact.qp.krylov import Stop, projected_gmres
+from fenics_contact.qp.layout import ContactLayout
+from fenics_contact.qp.problem import CountedOperator, DualProblem
+from fenics_contact.qp.reductions import global_sum
+from fenics_contact.qp.solution import apply_unless_zero
+from fenics_contact.results.contact import RowValues
+from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.state import State
+
+#: A contact point is weakly active if it is closer to a switch of the contact law than this many residuals.
+UNCERTAINTY = 3.0
+#: Weak points further from the switch than this fraction of the forces are assigned to the closer side.
+LEANING = 1e-5
+#: A projection within this distance of a facet's edge, in local coordinates, counts as on the edge.
+EDGE_TOLERANCE = 1e-6
+
+
+class WeakChoice(Enum):
+    """The branch that all weakly active points are given.
+
+    Each branch of each point is an element of the limiting coderivative of its contact law, and the adjoint
+    of a choice is an element of the inclusion for coderivatives of a composition. With a single weak point
+    either branch gives a Clarke subgradient. With several it need not: nearby designs may close some points
+    only while others open, so that no design has all of them open, or all closed.
+    """
+
+    RELEASED = "weak contacts count as open, weak discs as slipping"
+    HELD = "weak contacts count as closed, weak discs as sticking"
+
+
+@dataclass(frozen=True)
+class WeakPoints:
+    """Numbers of points on a switch of the contact law, to the accuracy of the state, over all ranks.
+
+    Attributes:
+        contacts: Points with neither force nor gap.
+        discs: Friction discs at their bound without slip.
+        edges: Closed points that project on an edge between facets; they count as inside the facet they
+            project on.
+        choice: The branch that contacts and discs were given. Those of an inaccurate state that are probably
+            on one side are assigned to that side.
+    """
+
+    contacts: int
+    discs: int
+    edges: int
+    choice: WeakChoice
+
+    @classmethod
+    def joined(cls, several: Sequence[WeakPoints]) -> WeakPoints:
+        """Return the weak points of several states together."""
+        counts = ((each.contacts, each.discs, each.edges) for each in several)
+        contacts, discs, edges = (sum(column) for column in zip(*counts, strict=True))
+        return cls(contacts, discs, edges, several[0].choice)
+
+    @property
+    def count(self) -> int:
+        """Number of all weak points."""
+        return self.contacts + self.discs + self.edges
+
+    @property
+    def may_be_invalid(self) -> bool:
+        """Whether the derivative may not be a subgradient: no nearby design may have all these branches.
+
+        Where one weak contact closes, its friction may slip: only that single point must not be held.
+        """
+        return self.count > 1 or (self.contacts > 0 and self.choice is WeakChoice.HELD)
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class LinearisedFace:
+    """Face of a state with the two bases of its linearised contact law.
+
+    Attributes:
+        face: Closed, sticking and slipping points.
+        tested: Z_s, test directions of the rows, shape (n_owned, n_face).
+        moving: Z_u, directions along which the multiplier varies: a slipping friction force grows with its
+            normal force by μ d, shape (n_owned, n_face).
+        slip_direction: d at the slipping discs, zero elsewhere, shape (n_friction, dim − 1), owned.
+        growing: Discs whose force grows with its normal force, shape (n_friction,), owned.
+        weak: Points on a switch.
+    """
+
+    face: Face
+    tested: sp.csr_matrix
+    moving: sp.csr_matrix
+    slip_direction: np.ndarray
+    growing: np.ndarray
+    weak: WeakPoints
+
+
+def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -> LinearisedFace:
+    """Classify the contact points of a state and build both bases. Collective.
+
+    Args:
+        choice: Branch for weakly active points.
+        coupling: If False, the growth of friction with the normal force is omitted; the derivative is then
+            that of Tresca friction.
+    """
+    torn, rows = state.torn, state.rows
+    layout, bound, step = torn.layout, rows.slip_bound, rows.step
+    trial = rows.multiplier - step * rows.residual
+    coefficient = torn.friction_coefficient[torn.owned_discs]
+    length = np.linalg.norm(trial[layout.tangential], axis=1)
+    # Two slacks: every point that may be weak is counted, but only one that leans to no side is reassigned.
+    uncertainty, closest = _uncertainty(torn.decomposition.comm, rows)
+    counted = _on_switch(layout, trial, bound, coefficient, uncertainty)
+    weak = _on_switch(layout, trial, bound, coefficient, closest)
+
+    known = classify(layout, bound, rows.multiplier, rows.residual, step)
+    direction = _directions(known.direction, trial[layout.tangential], length, weak.disc | weak.vanishing)
+    held, at_rest = choice is WeakChoice.HELD, length <= closest[layout.tangential[:, 0]]
+    face = replace(
+        known,
+        closed=np.where(weak.contact, held, known.closed),
+        stick=np.where(weak.vanishing, held & at_rest, np.where(weak.disc, held, known.stick)),
+        slip=~weak.vanishing & np.where(weak.disc, not held, known.slip),
+        direction=direction,
+        overshoot=np.where(weak.disc, 1.0, known.overshoot),
+    )
+    starting = weak.vanishing & held & ~at_rest
+    tested, growing = face.restriction, face.slip | starting
+    moving = tested + growth_of(face, growing, coefficient) if coupling else tested
+    slip_direction = np.where(face.slip[:, None], direction, 0.0)
+    contacts, discs = torn.decomposition.comm.allreduce(counted.counts)
+    points = WeakPoints(int(contacts), int(discs), _points_on_edges(state), choice)
+    return LinearisedFace(face, tested, moving.tocsr(), slip_direction, growing, points)
+
+
+@dataclass(frozen=True)
+class _OnSwitch:
+    """Marks of this rank's points that lie on a switch.
+
+    Attributes:
+        contact: Neither force nor gap, shape (n_contact,).
+        vanishing: Discs whose radius vanishes with the normal force of such a contact, shape (n_friction,).
+        disc: Other discs at their bound without slip, shape (n_friction,).
+    """
+
+    contact: np.ndarray
+    vanishing: np.ndarray
+    disc: np.ndarray
+
+    @property
+    def counts(self) -> np.ndarray:
+        """Number of contacts and of discs."""
+        return np.array([np.count_nonzero(self.contact), np.count_nonzero(self.disc)])
+
+
+def _on_switch(
+    layout: ContactLayout, trial: np.ndarray, bound: np.ndarray, coefficient: np.ndarray, slack: np.ndarray
+) -> _OnSwitch:
+    """Return which points are within their slack, [force], of a switch."""
+    contact = np.abs(trial[layout.normal]) <= slack[layout.normal]
+    vanishing = contact[layout.friction_of] & (coefficient > 0)
+    beyond = np.linalg.norm(trial[layout.tangential], axis=1) - bound
+    disc = (bound > 0) & ~vanishing & (np.abs(beyond) <= slack[layout.tangential[:, 0]])
+    return _OnSwitch(contact, vanishing, disc)
+
+
+def _uncertainty(comm: MPI.Comm, rows: RowValues) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distance from a switch beyond which a point's side is certain, owned, [force]. Collective.
+
+    It is the uncertainty of λ − ρ r due to the residuals of the state, with ρ the step: those of the
+    contact law are forces already, jumps between subdomains become forces as slips and gaps do.
+
+    Returns:
+        The distance, and that below which a point of an inaccurate state is assigned to no side, shapes
+        (size,).
+    """
+    residuals = rows.residuals
+    forces, jumps = residuals.natural * residuals.force_scale, residuals.gluing * residuals.gluing_scale
+    moved = np.where(rows.between_supports, 0.0, rows.step * rows.opening)  # none changes the others
+    squares = [float(global_sum(comm, x @ x)[0]) for x in (rows.multiplier, moved)]
+    rounding = ROUNDING * float(np.sqrt(max(squares)))
+    uncertainty = np.asarray(UNCERTAINTY * (forces + rows.step * jumps) + rounding)
+    return uncertainty, np.minimum(uncertainty, LEANING * residuals.force_scale + rounding)
+
+
+def _points_on_edges(state: State) -> int:
+    """Count the closed points over an edge of their master facet, where the normal field has a kink.
+
+    Points of mortar contact represent a mean over facets and lie on none.
+    """
+    points = state.torn.points
+    total = 0
+    for index, pair in enumerate(state.scene.contacts):
+        if isinstance(pair.master, Surface):
+            closed = (points.pair == index) & (points.facet >= 0) & (state.contact.normal_force > 0)
+            mesh = state.scene.bodies[pair.master.body].mesh.linear
+            corners = mesh.surfaces[pair.master.name].shape[1]
+            distance = np.abs(edge_distance(points.local[closed], corners))
+            total += int(np.count_nonzero(distance < EDGE_TOLERANCE))
+    return total
+
+
+def growth_of(face: Face, growing: np.ndarray, coefficient: np.ndarray) -> sp.csr_matrix:
+    """Return the growth of slipping forces with their normal forces, and that of incipient ones.
+
+    A Coulomb disc has zero radius where its contact is weak. When the contact closes, its force grows along
+    the slip: it has a direction but no offset, hence no column of its own; such columns come last.
+    """
+    return replace(face, slip=growing).growth(coefficient)[:, : face.n_face]
+
+
+def _directions(known: np.ndarray, trial: np.ndarray, length: np.ndarray, weak: np.ndarray) -> np.ndarray:
+    directions = trial / np.where(length > 0, length, 1.0)[:, None]
+    return np.where(weak[:, None], directions, known)
+
+
+#: Said where a face does not hold every body.
+NOT_HELD = (
+    "the adjoint needs a contact face that holds every body, but from this state some body can slide without "
+    "resistance: refine the contact until more points hold it, add a support, choose WeakChoice.HELD where "
+    "points are weakly active, or take a design away from this one"
+)
+#: Derivatives along a rigid motion below this fraction of their summands are rounding.
+UNFELT = 1e-9
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Adjoint:
+    """Solution of the adjoint system.
+
+    Attributes:
+        displacement: w on this rank's torn dofs.
+        multiplier: ζ = Z_s z, owned.
+        motions: β, coefficients of the rigid motions in w, shape (m,), replicated.
+        iterations: Krylov iterations, each one F-product.
+    """
+
+    displacement: np.ndarray
+    multiplier: np.ndarray
+    motions: np.ndarray
+    iterations: int
+
+
+def solve_adjoint(
+    state: LinearState,
+    partials: Partials,
+    linearised: LinearisedFace,
+    *,
+    tolerance: float = 1e-9,
+    max_iterations: int = 500,
+    start: np.ndarray | None = None,
+) -> Adjoint:
+    """Solve the transpose of the linearised state equations. Collective.
+
+    With the bases Z_s (test) and Z_u (trial) of the state's face and the curvature κ of slipping discs,
+
+        K w + Bᵀ Z_s z = ∂J/∂u,      Z_uᵀ B w − κ z = Z_uᵀ ∂J/∂λ.
+
+    Eliminating w leaves (Z_uᵀ F Z_s + κ) z − (G Z_u)ᵀ β = Z_uᵀ (B K⁺ ∂J/∂u − ∂J/∂λ) under G Z_s z = Rᵀ ∂J/∂u,
+    the system of a Newton step with its two bases swapped.
+
+    Everything is linear in the objective, also the start and the scale of the residual: rescaling the
+    objective rescales the adjoint, to rounding.
+
+    Args:
+        partials: Partial derivatives of the objective.
+        linearised: Branch of the contact law.
+        tolerance: Residual relative to that of the objective alone; what rounding leaves of the sums that it
+            is projected from is small enough, as where the objective is stationary in the state.
+        max_iterations: Largest number of F-products.
+        start: Multiplier of an adjoint to start from, owned, in any scaling; that of the same objective at a
+            less accurate state saves most products. By default the multiplier of the state.
+
+    Raises:
+        ConvergenceError: If the face does not hold every body, the objective changes along a rigid motion
+            that nothing resists, or the tolerance was not reached.
+    """
+    system = state.dual
+    _require_held(system, partials.by_displacement)
+    problem, face, factor = _scaled(system.problem, linearised.face)
+    task = Task("adjoint", unit="products")
+    operator = CountedOperator(problem.operator, lambda products, _: task.step(products))
+    face_system = FaceSystems(problem, operator).build(face)
+    transposed = CoupledSystem.build(
+        face_system, problem.coarse, linearised.moving, linearised.tested, damped=True
+    )
+    if transposed is None:
+        raise ConvergenceError(NOT_HELD)
+    flexed = system.inverse(partials.by_displacement)
+    right = linearised.moving.T @ (factor * (system.jump(flexed) - partials.by_multiplier))
+    load = np.asarray(problem.comm.allreduce(system.kernel.T @ partials.by_displacement))
+    if partials.by_motion is not None:
+        load += system.points.T @ partials.by_motion
+    # At a minimum of the energy without slip the adjoint multiplier is minus the multiplier itself.
+    guess = state.solution.multiplier if start is None else start
+    begin = _begin(problem, transposed, right, load, linearised.tested.T @ (guess / factor))
+    weights = np.ones(len(right))
+    small = max(tolerance * begin.size, begin.rounding)
+    with task:
+        solved = projected_gmres(transposed, begin.gradient, weights, small, max_iterations)
+    if solved.stop is not Stop.CONVERGED:
+        raise ConvergenceError(
+            f"the adjoint needs a relative residual below {small / (begin.size or 1.0):.1e}, reached "
+            f"{solved.measure / (begin.size or 1.0):.1e} after {solved.iterations} iterations "
+            f"({solved.stop.value}): raise max_iterations or loosen the tolerance"
+        )
+    multiplier = factor * (linearised.tested @ (begin.point + solved.step))
+    final = begin.gradient + transposed.operate(solved.step, solved.product)
+    beta = transposed.oblique.coefficients(final)
+    displacement = system.inverse(partials.by_displacement - system.force(multiplier)) + system.kernel @ beta
+    return Adjoint(displacement, multiplier, beta, solved.iterations)
+
+
+@dataclass(frozen=True, eq=False)
+class _Begin:
+    """The start of the iteration.
+
+    Attributes:
+        point: z, shape (n_face,).
+        gradient: Residual of the equations there, shape (n_face,).
+        size: Norm of the projected residual due to the objective alone, independent of the guess.
+        rounding: Norm of what rounding leaves of a residual that the projection removes.
+    """
+
+    point: np.ndarray
+    gradient: np.ndarray
+    size: float
+    rounding: float
+
+
+def _begin(
+    problem: DualProblem, transposed: CoupledSystem, right: np.ndarray, load: np.ndarray, guess: np.ndarray
+) -> _Begin:
+    """Return the shortest z that balances the load plus that multiple of the guess that fits best.
+
+    The guess has its own units (forces, or those of another objective), so its factor is computed.
+    Collective; one product each for load and guess.
+    """
+
+    def image(z: np.ndarray) -> np.ndarray:
+        return transposed.operate(z, apply_unless_zero(problem, problem.operator, transposed.moving @ z))
+
+    bearing = transposed.balanced(np.zeros_like(right), load)
+    direction = transposed.balanced(guess, np.zeros_like(load))
+    borne, turned = image(bearing), image(direction)
+    gradient = borne - right
+    rest, along = transposed.oblique(gradient), transposed.oblique(turned)
+    slope, square = problem.dot(along, rest), problem.dot(along, along)
+    share = -slope / square if square > 0.0 else 0.0
+    size = max(problem.norm(transposed.oblique(right)), problem.norm(rest))
+    rounding = ROUNDING * max(problem.norm(part) for part in (right, borne, share * turned))
+    return _Begin(bearing + share * direction, gradient + share * turned, size, rounding)
+
+
+def _require_held(system: DualSystem, by_displacement: np.ndarray) -> None:
+    """Reject objectives that change along motions that nothing resists. Collective.
+
+    Such motions are fixed by convention, not by the state, and how the convention changes with the shape is
+    not part of the adjoint.
+    """
+    work = system.unheld.T @ by_displacement
+    size = abs(system.unheld).T @ np.abs(by_displacement)
+    work, size = system.problem.comm.allreduce(np.stack([work, size]))
+    if np.any(np.abs(work) > UNFELT * size):
+        raise ConvergenceError(
+            "the adjoint needs an objective that is the same wherever nothing holds a body, but this one "
+            "changes along a rigid motion that meets no resistance (`State.unheld`): add a support, or use "
+            "stresses, energies or contact forces"
+        )
+
+
+def _scaled(problem: DualProblem, face: Face) -> tuple[DualProblem, Face, np.ndarray | float]:
+    """Return problem and face in multipliers scaled by stiffness, and the factors, see `Scaling`.
+
+    The factors are uniform within a contact point, so that both bases of a face are unchanged.
+    """
+    if problem.scaling is None:
+        return problem, face, 1.0
+    factor = problem.scaling.factor
+    flexibility = face.flexibility * factor[problem.layout.tangential[:, 0]] ** 2
+    return problem.scaled_problem, replace(face, flexibility=flexibility), factor
+
+
+def require_from_rest(state: State) -> None:
+    """Check that friction of a state does not depend on other states."""
+    if state.contact.slip_before[state.torn.frictional].any():
+        raise InvalidInputError(
+            "a state alone can be differentiated if it is a single load step from rest, got one with slip of "
+            "earlier steps, which depends on the design, too: use LoadPath"
+        )
+
+
+def with_later_steps(state: State, own: Partials, by_position: np.ndarray) -> Partials:
+    """Return the derivatives of a step's objective with what all later steps add. Collective.
+
+    Args:
+        by_position: Derivative of the objectives of all later steps by the relative tangential displacement
+            after this step, owned, zero in all other rows, shape (n_owned,).
+    """
+    columns = state.torn.free.columns
+    moved = -np.asarray(state.torn.decomposition.comm.allreduce(columns.T @ by_position))
+    return replace(
+        own,
+        by_displacement=own.by_displacement + state.torn.force(by_position),
+        by_jump=own.by_jump + by_position,
+        by_motion=moved if own.by_motion is None else own.by_motion + moved,
+    )
+
+
+def by_slip_origin(state: State, own: Partials, adjoint_multiplier: np.ndarray) -> np.ndarray:
+    """Return the derivative by the positions from which a step's slip is measured, owned, (n_owned,).
+
+    The slip B u − c enters the contact law with the adjoint's multiplier ζ and the step's own objective; the
+    origin is c: the derivative is ζ − ∂J/∂(B u − c) in tangential rows.
+
+    Args:
+        own: Derivatives of the step's own objective, without those of later steps.
+    """
+    torn = state.torn
+    tangential = torn.numbering.owned >= torn.n_equality + torn.points.count
+    return np.where(tangential, adjoint_multiplier - own.by_jump, 0.0)
+
+
+@dataclass(frozen=True)
+class StateError:
+    """First-order error of an objective at an inexact state, units of the objective.
+
+    Attributes:
+        correction: Difference of the value at the exact state, to first order.
+        spread: √Σ (share of a row or disc)², which does not vanish where shares of both signs cancel.
+    """
+
+    correction: float
+    spread: float
+
+    @property
+    def size(self) -> float:
+        """Estimated error of the corrected value, safe as it is of first order and the true one of second.
+
+        Not a bound: a state so inaccurate that it lies on another face can be further off.
+        """
+        return abs(self.correction) + self.spread
+
+
+def state_error(
+    state: State,
+    partials: Partials,
+    linearised: LinearisedFace,
+    adjoint: Adjoint,
+    unbalanced: np.ndarray,
+) -> StateError:
+    r"""Return the effect of a state's residuals on the objective. Collective; no product.
+
+    The state is u = K⁺(f − Bᵀλ) + R α. Its residuals are r = −(B u − c) along the test directions of the
+    face, to which a slipping disc adds κ s, with the part s of its force across the slip: there the law
+    requires r + κ s = 0 (`Face.curvature`); the balance G λ − e of the bodies; and n = λ − P_Λ(λ − ρ r) off
+    the face, where the law prescribes the multiplier. One step of Newton's method on the face would remove
+    all of it; along it the objective changes by
+
+        δJ = ζᵀ r + zᵀ κ s − βᵀ(G λ − e) − (∂J/∂λ − B w)ᵀ n_off,
+
+    with the adjoint w, ζ = Z_s z and β. The error of J + δJ is of second order, as long as the face is the
+    right one.
+
+    Args:
+        unbalanced: Shares βᵀ(G λ − e) of forces out of balance.
+
+    References:
+        R. Becker, R. Rannacher, An optimal control approach to a posteriori error estimation in finite
+        element methods, Acta Numer. 10 (2001) 1-102. M. B. Giles, E. Süli, ibid. 11 (2002) 145-236.
+    """
+    torn, rows, layout = state.torn, state.rows, state.torn.layout
+    trial = rows.multiplier - rows.step * rows.residual
+    miss = rows.multiplier - FeasibleSet(layout, rows.slip_bound).project(trial)
+    slope = partials.by_multiplier - torn.jump(adjoint.displacement)
+    tested = rows.residual + _bent(linearised, rows.multiplier)
+    shares = adjoint.multiplier * tested - slope * _off_face(miss, linearised, layout)
+    discs = shares[layout.tangential].sum(axis=1)
+    single = np.concatenate([shares[layout.equality], shares[layout.normal], discs])
+    total, squares = torn.decomposition.comm.allreduce(np.array([single.sum(), single @ single]))
+    return StateError(float(total - unbalanced.sum()), float(np.sqrt(squares + unbalanced @ unbalanced)))
+
+
+def _bent(linearised: LinearisedFace, multiplier: np.ndarray) -> np.ndarray:
+    """Return κ s across the slip of slipping discs, zero in all other rows, owned."""
+    across = linearised.face.curvature * linearised.face.restrict(multiplier)
+    return np.asarray(linearised.face.prolong(across))
+
+
+def _off_face(miss: np.ndarray, linearised: LinearisedFace, layout: ContactLayout) -> np.ndarray:
+    """Return n where contacts are open, discs are pinned, and along the force of slipping discs, owned.
+
+    Where discs slip too far to turn within a step, the face prescribes the force across the slip, too.
+    """
+    face, direction = linearised.face, linearised.slip_direction
+    off = np.zeros_like(miss)
+    off[layout.normal] = np.where(face.closed, 0.0, miss[layout.normal])
+    tangential = miss[layout.tangential]
+    along = np.einsum("ia,ia->i", tangential, direction)[:, None] * direction
+    slipping = np.where((face.slip & (face.overshoot <= STEEP))[:, None], along, tangential)
+    off[layout.tangential] = np.where(face.stick[:, None], 0.0, slipping)
+    return off

@@ -1,0 +1,695 @@
+"""Derivative of an objective by the slip bounds of friction, and by what these depend on.
+
+Displacements of the two sides of contact or tied points, of several fields.
+
+Reverse mode through averaged normals and nodal areas of a faceted surface.
+
+Reverse mode through the closest-point projection: from gap, normal and weights back to coordinates.
+
+Reverse mode through mortar contact points: from gaps, normals, weights and areas back to coordinates.
+
+Derivative of an objective by the geometry of the contact points: gap, normal, tangents, weights, areas.
+
+Derivative of an objective by the geometry of tied points: weights, and normals where a tie slides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fenics_contact._base.libraries import MPI
+from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
+from fenics_contact._pairing.points import ContactPoints, reference_axes
+from fenics_contact._pairing.search import MortarPoints
+from fenics_contact._scene.fields import gradients_of
+from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact._scene.pair_geometry import master_share
+from fenics_contact._scene.pairs import ContactPair, Surface, Tie, Tresca
+from fenics_contact._scene.parts import surface_of
+from fenics_contact._surfaces.facets import (
+    FacetedSurface,
+    GaussPoint,
+    bearing_pulled_back,
+    corner_normals,
+    corner_products,
+    edges_at_corners,
+    gauss_points,
+    heights,
+    shape_functions,
+    shape_weight_gradients,
+    shape_weights,
+    slopes,
+)
+from fenics_contact._surfaces.projection import Projection, interpolated_normal, newton_matrix
+from fenics_contact.design.adjoint import LinearisedFace
+from fenics_contact.errors import together
+from fenics_contact.feti.averages import nodal_mean_at
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.shapes.simple import evaluate_shape
+
+
+def bound_sensitivity(
+    torn: TornSystem, by_multiplier: np.ndarray, w: np.ndarray, linearised: LinearisedFace
+) -> np.ndarray:
+    """Return dJ by each slip bound at fixed geometry, d·(∂J/∂τ − B_T w), replicated. Collective."""
+    force = by_multiplier - torn.jump(w)
+    mine = np.einsum("na,na->n", linearised.slip_direction, force[torn.layout.tangential])
+    result = np.zeros(len(torn.frictional))
+    result[torn.owned_discs] = mine
+    return np.asarray(torn.decomposition.comm.allreduce(result))
+
+
+def bounds_by_area(torn: TornSystem, by_bound: np.ndarray) -> np.ndarray:
+    """Vector-Jacobian product of the slip bounds with respect to the areas of the points, (n_points,).
+
+    Tresca's bound is a traction times a nodal area, which moves with the nodes.
+
+    Args:
+        by_bound: Derivative by each frictional point's slip bound, shape (n_friction,).
+    """
+    by_area = np.zeros(torn.points.count)
+    area = torn.points.area[torn.frictional]
+    by_area[torn.frictional] = by_bound * torn.tresca_bound / np.where(area > 0.0, area, 1.0)
+    return by_area
+
+
+def bounds_by_place(torn: TornSystem, normal_force: np.ndarray, by_bound: np.ndarray) -> np.ndarray:
+    """Vector-Jacobian product of the slip bounds with respect to the slave nodes, (n_points, dim).
+
+    Friction given as a function of position changes with the place of the node: a bound μ(x) λ_N by λ_N ∇μ,
+    Tresca's bound by the area times the gradient of the traction. Gradients are central differences.
+
+    Args:
+        normal_force: λ_N of the points, shape (n_points,), [force].
+        by_bound: Derivative by each frictional point's slip bound, shape (n_friction,).
+    """
+    points = torn.points
+    result, by_all = np.zeros((points.count, torn.dim)), np.zeros(points.count)
+    by_all[torn.frictional] = by_bound
+    places = torn.scene.points[points.slave]
+    for index, pair in enumerate(torn.scene.contacts):
+        if pair.friction_varies:
+            mine = np.flatnonzero(points.pair == index)
+            size = points.area if isinstance(pair.friction, Tresca) else normal_force
+            slope = gradients_of(f"friction of {pair.place}", pair.friction_value, places[mine], ())
+            result[mine] = (size * by_all)[mine, None] * slope
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class PairedFields:
+    """State and adjoint as derivatives by the geometry combine them: multipliers of one, motion of the other.
+
+    Attributes:
+        multipliers: λ and ζ − ∂J/∂(B u − c), owned.
+        displacements: w and u, torn displacements of this rank, shape (torn_size,) each.
+    """
+
+    multipliers: tuple[np.ndarray, np.ndarray]
+    displacements: tuple[np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class PointMotions:
+    """Displacements of state and adjoint at points, replicated.
+
+    Attributes:
+        nodes: Nodes of slaves and masters, ascending, shape (n_nodes,).
+        values: Displacement of these nodes, of the adjoint and of the state, shape (2, n_nodes, dim): each
+            multiplier is paired with the other field.
+        relative: Slave minus master displacement, shape (2, n, dim), in the same order.
+    """
+
+    nodes: np.ndarray
+    values: np.ndarray
+    relative: np.ndarray
+
+    def at(self, nodes: np.ndarray) -> np.ndarray:
+        """Return the displacements of some of the nodes, shape (2, ..., dim)."""
+        return np.asarray(self.values[:, np.searchsorted(self.nodes, nodes)])
+
+
+def point_motions(
+    torn: TornSystem, points: ContactPoints, masters: Sequence[object], fields: PairedFields
+) -> PointMotions:
+    """Return the motions of points. Collective.
+
+    Args:
+        masters: The masters of the pairs that the points number; all nodes of surfaces are included, as some
+            have no weight at any point but a derivative of it.
+    """
+    tearing, scene = torn.decomposition.tearing, torn.scene
+    surfaces = [master for master in masters if isinstance(master, Surface)]
+    opposite = [tearing.global_nodes(each.body, np.unique(scene.facets(each))) for each in surfaces]
+    nodes = np.unique(np.concatenate([points.jump.indices, *opposite]))
+    values = np.stack([nodal_mean_at(torn.decomposition, field, nodes) for field in fields.displacements])
+    jump = points.jump[:, nodes]
+    return PointMotions(nodes, values, np.stack([jump @ value for value in values]))
+
+
+def normals_pulled_back(
+    surface: FacetedSurface, by_normals: np.ndarray, by_averaged: np.ndarray | float = 0.0
+) -> np.ndarray:
+    """Vector-Jacobian product of the unit normals with respect to the surface's nodes, shape (n, dim).
+
+    Args:
+        by_normals: Derivative by each nodal normal, shape (n, dim).
+        by_averaged: Direct derivative by each averaged normal, shape (n, dim).
+    """
+    along = np.einsum("nd,nd->n", surface.normals, by_normals)
+    by_true = by_normals - along[:, None] * surface.normals
+    if surface.relief is not None:
+        by_true = by_true / np.linalg.norm(surface.averaged + surface.relief.normals, axis=1)[:, None]
+    by_averaged = by_averaged + by_true
+    products = corner_products(surface.points, surface.facets)
+    summed = np.zeros_like(surface.points)
+    np.add.at(summed, surface.facets, products)
+    summed[surface.mirrored] = 0.0
+    length = np.linalg.norm(summed, axis=1)
+    along = np.einsum("nd,nd->n", surface.averaged, by_averaged)
+    by_summed = (by_averaged - along[:, None] * surface.averaged) / length[:, None]
+    by_summed[surface.mirrored] = 0.0
+    return _products_pulled_back(surface, by_summed[surface.facets])
+
+
+def slopes_pulled_back(
+    surface: FacetedSurface, facet: np.ndarray, by_slopes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return derivatives from those by the slopes of true surfaces, see `surfaces.relief.slopes`.
+
+    Args:
+        facet: Facets, shape (n,).
+        by_slopes: Derivative by the slopes at their corners, shape (n, corners, 2).
+
+    Returns:
+        By nodes, by true normals and by averaged normals, shape (n_nodes, dim) each.
+    """
+    by_points, by_normals, by_averaged = (np.zeros_like(surface.points) for _ in range(3))
+    if surface.relief is None:
+        return by_points, by_normals, by_averaged
+    nodes, c, slope = surface.facets[facet], corner_normals(surface, facet), slopes(surface, facet)
+    edges, along = (
+        edges_at_corners(surface.points[nodes]),
+        np.einsum("nkd,nkd->nk", surface.normals[nodes], c),
+    )
+    # s = −d·c / a·c
+    scaled = by_slopes / along[:, :, None]
+    by_edges = -scaled[..., None] * c[:, :, None]
+    turned = np.einsum("nke,nke->nk", scaled, slope)[:, :, None]
+    np.add.at(by_normals, nodes, -turned * c)
+    np.add.at(
+        by_averaged, nodes, -np.einsum("nke,nked->nkd", scaled, edges) - turned * surface.normals[nodes]
+    )
+    to_next, to_previous = by_edges[:, :, 0], by_edges[:, :, 1]
+    by_corner = np.roll(to_next, 1, axis=1) + np.roll(to_previous, -1, axis=1) - to_next - to_previous
+    np.add.at(by_points, nodes, by_corner)
+    return by_points, by_normals, by_averaged
+
+
+def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarray:
+    """Vector-Jacobian product of the nodal areas with respect to the surface's nodes, shape (n, dim).
+
+    Args:
+        by_areas: Derivative by each nodal area, shape (n,).
+    """
+    if surface.whole is not None:
+        by_nodal = bearing_pulled_back(by_areas[surface.whole])
+        return integral_pulled_back(
+            surface.points, surface.whole, lambda at: (by_nodal @ at.values, np.zeros((1, 1)))
+        )
+    total = corner_products(surface.points, surface.facets).sum(axis=1)
+    direction = total / np.linalg.norm(total, axis=1)[:, None]
+    divisor = {2: 2, 3: 6, 4: 4}[surface.corners] * surface.corners
+    by_total = by_areas[surface.facets].sum(axis=1)[:, None] * direction / divisor
+    return _products_pulled_back(surface, np.repeat(by_total[:, None], surface.corners, axis=1))
+
+
+#: Returns an integrand at a Gauss point of every facet, shape (n_facets,), and its derivative by the place.
+SurfaceDensity = Callable[[GaussPoint], tuple[np.ndarray, np.ndarray]]
+
+
+def integral_pulled_back(points: np.ndarray, facets: np.ndarray, density: SurfaceDensity) -> np.ndarray:
+    """Return the derivative of an integral over facets by the nodes, shape (n_nodes, dim).
+
+    Args:
+        points: Coordinates, shape (n_nodes, dim), [length].
+    """
+    result = np.zeros_like(points)
+    for at in gauss_points(points, facets):
+        value, by_place = density(at)
+        unit = at.normals / at.areas[:, None]
+        if points.shape[1] == 3:
+            first, second = at.tangents[:, 0], at.tangents[:, 1]
+            by_tangents = np.stack([np.cross(second, unit), np.cross(unit, first)], axis=1)
+        else:
+            by_tangents = rotated_back(unit)[:, None]
+        by_tangents = at.weight * value[:, None, None] * by_tangents
+        by_corners = np.einsum("ka,nad->nkd", at.gradients, by_tangents)
+        np.add.at(result, facets, by_corners + at.values[:, None] * (at.areas[:, None] * by_place)[:, None])
+    return result
+
+
+def _products_pulled_back(surface: FacetedSurface, by_products: np.ndarray) -> np.ndarray:
+    """Reverse of `corner_products`: (next − x) × (previous − x) at each corner, of edges their rotation."""
+    result, x = np.zeros_like(surface.points), surface.points[surface.facets]
+    if surface.corners == 2:
+        by_end = rotated_back(by_products.sum(axis=1))
+        np.add.at(result, surface.facets, np.stack([-by_end, by_end], axis=1))
+        return result
+    to_next, to_previous = np.roll(x, -1, axis=1) - x, np.roll(x, 1, axis=1) - x
+    # d(a × b)·c = (b × c)·da + (c × a)·db
+    by_next, by_previous = np.cross(to_previous, by_products), np.cross(by_products, to_next)
+    by_corner = np.roll(by_next, 1, axis=1) + np.roll(by_previous, -1, axis=1) - by_next - by_previous
+    np.add.at(result, surface.facets, by_corner)
+    return result
+
+
+def rotated_back(vectors: np.ndarray) -> np.ndarray:
+    """Return plane vectors, shape (n, 2), rotated counterclockwise: reverse of (x, y) -> (y, −x)."""
+    return np.stack([-vectors[:, 1], vectors[:, 0]], axis=1)
+
+
+@dataclass(frozen=True)
+class PointDerivatives:
+    """Derivatives of a scalar by the results of the projection at each contact point.
+
+    Attributes:
+        gap: By the gap, shape (n,).
+        normal: By the normal, shape (n, dim).
+        tangents: By the tangents, shape (n, dim − 1, dim).
+        weight: By the weights of the facet's nodes, shape (n, nodes).
+        axes: Axes nearest to the first tangents, shape (n, dim); `reference_axes` by default.
+        gradients: Of these weights in local coordinates, shape (n, nodes, dim − 1); by default those of the
+            linear shape functions of the corners.
+    """
+
+    gap: np.ndarray
+    normal: np.ndarray
+    tangents: np.ndarray
+    weight: np.ndarray
+    axes: np.ndarray | None = None
+    gradients: np.ndarray | None = None
+
+
+def frames_pulled_back(
+    normal: np.ndarray, by_tangents: np.ndarray, axes: np.ndarray | None = None
+) -> np.ndarray:
+    """Vector-Jacobian product of `tangent_frames` with respect to the unit normals, shape (n, dim).
+
+    Reverse of `fenics_contact._pairing.points.tangent_frames`.
+
+    Args:
+        normal: Unit normals, shape (n, dim).
+        by_tangents: Derivative by the tangents, shape (n, dim − 1, dim).
+        axes: Axes nearest to the first tangents, shape (n, dim); `reference_axes` by default.
+    """
+    if normal.shape[1] == 2:
+        return rotated_back(by_tangents[:, 0])
+    axes = reference_axes(normal) if axes is None else axes
+    along = np.einsum("nd,nd->n", axes, normal)
+    first = axes - along[:, None] * normal
+    length = np.linalg.norm(first, axis=1)
+    t1 = first / length[:, None]
+    # t2 = n × t1
+    by_t1 = by_tangents[:, 0] + np.cross(by_tangents[:, 1], normal)
+    by_normal = np.cross(t1, by_tangents[:, 1])
+    by_first = (by_t1 - np.einsum("nd,nd->n", by_t1, t1)[:, None] * t1) / length[:, None]
+    by_normal -= along[:, None] * by_first + np.einsum("nd,nd->n", by_first, normal)[:, None] * axes
+    return by_normal
+
+
+def projection_pulled_back(
+    master: FacetedSurface, facet: np.ndarray, local: np.ndarray, gap: np.ndarray, by: PointDerivatives
+) -> tuple[np.ndarray, np.ndarray]:
+    """Vector-Jacobian product of the projection with respect to the slave points and the master's nodes.
+
+    The projection solves Σ N_j(ξ) x_j + r n(ξ) − x_s = 0 with n = m/‖m‖, m = Σ N_j(ξ) a_j, a_j the nodal
+    normals; the implicit function theorem gives ξ and r. The gap is r − h, h(ξ) the height of the true
+    surface.
+
+    Args:
+        facet: Facet of each point, shape (n,).
+        local: ξ, shape (n, dim − 1).
+        gap: r − h, shape (n,), [length].
+
+    Returns:
+        Derivative by each slave point, shape (n, dim), and by each node of the master, (n_nodes, dim).
+    """
+    nodes = master.facets[facet]
+    corners, normals = master.points[nodes], master.normals[nodes]
+    height = heights(master, facet, local)
+    values, derivatives = shape_functions(local, master.corners)
+    normal, length = interpolated_normal(values, normals)
+    by_normal = by.normal + frames_pulled_back(normal, by.tangents, by.axes)
+    by_mean = _tangential(by_normal, normal) / length[:, None]
+    gradients = derivatives if by.gradients is None else by.gradients
+    by_local = np.einsum("nk,nka->na", by.weight, gradients) - by.gap[:, None] * height.by_local
+    by_local += np.einsum("nka,nkd,nd->na", derivatives, normals, by_mean)
+    along_ray = gap + height.value
+    matrix = newton_matrix(corners, normals, derivatives, along_ray, normal, length)
+    right = np.concatenate([by_local, by.gap[:, None]], axis=1)
+    z = -np.linalg.solve(np.swapaxes(matrix, 1, 2), right[:, :, None])[:, :, 0]
+    # z is the derivative by the residual; the residual depends on x_s, x_j and, through g n, on a_j.
+    by_mean = by_mean + along_ray[:, None] * _tangential(z, normal) / length[:, None]
+    by_points, by_normals, by_averaged = slopes_pulled_back(
+        master, facet, -by.gap[:, None, None] * height.by_slopes
+    )
+    np.add.at(by_points, nodes, values[:, :, None] * z[:, None])
+    np.add.at(by_normals, nodes, values[:, :, None] * by_mean[:, None])
+    return -z, by_points + normals_pulled_back(master, by_normals, by_averaged)
+
+
+def carriers(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes that carry a master's motion at points and the gradients of their weights.
+
+    Args:
+        facet: Facet of each point, shape (n,).
+        local: Local coordinates on it, shape (n, dim − 1).
+
+    Returns:
+        Positions among the surface's nodes, shape (n, nodes), and gradients, shape (n, nodes, dim − 1).
+    """
+    values, gradients = shape_functions(local, surface.corners)
+    whole = surface.whole
+    if whole is None:
+        return surface.facets[facet], gradients
+    nodes, _ = shape_weights(whole, facet, values)
+    return nodes, shape_weight_gradients(whole, facet, values, gradients)
+
+
+def _tangential(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    return vectors - np.einsum("nd,nd->n", vectors, normal)[:, None] * normal
+
+
+@dataclass(frozen=True)
+class MortarDerivatives:
+    """Derivatives of a scalar by mortar points.
+
+    Attributes:
+        pulled: Forces p on the master, in the equations of adjoint and state: that by the weight of node j is
+            the sum over both of p · v_j, shape (2, n, dim).
+        normal: By the normals, shape (n, dim).
+        gap: By the gaps, shape (n,).
+        area: By the areas, shape (n,).
+    """
+
+    pulled: np.ndarray
+    normal: np.ndarray
+    gap: np.ndarray
+    area: np.ndarray
+
+
+def mortar_by_shape(
+    torn: TornSystem,
+    pair: ContactPair | Tie,
+    points: np.ndarray,
+    motions: PointMotions,
+    by: MortarDerivatives,
+) -> np.ndarray:
+    """Return the derivative by the nodes of all bodies, replicated, shape (n_nodes, dim). Collective.
+
+    Args:
+        points: Slave nodes among those of all bodies, ascending, shape (n,).
+        motions: Displacements of state and adjoint at the nodes of the master.
+    """
+    tearing, scene = torn.decomposition.tearing, torn.scene
+    assert isinstance(pair.master, Surface)
+    slave, master = (surface_of(scene, side, pair.geometry) for side in (pair.slave, pair.master))
+    nodes, opposite = (
+        tearing.global_nodes(side.body, surface.nodes)
+        for side, surface in ((pair.slave, slave), (pair.master, master))
+    )
+    bearing, comm = np.isin(nodes, points), torn.decomposition.comm
+    met = MortarPoints.of(slave, master, bearing, master_share(scene, pair), comm)
+    left, right = (np.hstack(list(each)) for each in (by.pulled, motions.at(opposite)))
+    own, known = np.zeros((len(nodes), left.shape[1])), np.isin(nodes, motions.nodes)
+    own[known] = np.hstack(list(motions.at(nodes[known])))
+    coupled = CouplingDerivatives(by.area, left, right, by.normal, by.gap, own)
+    by_slave, by_master = mortar_points_pulled_back(met, coupled, comm)
+    result = np.zeros((tearing.n_nodes, torn.dim))
+    result[nodes] += by_slave
+    result[opposite] += by_master
+    return result
+
+
+def mortar_points_pulled_back(
+    points: MortarPoints, by: CouplingDerivatives, comm: MPI.Comm
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the derivatives by the nodes of slave and master, shape (n_nodes, dim) each. Collective.
+
+    Gaps between true surfaces are those that linear displacements can close: combinations of gaps at the
+    nodes of both, each of which is a projection.
+
+    Args:
+        comm: Communicator of the ranks that share the work, all with the same arguments.
+    """
+    slave, master, coupling, gaps = points.slave, points.master, points.coupling, points.closable
+    by_slave, by_master = np.zeros_like(slave.points), np.zeros_like(master.points)
+    if gaps is not None:
+        across = gaps.share * by.gap
+        by_own = np.where(gaps.kept, 0.0, by.gap) - across
+        here, there = gaps.here, gaps.there
+        at_slave, at_master = _gaps_pulled_back(master, here, by_own[here.point])
+        by_slave[coupling.node[here.point]] += at_slave
+        by_master += at_master
+        at_master, at_slave = _gaps_pulled_back(slave, there, (coupling.weight.T @ across)[there.point])
+        by_master[there.point] += at_master
+        by_slave += at_slave
+        own = None if by.own is None else np.pad(by.own, ((0, 0), (0, 1)))
+        by = replace(
+            by,
+            own=own,
+            gap=np.where(gaps.kept, by.gap, 0.0),
+            left=np.column_stack([by.left, across]),
+            right=np.column_stack([by.right, gaps.opposite]),
+        )
+    parts = points.pulled_back(by, comm)
+    for surface, part, result in zip((slave, master), parts, (by_slave, by_master), strict=True):
+        every = np.arange(len(surface.facets))
+        by_points, by_normals, by_averaged = slopes_pulled_back(surface, every, part.slopes)
+        result += part.points + by_points
+        result += normals_pulled_back(surface, part.normals + by_normals, by_averaged)
+    return by_slave, by_master
+
+
+def _gaps_pulled_back(
+    surface: FacetedSurface, hit: Projection, by_gap: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Vector-Jacobian product of the gaps with respect to projected points and the surface's nodes."""
+    count, dim, corners = len(hit.point), surface.dim, surface.corners
+    by = PointDerivatives(
+        by_gap, np.zeros((count, dim)), np.zeros((count, dim - 1, dim)), np.zeros((count, corners))
+    )
+    return projection_pulled_back(surface, hit.facet, hit.local, hit.gap, by)
+
+
+@dataclass(frozen=True, eq=False)
+class RowFields(PointMotions):
+    """Multipliers and displacements of state and adjoint at the contact points, replicated.
+
+    Attributes:
+        normal: λ_N and ζ_N, shape (2, n).
+        friction: τ and ζ_T in the points' tangents, shape (2, n, dim - 1).
+    """
+
+    normal: np.ndarray
+    friction: np.ndarray
+
+
+def contact_by_shape(
+    torn: TornSystem, fields: PairedFields, by_bound: np.ndarray, by_area: np.ndarray | float
+) -> np.ndarray:
+    """Return the derivative by the geometry of the contact points, replicated, shape (n_nodes, dim).
+
+    It is ∂/∂X of −λᵀ B w + (ζ − j)ᵀ(c − B u), with the objective's derivative j by B u − c, and the shares of
+    slip bounds and areas, by which the derivatives are given. Collective.
+    """
+    tearing, points = torn.decomposition.tearing, torn.points
+    result = np.zeros((tearing.n_nodes, torn.dim))
+    if points.count == 0:
+        return result
+    rows = _row_fields(torn, fields)
+    by_area = bounds_by_area(torn, by_bound) + by_area
+    with together(torn.decomposition.comm):
+        np.add.at(result, points.slave, bounds_by_place(torn, rows.normal[0], by_bound))
+    for index, pair in enumerate(torn.scene.contacts):
+        mine = np.flatnonzero(points.pair == index)
+        if pair.by_mortar:
+            result += _by_mortar(torn, index, rows, by_area)
+            continue
+        add_areas(result, torn, index, by_area)
+        if not isinstance(pair.master, Surface):
+            result[points.slave[mine]] += _by_obstacle(torn, pair.master, rows, mine)
+        else:
+            _add_projected(result, torn, pair, rows, mine)
+    return result
+
+
+def add_areas(
+    result: np.ndarray, torn: TornSystem, index: int, by_area: np.ndarray, places: np.ndarray | None = None
+) -> None:
+    """Add the derivative by the nodes through the areas on the slave surface of a pair.
+
+    Args:
+        result: By the nodes of all bodies, shape (n_nodes, dim).
+        by_area: By the areas of all points, shape (n_points,).
+        places: Where all nodes lie, shape (n_nodes, dim), [length]; undeformed by default.
+    """
+    pair = torn.scene.contacts[index]
+    slave, given = torn.points.of_surface(index, by_area)
+    if given.any():
+        surface = surface_of(torn.scene, pair.slave, "faceted")
+        nodes = torn.decomposition.tearing.global_nodes(pair.slave.body, surface.nodes)
+        if places is not None:
+            surface = replace(surface, points=places[nodes])
+        by_areas = np.zeros(len(nodes))
+        by_areas[np.searchsorted(nodes, slave)] = given
+        result[nodes] += areas_pulled_back(surface, by_areas)
+
+
+def _by_mortar(torn: TornSystem, index: int, rows: RowFields, by_area: np.ndarray) -> np.ndarray:
+    """Return the derivative by all nodes through points of mortar contact, (n_nodes, dim). Collective."""
+    points, mine = torn.points, np.flatnonzero(torn.points.pair == index)
+    by = _by_point(points, rows, mine)
+    turned = frames_pulled_back(points.normal[mine], by.tangents, by.axes)
+    # Nodes that have no point of this pair only give their areas to others.
+    slave, areas = points.of_surface(index, by_area)
+    own = np.isin(slave, points.slave[mine])
+    pulled, normal, gap = np.zeros((2, len(slave), torn.dim)), np.zeros((len(slave), torn.dim)), 0.0 * areas
+    pulled[:, own], normal[own], gap[own] = _pulled_master(points, rows, mine), by.normal + turned, by.gap
+    given = MortarDerivatives(pulled, normal, gap, areas)
+    return mortar_by_shape(torn, torn.scene.contacts[index], slave, rows, given)
+
+
+def _by_obstacle(torn: TornSystem, obstacle: RigidObstacle, rows: RowFields, mine: np.ndarray) -> np.ndarray:
+    """Return the derivative by the slave nodes that face an obstacle, shape (n, dim)."""
+    by, normal = _by_point(torn.points, rows, mine), torn.points.normal[mine]
+    with together(torn.decomposition.comm):
+        bending = evaluate_shape(obstacle, "curvatures", torn.scene.points[torn.points.slave[mine]])
+    turning = by.normal + frames_pulled_back(normal, by.tangents, by.axes)
+    return np.asarray(by.gap[:, None] * normal + np.einsum("nde,ne->nd", bending, turning))
+
+
+def _add_projected(
+    result: np.ndarray, torn: TornSystem, pair: ContactPair, rows: RowFields, mine: np.ndarray
+) -> None:
+    """Add the derivative by slave and master nodes of projected points."""
+    master = pair.master
+    assert isinstance(master, Surface)
+    points, surface = torn.points, surface_of(torn.scene, master, pair.geometry)
+    nodes = torn.decomposition.tearing.global_nodes(master.body, surface.nodes)
+    carrying, gradients = carriers(surface, points.facet[mine], points.local[mine])
+    by = replace(_by_point(points, rows, mine, rows.at(nodes[carrying])), gradients=gradients)
+    by_slave, by_master = projection_pulled_back(
+        surface, points.facet[mine], points.local[mine], points.distance[mine], by
+    )
+    result[points.slave[mine]] += by_slave
+    result[nodes] += by_master
+
+
+def _row_fields(torn: TornSystem, fields: PairedFields) -> RowFields:
+    """Gather multipliers and displacements at all points. Collective."""
+    points, width = torn.points, torn.dim - 1
+    normal = np.stack([torn.numbering.gather(x, torn.normal_rows) for x in fields.multipliers])
+    friction = np.zeros((2, points.count, width))
+    for k, x in enumerate(fields.multipliers):
+        gathered = torn.numbering.gather(x, torn.tangential_rows.ravel())
+        friction[k, torn.frictional] = gathered.reshape(-1, width)
+    masters = [pair.master for pair in torn.scene.contacts]
+    motions = point_motions(torn, points, masters, fields)
+    return RowFields(motions.nodes, motions.values, motions.relative, normal, friction)
+
+
+def _by_point(
+    points: ContactPoints, rows: RowFields, mine: np.ndarray, corners: np.ndarray | None = None
+) -> PointDerivatives:
+    """Differentiate −λᵀ B w − ζᵀ B u + ζ_N g; rows −n·rel(v) and t·rel(v), rel(v) = v_s − Σ w_j v_j.
+
+    Args:
+        mine: The points to differentiate, shape (m,).
+        corners: Displacements of the corners of their master facets, shape (2, m, corners, dim).
+    """
+    force, friction, relative = rows.normal[:, mine], rows.friction[:, mine], rows.relative[:, mine]
+    normal = np.einsum("kn,knd->nd", force, relative)
+    tangents = -np.einsum("kna,knd->nad", friction, relative)
+    if corners is None:
+        return PointDerivatives(force[1], normal, tangents, np.zeros((len(mine), 0)), points.axes[mine])
+    weight = np.einsum("knd,knjd->nj", _pulled_master(points, rows, mine), corners)
+    return PointDerivatives(force[1], normal, tangents, weight, points.axes[mine])
+
+
+def _pulled_master(points: ContactPoints, rows: RowFields, mine: np.ndarray) -> np.ndarray:
+    """Return the forces on the master, whose work in the other field is derived, shape (2, m, dim)."""
+    pressed = -rows.normal[:, mine, None] * points.normal[mine]
+    rubbed = np.einsum("kna,nad->knd", rows.friction[:, mine], points.tangents[mine])
+    return np.asarray(pressed + rubbed)
+
+
+def ties_by_shape(torn: TornSystem, fields: PairedFields) -> np.ndarray:
+    """Return the derivative by the geometry of tied points, replicated, shape (n_nodes, dim). Collective.
+
+    It is ∂/∂X of −λᵀ B w − (ζ − j)ᵀ B u over the rows of ties, with the objective's derivative j by B u − c.
+    Rows of bonded surfaces lie along the axes and change by the weights of the master alone, those of sliding
+    ones by its normals, too.
+    """
+    result = np.zeros((torn.decomposition.tearing.n_nodes, torn.dim))
+    if torn.ties.count == 0:
+        return result
+    masters = [tie.master for tie in torn.scene.ties]
+    motions = point_motions(torn, torn.ties, masters, fields)
+    forces = _forces(torn, fields.multipliers)
+    for index, tie in enumerate(torn.scene.ties):
+        mine = np.flatnonzero(torn.ties.pair == index)
+        add = _add_tie if tie.discretisation == "node" else _add_mortar_tie
+        add(result, torn, tie, motions, forces[:, mine], mine)
+    return result
+
+
+def _forces(torn: TornSystem, multipliers: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Return the multipliers of the rows times their directions, summed at each point, (2, n, dim)."""
+    rows = torn.relations[0]
+    result = np.zeros((2, torn.ties.count, torn.dim))
+    for force, multiplier in zip(result, multipliers, strict=True):
+        values = torn.numbering.gather(multiplier, torn.n_gluing + np.arange(rows.count))
+        np.add.at(force, rows.which, values[:, None] * rows.directions)
+    return result
+
+
+def _add_tie(
+    result: np.ndarray, torn: TornSystem, tie: Tie, motions: PointMotions, force: np.ndarray, mine: np.ndarray
+) -> None:
+    """Add the derivative by slave and master nodes of one tie; a row is d·(v_s − Σ w_j v_j)."""
+    points, surface = torn.ties, surface_of(torn.scene, tie.master, "faceted")
+    nodes = torn.decomposition.tearing.global_nodes(tie.master.body, surface.nodes)
+    carrying, gradients = carriers(surface, points.facet[mine], points.local[mine])
+    weight = np.einsum("knd,knjd->nj", force, motions.at(nodes[carrying]))
+    by_normal = _by_normal(torn, tie, motions, force, mine)
+    tangents = np.zeros_like(points.tangents[mine])
+    by = PointDerivatives(np.zeros(len(mine)), by_normal, tangents, weight, points.axes[mine], gradients)
+    by_slave, by_master = projection_pulled_back(
+        surface, points.facet[mine], points.local[mine], points.distance[mine], by
+    )
+    result[points.slave[mine]] += by_slave
+    result[nodes] += by_master
+
+
+def _add_mortar_tie(
+    result: np.ndarray, torn: TornSystem, tie: Tie, motions: PointMotions, force: np.ndarray, mine: np.ndarray
+) -> None:
+    """Add the derivative by slave and master nodes of one tie of weighted means. Collective."""
+    none = np.zeros(len(mine))
+    by = MortarDerivatives(force, _by_normal(torn, tie, motions, force, mine), none, none)
+    result += mortar_by_shape(torn, tie, torn.ties.slave[mine], motions, by)
+
+
+def _by_normal(
+    torn: TornSystem, tie: Tie, motions: PointMotions, force: np.ndarray, mine: np.ndarray
+) -> np.ndarray:
+    """Return the derivative by the normals, shape (n, dim): rows of sliding ties lie along −n."""
+    if not tie.sliding:
+        return np.zeros((len(mine), torn.dim))
+    along = -np.einsum("knd,nd->kn", force, torn.ties.normal[mine])
+    return np.einsum("kn,knd->nd", along, motions.relative[:, mine])

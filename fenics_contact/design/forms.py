@@ -1,0 +1,213 @@
+"""Derivatives of subdomain integrals by the mesh coordinates, from UFL."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import ufl
+from ufl.core.expr import Expr
+
+from fenics_contact import _dolfinx
+from fenics_contact._base.libraries import MPI
+from fenics_contact._fem.composition import integrate
+from fenics_contact._fem.forms import Temperature, stress_in_space, stress_left
+from fenics_contact._fem.load_forms import Symbol, load_key, load_name, load_work
+from fenics_contact._fem.templates import (
+    Constants,
+    Template,
+    Templates,
+    Written,
+    scalar_constants,
+    volume_measure,
+)
+from fenics_contact._scene.loads import Load
+from fenics_contact.errors import user_code
+from fenics_contact.feti.subdomain import Subdomain
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.materials.elastic import Material
+from fenics_contact.materials.hyperelastic import is_nonlinear
+
+#: Builds an integrand (UFL) from a displacement u, the coordinate x, the stress σ(u) and constants.
+Integrand = Callable[..., Expr]
+Materials = tuple[Material, ...]
+
+
+@dataclass(frozen=True)
+class Density:
+    """What is integrated over a body.
+
+    Attributes:
+        name: Its name among compiled forms.
+        integrand: Takes displacement, coordinates, stress and the constants (UFL), returns a UFL scalar.
+        constants: Number of constants.
+        in_space: Whether the stress of plane bodies has the component normal to the plane, too.
+    """
+
+    name: str
+    integrand: Integrand
+    constants: int = 0
+    in_space: bool = False
+
+
+class ShapeForms:
+    """Compiled functionals of one or two displacement fields and their derivatives.
+
+    A functional is compiled on first use, by all ranks together. ``materials`` are those of a `Composition`.
+
+    Attributes:
+        moving: Marks of the nodes of all bodies that a design moves, or None for all; derivatives by other
+            nodes are not needed.
+    """
+
+    def __init__(self, comm: MPI.Comm, moving: np.ndarray | None = None) -> None:
+        """Start empty."""
+        self.moving = moving
+        self._templates = Templates(comm)
+
+    @property
+    def compiled(self) -> tuple[tuple[object, ...], ...]:
+        """Names of the forms compiled so far."""
+        return self._templates.names
+
+    def virtual_work_by_shape(self, materials: Materials, cell_type: str) -> Template:
+        """∂/∂x of the work of the stresses at u along w, a(u, w) in small strain; coefficients (u, w)."""
+
+        def write() -> Written:
+            u, w = _dolfinx.field_symbols(cell_type, 2)
+            form, constants = integrate(
+                materials, cell_type, lambda m, c: _virtual_work(m, u, w, c), volume_measure(cell_type)
+            )
+            return _by_shape(form, cell_type), constants, [u, w]
+
+        name = ("work by shape", *(type(material) for material in materials), cell_type)
+        return self._templates.get(("work by shape", materials, cell_type), name, write)
+
+    def load_by_shape(self, load: Load, materials: Materials, cell_type: str) -> Template:
+        """∂/∂x of the work of a load along w at fixed nodal values of its field; coefficients (w, field)."""
+        return self._of_load("by shape", load, materials, cell_type, _by_shape)
+
+    def load_by_field(self, load: Load, materials: Materials, cell_type: str) -> Template:
+        """Derivative of the work of a load along w by the values of its field; the same coefficients."""
+
+        def by_field(form: ufl.Form, cell_type: str) -> ufl.Form:
+            return ufl.derivative(form, Symbol(load, cell_type).expression)
+
+        return self._of_load("by field", load, materials, cell_type, by_field)
+
+    def _of_load(
+        self,
+        what: str,
+        load: Load,
+        materials: Materials,
+        cell_type: str,
+        differentiate: Callable[[ufl.Form, str], ufl.Form],
+    ) -> Template:
+        def write() -> Written:
+            (w,) = _dolfinx.field_symbols(cell_type, 1)
+            symbol = Symbol(load, cell_type)
+            form, constants = load_work(load, materials, cell_type, symbol.expression, w)
+            coefficients = [w, *symbol.coefficients]
+            return differentiate(form, cell_type), (*symbol.constants, *constants), coefficients
+
+        key = (f"load {what}", *load_key(load, materials, cell_type))
+        return self._templates.get(key, (what, *load_name(load, cell_type)), write)
+
+    def functional(
+        self,
+        density: Density,
+        materials: Materials,
+        cell_type: str,
+        by: str,
+        temperature: Temperature = Temperature(),
+    ) -> Template:
+        """∫ density dx itself (by="value"), or its derivative by="displacement", "shape" or "temperature".
+
+        The derivative by the shape is that at fixed nodal values of a temperature that is a function of
+        position, that by the temperature is by these values.
+
+        Its constants are those of the density, of the temperature and of the materials; its coefficients are
+        u and those of the temperature.
+        """
+
+        def write() -> Written:
+            (u,) = _dolfinx.field_symbols(cell_type, 1)
+            x = ufl.SpatialCoordinate(_dolfinx.template(cell_type))
+            change, numbers, fields = temperature.write(cell_type)
+            own = scalar_constants(cell_type, density.constants)
+            stress_of = stress_in_space if density.in_space else stress_left
+
+            def write_density(material: Material, constants: Constants) -> Expr:
+                with user_code(f"the integrand of {density.name!r}"):
+                    return density.integrand(u, x, stress_of(material, u, constants, change), *own)
+
+            form, constants = integrate(materials, cell_type, write_density, volume_measure(cell_type, 2))
+            if by == "displacement":
+                form = ufl.derivative(form, u, ufl.TestFunction(_dolfinx.displacement_space(cell_type)))
+            elif by == "shape":
+                form = _by_shape(form, cell_type)
+            elif by == "temperature":
+                form = ufl.derivative(form, fields[0])
+            return form, (*own, *numbers, *constants), [u, *fields]
+
+        types = tuple(type(material) for material in materials)
+        key = (density, by, materials, cell_type, temperature.key)
+        return self._templates.get(key, (density.name, by, *types, cell_type), write)
+
+
+def _virtual_work(material: Any, u: Expr, w: Expr, constants: Constants) -> Expr:
+    """Return the work of the stresses at u along w."""
+    return material.work(u, w, constants) if is_nonlinear(material) else material.stiffness(u, w, constants)
+
+
+def _by_shape(form: ufl.Form, cell_type: str) -> ufl.Form:
+    velocity = ufl.TestFunction(_dolfinx.displacement_space(cell_type))
+    return ufl.derivative(form, ufl.SpatialCoordinate(_dolfinx.template(cell_type)), velocity)
+
+
+def sum_over_subdomains(
+    torn: TornSystem,
+    fields: Sequence[np.ndarray],
+    evaluate: Callable[[Subdomain, Sequence[_dolfinx.fem.Function]], np.ndarray],
+    moving: np.ndarray | None = None,
+) -> np.ndarray:
+    """Add up vectors of nodal derivatives over this rank's subdomains, shape (n_nodes, dim) for all bodies.
+
+    Args:
+        evaluate: Takes the subdomain and the Functions; returns a vector by dof.
+        moving: Marks of nodes of all bodies; subdomains without one of them are skipped.
+    """
+    tearing = torn.decomposition.tearing
+    total = np.zeros((int(tearing.node_offset[-1]), torn.scene.dim))
+    for subdomain, functions in subdomain_fields(torn, fields, moving):
+        vector = evaluate(subdomain, functions)
+        nodes = tearing.global_nodes(subdomain.mesh.body, subdomain.mesh.nodes)
+        total[nodes] += vector.reshape(-1, torn.scene.dim)
+    return total
+
+
+def subdomain_fields(
+    torn: TornSystem, fields: Sequence[np.ndarray], moving: np.ndarray | None = None
+) -> Iterator[tuple[Subdomain, list[_dolfinx.fem.Function]]]:
+    """Yield each of this rank's subdomains with the fields as Functions on it.
+
+    Args:
+        moving: Marks of nodes of all bodies; subdomains without one of them are skipped.
+    """
+    tearing = torn.decomposition.tearing
+    starts = np.cumsum([0] + [subdomain.mesh.size for subdomain in torn.subdomains])
+    for subdomain, start in zip(torn.subdomains, starts[:-1], strict=True):
+        mesh = subdomain.mesh
+        if moving is not None and not moving[tearing.global_nodes(mesh.body, mesh.nodes)].any():
+            continue
+        # Systems of several geometries share the meshes: another one may have moved them in the meantime.
+        points = torn.scene.bodies[mesh.body].mesh.points
+        _dolfinx.update_coordinates(mesh.space.mesh, points[np.sort(mesh.nodes)])
+        functions = []
+        for index, field in enumerate(fields):
+            function = _dolfinx.fem.Function(mesh.space, name=f"field{index}")
+            function.x.array[:] = field[start : start + mesh.size]
+            functions.append(function)
+        yield subdomain, functions

@@ -1,0 +1,244 @@
+"""Derivative by the places of the nodes at which loads given as functions of position are evaluated.
+
+Derivative of the work of a force and a moment that are spread over a surface whose nodes move.
+
+Derivatives of virtual works by the nodes: that of the stresses and that of the loads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from fenics_contact import _dolfinx
+from fenics_contact._fem.composition import material_sets
+from fenics_contact._fem.load_forms import is_scalar, load_fields, load_parameters
+from fenics_contact._fem.loads import LinearTraction, spread_traction
+from fenics_contact._scene.fields import OfPosition, gradients_of
+from fenics_contact._scene.loads import Load, SurfaceLoad, ThermalStrain, TotalForce
+from fenics_contact._surfaces.facets import GaussPoint, gauss_points, surface_moments
+from fenics_contact.design.contact_derivatives import integral_pulled_back
+from fenics_contact.design.forms import ShapeForms, sum_over_subdomains
+from fenics_contact.errors import together
+from fenics_contact.feti.averages import nodal_mean_at
+from fenics_contact.feti.subdomain import Subdomain
+from fenics_contact.feti.torn import TornSystem
+
+
+def field_by_places(
+    torn: TornSystem,
+    subdomain: Subdomain,
+    load: Load,
+    space: _dolfinx.fem.FunctionSpace,
+    by_values: np.ndarray,
+    moving: np.ndarray | None,
+) -> np.ndarray:
+    """Return Σ_c g_c ∇f_c at the nodes that move, by dof of the displacement, shape (size,).
+
+    Args:
+        moving: Marks of the nodes of all bodies that move, or None for all.
+    """
+    mesh, dim, mesh_of_body = subdomain.mesh, torn.dim, torn.scene.bodies[subdomain.mesh.body].mesh
+    nodes = np.sort(mesh.nodes)
+    chosen = np.ones(len(nodes), dtype=bool)
+    if moving is not None:
+        chosen &= moving[torn.decomposition.tearing.global_nodes(mesh.body, nodes)]
+    if isinstance(load, SurfaceLoad):
+        chosen &= np.isin(nodes, mesh_of_body.surfaces[load.surface])
+    inputs, dofs = _dolfinx.node_dofs(space)
+    _, own_dofs = _dolfinx.node_dofs(mesh.space)
+    here = chosen[inputs]
+    shape = () if is_scalar(load) else (dim,)
+    places = mesh_of_body.points[nodes[inputs[here]]]
+    function, name = cast(OfPosition, load.value), f"{type(load).__name__} on body {load.body!r}"
+    slope = gradients_of(name, function, places, shape)
+    weight = by_values.reshape(len(nodes), -1)[dofs[here]]
+    result = np.zeros((len(nodes), dim))
+    result[own_dofs[here]] = np.einsum("nc,ncd->nd", weight, slope.reshape(*weight.shape, dim))
+    return result.ravel()
+
+
+@dataclass(frozen=True, eq=False)
+class _Spread:
+    """A traction a + b × (x − c) and how its work along w depends on the moments of the surface.
+
+    The work is L = a·W₀ + b·W₁, W₀ = ∫ w, W₁ = ∫ r × w, r = x − c. At fixed w it changes with the surface,
+    and through a = F / A, the centroid c and J b = M + (p − c) × F, J = tr(S) I − S, S = ∫ r rᵀ. With
+    y = J⁻¹ W₁
+
+        δL = ∫δ (t·w + α + β·r + rᵀ Γ r),   α = −a·W₀ / A,   β = −(W₀ × b + F × y) / A,
+        Γ = (y bᵀ + b yᵀ) / 2 − (y·b) I,
+
+    with F × y only where the force acts at a given point. All vectors have three components; those of plane
+    bodies lie in the plane, and turning vectors normal to it.
+
+    Attributes:
+        even: a, shape (3,).
+        turning: b, shape (3,).
+        centre: c, shape (3,).
+        constant: α.
+        linear: β, shape (3,).
+        square: Γ, shape (3, 3).
+    """
+
+    even: np.ndarray
+    turning: np.ndarray
+    centre: np.ndarray
+    constant: float
+    linear: np.ndarray
+    square: np.ndarray
+
+    def density(self, places: np.ndarray, field: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the integrand at places with the field there, and its derivative by the places."""
+        dim = places.shape[1]
+        arm, w = _in_space(places) - self.centre, _in_space(field)
+        bent = arm @ self.square
+        work = np.einsum("nd,nd->n", self.even + np.cross(self.turning, arm), w)
+        values = work + self.constant + arm @ self.linear + np.einsum("nd,nd->n", bent, arm)
+        return values, (np.cross(w, self.turning) + self.linear + 2.0 * bent)[:, :dim]
+
+
+def resultant_by_shape(torn: TornSystem, load: TotalForce, w: np.ndarray) -> np.ndarray:
+    """Return ∂/∂X of the work of a resultant along w, on the first rank, zero elsewhere. Collective."""
+    mesh, tearing = torn.scene.bodies[load.body].mesh, torn.decomposition.tearing
+    result = np.zeros((tearing.n_nodes, torn.dim))
+    nodes, facets = np.unique(mesh.surfaces[load.surface], return_inverse=True)
+    facets = facets.reshape(mesh.surfaces[load.surface].shape)
+    numbers = tearing.global_nodes(load.body, nodes)
+    field, points = nodal_mean_at(torn.decomposition, w, numbers), mesh.points[nodes]
+    if torn.decomposition.comm.rank == 0:
+        spread = _spread(torn, load, points, facets, field)
+
+        def density(at: GaussPoint) -> tuple[np.ndarray, np.ndarray]:
+            return spread.density(at.of(points, facets), at.of(field, facets))
+
+        result[numbers] = integral_pulled_back(points, facets, density)
+    return result
+
+
+def _spread(
+    torn: TornSystem, load: TotalForce, points: np.ndarray, facets: np.ndarray, field: np.ndarray
+) -> _Spread:
+    """Return the traction of a load and the coefficients of the moments, see the class."""
+    moments = surface_moments(points, facets)
+    centre, force = (_in_space(vector[None])[0] for vector in (moments.centroid, np.array(load.value)))
+    total, turned = np.zeros(3), np.zeros(3)  # W₀ and W₁
+    for at in gauss_points(points, facets):
+        arm, w = _in_space(at.of(points, facets)) - centre, _in_space(at.of(field, facets))
+        total += at.areas @ w
+        turned += at.areas @ np.cross(arm, w)
+    even, turning, lever = force / moments.area, np.zeros(3), np.zeros(3)
+    traction = spread_traction(torn.scene, load).value
+    if isinstance(traction, LinearTraction):
+        turning[-len(traction.turning) :] = traction.turning
+        lever = _turn(moments.second_moment, turned)
+    moved = np.cross(total, turning) + (0.0 if load.at is None else np.cross(force, lever))
+    both = np.outer(lever, turning)
+    square = (both + both.T) / 2.0 - (lever @ turning) * np.eye(3)
+    return _Spread(even, turning, centre, -float(even @ total) / moments.area, -moved / moments.area, square)
+
+
+def _turn(second: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    """Return J⁻¹ M for the second moment S of a surface, of a curve in the plane about its normal."""
+    if len(second) == 2:
+        return moment / np.trace(second)
+    return np.asarray(np.linalg.solve(np.trace(second) * np.eye(3) - second, moment))
+
+
+def _in_space(vectors: np.ndarray) -> np.ndarray:
+    """Return vectors with three components, shape (n, 3), the third of plane ones zero."""
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
+
+
+Functions = Sequence["_dolfinx.fem.Function"]
+
+
+def work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Return ∂/∂X of a(u, w) − L(w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim)."""
+    return strain_work_by_shape(forms, torn, u, w) - load_work_by_shape(forms, torn, w)
+
+
+def strain_work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Return ∂/∂X of a(u, w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim).
+
+    Args:
+        u: Torn displacement of this rank, [length].
+    """
+    for body in torn.scene.bodies.values():  # all ranks compile, also for bodies without a part on them
+        for materials in material_sets(body):
+            forms.virtual_work_by_shape(materials, body.mesh.cell_type)
+
+    def on_subdomain(subdomain: Subdomain, functions: Functions) -> np.ndarray:
+        parts, cell_type = subdomain.material, torn.scene.bodies[subdomain.mesh.body].mesh.cell_type
+        template = forms.virtual_work_by_shape(parts.materials, cell_type)
+        form = template.bind([subdomain.mesh.space], parts.parameters, functions, cells=parts.cells)
+        return _dolfinx.assemble_vector(form)
+
+    return sum_over_subdomains(torn, [u, w], on_subdomain, forms.moving)
+
+
+def load_work_by_shape(forms: ShapeForms, torn: TornSystem, w: np.ndarray) -> np.ndarray:
+    """Return ∂/∂X of L(w), the share of this rank, by all nodes, shape (n_nodes, dim). Collective."""
+    loads = moving_loads(torn, forms.moving)
+    spread: list[Load] = [load for load in loads if not isinstance(load, TotalForce)]
+    for load in spread:  # all ranks compile
+        body = torn.scene.bodies[load.body]
+        for materials in material_sets(body):
+            forms.load_by_shape(load, materials, body.mesh.cell_type)
+            if callable(load.value):
+                forms.load_by_field(load, materials, body.mesh.cell_type)
+
+    def on_subdomain(subdomain: Subdomain, functions: Functions) -> np.ndarray:
+        result = np.zeros(subdomain.mesh.size)
+        for load in spread:
+            if load.body == subdomain.mesh.body:
+                result += _load_by_shape(forms, torn, subdomain, load, functions)
+        return result
+
+    with together(torn.decomposition.comm):
+        result = sum_over_subdomains(torn, [w], on_subdomain, forms.moving)
+    for resultant in loads:
+        if isinstance(resultant, TotalForce):
+            result += resultant_by_shape(torn, resultant, w)
+    return result
+
+
+def _load_by_shape(
+    forms: ShapeForms, torn: TornSystem, subdomain: Subdomain, load: Load, functions: Functions
+) -> np.ndarray:
+    """Return the derivative of the work of one load on one subdomain, by dof."""
+    mesh, parts = subdomain.mesh, subdomain.material
+    body, facets = torn.scene.bodies[mesh.body], None
+    nodes = np.sort(mesh.nodes)
+    acted = None
+    if isinstance(load, SurfaceLoad):
+        facets = mesh.facets_of(body, load.surface)
+        if len(facets[0]) == 0:
+            return np.zeros(mesh.size)
+        acted = np.isin(nodes, body.mesh.surfaces[load.surface])
+    cells = parts.cells if isinstance(load, ThermalStrain) else None
+    fields = load_fields(load, mesh.space, body.mesh.points[nodes], acted)
+    values, given = load_parameters(load, parts), [*functions, *fields]
+    template = forms.load_by_shape(load, parts.materials, body.mesh.cell_type)
+    result = _dolfinx.assemble_vector(template.bind([mesh.space], values, given, facets, cells=cells))
+    for field in fields:
+        template = forms.load_by_field(load, parts.materials, body.mesh.cell_type)
+        form = template.bind([field.function_space], values, given, facets, cells=cells)
+        by_values = _dolfinx.assemble_vector(form)
+        result += field_by_places(torn, subdomain, load, field.function_space, by_values, forms.moving)
+    return result
+
+
+def moving_loads(torn: TornSystem, moving: np.ndarray | None) -> list[Load]:
+    """Return the loads that act on moving volumes and surfaces."""
+    tearing, bodies = torn.decomposition.tearing, torn.scene.bodies
+
+    def moves(load: Load) -> bool:
+        mesh = bodies[load.body].mesh
+        nodes = mesh.surfaces[load.surface] if isinstance(load, SurfaceLoad) else np.arange(mesh.n_nodes)
+        return moving is None or bool(moving[tearing.global_nodes(load.body, nodes)].any())
+
+    return [load for load in torn.scene.loads if moves(load)]

@@ -1,0 +1,499 @@
+"""A design problem: value and subgradient of an objective as functions of the design variables.
+
+The equilibrium of a design, started from a neighbour and, where that fails, from nothing.
+
+Which scenes and objectives can be designed, and which scenes are load cases of one design.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from fenics_contact._base.display import displayed
+from fenics_contact._base.fingerprint import described
+from fenics_contact._base.libraries import MPI
+from fenics_contact._base.sparse import LAST_PLACES
+from fenics_contact._equilibrium.problem import ContactProblem
+from fenics_contact._scene.scene import Scene
+from fenics_contact.design.adjoint import WeakChoice, linearise_face, require_from_rest
+from fenics_contact.design.design import SurfaceDesign
+from fenics_contact.design.design_function import SingleProblem, comm_of, with_objective
+from fenics_contact.design.memory import (
+    AdaptiveTolerance,
+    DesignMemory,
+    DesignPoint,
+    Stored,
+    tightest_of,
+    with_fewest_weak_points,
+)
+from fenics_contact.design.motion import DesignGeometry
+from fenics_contact.design.objective import Objective, Partials, asking, finite, finite_partials, finite_value
+from fenics_contact.design.sensitivity import adjoint_of, by_nodes, products_of
+from fenics_contact.errors import (
+    ConvergenceError,
+    InfeasibleError,
+    InvalidDesignError,
+    InvalidInputError,
+    collectively,
+    safe_log,
+)
+from fenics_contact.materials.hyperelastic import has_mean_dilatation
+from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.results.deformed_state import AnyState
+
+logger = logging.getLogger(__name__)
+
+
+def design_state(
+    contact: ContactProblem,
+    scene: Scene,
+    start: AnyState | None,
+    tolerance: float,
+    *,
+    slip_from: AnyState | None = None,
+) -> AnyState:
+    """Compute the equilibrium of a design, whose surfaces may overlap before they are loaded. Collective.
+
+    Args:
+        scene: The scene in the shape of the design.
+        start: State of a neighbouring design, or None for the first one.
+        slip_from: State of the same design after the last load step, or None.
+    """
+    if scene.is_nonlinear and slip_from is not None:
+        raise InvalidInputError(
+            "designs of bodies that deform much have one load step, got a state before it: leave out LoadPath"
+        )
+    solve = partial(
+        contact.solve, scene, slip_from=slip_from, tolerance=tolerance, sensitivity=True, overlap=True
+    )
+    try:
+        return solve(start=start)
+    except InfeasibleError as error:
+        raise InvalidDesignError(f"the design has no equilibrium: {error}") from error
+    except ConvergenceError as error:
+        if start is None:
+            raise
+        safe_log(logger.warning, "a warm start failed, a cold one follows: %s", error)
+    try:
+        return solve(start=None)
+    except (ConvergenceError, InfeasibleError) as error:
+        raise InvalidDesignError(f"no equilibrium of the design was found: {error}") from error
+
+
+#: How far beside the first design an objective without a gradient is evaluated, by the size of the scene.
+BESIDE = 1e-6
+
+_LOG = logging.getLogger(__name__)
+
+
+def checked_contact(contact: ContactProblem) -> ContactProblem:
+    """Return the contact problem of a shape problem."""
+    if not isinstance(contact, ContactProblem):
+        raise InvalidInputError(
+            f"ShapeProblem needs a ContactProblem, got {type(contact).__name__}: write "
+            "ShapeProblem(ContactProblem(scene, comm), designs, objective)"
+        )
+    _check_differentiable(contact.scene)
+    return contact
+
+
+def _check_differentiable(scene: Scene) -> None:
+    """Reject what of large deformations has no derivative by the shape."""
+    if not scene.is_nonlinear:
+        return
+    reasons = {
+        "materials without history": any(
+            isinstance(each, HistoryMaterial) for body in scene.bodies.values() for each in body.materials
+        ),
+        "materials without mean_dilatation": any(
+            has_mean_dilatation(each) for body in scene.bodies.values() for each in body.materials
+        ),
+        "pressures that do not follow their surfaces": bool(scene.following_pressures),
+    }
+    for needed, missing in reasons.items():
+        if missing:
+            raise InvalidInputError(
+                f"designs of bodies that deform much need {needed}, this scene has others: optimise it with "
+                "a tool that takes plain functions, see fenics_contact.responses"
+            )
+
+
+def require_influence(
+    objective: Objective, scene: Scene, point: DesignPoint, evaluate: Callable[[np.ndarray], DesignPoint]
+) -> None:
+    """Reject an objective that no design variable changes, here or at a design nearby. Collective.
+
+    Where the gradient is rounding the objective may be stationary, as a norm of the pressure is where that is
+    even: then it has a gradient nearby.
+    """
+    size = float(np.ptp(scene.points))
+    if _has_influence(point, size):
+        return
+    number = len(point.gradient)
+    way = np.random.default_rng(0).standard_normal(number)
+    try:
+        if _has_influence(evaluate(point.alpha + BESIDE * size * way), size):
+            safe_log(_LOG.info, "the objective is stationary at the first design, to rounding")
+            return
+    except InvalidDesignError:
+        return  # not known
+    raise InvalidInputError(
+        f"an objective must change with the design, but {objective!r} is {point.value:.6g} and none of "
+        f"{number} variables changes it: choose one that the moving surfaces affect (pressures "
+        "need a pair in contact, movements a body that they load), or start from another design"
+    )
+
+
+def _has_influence(point: DesignPoint, size: float) -> bool:
+    """Return whether a variable changes the objective over the size of the scene."""
+    change = float(np.abs(point.gradient).max(initial=0.0) * size)
+    return change > LAST_PLACES * abs(point.value)
+
+
+def check_case(first: Scene, scene: Scene) -> None:
+    """Check that a scene is a load case of the same designs."""
+    if set(scene.bodies) != set(first.bodies):
+        raise InvalidInputError(
+            f"load cases must share their bodies, got {sorted(scene.bodies)} beside {sorted(first.bodies)}: "
+            "take the scene from dataclasses.replace(scene, loads=...) or LoadStep.applied_to(scene)"
+        )
+    for name, body in scene.bodies.items():
+        mate = first.bodies[name]
+        if body.mesh is not mate.mesh or body.materials != mate.materials:
+            raise InvalidInputError(
+                f"load cases must share their bodies, but {name!r} has another mesh or material: take the "
+                "scene from dataclasses.replace(scene, loads=...) or LoadStep.applied_to(scene)"
+            )
+        if not np.array_equal(scene.fixed(name), first.fixed(name)):
+            raise InvalidInputError(
+                f"load cases must hold the same components, their supports of {name!r} differ: give other "
+                "values, or hold by RigidSurface what only some cases move"
+            )
+
+
+#: Tolerance of the adjoint relative to that of its state, and the smallest: no looser than the state's.
+ADJOINT_SHARE, ADJOINT_FLOOR = 1e-1, 1e-11
+
+
+@displayed
+class ShapeProblem(SingleProblem):
+    """J(α) with a subgradient, for one or more moving surfaces of a scene.
+
+    Call it with α to get (J, subgradient): one state, one adjoint, whatever the number of variables. Where no
+    contact point is weakly active it is the gradient, where one is, a Clarke subgradient. Where several are
+    it may not be a subgradient (`WeakChoice`): such designs `may_be_invalid`, and
+    `gradient_near` returns the gradient of a design nearby. Topology, partition and compiled forms are
+    reused; each state starts from the one before.
+
+    Attributes:
+        contact: The problem that computes the states, to the tolerance given (`tolerance`).
+        scene: The scene in its reference shape.
+        geometry: How it moves with a design.
+
+    Example:
+        >>> designs = SurfaceDesign("link1", links.first.crown, net=(7, 4))  # doctest: +SKIP
+        >>> problem = ShapeProblem(ContactProblem(scene, comm), designs, TotalPotential())  # doctest: +SKIP
+        >>> value, subgradient = problem(np.zeros(problem.size))  # doctest: +SKIP
+        >>> result = minimize(problem, np.zeros(problem.size), bounds=(-1.0, 1.0))  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        contact: ContactProblem,
+        designs: tuple[SurfaceDesign, ...] | SurfaceDesign,
+        objective: Objective,
+        *,
+        choice: WeakChoice = WeakChoice.RELEASED,
+        tolerance: float | AdaptiveTolerance | None = None,
+    ) -> None:
+        """Decompose the scene and prepare the mesh motion. Collective.
+
+        Args:
+            contact: The problem that computes the states; its scene is the reference shape.
+            choice: Branch for weakly active points.
+            tolerance: Relative residual of all states, or `AdaptiveTolerance()`, with which an optimiser
+                requests the accuracy that it needs; None for that of ``contact``, or of its solver, as a
+                balanced state leaves the statuses uncertain on which derivatives depend.
+        """
+        self.contact, self.objective, self.choice = checked_contact(contact), objective, choice
+        self.scene, self.tolerance = contact.scene, tolerance
+        self._tightest = tightest_of(contact, tolerance)
+        self._timer = contact.timer
+        self._memory: DesignMemory = DesignMemory(self._restored)
+        self._neighbour: ShapeProblem | None = None
+        self._apart = False
+        with self._timer.phase("mesh motion"):
+            given = (designs,) if isinstance(designs, SurfaceDesign) else designs
+            self.geometry = DesignGeometry(self.scene, contact.decomposition, given)
+
+    def _facts(self) -> dict[str, Any]:
+        work = f"{self.evaluations} designs, {self.products} products with F"
+        return {"variables": self.size, "designs": self.designs, "objective": self.objective,
+                "choice": self.choice, "work": work, "contact": self.contact}  # fmt: skip
+
+    @property
+    def designs(self) -> tuple[SurfaceDesign, ...]:
+        """The moving surfaces; α is the concatenation of their variables."""
+        return self.geometry.designs
+
+    @property
+    def comm(self) -> MPI.Comm:
+        """Communicator over which the subdomains are spread."""
+        return self.contact.comm
+
+    @property
+    def _parts(self) -> Sequence[ShapeProblem]:
+        return (self,)
+
+    @property
+    def products(self) -> int:
+        """F-products of states and adjoints so far."""
+        return self._memory.products
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Wall time of this rank by phase, over all evaluations."""
+        return self._timer.seconds
+
+    @property
+    def inexact(self) -> bool:
+        """Whether an optimiser may ask for less accuracy, see `within`."""
+        return isinstance(self.tolerance, AdaptiveTolerance)
+
+    def fingerprint(self) -> dict[str, str]:
+        """Identify the problem, for a checkpoint."""
+        parts: dict[str, Any] = {
+            "scene": self.scene,
+            "partitions": self.contact.partitions,
+            "designs": self.designs,
+            "objective": self.objective,
+            "solver": self.contact.solver,
+            "tolerance": self.tolerance if self.inexact else self._tightest,
+            "choice": self.choice,
+        }
+        return {key: text for name, part in parts.items() for key, text in described(part, name).items()}
+
+    def memory(self) -> dict[str, np.ndarray]:
+        """Return what the next state depends on, and the stored designs. Collective.
+
+        Raises:
+            InvalidInputError: If bodies deform much.
+        """
+        if self.scene.is_nonlinear:
+            raise InvalidInputError(
+                "checkpoints of designs need linear materials, got others: leave the checkpoint out"
+            )
+        return self._memory.stored()
+
+    def recall(self, memory: Mapping[str, np.ndarray]) -> None:
+        """Continue from what `memory` returned, also on another number of ranks. Collective."""
+        self._memory.recall(memory)
+
+    def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the coordinates of the designed bodies, see `DesignGeometry.points_of`. Collective."""
+        return self.geometry.points_of(alpha)
+
+    def scene_of(self, alpha: np.ndarray) -> Scene:
+        """Return the scene in the shape of a design; raises as `evaluate` does. Collective."""
+        return self.geometry.scene_of(self.scene, alpha)
+
+    @collectively("ShapeProblem.state_of", comm_of)
+    def state_of(self, alpha: np.ndarray, after: AnyState | None = None) -> AnyState:
+        """Return the equilibrium of a design, started from the one before. Collective.
+
+        Args:
+            alpha: Design variables, shape (size,), [length].
+            after: State of the same design after the last load step, from which slip is measured, or None.
+
+        Raises:
+            InvalidDesignError: If the design inverts a cell or has no equilibrium.
+        """
+        return self._solved(alpha, self._tightest, after=after)
+
+    @collectively("ShapeProblem.value_of", comm_of)
+    def value_of(self, alpha: np.ndarray) -> float:
+        """Return J(α) alone, without adjoint. Collective."""
+        state = self.state_of(alpha)
+        with asking(self.comm):
+            return finite_value(self.objective.value(state, self.geometry.forms))
+
+    @collectively("ShapeProblem.evaluate", comm_of)
+    def evaluate(self, alpha: np.ndarray) -> DesignPoint:
+        """Solve the state and its adjoint and return value and subgradient. Collective.
+
+        Raises:
+            InvalidDesignError: If the design inverts a cell or has no equilibrium.
+            InvalidInputError: If bodies of the reference shape overlap, or no variable changes the objective
+                at the first design.
+        """
+        known = self._memory.of_design(alpha) if self.inexact else None
+        state = self._solved(alpha, self._tightest, known) if self.inexact else self.state_of(alpha)
+        return self._recorded(self._point_at(alpha, state, self._tightest, known))
+
+    @collectively("ShapeProblem.differentiate", comm_of)
+    def differentiate(self, state: AnyState, partials: Partials | None = None) -> DesignPoint:
+        """Return value and subgradient at a known state of the reference shape, for one adjoint. Collective.
+
+        Args:
+            state: Equilibrium of the scene, with the subdomains of this problem (`ContactProblem.following`).
+            partials: Derivatives by the state of what is differentiated, by default of the objective.
+
+        Raises:
+            InvalidInputError: If only the state is given and it follows another load step.
+        """
+        if partials is None:
+            require_from_rest(state)
+        return self._point_at(np.zeros(self.size), state, self._tightest, None, partials)
+
+    def partials_of(self, objective: Objective, state: AnyState) -> Partials:
+        """Return an objective and its partial derivatives at a state, checked. Collective."""
+        with self._timer.phase("objective"), asking(self.comm):
+            return finite_partials(objective.partials(state, self.geometry.forms))
+
+    def remarks(self, alpha: np.ndarray) -> tuple[str, ...]:
+        """Return what to know of a design beside its value: overlaps before it is loaded. Collective."""
+        known = self.known(alpha)
+        return self.contact.overlaps(self.state_of(alpha) if known is None else known.state)
+
+    @collectively("ShapeProblem.within", comm_of)
+    def within(self, alpha: np.ndarray, value: float, subgradient: float) -> tuple[float, np.ndarray, float]:
+        """Return J(α), a subgradient and the estimated error of J, to the requested accuracy. Collective.
+
+        Args:
+            alpha: Design variables, shape (size,), [length].
+            value: Largest error of J.
+            subgradient: Largest relative error of the subgradient, which the tolerance of the state follows.
+
+        Raises:
+            InvalidDesignError: If the design inverts a cell or has no equilibrium.
+        """
+        policy = self.tolerance
+        if not isinstance(policy, AdaptiveTolerance):
+            point = self.evaluate(alpha)
+            return point.value, point.gradient, 0.0
+        known = self._memory.of_design(alpha)
+        tolerance = policy.first(value, subgradient, self._memory.error_by_tolerance)
+        point = self._point_at(alpha, self._solved(alpha, tolerance, known), tolerance, known)
+        while point.error > value and tolerance > policy.tightest:
+            tolerance = policy.next(tolerance, point.error, value)
+            point = self._point_at(alpha, self._solved(alpha, tolerance, point), tolerance, point)
+        self._recorded(point)
+        return point.value, point.gradient, point.error
+
+    def _recorded(self, point: DesignPoint) -> DesignPoint:
+        if not self.evaluations and not point.weak.count:  # at a kink a branch may be flat
+            require_influence(self.objective, self.scene, point, self._unrecorded(self._tightest))
+        self._memory.record(point)
+        return point
+
+    @collectively("ShapeProblem.gradient_near", comm_of)
+    def gradient_near(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Return the gradient of the design between two, near α, with the fewest weak points. Collective.
+
+        Args:
+            alpha: Design variables, shape (size,), [length].
+            end: A design nearby in a generic direction, shape (size,), [length].
+
+        Raises:
+            InvalidDesignError: If no design between them has an equilibrium.
+        """
+        known = self._memory.of_design(alpha)
+        evaluate = self._unrecorded(known.tolerance if known else self._tightest)
+        return with_fewest_weak_points(alpha, end, evaluate).gradient
+
+    def _unrecorded(self, tolerance: float) -> Callable[[np.ndarray], DesignPoint]:
+        """Return what evaluates designs that are not recorded. Collective when called."""
+        return lambda near: self._point_at(near, self._solved(near, tolerance), tolerance, None)
+
+    def _solved(
+        self,
+        alpha: np.ndarray,
+        tolerance: float,
+        known: DesignPoint | None = None,
+        after: AnyState | None = None,
+    ) -> AnyState:
+        """Compute an equilibrium, from a less accurate one of the same design if known. Collective."""
+        previous = self._memory.state if known is None else known.state
+        if previous is None and self._neighbour is not None:  # the first state of a load case
+            previous = self._neighbour._memory.state
+        if not self._apart:  # the shape given, whichever design is the first
+            self.contact.check_apart(self.scene)
+            self._apart = True
+        with self._timer.phase("mesh motion"):
+            scene = self.scene_of(alpha) if known is None else known.state.scene
+        state = design_state(self.contact, scene, previous, tolerance, slip_from=after)
+        self._memory.record_state(alpha, state)
+        self._memory.products += products_of(state)
+        return state
+
+    def _point_at(
+        self,
+        alpha: np.ndarray,
+        state: AnyState,
+        tolerance: float,
+        known: DesignPoint | None,
+        partials: Partials | None = None,
+    ) -> DesignPoint:
+        """Return objective, subgradient and their errors at a state. Collective."""
+        before = products_of(state)
+        if partials is None:
+            partials = self.partials_of(self.objective, state)
+        with self._timer.phase("adjoint"):
+            linearised = linearise_face(state, self.choice)
+            start = None if known is None else known.adjoint_multiplier
+            accuracy = max(ADJOINT_SHARE * tolerance, ADJOINT_FLOOR)
+            adjoint, error = adjoint_of(state, partials, linearised, accuracy, start)
+        with self._timer.phase("gradient"):
+            by_points = by_nodes(state, adjoint, partials, linearised, self.geometry.forms)
+            gradient = self.geometry.pull_back(by_points)
+        spent = max(products_of(state) - before, adjoint.iterations)
+        self._memory.products += spent
+        value = partials.value + (error.correction if self.inexact else 0.0)
+        # Ranks must take the same decisions, whatever the rounding in sums over ranks.
+        value, gradient, error = self.comm.bcast((value, gradient, error))
+        finite("gradient", gradient)
+        safe_log(logger.info, "J = %.9g ± %.1e, %d products", value, error.size, before + spent)
+        return DesignPoint(
+            alpha=np.array(alpha, dtype=float), value=value, gradient=gradient, state=state,
+            weak=linearised.weak, adjoint_iterations=spent, tolerance=tolerance,
+            correction=error.correction, error=error.size, adjoint_multiplier=adjoint.multiplier,
+        )  # fmt: skip
+
+    @collectively("ShapeProblem.case", comm_of)
+    def case(self, scene: Scene, objective: Objective | None = None) -> ShapeProblem:
+        """Return the problem of another load case of the same designs, see `LoadCases`. Collective.
+
+        The cases share mesh motion, matrices and factors; each starts from its own last state.
+
+        Args:
+            scene: The scene with other loads, values of supports, friction or obstacles.
+            objective: Objective of the case; by default that of this problem.
+
+        Raises:
+            InvalidInputError: If it has other bodies, its supports hold other components, or its pairs or
+                loads have no derivative by the designs.
+        """
+        check_case(self.scene, scene)
+        other = with_objective(self, objective or self.objective)
+        other.scene, other._neighbour, other._apart = scene, self, False
+        other._memory = DesignMemory(other._restored)
+        return other
+
+    def shares_with(self, other: ShapeProblem) -> bool:
+        """Return whether another problem is a `case` of the same designs."""
+        return self.geometry is other.geometry
+
+    @collectively("ShapeProblem.volume", comm_of)
+    def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the volume of the designed bodies, in the plane the area, and its gradient. Collective."""
+        return self.geometry.volume(self.scene_of(alpha))
+
+    def _restored(self, alpha: np.ndarray, stored: Stored) -> AnyState:
+        state = self.contact.restore(stored, self.scene_of(alpha))
+        self._memory.products += products_of(state)
+        return state

@@ -1,0 +1,214 @@
+"""The adjoint of a state and the derivative by its nodes, of small and of large deformations.
+
+Derivative of an objective by the areas over which forces make pressures.
+
+Sensitivity of states of large deformations: the transpose of Newton's last tangent, its right sides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fenics_contact._base.progress import PhaseTimer
+from fenics_contact._large_deformations.tangent_step import tangent_adjoint
+from fenics_contact.design.adjoint import (
+    NOT_HELD,
+    Adjoint,
+    LinearisedFace,
+    StateError,
+    growth_of,
+    solve_adjoint,
+    state_error,
+)
+from fenics_contact.design.contact_derivatives import (
+    PairedFields,
+    add_areas,
+    bound_sensitivity,
+    bounds_by_area,
+    bounds_by_place,
+    contact_by_shape,
+    ties_by_shape,
+)
+from fenics_contact.design.forms import ShapeForms
+from fenics_contact.design.load_derivatives import work_by_shape
+from fenics_contact.design.objective import Partials
+from fenics_contact.errors import ConvergenceError, InvalidInputError, together
+from fenics_contact.feti.averages import nodal_mean_at, nodal_mean_transposed
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.qp.krylov import Stop
+from fenics_contact.results.deformed_state import DeformedState
+from fenics_contact.results.linear_state import LinearState, as_linear
+from fenics_contact.results.state import State
+
+if TYPE_CHECKING:
+    from fenics_contact._pairing.sliding.points import SlidingPoints
+
+
+def by_true_areas(state: State, by_area: np.ndarray) -> dict[str, np.ndarray]:
+    """Return partial derivatives of an objective, by their names in `Partials`. Collective.
+
+    Areas of the undeformed slave change with the shape alone. Those of a deformed one change with the places
+    x = X + u of its nodes, by mortar also with the master's: with the displacement and the shape alike.
+
+    Args:
+        by_area: Derivative by `ContactResult.area`, replicated, shape (n_points,).
+    """
+    moved = state.equilibrium.evaluation.contact if isinstance(state, DeformedState) else None
+    points = None if moved is None else moved.points
+    if moved is None or points is None:
+        return {"by_area": by_area}
+    torn = state.torn
+    by_now, by_before, by_met = points.areas(torn.scene).pulled_back(by_area)
+    by_places = points.met_areas_pulled_back(by_met)
+    for index in range(len(torn.scene.contacts)):
+        add_areas(by_places, torn, index, by_now, points.coordinates)
+    free = np.where(np.isnan(moved.prescribed), by_places, 0.0)
+    every, first = np.arange(len(free)), torn.decomposition.comm.rank == 0
+    return {
+        "by_displacement": nodal_mean_transposed(torn.decomposition, every, free),
+        "by_shape": by_places if first else np.zeros_like(by_places),
+        "by_area": by_before,
+    }
+
+
+def solve_deformed_adjoint(
+    state: DeformedState,
+    partials: Partials,
+    linearised: LinearisedFace,
+    *,
+    tolerance: float = 1e-9,
+    max_iterations: int = 500,
+) -> Adjoint:
+    """Solve the transpose of the linearised equations at a deformed state. Collective.
+
+    Its tangents are factored once more at the state itself, with the stiffness of forces that turn with
+    their surfaces; the columns of the face's two bases are swapped.
+    """
+    _require_whole_step(state)
+    evaluation, torn = state.equilibrium.evaluation, state.torn
+    exact = evaluation.linearised(PhaseTimer(), state.equilibrium.linearisation)
+    system, tangent = exact.system, exact.problem(evaluation)
+    face = replace(linearised.face, layout=tangent.problem.layout)
+    coupling = growth_of(face, linearised.growing, torn.friction_coefficient[torn.owned_discs])
+    by_multiplier = np.concatenate([partials.by_multiplier, np.zeros(exact.further.count)])
+    right = system.jump(system.inverse(partials.by_displacement)) - by_multiplier
+    load = np.asarray(tangent.problem.comm.allreduce(system.kernel.T @ partials.by_displacement))
+    found = tangent_adjoint(tangent, face, coupling, right, load, tolerance, max_iterations)
+    if found is None:
+        raise ConvergenceError(NOT_HELD)
+    if found.stop is not Stop.CONVERGED:
+        raise ConvergenceError(
+            f"the adjoint of the deformed state needs a relative residual below {tolerance:.1e}, not reached "
+            f"after {found.products} products ({found.stop.value}): loosen the tolerance"
+        )
+    moved = system.inverse(partials.by_displacement - system.force(found.multiplier))
+    multiplier = found.multiplier[: len(partials.by_multiplier)]
+    return Adjoint(moved + system.kernel @ found.motions, multiplier, found.motions, found.products)
+
+
+def _require_whole_step(state: DeformedState) -> None:
+    """Reject friction whose derivative needs more than the start of the load step."""
+    torn, points = state.torn, state.equilibrium.evaluation.contact.points
+    if len(torn.frictional) == 0:
+        return
+    if state.since > 0.0:
+        raise InvalidInputError(
+            "derivatives of nonlinear scenes with friction need slip that is one step from the start of the "
+            f"load step, here it begins at {state.since:.3g} of it: leave out finer_history=True, or "
+            "prescribe less where bodies snap"
+        )
+    if points is not None and state.begun is None:
+        raise InvalidInputError(
+            "derivatives of large deformations with friction need the start of the load step, this state was "
+            "read from a checkpoint, which does not keep it: solve the scene again"
+        )
+
+
+def deformed_contact_by_shape(
+    state: DeformedState, fields: PairedFields, by_bound: np.ndarray, by_area: np.ndarray | float
+) -> np.ndarray:
+    """Return the derivative by the geometry of contact, replicated, shape (n_nodes, dim). Collective.
+
+    Everything depends on places x = X + u alone, so that moving a node of the undeformed body acts as its
+    displacement does: through −wᵀ ∂(Bᵀλ)/∂x and ζᵀ ∂(c − B u)/∂x. Only slip depends on its start, too, and
+    areas and friction coefficients are those of the undeformed body.
+    """
+    torn, contact = state.torn, state.equilibrium.evaluation.contact
+    points = contact.points
+    result = np.zeros((torn.decomposition.tearing.n_nodes, torn.dim))
+    if points is None or points.points.count == 0:
+        return result
+    (normal, friction), (by_gap, by_slip) = (contact.at_points(each) for each in fields.multipliers)
+    w = _on_surfaces(torn, points, fields.displacements[0])
+    turning, rubbing = points.stiffness(np.maximum(normal, 0.0)), points.friction_stiffness(friction)
+    by_nodes = -turning.assembled() @ w - rubbing.right @ (rubbing.left.T @ w) + points.gap_rows.T @ by_gap
+    by_nodes += points.means_pulled_back(np.maximum(normal, 0.0), friction, by_gap, w)
+    if by_slip.any() and state.begun is not None and (start := state.begun.points) is not None:
+        rows = points.slip_rows(start.material_points()) + points.slip_by_start(start)
+        by_nodes -= rows.T @ by_slip.ravel()
+    result += by_nodes.reshape(result.shape)
+    by_area = bounds_by_area(torn, by_bound) + by_area
+    with together(torn.decomposition.comm):
+        np.add.at(result, torn.points.slave, bounds_by_place(torn, normal, by_bound))
+    for index in range(len(torn.scene.contacts)):
+        add_areas(result, torn, index, by_area)
+    return result
+
+
+def _on_surfaces(torn: TornSystem, points: SlidingPoints, field: np.ndarray) -> np.ndarray:
+    """Return a torn field at the nodes of contact surfaces, zero at others, by dof. Collective."""
+    nodes = points.moving_nodes
+    values = np.zeros((torn.decomposition.tearing.n_nodes, torn.dim))
+    values[nodes] = nodal_mean_at(torn.decomposition, field, nodes)
+    return values.ravel()
+
+
+def products_of(state: State) -> int:
+    """Return the number of F-products of a state so far; those of a deformed state's adjoint do not count."""
+    return state.system.products if isinstance(state, LinearState) else state.solution.products
+
+
+def adjoint_of(
+    state: State,
+    partials: Partials,
+    linearised: LinearisedFace,
+    tolerance: float,
+    start: np.ndarray | None = None,
+) -> tuple[Adjoint, StateError]:
+    """Solve the adjoint of a state and weigh its residuals with it. Collective.
+
+    Args:
+        start: Multiplier of a neighbouring adjoint, owned, or None; not used for deformed states.
+    """
+    if isinstance(state, DeformedState):
+        adjoint = solve_deformed_adjoint(state, partials, linearised, tolerance=tolerance)
+        unbalanced = -adjoint.displacement @ state.equilibrium.evaluation.unbalanced
+        shares = np.array([state.torn.numbering.comm.allreduce(float(unbalanced))])
+        return adjoint, state_error(state, partials, linearised, adjoint, shares)
+    linear = as_linear(state, "the adjoint and its error")
+    adjoint = solve_adjoint(linear, partials, linearised, tolerance=tolerance, start=start)
+    shares = adjoint.motions * linear.dual.problem.coarse.residual(linear.solution.multiplier)
+    return adjoint, state_error(state, partials, linearised, adjoint, shares)
+
+
+def by_nodes(
+    state: State, adjoint: Adjoint, partials: Partials, linearised: LinearisedFace, forms: ShapeForms
+) -> np.ndarray:
+    """Sum the objective's own derivative, −wᵀ δ(f_int − f) and the share of contacts and ties. Collective.
+
+    Returns:
+        The derivative by the nodes of all bodies, replicated, shape (n_nodes, dim).
+    """
+    torn, u, w = state.torn, state.torn_displacement, adjoint.displacement
+    work = work_by_shape(forms, torn, u, w)
+    fields = PairedFields((state.solution.multiplier, adjoint.multiplier - partials.by_jump), (w, u))
+    by_bound = bound_sensitivity(state.torn, partials.by_multiplier, w, linearised)
+    if isinstance(state, DeformedState):
+        rows = deformed_contact_by_shape(state, fields, by_bound, partials.by_area)
+    else:
+        rows = contact_by_shape(torn, fields, by_bound, partials.by_area)
+    rows = rows + ties_by_shape(torn, fields)
+    return np.asarray(torn.decomposition.comm.allreduce(partials.by_shape - work)) + rows

@@ -1,0 +1,429 @@
+"""One design under several loads: the largest objective of all load cases, or a weighted sum.
+
+One design under load steps that follow one another: the objectives of all steps, with a subgradient.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fenics_contact._base.display import displayed
+from fenics_contact._base.fingerprint import described
+from fenics_contact._base.libraries import MPI
+from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact.design.adjoint import WeakPoints, by_slip_origin, with_later_steps
+from fenics_contact.design.design_function import DesignProblem, comm_of
+from fenics_contact.design.forms import ShapeForms
+from fenics_contact.design.memory import DesignPoint, JointPoint, record_of_values, with_fewest_weak_points
+from fenics_contact.design.objective import Objective, Partials, asking, finite_value
+from fenics_contact.design.problem import ShapeProblem
+from fenics_contact.errors import InvalidInputError, collectively, together
+from fenics_contact.results.deformed_state import AnyState
+
+
+class JointProblem(DesignProblem[JointPoint]):
+    """A design problem with several states a design.
+
+    Attributes:
+        problems: Name of each case or step -> its problem; all are made of the first by `ShapeProblem.case`.
+    """
+
+    problems: dict[str, ShapeProblem]
+
+    @property
+    def _parts(self) -> Sequence[ShapeProblem]:
+        return list(self.problems.values())
+
+    def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the coordinates of the designed bodies, see `DesignGeometry.points_of`. Collective."""
+        return self._parts[0].points_of(alpha)
+
+    def fingerprint(self) -> dict[str, str]:
+        """Identify the problem, for a checkpoint."""
+        known = {name: problem.fingerprint() for name, problem in self.problems.items()}
+        return {f"{name}.{key}": text for name, each in known.items() for key, text in each.items()}
+
+
+@displayed
+class LoadCases(JointProblem):
+    """J(α) = max J_k(α) over load cases of one design, or Σ w_k J_k(α), with a subgradient.
+
+    Each case is a `ShapeProblem`; the others are made of the first by `ShapeProblem.case`. One design costs a
+    state and an adjoint for each case, but only one mesh motion, and one assembly and factorisation of what
+    moved. The subgradient of a maximum is that of the largest case; `minimize` uses the gradients of the
+    others as well. Samples of an uncertain friction coefficient are load cases, too.
+
+    Attributes:
+        problems: Name of the case -> its problem.
+        weights: Name of the case -> w_k; None for the largest.
+
+    Example:
+        >>> designs = SurfaceDesign("link1", links.first.crown, net=(7, 4))  # doctest: +SKIP
+        >>> problem = ShapeProblem(ContactProblem(scene, comm), designs, TotalPotential())  # doctest: +SKIP
+        >>> pulled = [TotalForce("link2", "grip", (60e3, 2e3, 0.0))]  # doctest: +SKIP
+        >>> askew = problem.case(LoadStep("askew", loads=pulled).applied_to(scene))  # doctest: +SKIP
+        >>> both = LoadCases({"straight": problem, "askew": askew})  # doctest: +SKIP
+        >>> result = minimize(both, np.zeros(both.size), bounds=(-1.0, 1.0))  # doctest: +SKIP
+    """
+
+    def __init__(
+        self, problems: Mapping[str, ShapeProblem], weights: Mapping[str, float] | None = None
+    ) -> None:
+        """Check the cases.
+
+        Args:
+            problems: Name of the case -> its problem.
+            weights: Name of the case -> its weight in the sum; None for the largest of all cases.
+
+        Raises:
+            InvalidInputError: If there is no case, a weight is missing or no finite number, or the problems
+                do not share their designs.
+        """
+        self.problems, self.weights = dict(problems), None if weights is None else dict(weights)
+        if not self.problems:
+            raise InvalidInputError("LoadCases needs a problem, got none: give {'name': problem}")
+        self._memory = record_of_values(self._at)
+        first = self._parts[0]
+        with together(first.comm):
+            for name, problem in self.problems.items():
+                if not isinstance(problem, ShapeProblem) or not problem.shares_with(first):
+                    raise InvalidInputError(
+                        f"load cases must share designs and meshes, {name!r} shares nothing with "
+                        f"{next(iter(self.problems))!r}: make it by problem.case(scene)"
+                    )
+            self._check_weights()
+
+    def _check_weights(self) -> None:
+        if self.weights is None:
+            return
+        if set(self.weights) != set(self.problems):
+            raise InvalidInputError(
+                f"LoadCases.weights must name the cases {sorted(self.problems)}, got {sorted(self.weights)}: "
+                "give each a weight, or none for the largest"
+            )
+        if not np.isfinite(list(self.weights.values())).all():
+            raise InvalidInputError(
+                f"LoadCases.weights must be finite numbers, got {self.weights}: give numbers such as 0.5"
+            )
+
+    def _facts(self) -> dict[str, Any]:
+        how = "largest" if self.weights is None else f"weighted sum, {self.weights}"
+        return {"cases": list(self.problems), "objective": how, "first": self._parts[0]}
+
+    @property
+    def inexact(self) -> bool:
+        """Whether an optimiser may ask for less accuracy, see `ShapeProblem.within`."""
+        return all(problem.inexact for problem in self.problems.values())
+
+    def pieces(self, alpha: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return J_k and gradients of the cases beside the largest, for `optimize`. Collective.
+
+        Args:
+            alpha: The design evaluated last, shape (size,), [length].
+
+        Returns:
+            Values, shape (k,), and gradients, shape (k, size); none of a weighted sum.
+        """
+        known = None if self.weights is not None else self.known(alpha)
+        points = sorted(known.parts.values(), key=lambda each: -each.value)[1:] if known else []
+        gradients = np.array([each.gradient for each in points]).reshape(len(points), self.size)
+        return np.array([each.value for each in points]), gradients
+
+    def evaluate(self, alpha: np.ndarray) -> JointPoint:
+        """Evaluate all cases. Collective; raises as `ShapeProblem.evaluate` does."""
+        point = self._joined({name: problem.evaluate(alpha) for name, problem in self.problems.items()})
+        self._memory.record(point)
+        return point
+
+    def within(self, alpha: np.ndarray, value: float, subgradient: float) -> tuple[float, np.ndarray, float]:
+        """Return J(α), a subgradient and the estimated error of J, see `ShapeProblem.within`. Collective."""
+        share = 1.0 if self.weights is None else sum(map(abs, self.weights.values())) or 1.0
+        for problem in self.problems.values():
+            problem.within(alpha, value / share, subgradient)
+        point = self._at(alpha)
+        self._memory.record(point)
+        return point.value, point.gradient, point.error
+
+    def values_of(self, alpha: np.ndarray) -> dict[str, float]:
+        """Return J_k(α) of every case. Collective."""
+        return {name: problem.value_of(alpha) for name, problem in self.problems.items()}
+
+    def states_of(self, alpha: np.ndarray) -> dict[str, AnyState]:
+        """Return the equilibrium of every case. Collective."""
+        return {name: problem.state_of(alpha) for name, problem in self.problems.items()}
+
+    def remarks(self, alpha: np.ndarray) -> tuple[str, ...]:
+        """Return what to know of a design beside its value, see `ShapeProblem.remarks`. Collective."""
+        return tuple(words for problem in self.problems.values() for words in problem.remarks(alpha))
+
+    def scene_of(self, alpha: np.ndarray) -> Scene:
+        """Return the scene of the first case in the shape of a design. Collective; raises as `evaluate`."""
+        return self._parts[0].scene_of(alpha)
+
+    def may_be_invalid(self, alpha: np.ndarray) -> bool:
+        """Return whether the last result, at α, may not be a subgradient. Collective."""
+        known = self.known(alpha)
+        return known is not None and any(
+            known.parts[name].weak.may_be_invalid for name in self._active(_values(known))
+        )
+
+    def gradient_near(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Return a gradient near α, see `ShapeProblem.gradient_near`. Collective."""
+        known = self.known(alpha)
+        names = self._active(self.values_of(alpha) if known is None else _values(known))
+        gradients = {name: self.problems[name].gradient_near(alpha, end) for name in names}
+        return gradients[names[0]] if self.weights is None else self._sum(gradients)
+
+    def fingerprint(self) -> dict[str, str]:
+        """Identify the problem, for a checkpoint."""
+        return {**super().fingerprint(), "weights": str(self.weights)}
+
+    def _at(self, alpha: np.ndarray) -> JointPoint:
+        """Return a design of the parts as they are known, or evaluated again. Collective."""
+        return self._joined({name: problem.at(alpha) for name, problem in self.problems.items()})
+
+    def _joined(self, parts: Mapping[str, DesignPoint]) -> JointPoint:
+        values = {name: part.value for name, part in parts.items()}
+        errors = {name: part.error for name, part in parts.items()}
+        names = self._active(values)
+        first, weak = parts[names[0]], WeakPoints.joined([parts[name].weak for name in names])
+        if self.weights is None:
+            return JointPoint(first.alpha, first.value, first.gradient, weak, parts, max(errors.values()))
+        gradient = self._sum({name: part.gradient for name, part in parts.items()})
+        error = self._sum(errors, absolute=True)
+        return JointPoint(first.alpha, self._sum(values), gradient, weak, parts, error)
+
+    def _sum(self, parts: Mapping[str, Any], *, absolute: bool = False) -> Any:
+        assert self.weights is not None
+        return sum(
+            (abs(self.weights[name]) if absolute else self.weights[name]) * parts[name] for name in parts
+        )
+
+    def _active(self, values: Mapping[str, float]) -> list[str]:
+        """Return the load cases that contribute to the subgradient, from their values."""
+        return list(self.problems) if self.weights is not None else [max(values, key=values.__getitem__)]
+
+
+def _values(point: JointPoint) -> dict[str, float]:
+    return {name: part.value for name, part in point.parts.items()}
+
+
+@displayed
+class LoadPath(JointProblem):
+    """J(α) = Σ J_n(α) over quasi-static load steps of one design, with a subgradient.
+
+    Slip of a step is measured from the step before, as by `LoadSequence`, so that its state depends on the
+    design through all steps before, too: adjoints are solved from the last step to the first, each with the
+    active set of its step and a load along the contact points' tangents from the step after. A design costs a
+    state and an adjoint for each step, one mesh motion, and one assembly and factorisation of what moved.
+
+    With `FrictionWork` as objective J is the work that friction dissipates in all steps.
+
+    Attributes:
+        problems: Name of the step -> its problem, with the loads of the step.
+        objectives: Name of the step -> J_n, for steps that have one.
+
+    Example:
+        >>> designs = SurfaceDesign("block", "z0", net=(4, 3))  # doctest: +SKIP
+        >>> problem = ShapeProblem(ContactProblem(scene, comm), designs, FrictionWork())  # doctest: +SKIP
+        >>> forth = LoadStep("forth", loads=[TotalForce("block", "z1", (9, 0, -50))])  # doctest: +SKIP
+        >>> back = LoadStep("back", loads=[TotalForce("block", "z1", (-9, 0, -50))])  # doctest: +SKIP
+        >>> wear = LoadPath(problem, [forth, back])  # doctest: +SKIP
+        >>> result = minimize(wear, np.zeros(wear.size), bounds=(-1.0, 1.0))  # doctest: +SKIP
+
+    References:
+        P. Michaleris, D. A. Tortorelli, C. A. Vidal, Tangent operators and design sensitivity formulations
+        for transient non-linear coupled problems with applications to elastoplasticity, Int. J. Numer.
+        Methods Eng. 37 (1994) 2471-2499.
+    """
+
+    def __init__(
+        self,
+        problem: ShapeProblem,
+        steps: Sequence[LoadStep],
+        objectives: Mapping[str, Objective] | None = None,
+    ) -> None:
+        """Apply the steps to the problem's scene, one after the other. Collective.
+
+        Args:
+            problem: Scene, designs and tolerance.
+            steps: The steps in their order, each with a name of its own; slip of the first is measured from
+                the undeformed state.
+            objectives: Name of the step -> its objective; None for that of the problem in every step.
+
+        Raises:
+            InvalidInputError: If there is no step, two have the same name, an objective is that of no step or
+                none is that of the last one, or the problem has an adaptive tolerance.
+        """
+        names = [step.name for step in steps]
+        with together(problem.comm):
+            if problem.inexact:
+                raise InvalidInputError(
+                    "LoadPath needs states that are all solved to one tolerance, as errors of a step enter "
+                    "the next one, got an adaptive one: give ShapeProblem a number as tolerance"
+                )
+            _check_names(names)
+        self.objectives = _checked(problem.comm, names, objectives or dict.fromkeys(names, problem.objective))
+        self.problems: dict[str, ShapeProblem] = {}
+        scene, last = problem.scene, problem
+        for step in steps:
+            scene = step.applied_to(scene)
+            self.problems[step.name] = last = last.case(scene)
+        self._states, self._memory = _States(self.problems), record_of_values(self._point_at)
+
+    def _facts(self) -> dict[str, Any]:
+        work = f"{self.evaluations} designs, {self.products} products with F"
+        return {"steps": list(self.problems), "objectives": self.objectives, "work": work}
+
+    @property
+    def scene(self) -> Scene:
+        """The scene after the last step, in its reference shape."""
+        return self._parts[-1].scene
+
+    @property
+    def forms(self) -> ShapeForms:
+        """Compiled derivatives, which objectives take beside a state."""
+        return self._parts[0].geometry.forms
+
+    @collectively("LoadPath.evaluate", comm_of)
+    def evaluate(self, alpha: np.ndarray) -> JointPoint:
+        """Solve the states of all steps and their adjoints. Collective.
+
+        States of the design solved last are not solved again.
+
+        Raises:
+            InvalidDesignError: If the design inverts a cell or has no equilibrium.
+        """
+        point = self._point_at(alpha)
+        self._memory.record(point)
+        return point
+
+    def scene_of(self, alpha: np.ndarray) -> Scene:
+        """Return the scene after the last step in the shape of a design. Collective; raises as `evaluate`."""
+        return self._parts[-1].scene_of(alpha)
+
+    @collectively("LoadPath.states_of", comm_of)
+    def states_of(self, alpha: np.ndarray) -> dict[str, AnyState]:
+        """Return the equilibrium after every step. Collective."""
+        return dict(self._states.of(alpha))
+
+    @collectively("LoadPath.values_of", comm_of)
+    def values_of(self, alpha: np.ndarray) -> dict[str, float]:
+        """Return J_n(α) of every step that has an objective. Collective."""
+        states, forms = self._states.of(alpha), self.forms
+        with asking(self.comm):
+            given = {name: each.value(states[name], forms) for name, each in self.objectives.items()}
+            return {name: finite_value(value) for name, value in given.items()}
+
+    def value_of(self, alpha: np.ndarray) -> float:
+        """Return J(α) alone, without adjoints. Collective."""
+        return sum(self.values_of(alpha).values())
+
+    def function(self, objectives: Mapping[str, Objective]) -> LoadPath:
+        """Return other objectives of the same steps as a function of the designs, for a constraint.
+
+        At the design solved last it uses the states and costs the adjoints. Collective.
+
+        Args:
+            objectives: Name of the step -> its objective, for some of the steps.
+        """
+        other = copy(self)
+        other.objectives = _checked(self.comm, list(self.problems), objectives, last=False)
+        other._memory = record_of_values(other._point_at)
+        return other
+
+    def remarks(self, alpha: np.ndarray) -> tuple[str, ...]:
+        """Return what to know of a design after the last step, see `ShapeProblem.remarks`. Collective."""
+        return self._parts[-1].contact.overlaps(self.states_of(alpha)[list(self.problems)[-1]])
+
+    @collectively("LoadPath.gradient_near", comm_of)
+    def gradient_near(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Return a gradient near α, see `ShapeProblem.gradient_near`. Collective."""
+        return with_fewest_weak_points(alpha, end, self._point_at).gradient
+
+    def fingerprint(self) -> dict[str, str]:
+        """Identify the problem, for a checkpoint."""
+        return super().fingerprint() | described(self.objectives, "objectives")
+
+    def _point_at(self, alpha: np.ndarray) -> JointPoint:
+        """Solve the adjoints from the last step to the first. Collective."""
+        states = self._states.of(alpha)
+        found: dict[str, DesignPoint] = {}
+        by_position = np.zeros(0)
+        for name in reversed(self.problems):
+            problem, state = self.problems[name], states[name]
+            if not found and name not in self.objectives:
+                continue
+            own = Partials.of(state, 0.0)
+            if name in self.objectives:
+                own = problem.partials_of(self.objectives[name], state)
+            found[name] = problem.differentiate(
+                state, with_later_steps(state, own, by_position) if found else own
+            )
+            by_position = by_slip_origin(state, own, found[name].adjoint_multiplier)
+        alpha = np.array(alpha, dtype=float)
+        parts = {name: replace(found[name], alpha=alpha) for name in self.problems if name in found}
+        value = sum(part.value for part in parts.values())
+        gradient = np.sum([part.gradient for part in parts.values()], axis=0)
+        return JointPoint(
+            alpha, value, gradient, WeakPoints.joined([part.weak for part in parts.values()]), parts
+        )
+
+
+class _States:
+    """States of all steps of one design after another; those of the last one are kept."""
+
+    def __init__(self, problems: Mapping[str, ShapeProblem]) -> None:
+        self._problems = problems
+        self._alpha: np.ndarray | None = None
+        self._known: dict[str, AnyState] = {}
+
+    def of(self, alpha: np.ndarray) -> Mapping[str, AnyState]:
+        """Return the states of a design. Collective."""
+        if self._alpha is not None and np.array_equal(self._alpha, alpha):
+            return self._known
+        states: dict[str, AnyState] = {}
+        last = None
+        for name, problem in self._problems.items():
+            states[name] = last = problem.state_of(alpha, last)
+        self._alpha, self._known = np.array(alpha, dtype=float), states
+        return states
+
+
+def _check_names(names: Sequence[str]) -> None:
+    """Check that there are steps with different names."""
+    if not names:
+        raise InvalidInputError("LoadPath needs a load step, got none: give [LoadStep('push', loads=...)]")
+    if len(set(names)) < len(names):
+        raise InvalidInputError(
+            f"LoadPath needs a name for each of its steps, got {list(names)}: number those that recur"
+        )
+
+
+def _checked(
+    comm: MPI.Comm, names: Sequence[str], objectives: Mapping[str, Objective], *, last: bool = True
+) -> dict[str, Objective]:
+    """Return the objectives of steps in the order of the steps."""
+    with together(comm):
+        if not isinstance(objectives, Mapping):
+            raise InvalidInputError(
+                "LoadPath.objectives must map names of steps to objectives, got "
+                f"{type(objectives).__name__}: give {{'{names[-1]}': objective}}, or none for that of the "
+                "problem in all steps"
+            )
+        if not objectives or not set(objectives) <= set(names):
+            raise InvalidInputError(
+                f"LoadPath.objectives must be those of some of the steps {list(names)}, got those of "
+                f"{list(objectives)}: give {{'{names[-1]}': objective}}"
+            )
+        if last and names[-1] not in objectives:
+            raise InvalidInputError(
+                f"the last step needs an objective, as nothing depends on it otherwise, but {names[-1]!r} "
+                f"is not among {list(objectives)}: leave out the steps after the last objective"
+            )
+    return {name: objectives[name] for name in names if name in objectives}

@@ -1,0 +1,50 @@
+"""Material models, written in UFL."""
+
+from fenics_contact.materials.elastic import (
+    Elasticity,
+    IsotropicElasticity,
+    Material,
+    PlaneStrain,
+    PlaneStress,
+    Thermoelastic,
+    Transverse,
+    strain,
+)
+from fenics_contact.materials.hyperelastic import (
+    EnergyModel,
+    Hyperelasticity,
+    MooneyRivlin,
+    NearlyIncompressible,
+    NeoHooke,
+    Ogden,
+    StVenantKirchhoff,
+)
+from fenics_contact.materials.kernels import rigid_body_modes
+from fenics_contact.materials.orthotropic import OrthotropicElasticity, OrthotropicPlaneStress, material_axes
+from fenics_contact.materials.plastic import FinitePlasticity, HistoryMaterial, J2Plasticity, MaterialResponse
+
+__all__ = [
+    "Elasticity",
+    "EnergyModel",
+    "FinitePlasticity",
+    "HistoryMaterial",
+    "Hyperelasticity",
+    "IsotropicElasticity",
+    "J2Plasticity",
+    "Material",
+    "MaterialResponse",
+    "MooneyRivlin",
+    "NearlyIncompressible",
+    "NeoHooke",
+    "Ogden",
+    "OrthotropicElasticity",
+    "OrthotropicPlaneStress",
+    "PlaneStrain",
+    "PlaneStress",
+    "StVenantKirchhoff",
+    "Thermoelastic",
+    "Transverse",
+    "material_axes",
+    "rigid_body_modes",
+    "strain",
+]

@@ -1,0 +1,406 @@
+"""Checks and conversions of engineering constants.
+
+The base of small-strain elastic models: only the stress has to be written.
+
+Isotropic elasticity: the common base of all isotropic models, and the model in space.
+
+Isotropic elasticity of plane bodies: plane strain and plane stress. Forces are per unit of thickness.
+
+What a material model must provide.
+
+Symmetric tensors as vectors (Voigt), their rotation, and stiffness matrices from engineering constants.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+import ufl
+from ufl.core.expr import Expr
+
+from fenics_contact._base.checks import checked
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials.kernels import rigid_body_modes
+
+
+def check_isotropic(young_modulus: float, poisson_ratio: float, thermal_expansion: float | None) -> None:
+    """Reject constants for which the strain energy is not positive."""
+    if not (np.isfinite(young_modulus) and young_modulus > 0):
+        raise InvalidInputError(
+            f"young_modulus must be a positive number, got {young_modulus!r}: "
+            "give E in force per area, for steel 2.1e5 in N/mm²"
+        )
+    if not -1 < poisson_ratio < 0.5:
+        raise InvalidInputError(
+            f"poisson_ratio must lie between -1 and 0.5 (excluded), got {poisson_ratio!r}: "
+            "use 0.3 for steel; incompressible bodies need another model"
+        )
+    if thermal_expansion is not None and not np.isfinite(thermal_expansion):
+        raise InvalidInputError(
+            f"thermal_expansion must be a finite number or None, got {thermal_expansion!r}: give the "
+            "strain per degree, for steel 1.2e-5"
+        )
+
+
+def lame(young_modulus: float, poisson_ratio: float) -> tuple[float, float]:
+    """Return the first Lamé parameter λ and the shear modulus G, [force / length²]."""
+    E, nu = young_modulus, poisson_ratio
+    return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
+
+
+def numbers(name: str, values: Sequence[float], count: int, meaning: str) -> tuple[float, ...]:
+    """Return ``count`` finite numbers as floats.
+
+    Raises:
+        InvalidInputError: If they are not; ``meaning`` ends the message.
+    """
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.full(0, np.nan)
+    if array.shape != (count,) or not np.isfinite(array).all():
+        raise InvalidInputError(f"{name} must be {count} finite numbers, got {values!r}: {meaning}")
+    return tuple(float(value) for value in array)
+
+
+def strain(u: Expr) -> Expr:
+    """Return the small strain ε(u) = ½ (∇u + ∇uᵀ)."""
+    return ufl.sym(ufl.grad(u))
+
+
+class Elasticity(ABC):
+    """Elasticity with work σ(u) : ε(v) and rigid motions as its kernel; write `parameters` and `stress`.
+
+    A plane model with stress normal to its plane adds the members of `Transverse`; otherwise its von Mises
+    stress is that of plane stress. A model with thermal expansion adds those of `Thermoelastic`.
+
+    Example:
+        Two independent moduli, in the plane or in space:
+
+        >>> from dataclasses import dataclass
+        >>> import ufl
+        >>> @dataclass(frozen=True)
+        ... class BulkAndShear(Elasticity):
+        ...     bulk: float
+        ...     shear: float
+        ...
+        ...     @property
+        ...     def parameters(self):
+        ...         return self.bulk, self.shear
+        ...
+        ...     def stress(self, u, parameters):
+        ...         bulk, shear = parameters
+        ...         return bulk * ufl.div(u) * ufl.Identity(len(u)) + 2 * shear * ufl.dev(strain(u))
+        >>> BulkAndShear(3.0, 1.0).dims
+        (2, 3)
+    """
+
+    @property
+    def dims(self) -> tuple[int, ...]:
+        """Plane bodies and bodies in space, unless a model overrides it."""
+        return (2, 3)
+
+    @property
+    @abstractmethod
+    def parameters(self) -> tuple[float, ...]:
+        """Values of the model's constants, in the order in which `stress` receives them."""
+
+    @abstractmethod
+    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return the stress tensor (dim x dim, symmetric, UFL), linear in the displacement ``u``."""
+
+    def stiffness(self, u: Expr, v: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return σ(u) : ε(v)."""
+        return ufl.inner(self.stress(u, parameters), strain(v))
+
+    def kernel(self, points: np.ndarray) -> np.ndarray:
+        """Return the rigid body modes."""
+        return rigid_body_modes(points)
+
+
+@dataclass(frozen=True)
+@checked()
+class Isotropic(Elasticity):
+    """The constants that all isotropic models have."""
+
+    young_modulus: float
+    poisson_ratio: float
+    thermal_expansion: float | None = None
+
+    def __post_init__(self) -> None:
+        """Reject constants for which the strain energy is not positive."""
+        check_isotropic(self.young_modulus, self.poisson_ratio, self.thermal_expansion)
+
+    @property
+    def expands(self) -> bool:
+        """Whether α was given."""
+        return self.thermal_expansion is not None
+
+    @property
+    def expansion(self) -> tuple[float, ...]:
+        """α where it was given, else nothing: the last of the parameters."""
+        return () if self.thermal_expansion is None else (self.thermal_expansion,)
+
+
+@dataclass(frozen=True)
+class IsotropicElasticity(Isotropic):
+    """Small-strain isotropic linear elasticity in space, σ = λ tr(ε) I + 2 G ε − ΔT (3λ + 2G) α I.
+
+    Attributes:
+        young_modulus: Young's modulus E > 0, [force / length²].
+        poisson_ratio: Poisson's ratio ν in (−1, 0.5), dimensionless.
+        thermal_expansion: Thermal expansion α, strain per degree. None for a body without thermal strain.
+    """
+
+    @property
+    def dims(self) -> tuple[int, ...]:
+        """Bodies in space; in the plane use `PlaneStrain` or `PlaneStress`."""
+        return (3,)
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """First Lamé parameter and shear modulus, [force / length²], and α where it was given."""
+        return (*lame(self.young_modulus, self.poisson_ratio), *self.expansion)
+
+    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return σ(u) with ``parameters`` = (λ, G, ...)."""
+        return parameters[0] * ufl.div(u) * ufl.Identity(3) + 2 * parameters[1] * strain(u)
+
+    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return (3λ + 2G) α I."""
+        lame_parameter, shear, expansion = parameters
+        return (3 * lame_parameter + 2 * shear) * expansion * ufl.Identity(3)
+
+
+@dataclass(frozen=True)
+class PlaneStrain(Isotropic):
+    """A slice of a long body that cannot strain along its length, σ = λ tr(ε) I + 2 G ε − ΔT (3λ + 2G) α I.
+
+    Attributes:
+        young_modulus: Young's modulus E > 0, [force / length²].
+        poisson_ratio: Poisson's ratio ν in (−1, 0.5), dimensionless.
+        thermal_expansion: Thermal expansion α, strain per degree. None for a body without thermal strain.
+    """
+
+    @property
+    def dims(self) -> tuple[int, ...]:
+        """Plane bodies."""
+        return (2,)
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """First Lamé parameter and shear modulus, [force / length²], and α where it was given."""
+        return (*lame(self.young_modulus, self.poisson_ratio), *self.expansion)
+
+    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return σ(u) in the plane."""
+        return parameters[0] * ufl.div(u) * ufl.Identity(2) + 2 * parameters[1] * strain(u)
+
+    def transverse_stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return λ tr(ε)."""
+        return parameters[0] * ufl.div(u)
+
+    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return (3λ + 2G) α I."""
+        return self.transverse_thermal_stress(parameters) * ufl.Identity(2)
+
+    def transverse_thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return (3λ + 2G) α."""
+        lame_parameter, shear, expansion = parameters
+        return (3 * lame_parameter + 2 * shear) * expansion
+
+
+@dataclass(frozen=True)
+class PlaneStress(Isotropic):
+    """A thin plate without stress normal to it, σ = E/(1−ν²) ((1−ν) ε + ν tr(ε) I) − ΔT E/(1−ν) α I.
+
+    Attributes:
+        young_modulus: Young's modulus E > 0, [force / length²].
+        poisson_ratio: Poisson's ratio ν in (−1, 0.5), dimensionless.
+        thermal_expansion: Thermal expansion α, strain per degree. None for a body without thermal strain.
+    """
+
+    @property
+    def dims(self) -> tuple[int, ...]:
+        """Plane bodies."""
+        return (2,)
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """E, [force / length²], ν, and α where it was given."""
+        return (self.young_modulus, self.poisson_ratio, *self.expansion)
+
+    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return σ(u) in the plane."""
+        E, nu = parameters[0], parameters[1]
+        return E / (1 - nu**2) * ((1 - nu) * strain(u) + nu * ufl.div(u) * ufl.Identity(2))
+
+    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return E α / (1 − ν) I."""
+        E, nu, expansion = parameters
+        return E * expansion / (1 - nu) * ufl.Identity(2)
+
+
+@runtime_checkable
+class Material(Protocol):
+    """A linear elastic model; `Elasticity` and `EnergyModel` leave only two of these members to write.
+
+    Numbers that may differ from body to body are returned by `parameters` and reach the forms as UFL
+    constants, so that all bodies of one class share one compiled form. A model is a value: equal models are
+    interchangeable, and it can be hashed, as a frozen dataclass of numbers and tuples can.
+    """
+
+    @property
+    def dims(self) -> tuple[int, ...]:
+        """Dimensions of the bodies that it is for, ``(2,)``, ``(3,)`` or ``(2, 3)``."""
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """Values of the model's constants, in the order in which the forms receive them."""
+
+    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return the stress tensor (dim x dim, UFL) of the displacement ``u``."""
+
+    def stiffness(self, u: Expr, v: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return the integrand of the symmetric bilinear form, virtual work per volume (UFL scalar)."""
+
+    def kernel(self, points: np.ndarray) -> np.ndarray:
+        """Return the zero-energy modes at ``points``, shape (n, dim) -> (n, dim, n_modes)."""
+
+
+@runtime_checkable
+class Thermoelastic(Protocol):
+    """What a material must provide in addition for `ThermalStrain` to act on it."""
+
+    @property
+    def expands(self) -> bool:
+        """Whether this material was given a thermal expansion."""
+
+    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return the stress that free expansion relieves per degree of temperature rise (dim x dim, UFL).
+
+        σ = stress(u) − ΔT · thermal_stress; for an isotropic body (3λ + 2G) α I.
+        """
+
+
+@runtime_checkable
+class Transverse(Protocol):
+    """What a plane model provides in addition if it has stress normal to its plane (plane strain)."""
+
+    def transverse_stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return the stress normal to the plane (UFL scalar), without thermal strain."""
+
+    def transverse_thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return by how much it falls per degree of temperature rise (UFL scalar)."""
+
+
+def can_expand(material: Material) -> bool:
+    """Return whether a temperature change strains the material."""
+    return isinstance(material, Thermoelastic) and material.expands
+
+
+#: Index pairs in Voigt order: xx, yy, zz, yz, xz, xy; in the plane xx, yy, xy.
+PAIRS = {3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)), 2: ((0, 0), (1, 1), (0, 1))}
+
+
+def to_vector(tensor: np.ndarray) -> np.ndarray:
+    """Return the entries of symmetric tensors in Voigt order, without factors.
+
+    Args:
+        tensor: Shape (..., 3, 3).
+
+    Returns:
+        Shape (..., 6).
+    """
+    rows, columns = np.transpose(PAIRS[3])
+    return np.asarray(tensor[..., rows, columns])
+
+
+def to_tensor(vector: np.ndarray) -> np.ndarray:
+    """Return the symmetric tensors with the given entries, (..., 6) to (..., 3, 3); undoes `to_vector`."""
+    return np.asarray(vector[..., [[0, 5, 4], [5, 1, 3], [4, 3, 2]]])
+
+
+def strain_vector(strain: Expr, dim: int) -> list[Expr]:
+    """Return the entries of a strain tensor (UFL) with engineering shears, γ = 2 ε."""
+    return [(1 if i == j else 2) * strain[i, j] for i, j in PAIRS[dim]]
+
+
+def as_tensor(vector: list[Expr], dim: int) -> Expr:
+    """Return the stress tensor (UFL) with the given Voigt entries."""
+    place = {pair: k for k, pair in enumerate(PAIRS[dim])}
+    return ufl.as_tensor([[vector[place[min(i, j), max(i, j)]] for j in range(dim)] for i in range(dim)])
+
+
+def upper_triangle(matrix: np.ndarray) -> tuple[float, ...]:
+    """Return the entries on and above the diagonal, row by row."""
+    return tuple(float(value) for value in matrix[np.triu_indices(len(matrix))])
+
+
+def symmetric_product(entries: tuple[ufl.Constant, ...], vector: list[Expr]) -> list[Expr]:
+    """Return the product of a symmetric matrix, given by its upper triangle, with a vector (UFL)."""
+    n = len(vector)
+    place = {(i, j): k for k, (i, j) in enumerate(zip(*np.triu_indices(n), strict=True))}
+    return [sum(entries[place[min(i, j), max(i, j)]] * vector[j] for j in range(n)) for i in range(n)]
+
+
+def rotated_stiffness(C: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """Rotate a stiffness matrix from material axes to those of the scene.
+
+    Args:
+        C: Stiffness in material axes, Voigt, shape (6, 6) or (3, 3).
+        axes: Material axes as rows, orthonormal, shape (dim, dim).
+    """
+    T = strain_rotation(axes)
+    return np.asarray(T.T @ C @ T)
+
+
+def strain_rotation(axes: np.ndarray) -> np.ndarray:
+    """Return the matrix that rotates a strain vector from the scene's axes to material axes."""
+    dim = len(axes)
+    T = np.empty((len(PAIRS[dim]),) * 2)
+    for column, (i, j) in enumerate(PAIRS[dim]):
+        unit = np.zeros((dim, dim))
+        unit[i, j] += 0.5
+        unit[j, i] += 0.5  # engineering shear 1
+        turned = axes @ unit @ axes.T
+        T[:, column] = [(1 if a == b else 2) * turned[a, b] for a, b in PAIRS[dim]]
+    return T
+
+
+def thermal_stresses(
+    C: np.ndarray, axes: np.ndarray, expansion: tuple[float, ...] | None
+) -> tuple[float, ...]:
+    """Return C : α in Voigt order, nothing without an expansion.
+
+    Args:
+        C: Stiffness in the scene's axes, Voigt.
+        axes: Material axes as rows, shape (dim, dim).
+        expansion: α along them.
+    """
+    if expansion is None:
+        return ()
+    along = np.zeros(len(C))
+    along[: len(axes)] = expansion
+    return tuple(float(value) for value in C @ np.linalg.solve(strain_rotation(axes), along))
+
+
+def checked_stiffness(compliance: np.ndarray, constants: str) -> np.ndarray:
+    """Invert a compliance matrix, shape (n, n).
+
+    Raises:
+        InvalidInputError: If it is not positive definite; ``constants`` names what it was built from.
+    """
+    scale = np.sqrt(np.abs(np.diag(compliance)))
+    smallest = np.linalg.eigvalsh(compliance / np.outer(scale, scale)).min()
+    if not smallest > 1e-12:
+        raise InvalidInputError(
+            f"engineering constants must give a positive energy, {constants} do not (smallest eigenvalue of "
+            f"the scaled compliance {smallest:.3g}): reduce the Poisson ratios, ν_ij² < E_i / E_j for each "
+            "pair is necessary"
+        )
+    return np.asarray(np.linalg.inv(compliance), dtype=np.float64)

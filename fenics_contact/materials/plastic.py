@@ -1,0 +1,563 @@
+"""The base of materials that remember: plasticity, viscoelasticity, damage.
+
+Hardening laws and the radial return of von Mises plasticity, for all points at once.
+
+What von Mises' metals have in common, in small and large deformations.
+
+Von Mises plasticity in small strain.
+
+Von Mises plasticity for large deformations, by logarithmic strains.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+import ufl
+from ufl.core.expr import Expr
+
+from fenics_contact._base.checks import checked
+from fenics_contact._base.display import displayed
+from fenics_contact.errors import InvalidInputError, user_code
+from fenics_contact.materials.elastic import (
+    Elasticity,
+    as_tensor,
+    check_isotropic,
+    lame,
+    strain,
+    strain_vector,
+    symmetric_product,
+    to_tensor,
+    to_vector,
+    upper_triangle,
+)
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class MaterialResponse:
+    """What a material with a history answers at n points at the end of a step.
+
+    Attributes:
+        stress: First Piola-Kirchhoff stress P, shape (n, 3, 3), [force / length²]; in small strain σ.
+        tangent: ∂P/∂H of the same step, H = ∇u, shape (n, 3, 3, 3, 3): [p, i, j, k, l] is ∂P_ij / ∂H_kl.
+        history: Internal variables at the end of the step, shape (n, k).
+    """
+
+    stress: np.ndarray
+    tangent: np.ndarray
+    history: np.ndarray
+
+
+class HistoryMaterial(Elasticity):
+    """A material whose stress depends on what it went through; write its history_size and respond.
+
+    The internal variables are zero at first, where the body is free of stress. Bodies in the plane are in
+    plane strain. The tangent at zero displacement and history, for a step of no duration, is the model's
+    linear part (`parameters`, `stress`, `stiffness`): small-strain elasticity.
+
+    `finite` tells whether `respond` uses the whole displacement gradient, rotations included, or its
+    symmetric part alone (small strain). With `mean_dilatation`, in small strain, it gets the mean change of
+    volume of each cell at all of its points, against locking where flow keeps the volume.
+
+    Example:
+        A Maxwell fluid: a spring that a damper relaxes, with its stress as history.
+
+        >>> from dataclasses import dataclass
+        >>> @dataclass(frozen=True)
+        ... class Maxwell(HistoryMaterial):
+        ...     modulus: float
+        ...     relaxation_time: float
+        ...     history_size = 12  # strain and stress at the start of the step
+        ...
+        ...     def respond(self, gradient, history, duration):
+        ...         strain = to_vector(0.5 * (gradient + gradient.swapaxes(1, 2)))
+        ...         decay = np.exp(-duration / self.relaxation_time)
+        ...         stress = decay * (history[:, 6:] + self.modulus * (strain - history[:, :6]))
+        ...         one = np.einsum("ik,jl->ijkl", np.eye(3), np.eye(3))
+        ...         tangent = 0.5 * decay * self.modulus * (one + one.swapaxes(0, 1))
+        ...         return MaterialResponse(
+        ...             to_tensor(stress),
+        ...             np.broadcast_to(tangent, (len(stress), 3, 3, 3, 3)),
+        ...             np.hstack([strain, stress]),
+        ...         )
+        >>> from fenics_contact.materials.elastic import to_tensor, to_vector
+        >>> float(Maxwell(2.0, 1.0).moduli[0, 0])
+        2.0
+    """
+
+    nonlinear: ClassVar[bool] = True
+    finite: ClassVar[bool] = False
+    mean_dilatation: bool = False
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        """Reject a model that replaces the checks of what it returns.
+
+        Raises:
+            InvalidInputError: If it has an `answer` of its own.
+        """
+        super().__init_subclass__(**given)
+        if "answer" in vars(cls):
+            raise InvalidInputError(
+                f"a material with a history must define respond, {cls.__name__} defines answer, which checks "
+                "what respond returns: rename it, and call super().respond there"
+            )
+
+    @property
+    @abstractmethod
+    def history_size(self) -> int:
+        """Number k of internal variables per point."""
+
+    @abstractmethod
+    def respond(self, gradient: np.ndarray, history: np.ndarray, duration: float) -> MaterialResponse:
+        """Return stress, tangent and history at the end of a step, for all points at once.
+
+        Args:
+            gradient: Displacement gradients ∂u_i/∂X_j at the end of the step, shape (n, 3, 3).
+            history: Internal variables at its start, shape (n, k); must not be changed.
+            duration: Of the step, in the unit of time of the material's constants; NaN where it is not known,
+                with which a model that depends on it shall compute, so that it ends in NaN, too.
+        """
+
+    def answer(self, gradient: np.ndarray, history: np.ndarray, duration: float) -> MaterialResponse:
+        """Return what `respond` does, as float64 arrays of the right shapes.
+
+        Raises:
+            InvalidInputError: If it returns other shapes, or numbers that are not finite where cells are not
+                turned inside out.
+            UserCodeError: If it raises.
+        """
+        name, n = type(self).__name__, len(gradient)
+        with user_code(f"respond of material {name}"):
+            given = self.respond(gradient, history, duration)
+        shapes = {"stress": (n, 3, 3), "tangent": (n, 3, 3, 3, 3), "history": (n, self.history_size)}
+        arrays = {part: np.asarray(getattr(given, part, None), dtype=np.float64) for part in shapes}
+        for part, shape in shapes.items():
+            if arrays[part].shape != shape:
+                raise InvalidInputError(
+                    f"respond of {name} must return {part} of shape {shape} for {n} points and "
+                    f"{self.history_size} internal variables, got {arrays[part].shape}: return a "
+                    "MaterialResponse(stress, tangent, history) with one row per point"
+                )
+        if np.isnan(duration) and not np.isfinite(arrays["stress"]).any():
+            raise InvalidInputError(
+                f"the answer of {name} depends on the duration of the step, none was given: give it, or use "
+                "a material that does not depend on it"
+            )
+        upright = np.linalg.det(np.eye(3) + gradient) > 0 if self.finite else np.ones(n, dtype=bool)
+        for part, values in arrays.items():
+            bad = ~np.isfinite(values.reshape(n, -1)).all(axis=1) & upright
+            if bad.any():
+                raise InvalidInputError(
+                    f"respond of {name} must return finite numbers, {part} has NaN or infinity at "
+                    f"{bad.sum()} of {n} points, first for the displacement gradient "
+                    f"{np.array2string(gradient[bad][0], precision=3, separator=', ')}: check the constants "
+                    "and guard divisions by zero"
+                )
+        return MaterialResponse(**arrays)
+
+    @cached_property
+    def moduli(self) -> np.ndarray:
+        """Elastic stiffness of the unloaded material, order xx, yy, zz, yz, xz, xy, shape (6, 6).
+
+        Raises:
+            InvalidInputError: If the unloaded material has stress, or the tangent there is not symmetric.
+        """
+        name = type(self).__name__
+        first = self.answer(np.zeros((1, 3, 3)), np.zeros((1, self.history_size)), 0.0)
+        A = first.tangent[0]
+        C = to_vector(np.moveaxis(to_vector(A), -1, 0))
+        size = np.abs(C).max()
+        swapped = C - C.T, A - A.swapaxes(0, 1), A - A.swapaxes(2, 3)
+        unsymmetric = max(np.abs(each).max() for each in swapped)
+        if np.abs(first.stress).max() > 1e-10 * size:
+            raise InvalidInputError(
+                f"{name} must have no stress at zero displacement and history, got "
+                f"{np.abs(first.stress).max():.3g}: choose internal variables that are zero in the "
+                "unloaded body"
+            )
+        if unsymmetric > 1e-10 * size:
+            raise InvalidInputError(
+                f"the tangent of {name} at zero displacement and history must be that of linear elasticity, "
+                f"it misses C_ijkl = C_klij = C_jikl by {unsymmetric / size:.1e} of its largest entry: check "
+                "the order of its indices, [point, i, j, k, l] is dP_ij / dH_kl"
+            )
+        return C
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """Upper triangle of `moduli`, which is all that the linear part knows."""
+        return upper_triangle(self.moduli)
+
+    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return the stress of the linear part."""
+        dim = len(u)
+        return as_tensor(self._stress_vector(u, parameters, dim), dim)
+
+    def transverse_stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return the stress of the linear part normal to the plane."""
+        return self._stress_vector(u, parameters, 3)[2]
+
+    def transverse_thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return zero: the model has no thermal expansion."""
+        return ufl.as_ufl(0.0)
+
+    def _stress_vector(self, u: Expr, parameters: tuple[ufl.Constant, ...], dim: int) -> list[Expr]:
+        if len(u) == 3:
+            return symmetric_product(parameters, strain_vector(strain(u), 3))
+        x, y, xy = strain_vector(strain(u), 2)
+        zero = ufl.as_ufl(0.0)
+        stress = symmetric_product(parameters, [x, y, zero, zero, zero, xy])
+        return stress if dim == 3 else [stress[0], stress[1], stress[5]]
+
+
+@dataclass(frozen=True)
+class Hardening:
+    """Yield stress by equivalent plastic strain α, σ_y = σ_0 + H α + (σ_∞ − σ_0)(1 − exp(−δ α)).
+
+    Attributes:
+        yield_stress: σ_0, [force / length²].
+        slope: H, [force / length²].
+        saturation_stress: σ_∞, [force / length²].
+        saturation_rate: δ, per plastic strain.
+    """
+
+    yield_stress: float
+    slope: float
+    saturation_stress: float
+    saturation_rate: float
+
+    def at(self, alpha: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the yield stress, which does not fall below zero, and its derivative by α."""
+        gain, left = self.saturation_stress - self.yield_stress, np.exp(-self.saturation_rate * alpha)
+        stress = self.yield_stress + self.slope * alpha + gain * (1 - left)
+        slope = self.slope + gain * self.saturation_rate * left
+        return np.maximum(stress, 0.0), np.where(stress > 0, slope, 0.0)
+
+
+def check_plastic(
+    young_modulus: float, yield_stress: float, slope: float, kinematic: float, saturation: tuple[float, float]
+) -> None:
+    """Reject constants for which plastic flow does not exist or is not unique.
+
+    Args:
+        young_modulus: E, already checked.
+        yield_stress: σ_0.
+        slope: H, of isotropic hardening.
+        kinematic: C, of kinematic hardening.
+        saturation: σ_∞ and δ.
+    """
+    if not (np.isfinite(yield_stress) and yield_stress > 0):
+        raise InvalidInputError(
+            f"yield_stress must be a positive number, got {yield_stress!r}: give it in force per area, for "
+            "structural steel 235 N/mm²; a body that does not yield is IsotropicElasticity"
+        )
+    if not (np.isfinite(kinematic) and kinematic >= 0):
+        raise InvalidInputError(
+            f"kinematic_hardening must be a number of at least 0, got {kinematic!r}: give the slope of the "
+            "back stress by plastic strain in tension, in force per area"
+        )
+    if not (np.isfinite(slope) and slope + kinematic > -young_modulus):
+        raise InvalidInputError(
+            f"isotropic_hardening must be a number above −E − kinematic_hardening = "
+            f"{-young_modulus - kinematic:.6g}, got {slope!r}: with less, stress in tension falls faster "
+            "than the bar unloads, and the strain is not unique"
+        )
+    stress, rate = saturation
+    if not (np.isfinite(stress) and stress >= yield_stress and np.isfinite(rate) and rate >= 0):
+        raise InvalidInputError(
+            f"saturation_stress must be a number of at least yield_stress {yield_stress!r} and "
+            f"saturation_rate one of at least 0, got {stress!r} and {rate!r}: give the stress at which "
+            "hardening ends and how fast it is approached, 1/α, or neither"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Returned:
+    """Where the return mapping ends.
+
+    Attributes:
+        stress: Shape (n, 3, 3), [force / length²].
+        moduli: Consistent tangent ∂σ/∂ε, shape (n, 3, 3, 3, 3).
+        flow: Increment of plastic strain, shape (n, 3, 3); zero where the step is elastic.
+        alpha: Equivalent plastic strain at the end of the step, shape (n,).
+    """
+
+    stress: np.ndarray
+    moduli: np.ndarray
+    flow: np.ndarray
+    alpha: np.ndarray
+
+
+def radial_return(
+    strain: np.ndarray,
+    back: np.ndarray,
+    alpha: np.ndarray,
+    elastic: tuple[float, float],
+    hardening: Hardening,
+    kinematic: float = 0.0,
+) -> Returned:
+    """Map an elastic trial state back to the yield surface.
+
+    Backward Euler for von Mises' yield function with associated flow, isotropic and Prager's kinematic
+    hardening; the normal of the trial state is that of the final one.
+
+    Args:
+        strain: Trial elastic strain, shape (n, 3, 3).
+        back: Back stress at the start of the step, deviatoric, shape (n, 3, 3).
+        alpha: Equivalent plastic strain there, shape (n,).
+        elastic: Bulk modulus and shear modulus.
+        hardening: Yield stress by α.
+        kinematic: Slope C of the back stress in tension.
+
+    References:
+        J. C. Simo, T. J. R. Hughes: Computational Inelasticity. Springer 1998, Boxes 3.1 and 3.2.
+    """
+    bulk, shear = elastic
+    one = np.eye(3)
+    volume = np.trace(strain, axis1=1, axis2=2)
+    deviator = 2 * shear * (strain - volume[:, None, None] / 3 * one)
+    relative = deviator - back
+    length = np.linalg.norm(relative, axis=(1, 2))
+    stiffness = 2 * shear + 2 / 3 * kinematic
+    multiplier, slope = _multipliers(length, alpha, stiffness, hardening)
+    normal = relative / np.where(length > 0, length, 1.0)[:, None, None]
+    flow = multiplier[:, None, None] * normal
+    theta = 1 - 2 * shear * multiplier / np.where(length > 0, length, 1.0)
+    along = np.where(multiplier > 0, 2 * shear / (stiffness + 2 / 3 * slope) - 1 + theta, 0.0)
+    spherical = np.einsum("ij,kl->ijkl", one, one)
+    symmetric = np.einsum("ik,jl->ijkl", one, one)
+    symmetric = 0.5 * (symmetric + symmetric.swapaxes(0, 1))
+    moduli = (
+        bulk * spherical
+        + 2 * shear * theta[:, None, None, None, None] * (symmetric - spherical / 3)
+        - 2 * shear * along[:, None, None, None, None] * np.einsum("nij,nkl->nijkl", normal, normal)
+    )
+    stress = deviator - 2 * shear * flow + bulk * volume[:, None, None] * one
+    return Returned(stress, moduli, flow, alpha + np.sqrt(2 / 3) * multiplier)
+
+
+def _multipliers(
+    length: np.ndarray, alpha: np.ndarray, stiffness: float, hardening: Hardening
+) -> tuple[np.ndarray, np.ndarray]:
+    """Solve ‖ξ‖ − stiffness Δγ = √(2/3) σ_y(α + √(2/3) Δγ) for Δγ ≥ 0; return Δγ and dσ_y/dα there.
+
+    Newton's method, with bisection where it leaves the bracket: softening ends with a kink at σ_y = 0.
+    """
+    multiplier, slope = np.zeros_like(length), np.zeros_like(length)
+    root = np.sqrt(2.0 / 3.0)  # radius of the yield surface in deviatoric stress, per unit of yield stress
+    radius = root * hardening.at(alpha)[0]
+    flows = np.flatnonzero(length > radius * (1 + 1e-12))  # a state on the surface is elastic, not rounding
+    size, alpha = length[flows], alpha[flows]
+    low, high = np.zeros_like(size), size / stiffness
+    guess = low
+    for _ in range(60):
+        stress, rate = hardening.at(alpha + root * guess)
+        rest = size - stiffness * guess - root * stress
+        low, high = np.where(rest >= 0, guess, low), np.where(rest <= 0, guess, high)
+        step = guess + rest / (stiffness + 2 / 3 * rate)
+        inside = (step >= low) & (step <= high)
+        guess = np.where(inside, step, 0.5 * (low + high))
+        if not (np.abs(rest) > 1e-14 * size).any():
+            break
+    multiplier[flows], slope[flows] = guess, hardening.at(alpha + root * guess)[1]
+    return multiplier, slope
+
+
+class VonMisesMetal(HistoryMaterial):
+    """Isotropic elasticity with a yield stress that grows with the equivalent plastic strain."""
+
+    young_modulus: float
+    poisson_ratio: float
+    yield_stress: float
+    isotropic_hardening: float
+    saturation_stress: float | None
+    saturation_rate: float
+
+    def __post_init__(self) -> None:
+        """Reject constants without a unique answer."""
+        check_isotropic(self.young_modulus, self.poisson_ratio, None)
+        law = self.hardening
+        saturation = law.saturation_stress, law.saturation_rate
+        check_plastic(self.young_modulus, law.yield_stress, law.slope, self._back_slope, saturation)
+        if (self.saturation_stress is None) != (self.saturation_rate == 0.0):
+            raise InvalidInputError(
+                "saturation_stress and saturation_rate must be given together, got "
+                f"{self.saturation_stress!r} and {self.saturation_rate!r}: one alone has no effect"
+            )
+
+    @property
+    def _back_slope(self) -> float:
+        """Slope of the back stress by plastic strain."""
+        return 0.0
+
+    @property
+    def hardening(self) -> Hardening:
+        """Yield stress by equivalent plastic strain."""
+        final = self.yield_stress if self.saturation_stress is None else self.saturation_stress
+        return Hardening(self.yield_stress, self.isotropic_hardening, final, self.saturation_rate)
+
+    @property
+    def history_size(self) -> int:
+        """A symmetric tensor of plastic deformation, and the equivalent plastic strain."""
+        return 7
+
+
+@dataclass(frozen=True)
+@checked()
+class J2Plasticity(VonMisesMetal):
+    """Elastic-plastic metals in small strain: von Mises' yield function, associated flow, no creep.
+
+    Yields where √(3/2) ‖dev σ − β‖ = σ_y(α), with σ_y = σ_0 + H α + (σ_∞ − σ_0)(1 − exp(−δ α)) and Prager's
+    back stress β = ⅔ C ε_p; elastic strain is isotropic. Plane bodies are in plane strain. The stress is that
+    at the end of each step by the radial return with its consistent tangent, exact to rounding for steps
+    along one direction of strain. Internal variables: plastic strain (xx, yy, zz, yz, xz, xy), α.
+
+    Attributes:
+        young_modulus: Young's modulus E > 0, [force / length²].
+        poisson_ratio: Poisson's ratio ν in (−1, 0.5), dimensionless.
+        yield_stress: Initial yield stress in tension σ_0 > 0, [force / length²].
+        isotropic_hardening: Slope H of the yield stress by plastic strain, [force / length²]; negative for
+            softening, whose bands are as wide as cells.
+        kinematic_hardening: Slope C ≥ 0 of the back stress by plastic strain in tension, [force / length²].
+        saturation_stress: Yield stress σ_∞ ≥ σ_0 that is approached exponentially, [force / length²]. None
+            for none.
+        saturation_rate: How fast it is approached, δ ≥ 0, per plastic strain.
+        mean_dilatation: Whether changes of volume are the means of cells: plastic flow keeps the volume, and
+            linear hexahedra and quadrilaterals lock without it.
+
+    Example:
+        Half the strain beyond yield is plastic where H = E:
+
+        >>> import numpy as np
+        >>> steel = J2Plasticity(2e5, 0.3, 235.0, isotropic_hardening=2e5)
+        >>> steel.history_size, steel.nonlinear, steel.finite
+        (7, True, False)
+    """
+
+    young_modulus: float
+    poisson_ratio: float
+    yield_stress: float
+    isotropic_hardening: float = 0.0
+    kinematic_hardening: float = 0.0
+    saturation_stress: float | None = None
+    saturation_rate: float = 0.0
+    mean_dilatation: bool = False
+
+    @property
+    def _back_slope(self) -> float:
+        return self.kinematic_hardening
+
+    def respond(self, gradient: np.ndarray, history: np.ndarray, duration: float) -> MaterialResponse:
+        """Return σ, the consistent tangent and the new plastic strain; nothing depends on the duration."""
+        plastic = to_tensor(history[:, :6])
+        strain = 0.5 * (gradient + gradient.swapaxes(1, 2))
+        back = 2 / 3 * self.kinematic_hardening * plastic
+        end = radial_return(
+            strain - plastic,
+            back,
+            history[:, 6],
+            elastic_moduli(self.young_modulus, self.poisson_ratio),
+            self.hardening,
+            self.kinematic_hardening,
+        )
+        return MaterialResponse(
+            end.stress, end.moduli, np.column_stack([to_vector(plastic + end.flow), end.alpha])
+        )
+
+
+def elastic_moduli(young_modulus: float, poisson_ratio: float) -> tuple[float, float]:
+    """Return the bulk and the shear modulus."""
+    first, shear = lame(young_modulus, poisson_ratio)
+    return first + 2 / 3 * shear, shear
+
+
+@dataclass(frozen=True)
+@checked()
+class FinitePlasticity(VonMisesMetal):
+    """Elastic-plastic metals in large deformations: multiplicative von Mises plasticity, F = F_e F_p.
+
+    Hencky's elastic law τ = κ tr ε I + 2 G dev ε between the Kirchhoff stress τ and the logarithmic elastic
+    strain ε = ½ ln(F_e F_eᵀ); yields where √(3/2) ‖dev τ‖ = σ_y(α), σ_y as in `J2Plasticity`; associated
+    flow. The exponential map makes the return mapping that of small strain, plastic flow keeps the volume to
+    rounding, and a rotation of the deformed body rotates its stress and does nothing else. The tangent is
+    exact. Plane bodies are in plane strain. Where det F ≤ 0 there is no stress (NaN). Hardening is isotropic.
+    Internal variables: (F_pᵀ F_p)⁻¹ − I (xx, yy, zz, yz, xz, xy), α.
+
+    Attributes:
+        young_modulus: Young's modulus E > 0, [force / length²].
+        poisson_ratio: Poisson's ratio ν in (−1, 0.5), dimensionless.
+        yield_stress: Initial yield stress σ_0 > 0 in terms of τ, [force / length²].
+        isotropic_hardening: Slope H of the yield stress by logarithmic plastic strain, [force / length²].
+        saturation_stress: Yield stress σ_∞ ≥ σ_0 that is approached exponentially, [force / length²]. None
+            for none.
+        saturation_rate: How fast it is approached, δ ≥ 0, per plastic strain.
+
+    References:
+        J. C. Simo: Algorithms for static and dynamic multiplicative plasticity that preserve the classical
+        return mapping schemes of the infinitesimal theory. Comput. Methods Appl. Mech. Engrg. 99, 1992.
+        E. A. de Souza Neto, D. Perić, D. R. J. Owen: Computational Methods for Plasticity. Wiley 2008,
+        chapter 14.
+    """
+
+    finite: ClassVar[bool] = True
+
+    young_modulus: float
+    poisson_ratio: float
+    yield_stress: float
+    isotropic_hardening: float = 0.0
+    saturation_stress: float | None = None
+    saturation_rate: float = 0.0
+
+    def respond(self, gradient: np.ndarray, history: np.ndarray, duration: float) -> MaterialResponse:
+        """Return P, its exact tangent and the new plastic deformation; nothing depends on the duration."""
+        F = np.eye(3) + gradient
+        upright = np.linalg.det(F) > 0
+        F = np.where(upright[:, None, None], F, np.eye(3))
+        before = np.eye(3) + to_tensor(history[:, :6])
+        half = before @ F.swapaxes(1, 2)
+        values, axes = np.linalg.eigh(F @ half)
+        strain = _spectral(0.5 * np.log(values), axes)
+        moduli = elastic_moduli(self.young_modulus, self.poisson_ratio)
+        end = radial_return(strain, np.zeros_like(F), history[:, 6], moduli, self.hardening)
+        inverse = np.linalg.inv(F)
+        stress = end.stress @ inverse.swapaxes(1, 2)
+        by_strain = np.einsum("nabkm,nlm->nabkl", _logarithm_derivative(values, axes), half)
+        by_gradient = (end.moduli.reshape(-1, 9, 9) @ by_strain.reshape(-1, 9, 9)).reshape(-1, 3, 3, 3, 3)
+        tangent = np.einsum("nimkl,njm->nijkl", by_gradient, inverse)
+        tangent -= np.einsum("nil,njk->nijkl", stress, inverse)
+        left = inverse @ _exponential(2 * (strain - end.flow), axes) @ inverse.swapaxes(1, 2)
+        flows = (end.alpha > history[:, 6])[:, None, None]
+        after = np.column_stack([to_vector(np.where(flows, left, before) - np.eye(3)), end.alpha])
+        for part in (stress, tangent):
+            part[~upright] = np.nan
+        return MaterialResponse(stress, tangent, np.where(upright[:, None], after, np.nan))
+
+
+def _spectral(values: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """Return symmetric tensors by their eigenvalues and eigenvectors (columns)."""
+    return np.asarray((axes * values[:, None, :]) @ axes.swapaxes(1, 2))
+
+
+def _exponential(tensor: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """Return the exponential of symmetric tensors of which the eigenvectors (columns) are known."""
+    return _spectral(np.exp(np.einsum("nia,nij,nja->na", axes, tensor, axes)), axes)
+
+
+def _logarithm_derivative(values: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """Return ∂(ln b)/∂b, shape (n, 3, 3, 3, 3), of symmetric tensors by eigenvalues and eigenvectors.
+
+    In the eigenvectors' frame the entries are divided differences (ln b_i − ln b_j) / (b_i − b_j), exact for
+    equal eigenvalues, too.
+    """
+    ratio = values[:, :, None] / values[:, None, :] - 1
+    safe = np.where(ratio == 0, 1.0, ratio)
+    quotient = np.where(ratio == 0, 1.0, np.log1p(safe) / safe) / values[:, None, :]
+    outer = np.einsum("nai,nbj->nabij", axes, axes).reshape(-1, 9, 9)
+    full = (outer * quotient.reshape(-1, 1, 9)) @ outer.swapaxes(1, 2)
+    full = full.reshape(-1, 3, 3, 3, 3)
+    return np.asarray(0.5 * (full + full.swapaxes(3, 4)))

@@ -1,0 +1,331 @@
+"""Partition of any mesh by recursive bisection with plane cuts of small area.
+
+References:
+    H. D. Simon: Partitioning of unstructured problems for parallel processing. Computing Systems in
+    Engineering 2 (1991) 135-148.
+
+Default number of subdomains of a body, and the default partition.
+
+Smoothing of boundaries between subdomains: protruding cells move to the neighbour.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact._base.checks import check_count
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.faces import coordinate_rounding
+from fenics_contact.mesh.partition import cell_weights, check_one_piece, check_parts, face_areas, merge_pieces
+
+LAYER = 1e-12
+"""Cells whose centres differ by less than this fraction of the body's extent lie in one layer."""
+
+UNEVEN = 2.0
+"""Subdomains e^s times too large or too small are accepted for a cut that is e^(2 s) times smaller."""
+
+APART = 0.5
+"""A cut at the end of the middle third is equivalent to a cut in the middle that is larger by a twelfth."""
+
+ALIKE = 1e-6
+"""Cuts that differ by less are equivalent: rounding does not choose between them."""
+
+
+def bisection_partition(mesh: BodyMesh, parts: int) -> np.ndarray:
+    """Cut any mesh in two, and the halves again, each time by the cut of least area.
+
+    Cuts are normal to the directions of the grid if there is one, else to the coordinate axes and the
+    principal axes of the piece; they do not split layers of cells. Cells are weighted by the root of their
+    volume, so that subdomains stay compact where cells are graded. Pieces that a cut leaves connected only by
+    an edge or a node are given to a neighbour, see `merge_pieces`.
+
+    Args:
+        mesh: Any mesh.
+        parts: Number of subdomains. The more often it can be halved, the more similar they are.
+
+    Returns:
+        (n_cells,) subdomain numbers, every subdomain connected through faces; the same on every rank.
+
+    Raises:
+        InvalidInputError: If there are fewer cells than parts, or the mesh consists of separate parts.
+    """
+    check_parts(mesh, parts)
+    partition = np.zeros(mesh.n_cells, dtype=np.int64)
+    if parts > 1:
+        pending = [_whole(mesh, parts)]
+        while pending:
+            piece = pending.pop()
+            if piece.parts == 1:
+                partition[piece.cells] = piece.first
+            else:
+                pending += piece.halves()
+    return merge_pieces(mesh, partition)
+
+
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """A cut of a piece normal to one direction.
+
+    Attributes:
+        order: Its cells along the direction, (n,).
+        cells: Number of cells before the cut.
+        parts: Number of subdomains that they become.
+        cost: Area, increased if the cut is uneven.
+    """
+
+    order: np.ndarray
+    cells: int
+    parts: int
+    cost: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A piece of a mesh that is to become several subdomains.
+
+    Attributes:
+        cells: Its cells, (n,).
+        places: Layers or coordinates of their centres, (n, 3 | 2).
+        turned: Whether it may be cut normal to its principal axes.
+        weights: Weight of each cell, (n,), with 1 for a subdomain.
+        pairs: Pairs of cells that share a face, in its own numbering, (n_pairs, 2).
+        areas: Areas of these faces, (n_pairs,).
+        first: Number of its first subdomain.
+        parts: Number of its subdomains.
+    """
+
+    cells: np.ndarray
+    places: np.ndarray
+    turned: bool
+    weights: np.ndarray
+    pairs: np.ndarray
+    areas: np.ndarray
+    first: int
+    parts: int
+
+    def halves(self) -> tuple[_Piece, _Piece]:
+        """Cut it in two by the cheapest cut."""
+        best = self._best(between_layers=True) or self._best(between_layers=False)
+        assert best is not None  # a piece has as many cells as subdomains
+        before = np.zeros(len(self.cells), dtype=bool)
+        before[best.order[: best.cells]] = True
+        return (
+            self._part(before, self.first, best.parts),
+            self._part(~before, self.first + best.parts, self.parts - best.parts),
+        )
+
+    def _best(self, between_layers: bool) -> _Cut | None:
+        """Return the cheapest cut, the first of equivalent ones."""
+        best: _Cut | None = None
+        for place in self._directions():
+            cut = self._across(place, between_layers)
+            if cut is not None and (best is None or cut.cost < (1.0 - ALIKE) * best.cost):
+                best = cut
+        return best
+
+    def _directions(self) -> list[np.ndarray]:
+        """List the positions of the cells along the directions, each (n,)."""
+        along = list(self.places.T)
+        if self.turned:
+            arms = self.places - self.weights @ self.places / self.weights.sum()
+            _, axes = np.linalg.eigh((arms * self.weights[:, None]).T @ arms)
+            along += list(np.round(arms @ axes).T)
+        return along
+
+    def _across(self, place: np.ndarray, between_layers: bool) -> _Cut | None:
+        """Return the cheapest cut normal to a direction, None if there is none between layers."""
+        order = np.argsort(place, kind="stable")
+        n, total = len(order), self.weights.sum()
+        cells, before = np.arange(1, n), np.cumsum(self.weights[order])[:-1]
+        least = min(-(-self.parts // 3), self.parts // 2)
+        parts = np.clip(np.round(self.parts * before / total), least, self.parts - least)
+        possible = (cells >= parts) & (n - cells >= self.parts - parts)
+        if between_layers:
+            possible &= np.diff(place[order]) > 0
+        if not possible.any():
+            return None
+        sizes = np.array([before / parts, (total - before) / (self.parts - parts)])
+        uneven = UNEVEN * np.abs(np.log(sizes)).max(axis=0) + APART * np.abs(cells / n - 0.5)
+        cost = np.where(possible, self._cut_areas(order) * np.exp(uneven), np.inf)
+        chosen = int(np.argmax(cost <= (1.0 + ALIKE) * cost.min()))
+        return _Cut(order, chosen + 1, int(parts[chosen]), float(cost[chosen]))
+
+    def _cut_areas(self, order: np.ndarray) -> np.ndarray:
+        """Return the area of the faces between the first k cells and the others, k = 1 ... n - 1."""
+        rank = np.empty_like(order)
+        rank[order] = np.arange(len(order))
+        ends = np.sort(rank[self.pairs], axis=1)
+        begins, stops = (np.bincount(end, self.areas, minlength=len(order)) for end in ends.T)
+        return np.asarray(np.cumsum(begins - stops)[:-1])
+
+    def _part(self, chosen: np.ndarray, first: int, parts: int) -> _Piece:
+        """Return some of its cells as a piece, (n,) bool."""
+        inside = chosen[self.pairs].all(axis=1)
+        number = np.cumsum(chosen) - 1
+        return _Piece(
+            self.cells[chosen],
+            self.places[chosen],
+            self.turned,
+            self.weights[chosen],
+            number[self.pairs[inside]],
+            self.areas[inside],
+            first,
+            parts,
+        )
+
+
+def _whole(mesh: BodyMesh, parts: int) -> _Piece:
+    """Return the whole mesh as a piece."""
+    if mesh.grid is None:
+        # In units above rounding, so that layers of cells are not split by the last bits.
+        unit = LAYER * float(np.ptp(mesh.points, axis=0).max()) + coordinate_rounding(mesh.points)
+        centres = mesh.points[mesh.cells].mean(axis=1)
+        places = np.round((centres - mesh.points.min(axis=0)) / unit)
+    else:
+        places = mesh.grid
+    cells, weights = np.arange(mesh.n_cells), parts * cell_weights(mesh)
+    return _Piece(cells, places, mesh.grid is None, weights, *face_areas(mesh), 0, parts)
+
+
+TARGET_NODES = {3: 700, 2: 1000}
+"""Nodes of a subdomain by dimension: about 2000 displacement unknowns in both.
+
+In 3D these are 9 nodes along an edge, as in the published chain of links. In 2D they are 32 nodes
+along an edge: the matrices are of the same size, their factors sparser and the interface smaller, and the
+condition number grows only with the squared logarithm of the cells along an edge."""
+
+NEAR = (0.8, 1.25)
+"""Factors by which the number of subdomains may miss the target so that it can be halved more often."""
+
+_NODES_PER_CELL = {
+    "hexahedron": 1.0,
+    "tetrahedron": 1.0 / 5.5,
+    "quadrilateral": 1.0,
+    "triangle": 0.5,
+    "hexahedron27": 8.0,
+    "quadrilateral9": 4.0,
+    "triangle6": 2.0,
+    "tetrahedron10": 8.0 / 5.5,
+}
+"""Nodes per cell in a large mesh; for tetrahedra those of mesh generators (6 in a split hexahedron)."""
+
+
+def target_parts(mesh: BodyMesh, nodes: float | None = None) -> int:
+    """Choose the number of subdomains so that each has about a given number of nodes.
+
+    A subdomain that would have m nodes inside a large mesh has (m^(1/d) + 1)^d once it is torn out.
+
+    Args:
+        mesh: Any mesh.
+        nodes: Nodes of one subdomain, at least 2^d; unless given 700 in 3D and 1000 in 2D, about 2000
+            displacements.
+
+    Returns:
+        Number of subdomains, at least 1 and at most the number of cells.
+
+    Raises:
+        InvalidInputError: If no subdomain can have so few nodes.
+    """
+    nodes = TARGET_NODES[mesh.dim] if nodes is None else nodes
+    if not 2**mesh.dim <= nodes < np.inf:
+        raise InvalidInputError(
+            f"nodes must be at least {2**mesh.dim}, which one cell has, got {nodes}: a few hundred are usual"
+        )
+    inside = (nodes ** (1.0 / mesh.dim) - 1.0) ** mesh.dim
+    parts = round(mesh.n_cells * _NODES_PER_CELL[mesh.cell_type] / inside)
+    return int(np.clip(parts, 1, mesh.n_cells))
+
+
+def default_partition(
+    mesh: BodyMesh, ranks: int = 1, *, nodes: float | None = None, body: str = ""
+) -> np.ndarray:
+    """Cut a body into a number of subdomains suited to its size, and at least one for every rank.
+
+    A number near the target that can be halved often is chosen: halves are similar, so that their matrices
+    share a pattern. The cuts are those of `bisection_partition`. Only a body with fewer cells than ranks has
+    fewer subdomains than there are ranks.
+
+    Args:
+        mesh: Any mesh that is connected through faces.
+        ranks: Number of MPI ranks.
+        nodes: As in `target_parts`.
+        body: Name of the body, for messages.
+
+    Returns:
+        (n_cells,) subdomain numbers, every subdomain connected through faces; the same on every rank.
+
+    Raises:
+        InvalidInputError: If the mesh consists of separate parts, or an argument cannot be used.
+    """
+    check_count(ranks, "ranks")
+    check_one_piece(mesh, body)
+    target, least = target_parts(mesh, nodes), min(ranks, mesh.n_cells)
+    return bisection_partition(mesh, _often_halved(target, least, mesh.n_cells))
+
+
+def _often_halved(target: int, least: int, most: int) -> int:
+    """Return the number near the target that can be halved most often, the nearer one of two."""
+    first, last = (min(max(least, round(factor * target)), most) for factor in NEAR)
+    return min(range(first, last + 1), key=lambda number: (-(number & -number), abs(number - target)))
+
+
+ROUNDS = 20
+"""Largest number of passes; each reduces the boundaries, and a few suffice."""
+
+GAIN = 1e-9
+"""A cell moves if the boundaries shrink by more than this fraction of the largest face."""
+
+
+def smoothed(partition: np.ndarray, pairs: np.ndarray, areas: np.ndarray) -> np.ndarray:
+    """Move cells that share more area with another subdomain than with their own.
+
+    In each pass only cells move that gain more than all their neighbours, so that no two moves interfere. A
+    cell that shares no face with its own subdomain stays: no subdomain loses its last one.
+
+    Args:
+        partition: (n_cells,) subdomain numbers.
+        pairs: Pairs of cells that share a face, (n, 2).
+        areas: Areas of these faces, (n,).
+
+    Returns:
+        (n_cells,) subdomain numbers.
+    """
+    cell, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    area, parts = np.tile(areas, 2), int(partition.max()) + 1
+    for _ in range(ROUNDS):
+        gain, better = _gains(partition, cell * parts + partition[other], area)
+        wishes = gain > GAIN * areas.max()
+        place = np.empty(len(partition), dtype=np.int64)
+        place[np.argsort(np.where(wishes, gain, 0.0), kind="stable")] = np.arange(len(partition))
+        highest = np.zeros_like(place)
+        np.maximum.at(highest, cell, np.where(wishes[other], place[other], 0))
+        moves = wishes & (place > highest)
+        if not moves.any():
+            break
+        partition = np.where(moves, better, partition)
+    return partition
+
+
+def _gains(partition: np.ndarray, towards: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the largest gain of each cell by a move, zero if it stays, and the target subdomain.
+
+    Args:
+        partition: (n_cells,) subdomain numbers.
+        towards: Cell and subdomain beyond every face, from both sides, as one number, (2 n,).
+        area: Areas of the faces, (2 n,).
+    """
+    parts = int(partition.max()) + 1
+    unique, where = np.unique(towards, return_inverse=True)
+    shared = np.bincount(where.ravel(), area)
+    cells, subdomains = unique // parts, unique % parts
+    own = np.zeros(len(partition))
+    inside = subdomains == partition[cells]
+    own[cells[inside]] = shared[inside]
+    order = np.argsort(np.where(inside, 0.0, shared), kind="stable")  # the last assignment wins
+    gain, better = np.zeros(len(partition)), partition.copy()
+    gain[cells[order]] = np.where(inside, 0.0, shared - own[cells])[order]
+    better[cells[order]] = subdomains[order]
+    return np.where(own > 0.0, gain, 0.0), better

@@ -1,0 +1,243 @@
+"""Cutting a mesh into subdomains.
+
+A partition is an int64 array with the subdomain 0..S-1 of every cell. A subdomain must be connected through
+faces: pieces joined only by an edge or a node have zero-energy relative motions beyond the rigid body modes
+that the solver knows.
+
+Weights of faces and cells for cutting meshes into compact subdomains.
+
+Slender subdomains, however many cells thick, have soft modes that cost iterations, and so have subdomains
+with jagged boundaries. Both have more area than compact ones of the same size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from fenics_contact._base.checks import check_count
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.faces import neighbours, shared_faces, vector_areas
+from fenics_contact.mesh.quality import cell_volumes
+
+
+def box_partition(mesh: BodyMesh, boxes: tuple[int, ...]) -> np.ndarray:
+    """Cut a structured mesh into boxes of cells.
+
+    If a count is not divisible, the boxes differ by at most one layer of cells. Subdomains are numbered with
+    the last direction running fastest, so that consecutive numbers are mostly neighbours.
+
+    Args:
+        mesh: Mesh with a ``grid``.
+        boxes: Number of boxes in each direction of the grid.
+
+    Returns:
+        (n_cells,) subdomain numbers.
+
+    Raises:
+        InvalidInputError: If the mesh is not structured or has fewer cells than boxes in some direction.
+    """
+    if mesh.grid is None:
+        raise InvalidInputError(
+            "box_partition needs a structured mesh, this one has grid None: use `graph_partition(mesh, "
+            "parts)`"
+        )
+    if not isinstance(boxes, Sequence | np.ndarray) or np.shape(boxes) != (mesh.dim,):
+        number = {2: "two", 3: "three"}[mesh.dim]
+        raise InvalidInputError(
+            f"boxes must be {number} integers, got {boxes!r}: give one for each grid direction"
+        )
+    counts = mesh.grid.max(axis=0) + 1
+    for d in range(mesh.dim):
+        check_count(boxes[d], f"boxes[{d}]")
+        if boxes[d] > counts[d]:
+            raise InvalidInputError(
+                f"boxes[{d}] must be at most the {counts[d]} layers of cells in that direction, got "
+                f"{boxes[d]}: take fewer boxes or a finer mesh"
+            )
+    position = mesh.grid * np.asarray(boxes) // counts
+    return np.ravel_multi_index(tuple(position.T), boxes).astype(np.int64)
+
+
+def check_parts(mesh: BodyMesh, parts: int) -> None:
+    """Reject a number of subdomains into which a mesh cannot be cut.
+
+    Raises:
+        InvalidInputError: If it is not between 1 and the number of cells.
+    """
+    check_count(parts, "parts")
+    if parts > mesh.n_cells:
+        raise InvalidInputError(
+            f"parts must be at most the {mesh.n_cells} cells, got {parts}: take fewer parts"
+        )
+
+
+def _face_pieces(mesh: BodyMesh, partition: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Number the face-connected pieces: piece of every cell, (n_cells,), and subdomain of every piece."""
+    inside = pairs[partition[pairs[:, 0]] == partition[pairs[:, 1]]]
+    graph = coo_matrix((np.ones(inside.shape[0], dtype=bool), tuple(inside.T)), shape=2 * (mesh.n_cells,))
+    n_pieces, piece = connected_components(graph, directed=False)
+    owner = np.empty(n_pieces, dtype=np.int64)
+    owner[piece] = partition
+    return piece, owner
+
+
+def merge_pieces(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> np.ndarray:
+    """Make every subdomain connected through faces.
+
+    The largest piece of each subdomain stays; every other piece goes to the subdomain with whose largest
+    piece it shares most faces, those that touch none in a later round.
+
+    Args:
+        mesh: A mesh that is itself connected through faces.
+        partition: (n_cells,) subdomain numbers.
+        body: Name of the body, for messages.
+
+    Returns:
+        (n_cells,) subdomain numbers, the same subdomains.
+
+    Raises:
+        InvalidInputError: If the mesh consists of separate parts, so that a piece has no neighbour.
+    """
+    partition = _checked_partition(mesh, partition).copy()
+    pairs = neighbours(mesh.cells, mesh.dim)
+    while True:
+        piece, owner = _face_pieces(mesh, partition, pairs)
+        by_size = np.lexsort((np.arange(owner.size), -np.bincount(piece)))
+        done = np.zeros(owner.size, dtype=bool)
+        done[by_size[np.unique(owner[by_size], return_index=True)[1]]] = True
+        if done.all():
+            return partition
+        links = np.concatenate([piece[pairs], piece[pairs][:, ::-1]])
+        links = links[~done[links[:, 0]] & done[links[:, 1]]]
+        if links.shape[0] == 0:
+            raise InvalidInputError(
+                f"{_named(body)} must be connected through faces to be cut, {np.count_nonzero(~done)} pieces "
+                f"of it have no neighbour: {_APART}"
+            )
+        shared, counts = np.unique(links, axis=0, return_counts=True)
+        order = np.argsort(counts, kind="stable")  # the last assignment wins: the one with most faces
+        target = owner.copy()
+        target[shared[order, 0]] = owner[shared[order, 1]]
+        partition = target[piece]
+
+
+_APART = (
+    "join nodes that coincide with `merge_duplicate_nodes`, or give each separate part a mesh and a body of "
+    "its own"
+)
+
+
+def _named(body: str) -> str:
+    return f"body '{body}'" if body else "a mesh"
+
+
+def check_one_piece(mesh: BodyMesh, body: str = "") -> None:
+    """Reject a mesh that is not connected through faces.
+
+    Args:
+        mesh: The mesh.
+        body: Name of the body, for the message.
+
+    Raises:
+        InvalidInputError: States the number of its parts.
+    """
+    piece, owner = _face_pieces(
+        mesh, np.zeros(mesh.n_cells, dtype=np.int64), neighbours(mesh.cells, mesh.dim)
+    )
+    if owner.size > 1:
+        sizes = np.sort(np.bincount(piece))[::-1]
+        raise InvalidInputError(
+            f"{_named(body)} must be connected through faces to be cut, it consists of {owner.size} parts, "
+            f"the largest of {sizes[0]} and {sizes[1]} cells: {_APART}"
+        )
+
+
+def check_face_connected(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> None:
+    """Reject a partition with a subdomain that is empty or not connected through faces.
+
+    Args:
+        mesh: The mesh.
+        partition: (n_cells,) subdomain numbers.
+        body: Name of the body, for the message.
+
+    Raises:
+        InvalidInputError: Names the subdomain.
+    """
+    partition = _checked_partition(mesh, partition)
+    _, owner = _face_pieces(mesh, partition, neighbours(mesh.cells, mesh.dim))
+    pieces = np.bincount(owner)
+    torn = np.flatnonzero(pieces > 1)
+    if torn.size:
+        raise InvalidInputError(
+            f"every subdomain{f' of {_named(body)}' if body else ''} must be connected through cell faces, "
+            f"{torn.size} of {pieces.size} are not, "
+            f"first subdomain {torn[0]} in {pieces[torn[0]]} pieces: cut differently, or "
+            "give each piece to a neighbour with `merge_pieces`"
+        )
+
+
+def _checked_partition(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
+    array = np.asarray(partition)
+    if array.shape != (mesh.n_cells,) or not np.issubdtype(array.dtype, np.integer):
+        raise InvalidInputError(
+            f"partition must be integers of shape ({mesh.n_cells},), got {array.dtype} of shape "
+            f"{array.shape}: give the subdomain number of every cell"
+        )
+    if array.min() < 0:
+        raise InvalidInputError(f"subdomain numbers must start at 0, got {array.min()}: shift them")
+    empty = np.flatnonzero(np.bincount(array) == 0)
+    if empty.size:
+        raise InvalidInputError(
+            f"subdomains must be numbered without holes, number {empty[0]} of {array.max() + 1} has no cell: "
+            "renumber"
+        )
+    return array.astype(np.int64)
+
+
+def combine(partitions: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Number the subdomains of several bodies consecutively.
+
+    Args:
+        partitions: One partition for each body, each counting from zero.
+
+    Returns:
+        The same with offsets, so that no number occurs in two bodies.
+    """
+    sizes = [int(np.max(p)) + 1 for p in partitions]
+    offsets = np.concatenate([[0], np.cumsum(sizes)])
+    return [np.asarray(p) + offset for p, offset in zip(partitions, offsets, strict=False)]
+
+
+def torn_node_counts(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
+    """Count the nodes of every subdomain, a node once for each subdomain that it belongs to.
+
+    Args:
+        mesh: The mesh.
+        partition: (n_cells,) subdomain numbers.
+
+    Returns:
+        (S,) node counts; their sum times the dimension is the number of torn displacements.
+    """
+    owner = np.repeat(partition, mesh.cells.shape[1])
+    pairs = np.unique(owner * mesh.n_nodes + mesh.cells.ravel())
+    return np.bincount(pairs // mesh.n_nodes)
+
+
+def face_areas(mesh: BodyMesh) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pairs of cells that share a face, (n, 2), and its area (in the plane length), (n,)."""
+    faces, pairs = shared_faces(mesh.cells, mesh.dim)
+    return pairs, np.linalg.norm(vector_areas(mesh.points, faces), axis=1)
+
+
+def cell_weights(mesh: BodyMesh) -> np.ndarray:
+    """Return the weight of every cell, (n_cells,), with sum 1: the root of its volume.
+
+    A compromise between equal numbers of cells, hence equal cost, and equal volume, hence compactness.
+    """
+    root = np.sqrt(cell_volumes(mesh.points, mesh.cells))
+    return np.asarray(root / root.sum())

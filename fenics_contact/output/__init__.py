@@ -1,0 +1,28 @@
+"""Results as files for ParaView and other programs, written atomically.
+
+On several ranks rank 0 writes (XDMF: all ranks together), and all raise if one fails.
+"""
+
+from fenics_contact.output.cad import CadError, write_step
+from fenics_contact.output.files import OutputError, only_run_in, write_json, write_text
+from fenics_contact.output.paraview import ResultSeries, write_vtx, write_xdmf
+from fenics_contact.output.reading import read_result
+from fenics_contact.output.result import versions, write_optimisation_result
+from fenics_contact.output.surfaces import write_design_table, write_stl
+
+__all__ = [
+    "CadError",
+    "OutputError",
+    "ResultSeries",
+    "only_run_in",
+    "read_result",
+    "versions",
+    "write_design_table",
+    "write_json",
+    "write_optimisation_result",
+    "write_step",
+    "write_stl",
+    "write_text",
+    "write_vtx",
+    "write_xdmf",
+]

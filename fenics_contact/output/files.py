@@ -1,0 +1,323 @@
+"""Atomic replacement of result files, also of several at once, written by one rank or by all.
+
+JSON files of results; NumPy's types are converted, numbers that JSON lacks are rejected.
+
+One run at a time in a folder: a second one would mistake the files of the first for its own.
+
+A run holds a lock on a hidden file in its folder. The system releases the lock of a run that dies for any
+reason; the remaining file blocks no other run.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+from fenics_contact._base.files import hidden_folder, replace_all
+from fenics_contact.errors import FenicsContactError, agree, together
+import json
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import partial
+from typing import TYPE_CHECKING, Any
+import numpy as np
+from fenics_contact._base.display import in_short
+from fenics_contact.errors import InvalidInputError, together
+import fcntl
+import logging
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from datetime import datetime
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+class OutputError(FenicsContactError, OSError):
+    """A file could not be written; an existing one of its name is unchanged."""
+
+
+@contextmanager
+def replacing(*targets: Path) -> Iterator[tuple[Path, ...]]:
+    """Yield paths to write to, and move the written files to the targets at the end.
+
+    If the block raises, the targets are unchanged. Each file is replaced atomically. Of several the last must
+    be one that refers to the others: it exists only while all the others do.
+
+    Yields:
+        For every target a path of the same name in a hidden folder beside it.
+
+    Raises:
+        OutputError: If the disk is full or the folder cannot be written to; says what to do.
+    """
+    folder = targets[0].parent
+    try:
+        with hidden_folder(folder, targets[0].stem) as hidden:
+            yield tuple(hidden / target.name for target in targets)
+            replace_all([hidden / target.name for target in targets], folder)
+    except OSError as error:
+        raise _output_error(targets, error) from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file atomically; raises as `replacing` does."""
+    with replacing(path) as (temporary,):
+        temporary.write_text(text, encoding="utf-8")
+
+
+def replacing_together(
+    comm: MPI.Comm,
+    targets: Sequence[Path],
+    write: Callable[[Path], None],
+    *,
+    size: int,
+    repair: Callable[[Path], None] | None = None,
+) -> None:
+    """Let all ranks write the same files, and move them to their targets when all are done. Collective.
+
+    Raises:
+        OutputError: On all ranks, if the disk is full or the folder cannot be written to.
+    """
+    with _on_first_rank(comm, targets[0]) as hidden:
+        with together(comm):
+            if comm.rank == 0:
+                _require_room(targets, size)
+        error: Exception | None = None
+        try:
+            write(hidden)
+        except (OSError, RuntimeError) as caught:  # HDF5 and ADIOS2 report a full disk in their own ways
+            error = _output_error(targets, caught)
+        except Exception as caught:
+            error = caught
+        agree(comm, error)
+        with together(comm):
+            if comm.rank == 0:
+                try:
+                    if repair is not None:
+                        repair(hidden)
+                    replace_all([hidden / target.name for target in targets], targets[0].parent)
+                except OSError as caught:
+                    raise _output_error(targets, caught) from caught
+
+
+def _require_room(targets: Sequence[Path], size: int) -> None:
+    free = shutil.disk_usage(targets[0].parent).free
+    if free < size:
+        reason = f"{os.strerror(errno.ENOSPC)}: {size} bytes are needed, {free} are free"
+        raise _output_error(targets, OSError(errno.ENOSPC, reason))
+
+
+@contextmanager
+def _on_first_rank(comm: MPI.Comm, target: Path) -> Iterator[Path]:
+    """Create a hidden folder on rank 0 and broadcast its name. Collective."""
+    owner = hidden_folder(target.parent, target.stem)
+    name: Path | None = None
+    with together(comm):
+        try:
+            name = owner.__enter__() if comm.rank == 0 else None
+        except OSError as error:
+            raise _output_error([target], error) from error
+    try:
+        yield comm.bcast(name)
+    finally:
+        if comm.rank == 0:
+            owner.__exit__(None, None, None)
+
+
+def _output_error(targets: Sequence[Path], error: Exception) -> OutputError:
+    """Return the error that states which files could not be written, why, and what to do."""
+    reason = (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
+    names = ", ".join(repr(target.name) for target in targets[:3])
+    more = f" and {len(targets) - 3} more" if len(targets) > 3 else ""
+    return OutputError(
+        f"{names}{more} could not be written to the folder {str(targets[0].parent)!r}: {reason}. What was "
+        "there under these names is as it was: free space, make the folder writable or give another one"
+    )
+
+
+#: Largest number of entries of an array that a description lists.
+SHOWN = 12
+
+
+def write_json(path: str | Path, data: Any, *, comm: MPI.Comm | None = None) -> Path:
+    """Write data to a JSON file, indented, with the keys in the order given.
+
+    Args:
+        path: File to write; its folder is created. A file of that name is replaced when the new one is
+            complete.
+        data: Mappings, sequences, strings, numbers, booleans and None; also NumPy's arrays and numbers,
+            paths, dataclasses (by their fields) and enumerations (by their values).
+        comm: If given, only rank 0 writes, and an error is raised on all ranks.
+
+    Returns:
+        The path.
+
+    Raises:
+        InvalidInputError: If a number is NaN or infinite or something has no counterpart in JSON; states
+            where.
+
+    Note:
+        Collective on ``comm`` if given.
+
+    Example:
+        >>> write_json("result.json", {"objective": np.float64(-1.5), "force": np.zeros(3)})  # doctest: +SKIP
+    """
+    target = Path(path)
+    with nullcontext() if comm is None else together(comm):
+        if comm is None or comm.rank == 0:
+            write_text(target, json_text(data))
+    return target
+
+
+def json_text(data: Any) -> str:
+    """Return data as the text of a JSON file; see `write_json`."""
+    return json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def plain(data: Any, place: str = "data", *, lenient: bool = False) -> Any:
+    """Convert data to JSON's types.
+
+    Raises:
+        InvalidInputError: If some part cannot be converted; states which.
+    """
+
+    def inside(part: Any, where: str) -> Any:
+        return plain(part, f"{place}{where}", lenient=lenient)
+
+    if isinstance(data, Enum):
+        return inside(data.value, "")
+    if is_dataclass(data) and not isinstance(data, type):
+        kind = {"type": type(data).__name__} if lenient else {}
+        return kind | {part.name: inside(getattr(data, part.name), f".{part.name}") for part in fields(data)}
+    if lenient and isinstance(data, np.ndarray) and data.size > SHOWN:
+        return in_short(data)
+    if isinstance(data, np.ndarray | np.generic):
+        return inside(data.tolist(), "")
+    if isinstance(data, Mapping):
+        return {_key(key, place, lenient): inside(value, f"[{key!r}]") for key, value in data.items()}
+    if isinstance(data, float) and not math.isfinite(data) and not lenient:
+        raise InvalidInputError(
+            f"{place} must be finite, got {data}: JSON has no such number; leave it out or write None"
+        )
+    if isinstance(data, float):
+        return data if math.isfinite(data) else None
+    if data is None or isinstance(data, str | bool | int):
+        return data
+    if isinstance(data, Path):
+        return str(data)
+    if isinstance(data, Sequence) and not isinstance(data, bytes | bytearray):
+        return [inside(value, f"[{index}]") for index, value in enumerate(data)]
+    if lenient:
+        return _named(data)
+    raise InvalidInputError(
+        f"{place} must be a mapping, sequence, string, number, truth value, None or array, got a "
+        f"{type(data).__name__}: convert it first"
+    )
+
+
+def _key(key: Any, place: str, lenient: bool) -> str:
+    if not isinstance(key, str) and not lenient:
+        raise InvalidInputError(f"keys of {place} must be strings, got {key!r}: convert it first")
+    return str(key)
+
+
+def _named(data: Any) -> dict[str, str]:
+    """Describe a function by its name, any other object by its type."""
+    if isinstance(data, partial):
+        return _named(data.func)
+    return {"function": data.__qualname__} if hasattr(data, "__qualname__") else {"type": type(data).__name__}
+
+
+#: Name of the lock file.
+LOCK = ".fenics_contact.lock"
+
+_LOG = logging.getLogger(__name__)
+
+
+@contextmanager
+def only_run_in(folder: str | Path, comm: MPI.Comm) -> Iterator[None]:
+    """Keep other runs out of a folder while the block writes its results there. Collective on ``comm``.
+
+    Rank 0 holds the lock, all ranks learn whether there is another run. On a file system without locks no run
+    is excluded, which is logged.
+
+    Args:
+        folder: Folder of the results; created, and removed again if nothing was written.
+        comm: Communicator of the run.
+
+    Raises:
+        InvalidInputError: On all ranks, if another run writes to the folder; states which.
+        OutputError: On all ranks, if the folder cannot be made or written to.
+
+    Example:
+        >>> with only_run_in("output", comm):  # doctest: +SKIP
+        ...     write_result(solve_scene(scene, comm), "output")
+    """
+    path, lock, made = Path(folder) / LOCK, None, False
+    with together(comm):
+        if comm.rank == 0:
+            try:
+                made = not path.parent.is_dir()
+                path.parent.mkdir(parents=True, exist_ok=True)
+                lock = _taken(path)
+            except InvalidInputError:
+                raise
+            except (OSError, ValueError) as error:
+                reason = getattr(error, "strerror", None) or error
+                raise OutputError(
+                    f"results must be written to the folder {str(folder)!r}, which cannot be done: {reason}. "
+                    "Make it writable or give another one"
+                ) from error
+    try:
+        yield
+    finally:
+        if lock is not None:
+            path.unlink(missing_ok=True)
+            os.close(lock)
+        if made:
+            with suppress(OSError):  # not empty: something was written
+                path.parent.rmdir()
+
+
+def _taken(path: Path) -> int | None:
+    """Lock a file, created if necessary; None where there are no locks."""
+    while True:
+        lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            owner = os.pread(lock, 200, 0).decode("utf-8", "replace").strip()
+            os.close(lock)
+            raise InvalidInputError(
+                f"a folder must have one run at a time, another one ({owner or 'just begun'}) writes to "
+                f"{str(path.parent)!r}: wait for its end, or give this run another folder"
+            ) from None
+        except OSError as error:
+            os.close(lock)
+            path.unlink(missing_ok=True)
+            _LOG.warning(
+                "%s: no locks there (%s), let no other run write to this folder", path.parent, error.strerror
+            )
+            return None
+        if _is_still(path, lock):
+            os.ftruncate(lock, 0)
+            begun = datetime.now().astimezone().isoformat(" ", "seconds")
+            os.pwrite(lock, f"process {os.getpid()} on {socket.gethostname()}, begun {begun}".encode(), 0)
+            return lock
+        os.close(lock)  # its owner has removed it since it was opened
+
+
+def _is_still(path: Path, descriptor: int) -> bool:
+    """Return whether an open file is the one at a path."""
+    try:
+        return os.path.samestat(os.fstat(descriptor), path.stat())
+    except FileNotFoundError:
+        return False

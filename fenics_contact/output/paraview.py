@@ -1,0 +1,547 @@
+"""PVD files: the files of a series by time, for ParaView.
+
+Names of files made from names of bodies.
+
+VTU files, one per body, gathered from all ranks, with an index that opens them together.
+
+XDMF files of the fields on the bodies' own meshes, written by dolfinx.
+
+VTX files, the parallel format of ADIOS2, if dolfinx was built with it.
+
+Series of states for ParaView: load steps, designs of an optimisation.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+from fenics_contact.errors import InvalidInputError
+import hashlib
+import os
+import re
+from collections.abc import Iterable
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+import numpy as np
+from fenics_contact.results.fields import in_space
+from fenics_contact.results.state import State
+from fenics_contact.errors import InvalidInputError, collectively, together
+from fenics_contact.output.files import replacing
+from fenics_contact import _dolfinx
+from fenics_contact._base.libraries import MPI
+from fenics_contact.errors import InvalidInputError, collectively
+from fenics_contact.output.files import replacing_together
+from functools import partial
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from fenics_contact._base.files import remove_abandoned
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.output.files import write_text
+
+if TYPE_CHECKING:
+    import meshio
+    from fenics_contact._optimize.result import Record
+    from fenics_contact.design.problem import ShapeProblem
+    from fenics_contact.design.several import LoadPath
+
+
+@dataclass(frozen=True, order=True)
+class Member:
+    """One state of a series.
+
+    Attributes:
+        label: Description; ParaView stores it as the field datum "Name".
+    """
+
+    value: float
+    number: int
+    label: str = ""
+
+
+def stem_of(name: str, number: int) -> str:
+    """Return the stem of a member's file names."""
+    return f"{name}_{number:04d}"
+
+
+def collection(name: str, members: Sequence[Member]) -> str:
+    """Return the text of a PVD file with the multi-block file of every member."""
+    lines = "".join(
+        f'    <DataSet timestep="{member.value!r}" group="" part="0" '
+        f"file={quoteattr(f'{name}/{stem_of(name, member.number)}.vtm')}"
+        f"{f' name={quoteattr(member.label)}' if member.label else ''}/>\n"
+        for member in sorted(members)
+    )
+    return (
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n'
+        f"  <Collection>\n{lines}  </Collection>\n</VTKFile>\n"
+    )
+
+
+def read_collection(path: Path) -> list[Member]:
+    """Return the members of a PVD file whose multi-block files exist.
+
+    Raises:
+        InvalidInputError: If it cannot be read or was not written by a `ResultSeries`.
+    """
+    name, members = path.stem, []
+    try:
+        for entry in ET.parse(path).getroot().iter("DataSet"):
+            file = entry.attrib["file"]
+            member = Member(
+                float(entry.attrib["timestep"]),
+                int(Path(file).stem.removeprefix(f"{name}_")),
+                entry.attrib.get("name", ""),
+            )
+            if file != f"{name}/{stem_of(name, member.number)}.vtm" or not math.isfinite(member.value):
+                raise ValueError(f"it names {file!r} at {member.value}")
+            if (path.parent / file).is_file():
+                members.append(member)
+    except (OSError, ET.ParseError, KeyError, ValueError) as error:
+        raise InvalidInputError(
+            f"a series needs a PVD file that a ResultSeries wrote, or none, {str(path)!r} is another one "
+            f"({error}): give the series another name, or move the file away"
+        ) from error
+    return sorted(members)
+
+
+#: Bytes of a file's name before its suffix: most disks take 255, also for the hidden ones of files in work.
+LONGEST = 200
+
+
+def file_of_each(bodies: Iterable[str], folder: Path, stem: str, suffix: str) -> dict[str, Path]:
+    """Name one file for each body: "state_link_1.vtu" for the body "link 1".
+
+    Args:
+        bodies: Names of the bodies, any text.
+        folder: Folder of the files.
+        stem: Beginning of their names.
+        suffix: Suffix with the dot.
+
+    Returns:
+        Body name -> file. Names that differ only in special characters are numbered, those that no disk takes
+        are cut and end in a number made from the whole name.
+    """
+    files: dict[str, Path] = {}
+    for body in bodies:
+        plain = f"{stem}_{re.sub(r'[^A-Za-z0-9.-]+', '_', body)}"
+        if len(os.fsencode(plain)) > LONGEST:
+            plain = f"{plain[: LONGEST - 9]}_{hashlib.sha256(f'{stem}_{body}'.encode()).hexdigest()[:8]}"
+        path, number = folder / f"{plain}{suffix}", 1
+        while path in files.values():
+            number += 1
+            path = folder / f"{plain}_{number}{suffix}"
+        files[body] = path
+    return files
+
+
+def checked_name(folder: str | Path, name: str, suffix: str) -> Path:
+    """Return the path of a file name in a folder.
+
+    Raises:
+        InvalidInputError: If the name is empty, contains a folder or is too long.
+    """
+    if not name.strip(".") or Path(name).name != name:
+        raise InvalidInputError(
+            f"name must be the beginning of a file's name, got {name!r}: put folders into folder"
+        )
+    if len(os.fsencode(name)) > LONGEST:
+        raise InvalidInputError(
+            f"name must have at most {LONGEST} bytes, as disks take no longer ones with what is added to it, "
+            f"got {len(os.fsencode(name))}: give a shorter one"
+        )
+    return Path(folder) / f"{name}{suffix}"
+
+
+_MESHIO_NAMES = {
+    "hexahedron": "hexahedron",
+    "tetrahedron": "tetra",
+    "quadrilateral": "quad",
+    "triangle": "triangle",
+    "hexahedron27": "hexahedron27",
+    "quadrilateral9": "quad9",
+    "triangle6": "triangle6",
+    "tetrahedron10": "tetra10",
+}
+
+
+@collectively("write_vtu", lambda state, *_, **__: state.torn.decomposition.comm)
+def write_vtu(
+    state: State,
+    folder: str | Path,
+    name: str = "state",
+    *,
+    cell_fields: Mapping[str, Mapping[str, np.ndarray]] | None = None,
+) -> Path:
+    """Write a state for ParaView: a file for each body and a multi-block file to open. Collective.
+
+    They hold the fields of `contact.GatheredFields`, and the given fields on cells. Plane bodies lie in the
+    plane z = 0, their vectors have zero z component.
+
+    Args:
+        state: The state.
+        folder: Output folder; created.
+        name: Beginning of the files' names: "state" gives "state.vtm" and, for a body "link 1",
+            "state_link_1.vtu". Files are replaced when the new ones are complete.
+        cell_fields: Further fields: name -> body -> a number or a row for every cell, such as
+            ``{"discretisation_error": {body: estimate.by_cell(body) for body in state.scene.bodies}}``.
+
+    Returns:
+        The multi-block file.
+
+    Raises:
+        InvalidInputError: If the name contains a folder, or a field lacks a body or does not fit its cells.
+    """
+    import meshio  # takes a tenth of a second
+
+    index = checked_name(folder, name, ".vtm")
+    more = {body: _checked(state, body, cell_fields or {}) for body in state.scene.bodies}
+    meshes = {body: _gathered(state, body, more[body]) for body in state.scene.bodies}
+    files = list(file_of_each(meshes, index.parent, name, ".vtu").values())
+    comm = state.torn.decomposition.comm
+    with together(comm):
+        if comm.rank == 0:
+            # The index last: when it exists, so do its files.
+            with replacing(*files, index) as paths:
+                for path, mesh in zip(paths, meshes.values(), strict=False):
+                    meshio.write(path, mesh, file_format="vtu")
+                paths[-1].write_text(_multi_block(list(meshes), files), encoding="utf-8")
+    return index
+
+
+def _checked(
+    state: State, body: str, fields: Mapping[str, Mapping[str, np.ndarray]]
+) -> dict[str, np.ndarray]:
+    count, arrays = state.scene.bodies[body].mesh.n_cells, {}
+    for name, values in fields.items():
+        arrays[name] = np.asarray(values[body]) if body in values else np.zeros(0)
+        if arrays[name].shape[:1] != (count,):
+            given = f"shape {arrays[name].shape}" if body in values else "none"
+            raise InvalidInputError(
+                f"the cell field {name!r} must have {count} rows for body {body!r}, one per cell, got "
+                f"{given}: give every body an array in the order of the cells of its mesh"
+            )
+    return arrays
+
+
+def _gathered(state: State, body: str, more: Mapping[str, np.ndarray]) -> meshio.Mesh:
+    mesh = state.scene.bodies[body].mesh
+    fields = state.gather_fields(body)
+    import meshio
+
+    return meshio.Mesh(
+        in_space(mesh.points),
+        [(_MESHIO_NAMES[mesh.cell_type], mesh.cells)],
+        point_data={key: in_space(values) for key, values in fields.points.items()},
+        cell_data={key: [in_space(values)] for key, values in {**fields.cells, **more}.items()},
+    )
+
+
+def _multi_block(bodies: list[str], files: list[Path]) -> str:
+    blocks = "".join(
+        f"    <DataSet index={quoteattr(str(number))} name={quoteattr(body)} file={quoteattr(file.name)}/>\n"
+        for number, (body, file) in enumerate(zip(bodies, files, strict=True))
+    )
+    return (
+        '<?xml version="1.0"?>\n<VTKFile type="vtkMultiBlockDataSet" version="1.0">\n'
+        f"  <vtkMultiBlockDataSet>\n{blocks}  </vtkMultiBlockDataSet>\n</VTKFile>\n"
+    )
+
+
+@collectively("write_xdmf", lambda state, *_, **__: state.torn.decomposition.comm)
+def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
+    """Write displacement and von Mises stress of every body to XDMF, all ranks together. Collective.
+
+    The data are in HDF5 files beside them. ParaView opens them with its "Xdmf3 Reader S".
+
+    Args:
+        state: The state.
+        path: Name from which those of the files are derived: for the body "link 1" "chain.xdmf" becomes
+            "chain_link_1.xdmf" and "chain_link_1.h5". The folder is created; files are replaced when the new
+            ones are complete.
+
+    Returns:
+        Body name -> its XDMF file.
+
+    Raises:
+        InvalidInputError: If the name does not end in ".xdmf".
+    """
+    base = Path(path)
+    if base.suffix != ".xdmf":
+        raise InvalidInputError(
+            f"the file must be an XDMF file, got the name {base.name!r}: let it end in '.xdmf'"
+        )
+    files = file_of_each(state.displacement, base.parent, base.stem, ".xdmf")
+    for name, target in files.items():
+        _write_xdmf(state.torn.decomposition.comm, target, state.displacement[name], state.von_mises[name])
+    return files
+
+
+#: The standard name of the rule that grids include the mesh, and what dolfinx 0.9 writes instead, with which
+#: ParaView finds no mesh and VTK's reader crashes.
+_XINCLUDE, _UNKNOWN = "http://www.w3.org/2001/XInclude", "https://www.w3.org/2001/XInclude"
+
+
+def _write_xdmf(
+    comm: MPI.Comm, target: Path, displacement: _dolfinx.fem.Function, von_mises: _dolfinx.fem.Function
+) -> None:
+    mesh = displacement.function_space.mesh
+    # The XDMF file names its HDF5 file: both keep their names and are written in a separate folder.
+    replacing_together(
+        comm,
+        [target.with_suffix(".h5"), target],
+        lambda hidden: _dolfinx.write_xdmf(hidden / target.name, mesh, [displacement, von_mises]),
+        size=parallel_size(mesh),
+        repair=lambda hidden: _repair(hidden / target.name),
+    )
+
+
+def parallel_size(mesh: _dolfinx.mesh.Mesh) -> int:
+    """Return the approximate bytes of a file with a mesh, its displacement and a field on its cells."""
+    nodes = mesh.geometry.index_map().size_global
+    cells = mesh.topology.index_map(mesh.topology.dim).size_global
+    return int(8 * (6 * nodes + 28 * cells) + 2**16)
+
+
+def _repair(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace(_UNKNOWN, _XINCLUDE), encoding="utf-8")
+
+
+@collectively("write_vtx", lambda state, *_, **__: state.torn.decomposition.comm)
+def write_vtx(
+    state: State, folder: str | Path, name: str = "state", *, value: float = 0.0
+) -> dict[str, tuple[Path, Path]]:
+    """Write displacement and von Mises stress of every body in the VTX format. Collective; all ranks write.
+
+    The format is a folder, ``.bp``, which ParaView opens as a file. One holds the displacement, another the
+    stress (as a discontinuous field), as all fields of one must have the same nodes.
+
+    Args:
+        state: The state.
+        folder: Output folder; created.
+        name: Beginning of the names: "state" gives "state_link_1_displacement.bp" and
+            "state_link_1_von_mises.bp" for a body "link 1". They are replaced when the new ones are complete.
+        value: Time that ParaView shows.
+
+    Returns:
+        Body name -> its two folders.
+
+    Raises:
+        InvalidInputError: If dolfinx was built without ADIOS2, or the name contains a folder.
+    """
+    comm = state.torn.decomposition.comm
+    with together(comm):
+        require_vtx()
+        base = checked_name(folder, name, "")
+    written = {}
+    for body, target in file_of_each(state.displacement, base.parent, name, "").items():
+        fields = (state.displacement[body], state.von_mises[body])
+        pair = [target.with_name(f"{target.name}_{field.name}.bp") for field in fields]
+        for path, field, cellwise in zip(pair, fields, (False, True), strict=True):
+            write = partial(_write_vtx, path.name, field, value, cellwise)
+            size = 8 * parallel_size(field.function_space.mesh)  # a discontinuous field has its own nodes
+            replacing_together(comm, [path], write, size=size)
+        written[body] = (pair[0], pair[1])
+    return written
+
+
+def require_vtx() -> None:
+    """Raise if ADIOS2 is missing.
+
+    Raises:
+        InvalidInputError: Names the formats to use instead.
+    """
+    if not _dolfinx.has_vtx():
+        version = ".".join(map(str, _dolfinx.version()))
+        raise InvalidInputError(
+            f"VTX files need a dolfinx that was built with ADIOS2, this one ({version}) was not: use the "
+            "formats 'vtu' and 'xdmf', which every dolfinx has; dolfinx of Debian 13 and of conda-forge has "
+            "ADIOS2"
+        )
+
+
+def _write_vtx(name: str, field: object, value: float, cellwise: bool, hidden: Path) -> None:
+    _dolfinx.write_vtx(hidden / name, field, value, cellwise=cellwise)
+
+
+FORMATS = ("vtu", "xdmf", "vtx")
+
+
+class ResultSeries:
+    """A sequence of states in files that ParaView plays as an animation.
+
+    | written | what to open |
+    |---|---|
+    | ``NAME.pvd``, with VTU files in the folder ``NAME/`` | always; all bodies, all fields of `write_vtu` |
+    | ``NAME/NAME_0000_BODY.xdmf``, with HDF5 files | with "xdmf": displacement and von Mises stress |
+    | ``NAME/NAME_0000_BODY_FIELD.bp`` | with "vtx" (ADIOS2): one folder per state, body and field |
+
+    Every member has its own mesh, so that designs may differ in shape. After each `add` all files are
+    complete, and the PVD file refers to complete members only, also if a run is killed at any
+    moment.
+
+    A run that continues, for example from a checkpoint, continues the series: members are identified by their
+    values. The first member added removes those that an earlier run left at the same and higher values, as
+    they belong to a discarded continuation; earlier ones stay. A value added twice replaces its member.
+
+    Attributes:
+        path: The PVD file.
+
+    Example:
+        >>> series = ResultSeries("output", "history", comm)  # doctest: +SKIP
+        >>> for number, state in enumerate(solve_steps(ContactProblem(scene, comm), steps)):  # doctest: +SKIP
+        ...     series.add(state, number, steps[number].name)
+    """
+
+    def __init__(
+        self, folder: str | Path, name: str, comm: MPI.Comm, *, formats: Sequence[str] = ("vtu",)
+    ) -> None:
+        """Read existing members; nothing is written yet. Collective on ``comm``.
+
+        Args:
+            folder: Output folder; created with the first member.
+            name: Name of the series, the beginning of all file names.
+            comm: Communicator of the states.
+            formats: Any of "vtu", "xdmf" and "vtx"; VTU files are always written.
+
+        Raises:
+            InvalidInputError: If the name contains a folder, a format is unknown or unavailable, or a PVD
+                file of that name does not belong to a series.
+        """
+        inherited: list[Member] = []
+        with together(comm):
+            self.path = checked_name(folder, name, ".pvd")
+            _check_formats(formats)
+            if comm.rank == 0 and self.path.exists():
+                inherited = read_collection(self.path)
+        self._name, self._comm, self._formats = name, comm, tuple(formats)
+        self._inherited: list[Member] = comm.bcast(inherited)
+        self._added: list[Member] = []
+
+    path: Path
+
+    @property
+    def members(self) -> tuple[Member, ...]:
+        """All members in the order of their values, including those of an earlier run."""
+        return tuple(sorted([*self._inherited, *self._added]))
+
+    def add(
+        self,
+        state: State,
+        value: float,
+        label: str = "",
+        *,
+        cell_fields: Mapping[str, Mapping[str, np.ndarray]] | None = None,
+    ) -> Path:
+        """Write a state as the member at a value. Collective.
+
+        Args:
+            state: The state.
+            value: Time, load factor or number of the step or design; shown by ParaView as time.
+            label: Description, for example the name of the load step.
+            cell_fields: Further fields of the VTU files, as for `write_vtu`.
+
+        Returns:
+            The PVD file.
+
+        Raises:
+            InvalidInputError: If the value is not finite or the label is not a line of text.
+            OutputError: If a file cannot be written; earlier members are unchanged.
+        """
+        value = _finite(value, label)
+        number = self._make_room(value)
+        stem, folder = stem_of(self._name, number), self.path.with_suffix("")
+        write_vtu(state, folder, stem, cell_fields=cell_fields)
+        if "xdmf" in self._formats:
+            write_xdmf(state, folder / f"{stem}.xdmf")
+        if "vtx" in self._formats:
+            write_vtx(state, folder, stem, value=value)
+        self._added.append(Member(value, number, label))
+        with together(self._comm):
+            if self._comm.rank == 0:
+                self._write_index()
+        return self.path
+
+    def follow(self, problem: ShapeProblem | LoadPath) -> Callable[[Record, np.ndarray], None]:
+        """Return a callback for `minimize` that adds the first design and every better one.
+
+        Their values are the numbers of the evaluations, their labels the objectives.
+
+        Args:
+            problem: The minimised problem.
+
+        Example:
+            >>> minimize(problem, start, callback=series.follow(problem))  # doctest: +SKIP
+        """
+
+        def add(record: Record, best: np.ndarray) -> None:
+            point = problem.last
+            if record.kind.value in ("start", "serious") and point is not None:
+                self.add(point.state, record.evaluations, f"J = {record.value:.6g}")
+
+        return add
+
+    def _make_room(self, value: float) -> int:
+        """Remove the members that a value replaces and return the number of the new one. Collective."""
+        before = self.members
+        later = [] if self._added else [member for member in self._inherited if member.value >= value]
+        equal = [member for member in before if member.value == value]
+        gone = {*later, *equal}
+        self._inherited = [member for member in self._inherited if member not in gone]
+        self._added = [member for member in self._added if member not in gone]
+        with together(self._comm):
+            if self._comm.rank == 0 and self.path.parent.is_dir():
+                remove_abandoned(self.path.parent)
+                if gone:  # first the index file, then the files
+                    self._write_index()
+                if not self._added:
+                    self._remove_unnamed()
+        if equal:
+            return equal[0].number
+        return 1 + max((member.number for member in self.members), default=-1)
+
+    def _write_index(self) -> None:
+        """Write the PVD file, which refers to the files of all members."""
+        if not self.members:  # readers reject a series without members
+            self.path.unlink(missing_ok=True)
+            return
+        write_text(self.path, collection(self._name, self.members))
+
+    def _remove_unnamed(self) -> None:
+        """Remove the files of removed members, and of those that a killed run did not complete."""
+        folder = self.path.with_suffix("")
+        if not folder.is_dir():
+            return
+        named = {member.number for member in self.members}
+        pattern = re.compile(rf"{re.escape(self._name)}_(\d{{4,}})(_.*)?\.(vtm|vtu|xdmf|h5|bp)")
+        # Index files are removed before the files to which they refer.
+        for path in sorted(folder.iterdir(), key=lambda path: path.suffix not in (".vtm", ".xdmf")):
+            match = pattern.fullmatch(path.name)
+            if match and int(match.group(1)) not in named:
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+def _check_formats(formats: Sequence[str]) -> None:
+    unknown = [name for name in formats if name not in FORMATS]
+    if unknown or isinstance(formats, str):
+        raise InvalidInputError(
+            f"formats must be some of {list(FORMATS)}, got {formats!r}: give a tuple such as ('vtu', 'xdmf')"
+        )
+    if "vtx" in formats:
+        require_vtx()
+
+
+def _finite(value: float, label: str) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise InvalidInputError(
+            f"the value of a member must be finite, got {number}: give the time, the load factor or the "
+            "number of the step"
+        )
+    if not label.isprintable():
+        raise InvalidInputError(f"the label of a member must be one line of text, got {label!r}: shorten it")
+    return number

@@ -1,0 +1,31 @@
+"""Pictures of scenes, states and optimisations as PNG files, drawn without a display.
+
+Three-dimensional parts are rendered by pyvista; matplotlib adds titles, colour bars and diagrams, and draws
+plane bodies. On several ranks the fields are gathered by all and drawn by rank 0. Every ``plot_`` function
+returns a `Picture`, which Jupyter shows and which is written to a file if a path is given.
+"""
+
+from fenics_contact.pictures.canvas import Picture, Units
+from fenics_contact.pictures.curves import plot_curves
+from fenics_contact.pictures.designs import plot_before_after, plot_control_net, plot_convergence
+from fenics_contact.pictures.states import (
+    plot_contact_pressure,
+    plot_contact_status,
+    plot_decomposition,
+    plot_error,
+    plot_stress,
+)
+
+__all__ = [
+    "Picture",
+    "Units",
+    "plot_before_after",
+    "plot_contact_pressure",
+    "plot_contact_status",
+    "plot_control_net",
+    "plot_convergence",
+    "plot_curves",
+    "plot_decomposition",
+    "plot_error",
+    "plot_stress",
+]

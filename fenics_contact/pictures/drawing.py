@@ -1,0 +1,341 @@
+"""Rigid obstacles in pictures and pages: outlines of simple shapes; in the plane also shaded areas.
+
+A field on all bodies, ready for drawing: values, colours and labels.
+
+Drawing a field on bodies: all of them, and the contact at a larger scale.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+import pyvista as pv
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Colormap, Normalize
+from matplotlib.figure import Figure
+
+from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle
+from fenics_contact._scene.pairs import Surface
+from fenics_contact.pictures.canvas import (
+    AXES,
+    GREY,
+    IN_PLANE,
+    INK,
+    PALE,
+    Frame,
+    Layer,
+    Picture,
+    Units,
+    View,
+    add_colour_bar,
+    draw_picture,
+    frame_around,
+    oblique_view,
+    render,
+    sheet,
+    show_image,
+)
+from fenics_contact.pictures.section import (
+    Bodies,
+    Spot,
+    cells_of,
+    draw_cell_edges,
+    draw_field,
+    draw_outline,
+    is_plane,
+    moved,
+    points_of,
+    section_frame,
+    section_layers,
+    sections_of,
+)
+from fenics_contact.pictures.unrolled import label_axes
+from fenics_contact.results.state import State
+from fenics_contact.shapes.combined import simplified
+from fenics_contact.shapes.simple import Cylinder, Plane, Sphere, SurfaceShape
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+#: Samples along each side of a plane picture.
+SAMPLES = 400
+#: Pieces of a circle.
+PIECES = 96
+#: Margin of the shown part of a plane around the bodies, relative to their size.
+BORDER = 0.06
+
+
+def obstacles_of(state: State) -> list[SurfaceShape]:
+    """Return the different rigid obstacles of a scene, where they are in a state of it."""
+    obstacles: list[RigidObstacle] = []
+    for pair in state.scene.contacts:
+        if not isinstance(pair.master, Surface) and pair.master not in obstacles:
+            obstacles.append(pair.master)
+    now = [each.at(state.time) if isinstance(each, MovingObstacle) else each for each in obstacles]
+    return [simplified(each) for each in now]
+
+
+def shade_obstacles(axes: Axes, obstacles: list[SurfaceShape], frame: Frame) -> None:
+    """Shade the inside of plane obstacles of any shape, where the distance is negative."""
+    x, y = (np.linspace(a, b, SAMPLES) for a, b in zip(frame.low, frame.high, strict=True))
+    grid = np.stack(np.meshgrid(x, y), axis=-1)
+    for obstacle in obstacles:
+        distance = obstacle.distance(grid.reshape(-1, 2)).reshape(SAMPLES, SAMPLES)
+        if distance.min() < 0 < distance.max():
+            axes.contourf(x, y, distance, levels=[distance.min(), 0.0], colors=[PALE], zorder=0)
+            axes.contour(x, y, distance, levels=[0.0], colors=[GREY], linewidths=1.5, zorder=0.5)
+
+
+def outline(shape: SurfaceShape, points: np.ndarray) -> list[np.ndarray]:
+    """Return lines that show an obstacle beside bodies, (n, dim) each; none for shapes other than these.
+
+    Of a plane the edge of the part under the bodies, of a sphere three circles, of a cylinder a circle at
+    each end of the part beside the bodies and four lines between them.
+
+    Args:
+        shape: The obstacle.
+        points: All nodes of the bodies, (n, dim).
+    """
+    if isinstance(shape, Plane):
+        return [_edge(shape, points)]
+    if isinstance(shape, Sphere):
+        axes = np.eye(len(shape.centre))
+        return [
+            _circle(np.asarray(shape.centre), (first, second), shape.radius)
+            for k, first in enumerate(axes)
+            for second in axes[:k]
+        ]
+    if not isinstance(shape, Cylinder):
+        return []
+    axis = np.asarray(shape.axis)
+    along = (points - np.asarray(shape.point)) @ axis
+    ends = [np.asarray(shape.point) + reach * axis for reach in (along.min(), along.max())]
+    across = _across(axis)
+    sides = [sign * shape.radius * each for each in across for sign in (1.0, -1.0)]
+    circles = [_circle(end, across, shape.radius) for end in ends]
+    return circles + [np.stack([end + side for end in ends]) for side in sides]
+
+
+def obstacle_layers(
+    obstacles: list[SurfaceShape], points: np.ndarray, view: View
+) -> tuple[list[Layer], np.ndarray]:
+    """Draw the outlines of obstacles in space, and planes as sheets.
+
+    A sheet seen from its free side lies behind all bodies; seen from behind it would hide them.
+
+    Returns:
+        Layers to draw, and points that the picture should contain, (n, 3).
+    """
+    layers: list[Layer] = []
+    held = [np.zeros((0, 3))]
+    for obstacle in obstacles:
+        lines = outline(obstacle, points)
+        if isinstance(obstacle, Plane):
+            held += lines
+            if np.asarray(obstacle.normal) @ view.towards > 0.05:
+                layers.append(Layer(pv.Quadrilateral(lines[0][:-1]), {"color": PALE, "lighting": False}))
+        look = {"color": GREY, "line_width": 3, "lighting": False}
+        layers += [Layer(pv.lines_from_points(line), look) for line in lines]
+    return layers, np.concatenate(held)
+
+
+def _across(direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return two unit vectors perpendicular to a unit vector and to each other."""
+    first = np.eye(3)[int(np.argmin(np.round(np.abs(direction), 6)))]
+    first = first - (first @ direction) * direction
+    first /= np.linalg.norm(first)
+    return first, np.cross(direction, first)
+
+
+def _edge(plane: Plane, points: np.ndarray) -> np.ndarray:
+    """Return the edge of the part of a plane under the bodies, closed in space, (5, 3) or (2, 2)."""
+    normal = np.asarray(plane.normal)
+    axes = np.array([[-normal[1], normal[0]]]) if plane.dim == 2 else np.stack(_across(normal))
+    flat = (points - np.asarray(plane.point)) @ axes.T
+    border = BORDER * float(np.ptp(points, axis=0).max())
+    low, high = flat.min(axis=0) - border, flat.max(axis=0) + border
+    corners = [low, high] if plane.dim == 2 else [low, (high[0], low[1]), high, (low[0], high[1]), low]
+    return np.asarray(plane.point) + np.array(corners) @ axes
+
+
+def _circle(centre: np.ndarray, axes: tuple[np.ndarray, np.ndarray], radius: float) -> np.ndarray:
+    turn = np.linspace(0.0, 2 * np.pi, PIECES + 1)
+    return np.asarray(centre + radius * (np.outer(np.cos(turn), axes[0]) + np.outer(np.sin(turn), axes[1])))
+
+
+@dataclass(frozen=True)
+class Paints:
+    """The content of a picture of a field, apart from the bodies.
+
+    Attributes:
+        reach: Extent of details to each side of the contact's centre, [length], or None.
+    """
+
+    values: Mapping[str, np.ndarray]
+    colours: Colormap
+    norm: Normalize
+    label: str
+    headline: str
+    scale: float
+    reach: float | None
+    units: Units
+    width: int
+
+    def on(self, bodies: Mapping[str, pv.UnstructuredGrid]) -> dict[str, pv.UnstructuredGrid]:
+        """Return the bodies with the field ``shown``, the values in terms of the colours, 0 to 1."""
+        painted = {}
+        for name, body in bodies.items():
+            shown = np.ma.filled(self.norm(self.values[name], clip=False), 0.0)
+            painted[name] = body.copy(deep=False)
+            data = painted[name].point_data if len(shown) == body.n_points else painted[name].cell_data
+            data["shown"] = shown
+        return painted
+
+    def add_bar(self, figure: Figure, panels: Iterable[Axes]) -> None:
+        """Add a colour bar beside axes; its ends are pointed where values lie beyond, and say how far."""
+        low = min(float(np.nanmin(values)) for values in self.values.values())
+        high = max(float(np.nanmax(values)) for values in self.values.values())
+        key = ScalarMappable(self.norm, self.colours)
+        add_colour_bar(figure, panels, key, self.label, beyond=(low, high))
+
+    @property
+    def of_surfaces(self) -> dict[str, Any]:
+        """Keywords of pyvista's ``add_mesh`` for the field ``shown``."""
+        return {"scalars": "shown", "cmap": self.colours, "clim": (0.0, 1.0), "n_colors": 256}
+
+
+#: Half size of the detail of a plane picture, relative to half the length of the closed contact.
+REACH = 2.5
+#: A detail in the plane that shows more than this fraction of the bodies is omitted.
+LARGEST_DETAIL = 0.4
+#: Fraction of the width for pictures; the rest is for the colour bar.
+WIDE = 0.84
+
+_LOOK = {
+    "show_edges": True, "edge_color": INK, "edge_opacity": 0.12, "line_width": 1,
+    # Enough ambient light that colours of shaded faces match the bar.
+    "ambient": 0.75, "diffuse": 0.28, "smooth_shading": True, "split_sharp_edges": True, "feature_angle": 50,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A part of the picture, and the function that draws it on matplotlib's axes."""
+
+    frame: Frame
+    draw: Callable[[Axes], None]
+
+
+def paint(
+    bodies: Bodies,
+    paints: Paints,
+    path: Path | None,
+    *,
+    obstacles: list[SurfaceShape],
+    spot: Spot | None = None,
+    comm: MPI.Comm | None = None,
+) -> Picture:
+    """Draw a field on all bodies, with details of a contact in true deformation. Collective on ``comm``.
+
+    Args:
+        bodies: Undeformed bodies with linear cells and, if they moved, their ``displacement``.
+        paints: The field.
+        path: PNG file to write, or None.
+        obstacles: Rigid obstacles to draw beside them.
+        spot: The contact of which a detail is drawn, in space two sections; None for no detail.
+        comm: Communicator, None if this rank draws for itself.
+    """
+    painted = paints.on(bodies)
+    plane = all(map(is_plane, bodies.values()))
+    parts_of = _in_plane if plane else _in_space
+    return draw_picture(
+        comm, path, lambda paper: _draw(parts_of(painted, obstacles, spot, paints), paper, paints)
+    )
+
+
+def _draw(parts: Sequence[_Part], paper: BinaryIO, paints: Paints) -> None:
+    """Place details below the main part, or beside it where that is not wide."""
+    main, *details = parts
+    beside = len(details) == 1 and main.frame.proportion < 2.2
+    rows = [[*parts]] if beside or not details else [[main], details]
+    wide = [part.frame.proportion for part in rows[-1]]
+    high = [min(WIDE / sum(part.frame.proportion for part in row), 0.5) for row in rows]
+    height = round(float(np.clip(sum(high) + 0.09 * len(rows), 0.3, 1.3)) * paints.width)
+    names = [[str(parts.index(part)) for part in row] for row in rows]
+    names[0] *= len(wide) // len(names[0])
+    with sheet(paper, (paints.width, height), paints.headline) as figure:
+        panels = figure.subplot_mosaic(names, width_ratios=wide, height_ratios=high)
+        for number, part in enumerate(parts):
+            part.draw(panels[str(number)])
+        paints.add_bar(figure, panels.values())
+
+
+def _in_plane(
+    bodies: Bodies, obstacles: list[SurfaceShape], spot: Spot | None, paints: Paints
+) -> list[_Part]:
+    """All bodies, and the contact if it is small."""
+    everything = moved(bodies, paints.scale)
+    frame = frame_around(IN_PLANE, points_of(everything), 0.04)
+    parts = [_Part(frame, partial(_draw_plane, everything, obstacles, frame, paints, ""))]
+    if spot is not None:
+        half = REACH * spot.radius if paints.reach is None else paints.reach
+        detail = Frame(spot.centre - half, spot.centre + half)
+        if 2 * half < LARGEST_DETAIL * float(np.max(frame.size)) / 1.08:
+            words, true = "where they touch; displacement × 1", moved(bodies, 1.0)
+            parts.append(_Part(detail, partial(_draw_plane, true, obstacles, detail, paints, words)))
+    return parts
+
+
+def _draw_plane(
+    bodies: Bodies, obstacles: list[SurfaceShape], frame: Frame, paints: Paints, title: str, axes: Axes
+) -> None:
+    shade_obstacles(axes, obstacles, frame)
+    look = {"cmap": paints.colours, "vmin": 0.0, "vmax": 1.0}
+    for body in bodies.values():
+        points, cells = np.asarray(body.points)[:, :2], cells_of(body)
+        draw_field(axes, points, cells, np.asarray(body["shown"]), look)
+        draw_cell_edges(axes, points, cells, frame)
+        draw_outline(axes, points, cells)
+    unit = paints.units.length
+    axes.set(title=title, xlabel=f"x ({unit})", ylabel=f"y ({unit})")
+    frame.fit(axes)
+
+
+def _in_space(
+    bodies: Bodies, obstacles: list[SurfaceShape], spot: Spot | None, paints: Paints
+) -> list[_Part]:
+    """All bodies, and two sections through the contact on axes of their own."""
+    everything = moved(bodies, paints.scale)
+    points = points_of(everything)
+    view = oblique_view(points)
+    layers, corners = obstacle_layers(obstacles, points, view)
+    for body in everything.values():
+        layers.append(Layer(body.extract_surface(algorithm=None), {**paints.of_surfaces, **_LOOK}))
+    frame = frame_around(view, np.concatenate([points, corners]))
+    # room for the directions of the axes
+    frame = Frame(frame.low - [AXES / 2 * float(np.min(frame.size)), 0.0], frame.high)
+    image = render(layers, view, frame, round(paints.width * WIDE), axes=True)
+    parts = [_Part(frame, partial(show_image, image=image, frame=frame))]
+    return parts if spot is None else [*parts, *_sections(moved(bodies, 1.0), spot, view, paints)]
+
+
+def _sections(bodies: Bodies, spot: Spot, main: View, paints: Paints) -> Iterator[_Part]:
+    """Render two sections through a contact, to be shown on axes with coordinates."""
+    for section in sections_of(spot, main):
+        frame = section_frame(section.view, spot, points_of(bodies), paints.reach)
+        layers = section_layers(bodies, section, paints.of_surfaces)
+        image = render(layers, section.view, frame, paints.width // 2)
+        title = f"{section.title(frame, paints.units.length)}; displacement × 1"
+        yield _Part(frame, partial(_draw_section, image, frame, title, section.view, paints.units))
+
+
+def _draw_section(image: np.ndarray, frame: Frame, title: str, view: View, units: Units, axes: Axes) -> None:
+    show_image(axes, image, frame, title, coordinates=True)
+    label_axes(axes, view, units)

@@ -1,0 +1,614 @@
+"""Picture of the bodies cut into subdomains.
+
+Pictures of a field in the deformed bodies, with sections through the contact.
+
+Picture of the discretisation error of a state.
+
+Maps of the status of contact points, one for each state of a history.
+
+Picture of a contact surface seen face on: pressure and status.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
+
+import numpy as np
+import pyvista as pv
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import LogNorm, Normalize
+
+from fenics_contact._accuracy.discretisation import discretisation_error
+from fenics_contact._base.display import counted
+from fenics_contact._scene.scene import Scene
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.pictures.canvas import (
+    ERROR_MAP,
+    GREY,
+    IN_PLANE,
+    INK,
+    PALE,
+    PRESSURE_MAP,
+    SIGNED_MAP,
+    STRESS_MAP,
+    Frame,
+    Layer,
+    Picture,
+    Units,
+    checked_range,
+    checked_reach,
+    colour_subdomains,
+    draw_picture,
+    frame_around,
+    headline,
+    neighbours,
+    nice_number,
+    oblique_view,
+    png_path,
+    render,
+    sheet,
+    show_image,
+    symbols_of,
+    written,
+)
+from fenics_contact.pictures.curves import contact_trace
+from fenics_contact.pictures.drawing import Paints, obstacles_of, paint
+from fenics_contact.pictures.section import (
+    Bodies,
+    Spot,
+    component,
+    contact_places,
+    draw_cell_edges,
+    draw_field,
+    draw_outline,
+    drawn_bodies,
+    field_entries,
+    lengths,
+    linear,
+    moved,
+    nodal,
+    points_of,
+    rounded_up,
+    strongest_contact,
+)  # fmt: skip
+from fenics_contact.pictures.unrolled import (
+    ContactPatch,
+    checked_pair,
+    contact_patches,
+    draw_traction,
+    label_patch,
+    pressure_bar,
+)
+from fenics_contact.results.fields import in_space
+from fenics_contact.results.multi_block import body_grid
+from fenics_contact.results.state import State
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+def plot_decomposition(
+    scene: Scene,
+    partitions: Mapping[str, np.ndarray],
+    path: str | Path | None = None,
+    *,
+    explode: float = 0.0,
+    width: int = 1600,
+    comm: MPI.Comm | None = None,
+) -> Picture:
+    """Draw the subdomains of all bodies; neighbours have different colours.
+
+    Args:
+        scene: The bodies.
+        partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
+        path: PNG file to write, None to write none.
+        explode: Shrinkage of each subdomain towards its centre, from 0 (whole bodies) to below 1.
+        width: Width of the picture in pixels.
+        comm: If given, only rank 0 draws, and an error is raised on all ranks; collective then.
+
+    Returns:
+        The picture, which can be used like a path to its file.
+
+    Raises:
+        InvalidInputError: If a partition does not fit its body or ``explode`` is out of range.
+        MissingRequirementError: If this machine cannot render.
+    """
+    target = png_path(path)
+    if not 0.0 <= explode < 1.0:
+        raise InvalidInputError(f"explode must be at least 0 and below 1, got {explode}: try 0.1")
+    for name, body in scene.bodies.items():
+        shape = np.shape(partitions[name]) if name in partitions else "none"
+        if shape != (body.mesh.n_cells,):
+            raise InvalidInputError(
+                f"partitions[{name!r}] must have shape ({body.mesh.n_cells},), one subdomain per cell, got "
+                f"{shape}: pass the partitions that the scene was cut with"
+            )
+    count = sum(np.unique(partitions[name]).size for name in scene.bodies)
+    cells = sum(body.mesh.n_cells for body in scene.bodies.values())
+    bodies = counted(len(scene.bodies), "body", "bodies")
+    title = f"{counted(count, 'subdomain')} of {bodies}, {written(cells)} cells"
+    parts = [_linear(body.mesh, partitions[name]) for name, body in scene.bodies.items()]
+    points = in_space(np.concatenate([mesh.points for mesh, _ in parts]))
+    plane = scene.dim == 2
+    view = IN_PLANE if plane else oblique_view(points)
+    frame = frame_around(view, points, 0.03 if plane else 0.02)
+    height = float(np.clip((0.85 if plane else 1.0) / frame.proportion + 0.08, 0.2, 1.2))
+
+    def draw(paper: BinaryIO) -> None:
+        with sheet(paper, (width, round(height * width)), title) as figure:
+            axes = figure.subplots()
+            if plane:
+                for family, (mesh, partition) in enumerate(parts):
+                    _draw_plane_body(axes, mesh, partition, family, explode, frame)
+                frame.fit(axes)
+                axes.set_axis_off()
+            else:
+                layers = [
+                    layer for family, part in enumerate(parts) for layer in _layers(*part, family, explode)
+                ]
+                show_image(axes, render(layers, view, frame, width), frame)
+
+    return draw_picture(comm, target, draw)
+
+
+def _linear(mesh: BodyMesh, partition: np.ndarray) -> tuple[BodyMesh, np.ndarray]:
+    """Return the linear cells to draw and the subdomain of each."""
+    return mesh.linear, np.repeat(np.asarray(partition), mesh.linear.n_cells // mesh.n_cells)
+
+
+def _draw_plane_body(
+    axes: Axes, mesh: BodyMesh, partition: np.ndarray, family: int, explode: float, frame: Frame
+) -> None:
+    colours = colour_subdomains(neighbours(mesh.cells, partition), family)
+    for number in np.unique(partition):
+        cells = mesh.cells[partition == number]
+        centre = mesh.points[np.unique(cells)].mean(axis=0)
+        points = centre + (1.0 - explode) * (mesh.points - centre)
+        # Faces with borders in their own colour: otherwise the white background shows between them.
+        axes.add_collection(PolyCollection(points[cells], color=colours[number], linewidths=0.4))
+        draw_outline(axes, points, cells, width=2.0)
+    if not explode:
+        draw_cell_edges(axes, mesh.points, mesh.cells, frame)
+
+
+def _layers(mesh: BodyMesh, partition: np.ndarray, family: int, explode: float) -> list[Layer]:
+    """Draw the subdomains of a body, neighbours in different colours, and the seams between them."""
+    colours, layers = colour_subdomains(neighbours(mesh.cells, partition), family), []
+    grid = body_grid(mesh, mesh.points)
+    grid.cell_data["subdomain"] = partition
+    skin = grid.extract_surface(algorithm=None)
+    look = {"show_edges": True, "edge_color": INK, "edge_opacity": 0.25, "ambient": 0.5, "diffuse": 0.55}
+    for number in np.unique(partition):
+        piece: pv.PolyData = grid.extract_cells(partition == number).extract_surface(algorithm=None)
+        centre = piece.points.mean(axis=0)
+        piece.points = centre + (1.0 - explode) * (piece.points - centre)
+        layers.append(Layer(piece, {"color": colours[number], "line_width": 1, **look}))
+        seen = skin.extract_cells(skin["subdomain"] == number)
+        if not explode and 0 < seen.n_cells < skin.n_cells:
+            seam = seen.extract_feature_edges(feature_edges=False, manifold_edges=False)
+            layers.append(Layer(seam, {"color": INK, "line_width": 4, "lighting": False}))
+    return layers
+
+
+#: Apparent size of the largest displacement relative to the bodies.
+VISIBLE = 0.03
+#: The colours end at this quantile of the cells, as the peak under a contact would leave the rest in one
+#: shade.
+QUANTILE = 0.995
+
+
+def plot_stress(
+    state: State,
+    path: str | Path | None = None,
+    *,
+    clim: tuple[float, float] | None = None,
+    scale: float | None = None,
+    sections: bool = True,
+    reach: float | None = None,
+    smooth: bool = True,
+    title: str = "",
+    units: Units | None = None,
+    width: int = 1600,
+) -> Picture:
+    """Draw the von Mises stress on the deformed bodies. Collective.
+
+    Below, two sections through the centre of the strongest contact, in true deformation: with magnified
+    displacement bodies would overlap in contact. Plane bodies are shown in their plane, with a detail of the
+    contact if it is small. Rigid obstacles are shaded in the plane; in space planes are shown as sheets,
+    spheres and cylinders by their outlines, others not at all.
+
+    Args:
+        state: The state.
+        path: PNG file to write, None to write none.
+        clim: Range of the colours, [force / length²]; from zero to the 99.5 % quantile unless given. Give two
+            pictures the same range to compare them.
+        scale: Factor of the displacement in the upper picture; chosen and stated unless given, 1 where there
+            are rigid obstacles.
+        sections: Whether to draw the sections, if a contact carries force.
+        reach: How far sections reach up and down from the contact's middle, [length]; chosen unless given.
+        smooth: Whether to show nodal means instead of cell values.
+        title: Text before the facts in the title.
+        units: Names of the units, mm, N and MPa unless given.
+        width: Width of the picture in pixels.
+
+    Returns:
+        The picture, which can be used like a path to its file.
+
+    Raises:
+        InvalidInputError: If an option or the name of the file cannot be used.
+        MissingRequirementError: If this machine cannot render.
+
+    Example:
+        >>> plot_stress(state, "output/stress.png", clim=(0, 400), scale=50)  # doctest: +SKIP
+        >>> plot_stress(state)  # in a notebook  # doctest: +SKIP
+    """
+    target = png_path(path)
+    if scale is not None:
+        checked_scale(scale)
+    checked_reach(reach)
+    given = None if clim is None else checked_range(clim)
+    bodies, obstacles = drawn_bodies(state), obstacles_of(state)
+    # With magnified displacement bodies would penetrate rigid obstacles.
+    factor = float(scale) if scale is not None else 1.0 if obstacles else chosen_scale(bodies)
+    by_cell, named = np.concatenate([body["von_mises"] for body in bodies.values()]), units or Units()
+    facts = f"von Mises stress, largest mean over a cell {written(float(by_cell.max()))} {named.stress}"
+    values = {
+        name: nodal(body, "von_mises") if smooth else body["von_mises"] for name, body in bodies.items()
+    }
+    norm = Normalize(*(given or (0.0, rounded_up(float(np.quantile(by_cell, QUANTILE))))))
+    words = headline(title, f"{facts}; displacement × {factor:g}")
+    label = f"von Mises stress ({named.stress})"
+    paints = Paints(values, STRESS_MAP, norm, label, words, factor, reach, named, width)
+    spot = contact_spot(state, bodies) if sections else None
+    return paint(bodies, paints, target, obstacles=obstacles, spot=spot, comm=state.torn.decomposition.comm)
+
+
+def plot_field(
+    bodies: Mapping[str, pv.UnstructuredGrid],
+    field: str = "von_mises",
+    path: str | Path | None = None,
+    *,
+    scale: float = 1.0,
+    title: str = "",
+    units: Units | None = None,
+    width: int = 1600,
+) -> Picture:
+    """Draw any field of bodies, such as those of `State.to_pyvista` or of a file of results.
+
+    Args:
+        bodies: Name -> body with its fields.
+        field: Name of the field: that in the file, with the name of a component for stresses, as in
+            "stress_xx" and "principal_stress_1", and for vectors, as in "displacement_x".
+        path: PNG file to write, None to write none.
+        scale: Factor of the displacement.
+        title: Text before the facts in the title.
+        units: Names of the units, mm, N and MPa unless given.
+        width: Width of the picture in pixels.
+
+    Returns:
+        The picture, which can be used like a path to its file.
+
+    Raises:
+        InvalidInputError: If there is no such field, or an option or the name of the file cannot be used.
+        MissingRequirementError: If this machine cannot render.
+    """
+    target, named = png_path(path), units or Units()
+    checked_scale(scale)
+    bodies = {name: linear(name, body) for name, body in bodies.items()}
+    entries = {entry["name"]: entry for entry in field_entries([bodies], named)}
+    if field not in entries:
+        raise InvalidInputError(
+            f"field must be one of {', '.join(entries)}, got {field!r}: choose one of them"
+        )
+    entry = entries[field]
+    values = {name: component(body, entry) for name, body in bodies.items()}
+    ends = entry["extremes"][0] or (-1.0, 2.0)
+    label = f"{entry['label']} ({entry['unit']})" if entry["unit"] else entry["label"]
+    facts = f"{entry['label']}, {written(ends[0])} to {written(ends[1])} {entry['unit']}".rstrip()
+    colours = SIGNED_MAP if entry["colours"] == "signed" else STRESS_MAP
+    words = headline(title, f"{facts}; displacement × {scale:g}")
+    paints = Paints(
+        values, colours, Normalize(*entry["range"]), label, words, float(scale), None, named, width
+    )
+    return paint(bodies, paints, target, obstacles=[])
+
+
+def checked_scale(scale: float) -> None:
+    """Raise unless a factor of the displacement is finite."""
+    if not np.isfinite(scale):
+        raise InvalidInputError(
+            f"scale must be finite, got {scale}: give the factor of the displacement, such as 10"
+        )
+
+
+def contact_spot(state: State, bodies: Bodies) -> Spot | None:
+    """Return the strongest contact of a state, None if no contact carries force."""
+    if not np.any(state.contact.normal_force > 0):
+        return None
+    return strongest_contact(state.contact, contact_places(state, moved(bodies, 1.0)))
+
+
+def chosen_scale(bodies: Bodies) -> float:
+    """Return the round factor, at least 1, that makes the displacement visible."""
+    largest = max((float(lengths(body).max()) for body in bodies.values()), default=0.0)
+    extent = float(np.ptp(points_of(bodies), axis=0).max())
+    return max(1.0, nice_number(VISIBLE * extent / largest)) if largest > 0 else 1.0
+
+
+#: Smallest lower end of the colours relative to their upper end: smaller errors do not matter.
+SPAN = 1e-4
+
+
+def plot_error(
+    state: State,
+    path: str | Path | None = None,
+    by_cell: Mapping[str, np.ndarray] | None = None,
+    *,
+    clim: tuple[float, float] | None = None,
+    sections: bool = True,
+    reach: float | None = None,
+    title: str = "",
+    units: Units | None = None,
+    width: int = 1600,
+) -> Picture:
+    """Draw each cell's part of the discretisation error, on a logarithmic scale. Collective.
+
+    The squares of the cells' parts, relative to the energy norm √(uᵀK u) of the displacement, add up to the
+    square of the relative error in the title. An efficient mesh shows a uniform colour; dark cells should be
+    refined. Bodies are shown in true deformation, with sections through the strongest contact as in
+    `plot_stress`.
+
+    Args:
+        state: The state.
+        path: PNG file to write, None to write none.
+        by_cell: Body name -> part of each cell relative to that norm, shape (n_cells,); estimated unless
+            given, see `accuracy.discretisation_error`.
+        clim: Range of the colours, positive; up to the largest part and down to a ten thousandth of it, or
+            the smallest, unless given. Give two pictures the same range to compare them.
+        sections: Whether to draw the sections, if a contact carries force.
+        reach: How far sections reach up and down from the contact's middle, [length]; chosen unless given.
+        title: Text before the facts in the title.
+        units: Names of the units, mm, N and MPa unless given.
+        width: Width of the picture in pixels.
+
+    Returns:
+        The picture, which can be used like a path to its file.
+
+    Raises:
+        InvalidInputError: If the number of parts is not that of the cells, or an option or the name of the
+            file cannot be used.
+        MissingRequirementError: If this machine cannot render.
+    """
+    target = png_path(path)
+    checked_reach(reach)
+    given = None if clim is None else checked_range(clim)
+    if given is not None and given[0] <= 0:
+        raise InvalidInputError(f"clim of a logarithmic scale must be positive, got {clim}: try (1e-5, 1e-2)")
+    if by_cell is None:
+        estimate = discretisation_error(state.torn, state.conforming_displacement)
+        size = np.sqrt(2 * state.energies.strain) or np.inf  # a body at rest has no error
+        by_cell = {name: estimate.by_cell(name) / size for name in state.scene.bodies}
+    parts = {name: _checked(name, body.mesh.n_cells, by_cell) for name, body in state.scene.bodies.items()}
+    every = np.concatenate(list(parts.values()))
+    total, top = float(np.linalg.norm(every)), float(every.max()) or 1.0
+    ends = given or (min(max(float(every.min()), SPAN * top), top / 10), top)
+    facts = f"estimated discretisation error {written(100 * total, 3)} % in energy norm, by cell"
+    bodies, named = drawn_bodies(state), units or Units()
+    shown = {name: np.repeat(part, bodies[name].n_cells // len(part)) for name, part in parts.items()}
+    words, label = headline(title, facts), "part of a cell, relative"
+    paints = Paints(shown, ERROR_MAP, LogNorm(*ends), label, words, 1.0, reach, named, width)
+    spot = contact_spot(state, bodies) if sections else None
+    comm = state.torn.decomposition.comm
+    return paint(bodies, paints, target, obstacles=obstacles_of(state), spot=spot, comm=comm)
+
+
+def _checked(name: str, cells: int, by_cell: Mapping[str, np.ndarray]) -> np.ndarray:
+    part = np.asarray(by_cell[name], dtype=np.float64) if name in by_cell else np.zeros(0)
+    if part.shape != (cells,) or not np.all(np.isfinite(part) & (part >= 0)):
+        smallest = f", the smallest {part.min()}" if part.size else ""
+        raise InvalidInputError(
+            f"by_cell[{name!r}] must hold {cells} numbers, one per cell, finite and not negative, got "
+            f"{f'shape {part.shape}{smallest}' if name in by_cell else 'none'}: give the by_cell(body) of an "
+            "estimate, divided by the norm of the displacement"
+        )
+    return part
+
+
+#: Length of the longest arrow, relative to the map.
+ARROW = 0.07
+#: Largest number of maps in a row.
+COLUMNS = 3
+
+
+def plot_contact_status(
+    states: Mapping[str, State],
+    path: str | Path | None = None,
+    *,
+    pair: int = 0,
+    reach: float | None = None,
+    title: str = "",
+    units: Units | None = None,
+    width: int = 1600,
+) -> Picture:
+    """Draw where a contact pair is open, sticks and slips, in one map for each state. Collective.
+
+    Arrows show the slip on the master in the last load step. The surface is seen from the master's side, or
+    from inside the slave if the axes then run to the right.
+
+    Args:
+        states: Name -> state of a scene in space, for instance after each load step.
+        path: PNG file to write, None to write none.
+        pair: Number of the contact pair in the scenes.
+        reach: How far a map reaches around the contact's middle, [length]; chosen unless given.
+        title: Title.
+        units: Names of the units, mm, N and MPa unless given.
+        width: Width of the picture in pixels.
+
+    Returns:
+        The picture, which can be used like a path to its file.
+
+    Raises:
+        InvalidInputError: If there is no state, one has no such pair, or one is plane.
+    """
+    target = png_path(path)
+    if not states:
+        raise InvalidInputError("maps of the status need a state, got none: pass {'name': state}")
+    for name, state in states.items():
+        if state.scene.dim == 2 or not 0 <= pair < len(state.scene.contacts):
+            raise InvalidInputError(
+                f"maps of the status need states in space with a contact pair {pair}, got {name!r} in "
+                f"{state.scene.dim} dimensions, number of pairs {len(state.scene.contacts)}: "
+                "plot_contact_pressure draws plane states"
+            )
+    comm = next(iter(states.values())).torn.decomposition.comm
+
+    def draw(paper: BinaryIO) -> None:
+        patches = dict(zip(states, contact_patches(list(states.values()), pair, reach), strict=True))
+        _draw_status(patches, paper, title or next(iter(patches.values())).name, units or Units(), width)
+
+    return draw_picture(comm, target, draw)
+
+
+def _draw_status(
+    patches: Mapping[str, ContactPatch], paper: BinaryIO, title: str, units: Units, width: int
+) -> None:
+    columns = min(COLUMNS, len(patches))
+    rows = -(-len(patches) // columns)
+    proportion = next(iter(patches.values())).frame.proportion
+    height = round((0.09 + rows * (0.09 + 0.9 / (proportion * columns))) * width)
+    with sheet(paper, (width, height), title) as figure:
+        panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+        for axes, (name, patch) in zip(panels, patches.items(), strict=False):
+            draw_status(axes, patch, counted=False)
+            axes.set_title(_words(patch, units) if name == title else f"{name}\n{_words(patch, units)}")
+            label_patch(axes, patch, units, mirror=True)
+        for axes in panels[len(patches) :]:
+            axes.set_axis_off()
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower right", ncols=3, handletextpad=0.2)
+
+
+def _words(patch: ContactPatch, units: Units) -> str:
+    longest, slips = patch.largest_slip, patch.slips
+    share = f"{np.count_nonzero(slips)} of {len(slips)} slip"
+    words = f"{share}, by up to {written(longest, 2)} {units.length}" if longest > 0 else "none slips"
+    return words + patch.behind
+
+
+def draw_status(axes: Axes, patch: ContactPatch, *, counted: bool = True) -> None:
+    """Draw projected facets, a symbol on each contact point, and arrows for slip."""
+    axes.add_collection(PolyCollection(patch.places[patch.facets], facecolors=PALE, edgecolors="white"))
+    places = patch.places[patch.points]
+    for status, (name, look) in symbols_of(patch.rubs).items():
+        chosen = patch.status == status
+        label = f"{name} ({np.count_nonzero(chosen)})" if counted else name
+        axes.scatter(*places[chosen].T, label=label, zorder=3, linewidths=1.0, **look)
+    longest = patch.largest_slip
+    if longest > 0:
+        # On wide strips arrows and their heads follow the height.
+        slender = min(1.0, 3.0 / patch.frame.proportion)
+        reach = ARROW * slender * float(np.max(patch.frame.size)) / longest
+        arrows = {"angles": "xy", "scale_units": "xy", "scale": 1, "color": INK, "zorder": 4}
+        arrows["width"] = 0.004 * slender
+        # Short arrows stay arrows, as dots would hide the symbols.
+        arrows |= {"minlength": 0.0}
+        shown = patch.slips & patch.frame.holds(places)
+        drawn = axes.quiver(*places[shown].T, *(reach * patch.slip[shown]).T, clip_on=False, **arrows)
+        drawn.set_in_layout(False)  # its extent is not known before it is drawn
+
+
+#: Surfaces wider than this relative to their height are drawn one above the other.
+WIDE = 2.5
+
+
+def plot_contact_pressure(
+    state: State,
+    path: str | Path | None = None,
+    *,
+    pair: int = 0,
+    clim: tuple[float, float] | None = None,
+    reach: float | None = None,
+    title: str = "",
+    units: Units | None = None,
+    width: int = 1600,
+) -> Picture:
+    """Draw a contact pair's slave surface seen from its master. Collective.
+
+    Left, or above, the nodal pressure, then the status of the points with the direction of slip on the
+    master. A surface around an axis that carries force on sides facing away, such as a bore, is unrolled; of
+    others the title says how many closed points are not seen. For a plane scene the pressure along the slave
+    surface, below it the tangential traction on the slave between its bounds, with the status of the points.
+
+    Args:
+        state: The state.
+        path: PNG file to write, None to write none.
+        pair: Number of the contact pair in the scene.
+        clim: Range of the pressure, [force / length²]; from zero to the largest pressure unless given. Give
+            two pictures the same range to compare them.
+        reach: How far the picture reaches around the contact's middle, [length]; chosen unless given.
+        title: Text before the facts in the title.
+        units: Names of the units, mm, N and MPa unless given.
+        width: Width of the picture in pixels.
+
+    Returns:
+        The picture, which can be used like a path to its file.
+
+    Raises:
+        InvalidInputError: If the scene has no such pair, or a range or the name of the file cannot be used.
+    """
+    target = png_path(path)
+    checked_pair(state, pair)
+    checked_reach(reach)
+    given = None if clim is None else checked_range(clim)
+    named = units or Units()
+
+    def draw(paper: BinaryIO) -> None:
+        if state.scene.dim == 2:
+            draw_traction(contact_trace(state, pair), paper, (given, reach), title, named, width)
+        else:
+            _draw_pressure(contact_patches([state], pair, reach)[0], paper, given, title, named, width)
+
+    return draw_picture(state.torn.decomposition.comm, target, draw)
+
+
+def _draw_pressure(
+    patch: ContactPatch,
+    paper: BinaryIO,
+    clim: tuple[float, float] | None,
+    title: str,
+    units: Units,
+    width: int,
+) -> None:
+    peak = float(patch.pressure.max())
+    shown = clim or (0.0, peak or 1.0)
+    facts = (
+        f"largest pressure {written(peak)} {units.stress}, normal force {written(patch.force)} {units.force}"
+    )
+    wide = patch.frame.proportion > WIDE
+    tall = 0.24 + 1.76 / patch.frame.proportion if wide else 0.19 + 0.38 / patch.frame.proportion
+    with sheet(paper, (width, round(tall * width)), headline(title, facts)) as figure:
+        left, right = figure.subplots(*((2, 1) if wide else (1, 2)), sharex=True, sharey=True)
+        draw_pressure(left, patch, shown)
+        pressure_bar(left, shown, "max" if peak > shown[1] else "neither", units)
+        draw_status(right, patch)
+        longest = f"{written(patch.largest_slip, 2)} {units.length}"
+        slip = f"largest slip {longest}" if patch.largest_slip > 0 else "no slip"
+        right.set_title(f"status, {slip if patch.rubs else 'no friction'}{patch.behind}")
+        for axes in (left, right):
+            label_patch(axes, patch, units)
+        (left.set_xlabel if wide else right.set_ylabel)("")
+        handles, labels = right.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower right", ncols=3, handletextpad=0.2)
+
+
+def draw_pressure(axes: Axes, patch: ContactPatch, clim: tuple[float, float]) -> None:
+    """Draw the pressure on projected facets."""
+    look = {"cmap": PRESSURE_MAP, "vmin": clim[0], "vmax": clim[1]}
+    draw_field(axes, patch.places, patch.facets, patch.pressure, look)
+    outlines = {"facecolors": "none", "edgecolors": GREY, "linewidths": 0.5}
+    axes.add_collection(PolyCollection(patch.places[patch.facets], **outlines))
+    axes.set_title(f"pressure on {patch.name}")

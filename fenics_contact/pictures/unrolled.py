@@ -1,0 +1,400 @@
+"""Surfaces around an axis, unrolled: around it to the right, along it up.
+
+A contact surface projected to a plane, seen from its master, or unrolled.
+
+Axes for views along coordinates, and the bar of the pressure.
+
+Picture of a plane contact surface: pressure, tangential traction and status along it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import BinaryIO
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+from fenics_contact._surfaces.facets import filled_at_corners
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.faces import vector_areas
+from fenics_contact.pictures.canvas import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    PALE,
+    PRESSURE_MAP,
+    Frame,
+    Units,
+    View,
+    axis_label,
+    face_on,
+    headline,
+    sheet,
+    symbols_of,
+    written,
+)
+from fenics_contact.pictures.curves import ContactTrace
+from fenics_contact.results.contact import Status
+from fenics_contact.results.state import State
+
+#: A surface runs around an axis if Σ A n nᵀ has one eigenvalue below this fraction of the next.
+SLENDER = 0.05
+#: Its nodes may lie farther or nearer than the mean radius by this fraction of it.
+ROUND = 0.1
+
+
+@dataclass(frozen=True)
+class Unrolling:
+    """A cylinder that is cut open along a line.
+
+    Attributes:
+        centre: A point of its axis, (3,), [length].
+        frame: Direction of angle 0, direction of a quarter turn, and axis as rows, (3, 3), right-handed.
+        radius: [length].
+        middle: Angle opposite of the cut, [rad].
+    """
+
+    centre: np.ndarray
+    frame: np.ndarray
+    radius: float
+    middle: float
+
+    def angles(self, points: np.ndarray) -> np.ndarray:
+        """Return the angles of points (..., 3), within half a turn of the middle, [rad]."""
+        zero, quarter = np.moveaxis((points - self.centre) @ self.frame[:2].T, -1, 0)
+        return np.asarray(self.middle + _half_turn(np.arctan2(quarter, zero) - self.middle))
+
+    def unroll(self, points: np.ndarray, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Unroll a surface; facets that the cut runs through stay whole, and their nodes are there twice.
+
+        Args:
+            points: Nodes of the body, (n, 3).
+            facets: Facets of linear shape, (m, 3 | 4).
+
+        Returns:
+            The node of every place, (k,); the places, (k, 2); facets as rows of places. The first place of a
+            node is within half a turn of the middle, if a facet is there.
+        """
+        angles = self.angles(points)
+        around = self.angles(points[facets].mean(axis=1))
+        turns = np.round((around[:, None] - angles[facets]) / (2 * np.pi)).astype(int)
+        keys, rows = np.unique(
+            np.column_stack([turns.ravel() ** 2, turns.ravel(), facets.ravel()]), axis=0, return_inverse=True
+        )
+        node = keys[:, 2]
+        arcs = self.radius * (angles[node] + 2 * np.pi * keys[:, 1])
+        return node, np.column_stack([arcs, points[node] @ self.frame[2]]), rows.reshape(facets.shape)
+
+    def turn(self, vectors: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Return vectors at points, both (n, 3), as they run on the unrolled surface, (n, 2)."""
+        angles = self.angles(points)
+        around = np.cos(angles)[:, None] * self.frame[1] - np.sin(angles)[:, None] * self.frame[0]
+        return np.column_stack([np.einsum("nd,nd->n", vectors, around), vectors @ self.frame[2]])
+
+    def labels(self, units: Units) -> tuple[str, str]:
+        """Return the labels of the horizontal and the vertical axis."""
+        axis, zero = axis_label(self.frame[2]), axis_label(self.frame[0])
+        if not axis:
+            return f"around the axis ({units.length})", f"along the axis ({units.length})"
+        return f"around {axis} ({units.length}), 0 towards {zero}", f"{axis} ({units.length})"
+
+
+def unrolling_of(
+    points: np.ndarray, facets: np.ndarray, places: np.ndarray, force: np.ndarray
+) -> Unrolling | None:
+    """Fit a cylinder to a surface that runs around an axis; None if it does not.
+
+    Args:
+        points: Nodes of the body, (n, 3), [length].
+        facets: Facets of linear shape, (m, 3 | 4).
+        places: Where forces act on it, (k, 3): the cut is opposite of their middle.
+        force: Their sizes, (k,).
+    """
+    areas = vector_areas(points, facets)
+    size = np.linalg.norm(areas, axis=1)
+    values, vectors = np.linalg.eigh((areas / size[:, None]).T @ areas)
+    if values[0] > SLENDER * values[1]:
+        return None
+    frame, nodes = _unrolled_frame(vectors[:, 0]), points[np.unique(facets)]
+    flat = nodes @ frame[:2].T
+    origin = flat.mean(axis=0)
+    flat -= origin
+    # |p|² = 2 c·p + r² − |c|² on a circle of centre c and radius r.
+    terms = np.column_stack([2 * flat, np.ones(len(flat))])
+    fitted = np.linalg.lstsq(terms, np.sum(flat**2, axis=1), rcond=None)[0]
+    middle, radius = fitted[:2], float(np.sqrt(fitted[2] + fitted[:2] @ fitted[:2]))
+    if np.abs(np.linalg.norm(flat - middle, axis=1) - radius).max() > ROUND * radius:
+        return None
+    cylinder = Unrolling((origin + middle) @ frame[:2], frame, radius, 0.0)
+    strong = frame[:2] @ (force @ (places - cylinder.centre))
+    # Forces alike all around point nowhere.
+    alike = np.linalg.norm(strong) < 1e-3 * radius * force.sum()
+    return replace(cylinder, middle=0.0 if alike else float(np.arctan2(strong[1], strong[0])))
+
+
+def _unrolled_frame(axis: np.ndarray) -> np.ndarray:
+    """Return a right-handed frame, (3, 3), whose last row is a unit vector, along and not against x, y or z.
+
+    Along an axis angle 0 is at the next one: around z they count from x to y.
+    """
+    main = int(np.argmax(np.abs(axis)))
+    axis = np.sign(axis[main]) * axis
+    zero = np.eye(3)[(main + 1) % 3] - axis[(main + 1) % 3] * axis
+    zero /= np.linalg.norm(zero)
+    return np.array([zero, np.cross(axis, zero), axis])
+
+
+def _half_turn(angles: np.ndarray) -> np.ndarray:
+    """Return angles from −π to below π."""
+    return (angles + np.pi) % (2 * np.pi) - np.pi
+
+
+@dataclass(frozen=True)
+class ContactPatch:
+    """The slave surface projected to a plane or unrolled, and its contact points.
+
+    Attributes:
+        unrolling: How the surface is unrolled instead, or None.
+        places: All nodes of the surface in the picture, (n, 2).
+        pressure: On all nodes of the surface, interpolated at the corners of quadratic triangles, (n,).
+        slip: Of the contact points in the picture, (n_points, 2).
+    """
+
+    view: View
+    unrolling: Unrolling | None
+    name: str
+    places: np.ndarray
+    facets: np.ndarray
+    pressure: np.ndarray
+    points: np.ndarray
+    status: np.ndarray
+    slip: np.ndarray
+    force: float
+    rubs: bool
+    hidden: int
+    frame: Frame
+
+    @property
+    def slips(self) -> np.ndarray:
+        """Which contact points slip against friction."""
+        return (self.status == Status.SLIP) & self.rubs
+
+    @property
+    def behind(self) -> str:
+        """What is not shown, "; 12 of 80 closed points face away", or ""."""
+        closed = self.hidden + int(np.count_nonzero(self.status != Status.OPEN))
+        return f"; {self.hidden} of {closed} closed points face away" if self.hidden else ""
+
+    @property
+    def largest_slip(self) -> float:
+        """Their largest slip, [length]."""
+        return float(np.linalg.norm(self.slip[self.slips], axis=1).max(initial=0.0))
+
+
+def checked_pair(state: State, pair: int) -> None:
+    """Reject a number that no contact pair of the scene has."""
+    if not 0 <= pair < len(state.scene.contacts):
+        raise InvalidInputError(
+            f"pair must number one of the scene's {len(state.scene.contacts)} contact pairs from 0, got "
+            f"{pair}: draw a scene with contact"
+        )
+
+
+def contact_patches(states: Sequence[State], pair: int, reach: float | None) -> list[ContactPatch]:
+    """Show the slave surface of a pair in several states alike.
+
+    It is projected to a plane. If facets that face away carry force it is unrolled, provided that it runs
+    around an axis.
+    """
+    patches = [_patch(state, pair, reach, None) for state in states]
+    behind = next((state for state, patch in zip(states, patches, strict=True) if patch.hidden), None)
+    if behind is None:
+        return patches
+    contact, slave = behind.contact, behind.scene.contacts[pair].slave
+    points, chosen = behind.scene.bodies[slave.body].mesh.points, behind.contact.on_pair(pair)
+    places, force = behind.contact_places[chosen], contact.normal_force[chosen]
+    unrolling = unrolling_of(points, behind.scene.facets(slave), places, force)
+    return patches if unrolling is None else [_patch(state, pair, reach, unrolling) for state in states]
+
+
+def _patch(state: State, pair: int, reach: float | None, unrolling: Unrolling | None) -> ContactPatch:
+    """Unroll the slave surface, or project it to a plane without the facets that face away."""
+    contact, slave = state.contact, state.scene.contacts[pair].slave
+    mesh, facets = state.scene.bodies[slave.body].mesh, state.scene.facets(slave)
+    chosen = contact.on_pair(pair)
+    force = float(contact.normal_force[chosen].sum())
+    weight = contact.normal_force[chosen] if force > 0 else np.ones(len(chosen))
+    view = face_on(-weight @ contact.points.normal[chosen])
+    if unrolling is None:
+        facing = facets[vector_areas(mesh.points, facets) @ view.towards > 0]
+        node, rows = np.unique(facing, return_inverse=True)
+        places = view.project(mesh.points[node])
+    else:
+        node, places, rows = unrolling.unroll(mesh.points, facets)
+    nodes, first = np.unique(node, return_index=True)
+    numbers = state.torn.decomposition.tearing.global_nodes(slave.body, nodes)
+    seen = np.isin(contact.points.slave[chosen], numbers)
+    hidden = int(np.count_nonzero(~seen & (contact.normal_force[chosen] > 0)))
+    chosen = chosen[seen]
+    points = first[np.searchsorted(numbers, contact.points.slave[chosen])]
+    pressure = np.zeros(mesh.n_nodes)
+    pressure[node[points]] = contact.pressure[chosen]
+    pressure = np.maximum(filled_at_corners(mesh.surfaces[slave.name], pressure)[node], 0.0)
+    slip = contact.slip_in_space[chosen]
+    return ContactPatch(
+        view, unrolling, f"{slave.body}, {slave.name}", places, rows.reshape(-1, facets.shape[1]), pressure,
+        points, contact.status[chosen],
+        view.project(slip) if unrolling is None else unrolling.turn(slip, mesh.points[node[points]]),
+        force, state.scene.contacts[pair].has_friction, hidden,
+        _frame(places, points, pressure[points], contact.points.area[chosen], reach),
+    )  # fmt: skip
+
+
+def _frame(
+    places: np.ndarray, points: np.ndarray, pressure: np.ndarray, area: np.ndarray, reach: float | None
+) -> Frame:
+    """Return a square around the closed points with a margin of two facets.
+
+    Unless its size is given, it is limited to slightly more than the surface.
+    """
+    closed = pressure > 0 if np.any(pressure > 0) else np.ones(len(points), dtype=bool)
+    low, high = places[points[closed]].min(axis=0), places[points[closed]].max(axis=0)
+    middle = (low + high) / 2
+    if reach is not None:
+        return Frame(middle - reach, middle + reach)
+    half = float(np.max(high - low)) / 2 + 2.5 * float(np.sqrt(area[closed].mean()))
+    border = 0.1 * min(half, float(np.ptp(places, axis=0).min()))
+    low, high = places.min(axis=0) - border, places.max(axis=0) + border
+    return Frame(np.maximum(middle - half, low), np.minimum(middle + half, high))
+
+
+def label_axes(axes: Axes, view: View, units: Units, *, mirror: bool = False) -> None:
+    """Label the axes of a view, a reversed one with decreasing numbers and the viewing side, or mirrored."""
+    for axis, direction, word, back in (
+        (axes.xaxis, view.right, "right", "to the left"),
+        (axes.yaxis, view.up, "up", "down"),
+    ):
+        name = axis_label(direction)
+        label = f"{name.strip('−') or word} ({units.length})"
+        if name.startswith("−"):
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{0 - value:g}".replace("-", "−")))
+            if mirror and axis is axes.xaxis:
+                axes.invert_xaxis()
+            else:
+                seen = axis_label(view.towards)
+                label += f", runs {back}" + (f": seen from {seen}" if seen else "")
+        axis.set_label_text(label)
+
+
+def label_patch(axes: Axes, patch: ContactPatch, units: Units, *, mirror: bool = False) -> None:
+    """Show the frame of a contact surface with equal scales, and name its axes; see `label_axes`."""
+    patch.frame.fit(axes)
+    if patch.unrolling is None:
+        label_axes(axes, patch.view, units, mirror=mirror)
+    else:
+        across, along = patch.unrolling.labels(units)
+        axes.set(xlabel=across, ylabel=along)
+
+
+def pressure_bar(axes: Axes, clim: tuple[float, float], extend: str, units: Units) -> None:
+    """Add a colour bar beside axes, of the same height."""
+    key, label = ScalarMappable(Normalize(*clim), PRESSURE_MAP), f"contact pressure ({units.stress})"
+    place = axes.inset_axes((1.03, 0.0, 0.04, 1.0))
+    axes.figure.colorbar(key, cax=place, label=label, extend=extend)
+
+
+#: Length of the longest arrow, relative to the width, and the largest number of arrows.
+ARROW, MOST_ARROWS = 0.03, 40
+
+
+def draw_traction(
+    trace: ContactTrace,
+    paper: BinaryIO,
+    window: tuple[tuple[float, float] | None, float | None],
+    title: str,
+    units: Units,
+    width: int,
+) -> None:
+    """Draw the pressure above and, where friction acts, the tangential traction on the slave below.
+
+    ``window`` holds the range of the pressure and the extent of the picture, None for automatic ones.
+    """
+    (clim, reach), rubs = window, trace.rubs
+    facts = f"largest pressure {written(float(trace.pressure.max()))} {units.stress}, "
+    facts += f"normal force {written(trace.force)} {units.force}/{units.length}"
+    if rubs:
+        facts += f", tangential force {written(trace.shear)} {units.force}/{units.length}"
+    top = float(trace.pressure.max()) or 1.0
+    height = round((0.62 if rubs else 0.4) * width)
+    with sheet(paper, (width, height), headline(title, facts)) as figure:
+        rows = figure.subplots(2 if rubs else 1, 1, sharex=True, squeeze=False)[:, 0]
+        _curve(rows[0], trace, trace.pressure, BLUE)
+        _symbols(rows[0], trace, trace.pressure)
+        rows[0].set_ylabel(f"contact pressure ({units.stress})")
+        rows[0].set_title(f"pressure on {trace.name}")
+        rows[0].set_ylim(*(clim or (-0.05 * top, 1.08 * top)))
+        if rubs:
+            _draw_friction(rows[1], trace, units)
+        rows[-1].set_xlabel(f"{trace.axis} ({units.length})")
+        rows[-1].set_xlim(*trace.window(reach))
+        for axes in rows:
+            axes.grid(color=GREY, alpha=0.25)
+            axes.yaxis.set_major_locator(MaxNLocator(6))
+        handles, labels = rows[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower right", ncols=3, handletextpad=0.2)
+
+
+def _draw_friction(axes: Axes, trace: ContactTrace, units: Units) -> None:
+    places, bound = trace.broken(trace.places), trace.broken(trace.bound)
+    axes.fill_between(places, -bound, bound, color=PALE, linewidth=0)
+    for side in (-bound, bound):
+        axes.plot(places, side, "--", color=INK, lw=1.2)
+    _curve(axes, trace, trace.traction, ORANGE)
+    _symbols(axes, trace, trace.traction)
+    axes.axhline(0.0, color=INK, lw=0.8)
+    axes.set_ylabel(f"tangential traction ({units.stress})")
+    slips = trace.status == Status.SLIP
+    longest = float(np.abs(trace.slip[slips]).max(initial=0.0))
+    end = ", no slip"
+    if longest > 0:
+        _draw_slip(axes, trace, longest)
+        end = f"; arrows: slip on the master, largest {written(longest, 2)} {units.length}"
+    axes.set_title(f"tangential traction on the slave, slip bound dashed{end}")
+
+
+def _draw_slip(axes: Axes, trace: ContactTrace, longest: float) -> None:
+    """Draw slip by arrows, at a subset of the points if these are many."""
+    low, high = trace.window(None)
+    places = trace.places[trace.points]
+    seen = np.flatnonzero((trace.status == Status.SLIP) & (places > low) & (places < high))
+    seen = seen[np.argsort(places[seen])][:: -(-len(seen) // MOST_ARROWS)]
+    lengths = ARROW * trace.slip[seen] / longest
+    look = {"angles": "uv", "scale_units": "width", "scale": 1, "width": 0.0022, "minlength": 0.0}
+    heights = trace.traction[trace.points[seen]]
+    axes.quiver(places[seen], heights, lengths, 0 * lengths, color=INK, zorder=4, **look)
+
+
+def _curve(axes: Axes, trace: ContactTrace, values: np.ndarray, colour: str) -> None:
+    axes.plot(trace.broken(trace.places), trace.broken(values), color=colour, lw=1.8, zorder=2.5)
+
+
+def _symbols(axes: Axes, trace: ContactTrace, values: np.ndarray) -> None:
+    low, high = trace.window(None)
+    seen = np.count_nonzero((trace.places > low) & (trace.places < high))
+    size = float(np.clip(60 / max(seen, 1), 0.12, 0.6))
+    for status, (name, look) in symbols_of(trace.rubs).items():
+        chosen = trace.points[trace.status == status]
+        axes.scatter(
+            trace.places[chosen],
+            values[chosen],
+            label=f"{name} ({len(chosen)})",
+            zorder=3,
+            linewidths=0.6,
+            **{**look, "s": size * look["s"]},
+        )

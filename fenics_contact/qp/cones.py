@@ -1,0 +1,261 @@
+"""The set Λ(Ψ) of admissible multipliers: λ_N ≥ 0 and ‖τ_i‖ ≤ Ψ_i, one disc per frictional contact.
+
+Slip bounds of discs: given (Tresca) or from the normal force (Coulomb).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from fenics_contact._base.sparse import ROUNDING
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.qp.layout import ContactLayout
+from fenics_contact.qp.reductions import Vector
+
+
+@dataclass(frozen=True, eq=False)
+class FeasibleSet:
+    """Bounds and friction discs on this rank's multipliers; no method communicates.
+
+    All constraints are separable, so the set splits into half lines and discs, and projections, steps to
+    the boundary and the split of a gradient are local to one contact.
+
+    Attributes:
+        layout: Positions of normal and tangential multipliers.
+        slip_bound: Ψ, a nodal force per friction disc, shape (n_friction,), owned; 0 pins τ to zero.
+
+    Raises:
+        InvalidInputError: A slip bound is negative or not finite, or their number is wrong.
+
+    References:
+        Z. Dostál, T. Kozubek, An optimal algorithm and superrelaxation for minimization of a quadratic
+        function subject to separable convex constraints with applications, Math. Program. 135 (2012).
+    """
+
+    layout: ContactLayout
+    slip_bound: Vector
+
+    def __post_init__(self) -> None:
+        """Check the slip bound."""
+        expected = (self.layout.n_friction,)
+        if np.shape(self.slip_bound) != expected:
+            raise InvalidInputError(
+                f"slip_bound must have shape {expected}, got {np.shape(self.slip_bound)}: "
+                "give one nodal force per friction disc"
+            )
+        if not np.all((self.slip_bound >= 0) & np.isfinite(self.slip_bound)):
+            raise InvalidInputError(
+                f"slip_bound must be finite and not negative, got {np.min(self.slip_bound)} to "
+                f"{np.max(self.slip_bound)}: check the friction coefficient and the normal forces"
+            )
+
+    def project(self, x: Vector) -> Vector:
+        """Return the nearest admissible multiplier, owned."""
+        projected = np.array(x, dtype=np.float64)
+        normal, rows = self.layout.normal, self.layout.tangential
+        projected[normal] = np.maximum(x[normal], 0.0)
+        tau = x[rows]
+        length = np.linalg.norm(tau, axis=1)
+        outside = length > self.slip_bound
+        shrink = self.slip_bound[outside] / length[outside]
+        projected[rows[outside]] = shrink[:, None] * tau[outside]
+        return projected
+
+    def violation(self, x: Vector) -> float:
+        """Return the largest distance of a normal multiplier or disc of this rank to its bound."""
+        normal = -x[self.layout.normal]
+        tangential = np.linalg.norm(x[self.layout.tangential], axis=1) - self.slip_bound
+        return max(normal.max(initial=0.0), tangential.max(initial=0.0))
+
+    def active(self, x: Vector) -> npt.NDArray[np.bool_]:
+        """Mark the entries whose constraint holds with equality, shape (size,), owned."""
+        marks = np.zeros(self.layout.size, dtype=bool)
+        marks[self.layout.normal] = x[self.layout.normal] <= 0.0
+        marks[self.layout.tangential[self._on_circle(x)]] = True
+        return marks
+
+    def projected_gradient(self, x: Vector, gradient: Vector) -> Vector:
+        """Return the gradient without its components against active constraints, owned.
+
+        Where a constraint with outward normal n is active and −g points out of the set, that part of g is
+        removed: gᴾ = g − min(nᵀg, 0) n. Zero exactly at a minimiser over the set.
+        """
+        result = np.array(gradient)
+        normal, rows = self.layout.normal, self.layout.tangential
+        closed_off = normal[x[normal] <= 0.0]
+        result[closed_off] = np.minimum(gradient[closed_off], 0.0)
+        circle = self._on_circle(x)
+        outward = _unit(x[rows[circle]])
+        push = np.minimum(np.einsum("ia,ia->i", outward, gradient[rows[circle]]), 0.0)
+        result[rows[circle]] -= push[:, None] * outward
+        result[rows[self.slip_bound <= 0.0]] = 0.0
+        return result
+
+    def step_to_boundary(self, x: Vector, direction: Vector) -> float:
+        """Return the largest step a ≥ 0 with x − a·direction in the set, infinite if there is no boundary.
+
+        For a disc it is the larger root of ‖τ − a p‖² = Ψ², written without cancellation.
+        """
+        p, value = direction[self.layout.normal], x[self.layout.normal]
+        falling = p > 0.0
+        with np.errstate(over="ignore"):  # an overflow means no boundary
+            steps = np.maximum(value[falling], 0.0) / p[falling]
+        return float(min(steps.min(initial=np.inf), self._disc_steps(x, direction).min(initial=np.inf)))
+
+    def _disc_steps(self, x: Vector, direction: Vector) -> Vector:
+        p, tau = direction[self.layout.tangential], x[self.layout.tangential]
+        square = np.einsum("ia,ia->i", p, p)
+        moving = square > 0.0
+        square, p, tau = square[moving], p[moving], tau[moving]
+        length = np.linalg.norm(tau, axis=1)
+        radius = self.slip_bound[moving]
+        slope = np.einsum("ia,ia->i", tau, p)
+        room = np.maximum((radius - length) * (radius + length), 0.0)
+        root = np.sqrt(slope**2 + square * room)
+        forward = slope > 0.0
+        steps = np.empty_like(root)
+        steps[forward] = (slope + root)[forward] / square[forward]
+        backward = (root - slope)[~forward]
+        steps[~forward] = np.divide(
+            room[~forward], backward, out=np.zeros_like(backward), where=backward > 0.0
+        )
+        return steps
+
+    def _on_circle(self, x: Vector) -> npt.NDArray[np.bool_]:
+        length = np.linalg.norm(x[self.layout.tangential], axis=1)
+        return length >= self.slip_bound * (1.0 - ROUNDING)
+
+
+def _unit(vectors: Vector) -> Vector:
+    """Return the rows scaled to unit length; rows of zeros stay zero."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+
+
+class SlipLaw(Protocol):
+    """A rule for the slip bound Ψ that belongs to a multiplier."""
+
+    def bound(self, multiplier: Vector) -> Vector:
+        """Return Ψ, a nodal force per friction disc, shape (n_friction,), owned."""
+
+    @property
+    def growth(self) -> Vector:
+        """dΨ/dλ_N of each disc, shape (n_friction,), owned."""
+
+    def feasible(self, multiplier: Vector) -> FeasibleSet:
+        """Return Λ(Ψ) for the slip bound that belongs to the multiplier."""
+
+    def admit(self, multiplier: Vector) -> Vector:
+        """Return the nearest multiplier that the law admits with the slip bound of its own normal force."""
+
+    def scaled(self, factor: Vector) -> SlipLaw:
+        """Return the law for μ where λ = s μ, with the factor s of each disc, shape (n_friction,), owned."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrescaLaw:
+    """Slip bounds that do not depend on the multiplier.
+
+    Attributes:
+        layout: Positions of the multipliers.
+        slip_bound: Ψ, shape (n_friction,), owned.
+    """
+
+    layout: ContactLayout
+    slip_bound: Vector
+
+    def bound(self, multiplier: Vector) -> Vector:
+        """Return the given slip bound."""
+        return self.slip_bound
+
+    @property
+    def growth(self) -> Vector:
+        """Zero, as the bounds are given."""
+        return np.zeros_like(self.slip_bound)
+
+    def feasible(self, multiplier: Vector) -> FeasibleSet:
+        """Return Λ(Ψ), the same for every multiplier."""
+        return FeasibleSet(self.layout, self.slip_bound)
+
+    def admit(self, multiplier: Vector) -> Vector:
+        """Return the projection on Λ(Ψ)."""
+        return self.feasible(multiplier).project(multiplier)
+
+    def scaled(self, factor: Vector) -> TrescaLaw:
+        """Return the law with the bounds Ψ / s."""
+        return TrescaLaw(self.layout, self.slip_bound / factor)
+
+
+@dataclass(frozen=True, eq=False)
+class CoulombLaw:
+    """Slip bounds Ψ = Ψ₀ + μ max(λ_N, 0): a given part, zero by default, and one that follows λ_N.
+
+    With both parts it is the Mohr-Coulomb law, or Tresca's on some discs and Coulomb's on others.
+
+    Attributes:
+        layout: Positions of the multipliers.
+        friction_coefficient: μ per friction disc, shape (n_friction,), owned.
+        given: Ψ₀ per friction disc, shape (n_friction,), owned, or one number for all, [force].
+
+    Raises:
+        InvalidInputError: A coefficient or given bound is negative or not finite, or their number is wrong.
+    """
+
+    layout: ContactLayout
+    friction_coefficient: Vector
+    given: Vector | float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check coefficients and given bounds."""
+        expected = (self.layout.n_friction,)
+        coefficient = np.asarray(self.friction_coefficient)
+        if coefficient.shape != expected:
+            raise InvalidInputError(
+                f"friction_coefficient must have shape {expected}, got {coefficient.shape}: "
+                "give one coefficient per friction disc"
+            )
+        if not np.all((coefficient >= 0) & np.isfinite(coefficient)):
+            raise InvalidInputError(
+                "friction_coefficient must be finite and not negative, got "
+                f"{coefficient.min()} to {coefficient.max()}"
+            )
+        given = np.asarray(self.given, dtype=np.float64)
+        FeasibleSet(self.layout, given if given.ndim else np.full(expected, float(given)))
+
+    def bound(self, multiplier: Vector) -> Vector:
+        """Return Ψ₀ + μ max(λ_N, 0)."""
+        normal = multiplier[self.layout.tangential_frictional]
+        return self.given + self.friction_coefficient * np.maximum(normal, 0.0)
+
+    @property
+    def growth(self) -> Vector:
+        """The friction coefficient."""
+        return self.friction_coefficient
+
+    def feasible(self, multiplier: Vector) -> FeasibleSet:
+        """Return Λ(Ψ₀ + μ λ_N)."""
+        return FeasibleSet(self.layout, self.bound(multiplier))
+
+    def admit(self, multiplier: Vector) -> Vector:
+        """Return the projection on the friction cones ‖τ‖ ≤ Ψ₀ + μ λ_N, λ_N ≥ 0, a convex set."""
+        layout, mu_f = self.layout, self.friction_coefficient
+        admitted = np.array(multiplier)
+        admitted[layout.normal] = np.maximum(multiplier[layout.normal], 0.0)
+        normal = multiplier[layout.tangential_frictional]
+        tau = multiplier[layout.tangential]
+        length = np.linalg.norm(tau, axis=1)
+        outside = (length > self.given + mu_f * normal) & (length > 0.0)
+        # The nearest point of the mantle; where it has no normal force, of the disc at the cone's end.
+        peak = np.maximum((normal + mu_f * (length - self.given)) / (1.0 + mu_f**2), 0.0)
+        shrink = np.divide(self.given + mu_f * peak, length, out=np.ones_like(length), where=outside)
+        admitted[layout.tangential_frictional[outside]] = peak[outside]
+        admitted[layout.tangential] = np.minimum(shrink, 1.0)[:, None] * tau
+        return admitted
+
+    def scaled(self, factor: Vector) -> CoulombLaw:
+        """Return the law with the given part Ψ₀ / s; μ is unchanged, as s is that of the whole contact."""
+        return CoulombLaw(self.layout, self.friction_coefficient, np.asarray(self.given / factor))

@@ -1,0 +1,243 @@
+"""The next slip bounds of the Coulomb fixed point: undamped as long as that converges, else damped.
+
+Coulomb friction as a fixed point of Tresca problems: the slip bound follows the normal force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fenics_contact._base.libraries import MPI
+from fenics_contact.errors import ConvergenceError
+from fenics_contact.qp.cones import TrescaLaw
+from fenics_contact.qp.problem import DualProblem
+from fenics_contact.qp.reductions import Vector, global_sum
+from fenics_contact.qp.solution import DualSolution, SolverStep, Start, measure
+from fenics_contact.qp.solve import DualSolver, find_equilibrium, solve
+
+#: Slip bounds have returned to earlier ones if the distance to these, relative to the last ones, is below
+#: this.
+RETURN_RATIO = 0.3
+#: A cycle is a return in this many consecutive steps.
+RETURNS = 3
+#: Residuals have stopped falling if this many steps (1/θ times as many when damped) have not reduced the best
+#: one by this factor.
+PATIENCE, PROGRESS = 10, 0.9
+#: Number of earlier slip bounds that are compared: the longest period that is recognised, plus one.
+MEMORY = 6
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Ψ ← (1 − θ) Ψ + θ μ λ_N with θ = 1 until the iteration cycles or stagnates.
+
+    Near the solution the undamped iteration multiplies an error by an eigenvalue that friction makes
+    negative: below −1 it alternates without converging, and damping by θ moves the eigenvalue ω to 1 − θ
+    (1 − ω).
+
+    Attributes:
+        fractions: The values of θ, each used when the one before it failed.
+    """
+
+    fractions: tuple[float, ...] = (1.0, 0.6, 0.3, 0.15)
+
+
+class SlipBoundSequence:
+    """Chooses slip bounds from the record of earlier ones.
+
+    Attributes:
+        fraction: θ of the next step.
+        exhausted: Whether the smallest θ failed too.
+    """
+
+    def __init__(self, comm: MPI.Comm, damping: Damping) -> None:
+        """Begin with the first θ and an empty record."""
+        self._comm, self._fractions = comm, damping.fractions
+        self._stage = 0
+        self._bounds: list[Vector] = []
+        self._best, self._since_best, self._returns = np.inf, 0, 0
+
+    @property
+    def fraction(self) -> float:
+        """θ of the next step."""
+        return self._fractions[min(self._stage, len(self._fractions) - 1)]
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether the smallest θ failed too."""
+        return self._stage >= len(self._fractions)
+
+    def advance(self, bound: Vector, image: Vector, residual: float) -> tuple[Vector, str]:
+        """Return the next slip bound and a note on the decision. Collective.
+
+        Args:
+            bound: Ψ of the last Tresca problem, shape (n_friction,), owned.
+            image: The slip bound that belongs to its solution, shape (n_friction,), owned.
+            residual: Natural residual of that solution with ``image``.
+        """
+        self._bounds = [*self._bounds[1 - MEMORY :], bound]
+        period, change = self._returned(image)
+        self._returns = self._returns + 1 if period else 0
+        if residual < PROGRESS * self._best:
+            self._best, self._since_best = residual, 0
+        else:
+            self._since_best += 1
+        note = f"slip bounds changed by {change:.1e}"
+        reason = self._failure(period)
+        if reason:
+            self._stage += 1
+            self._bounds, self._best, self._since_best, self._returns = [], np.inf, 0, 0
+            remedy = "no θ is left" if self.exhausted else f"damping with θ = {self.fraction:g}"
+            note += f", {reason}: {remedy}"
+        return (1.0 - self.fraction) * bound + self.fraction * image, note
+
+    def _failure(self, period: int) -> str:
+        """Return why the present θ fails, empty if it does not."""
+        if self._returns >= RETURNS and self._since_best >= RETURNS:
+            return f"they cycle with period {period}"
+        if self._since_best * self.fraction >= PATIENCE:
+            return f"the residual has not fallen in {self._since_best} steps"
+        return ""
+
+    def _returned(self, image: Vector) -> tuple[int, float]:
+        """Return the period with which the bounds repeat, 0 for none, and their last relative change."""
+        squares = [(image - earlier) @ (image - earlier) for earlier in reversed(self._bounds)]
+        *distances, size = np.sqrt(global_sum(self._comm, *squares, image @ image))
+        change = float(distances[0] / size) if size > 0.0 else 0.0
+        older = distances[1:]
+        if not older or distances[0] == 0.0 or min(older) > RETURN_RATIO * distances[0]:
+            return 0, change
+        return int(np.argmin(older)) + 2, change
+
+
+#: Factor on an equilibrium's own friction in the first Tresca problem, so that it surely has a solution.
+FIRST_MARGIN = 1.1
+
+
+@dataclass(frozen=True)
+class FixedPoint:
+    """Two loops: Ψ ← given bound + μ λ_N around a solver for given slip bounds.
+
+    A Tresca problem is solved no more accurately than the slip bound deserves: its tolerance follows the
+    natural residual that its solution will have with its own slip bound. The bound is updated undamped;
+    only where the bounds cycle or the residual stops falling are they damped, as the history reports.
+
+    Attributes:
+        solver: Solver of the Tresca problems.
+        max_steps: Largest number of Tresca problems.
+        forcing: Tolerance of a Tresca problem relative to the last natural residual.
+        loosest: Largest tolerance, that of the first Tresca problem.
+        damping: What to do where the plain iteration cycles.
+
+    References:
+        J. Haslinger, Z. Dostál, R. Kučera, On a splitting type algorithm for the numerical realization of
+        contact problems with Coulomb friction, CMAME 191 (2002).
+
+    Example:
+        >>> state = solve_scene(scene, comm, solver=FixedPoint(Smalse()))  # doctest: +SKIP
+    """
+
+    solver: DualSolver
+    max_steps: int = 200
+    forcing: float = 0.1
+    loosest: float = 1e-2
+    damping: Damping = field(default_factory=Damping)
+
+    @property
+    def tolerance(self) -> float:
+        """Largest residual of a solution with the slip bound that belongs to its own normal force."""
+        return self.solver.tolerance
+
+    def with_tolerance(self, tolerance: float) -> FixedPoint:
+        """Return the fixed point around its solver with another tolerance."""
+        return replace(self, solver=self.solver.with_tolerance(tolerance))
+
+    def run(self, problem: DualProblem, start: Start) -> DualSolution:
+        """Solve from ``start``; called by `fenics_contact.qp.solve`. Collective.
+
+        Raises:
+            InfeasibleError: If a Tresca problem on the way has no equilibrium.
+            ConvergenceError: If the fixed point was not reached; carries the history of all steps.
+        """
+        slip_bound = _first_slip_bound(problem, start)
+        sequence = SlipBoundSequence(problem.comm, self.damping)
+        earlier: DualSolution | np.ndarray | None = None if start.cold else start.iterate.multiplier
+        history: list[SolverStep] = []
+        products, reached = start.operator.products, np.inf
+        for number in range(self.max_steps):
+            try:
+                solution = solve(problem, slip_bound, self._inner(sequence.fraction * reached), earlier)
+            except ConvergenceError as failure:
+                steps = _continued(history, failure.history, products)
+                raise ConvergenceError(
+                    f"the Coulomb fixed point needs residuals below {self.tolerance:.1e}, but its Tresca "
+                    f"problem {number} failed: {failure}",
+                    steps,
+                ) from failure
+            history = _continued(history, solution.history, products)
+            products += solution.products
+            solution = _under_own_bound(problem, solution)
+            reached = solution.natural_residual
+            slip_bound, note = sequence.advance(slip_bound, solution.slip_bound, reached)
+            history[-1] = replace(history[-1], note=f"{history[-1].note}; {note}")
+            start.reached(replace(history[-1], residuals=solution.residuals))
+            if solution.residuals.within(self.tolerance):
+                return replace(solution, iterations=len(history), products=products, history=tuple(history))
+            if sequence.exhausted:
+                break
+            earlier = solution
+        raise ConvergenceError(self._failure(sequence, reached), history)
+
+    def _inner(self, residual: float) -> DualSolver:
+        """Return the solver of the next Tresca problem, given the error that its slip bound has already."""
+        # Inner solutions may be as inaccurate as their tolerance allows; half of it is left to the fixed
+        # point.
+        tolerance = max(0.5 * self.tolerance, min(self.loosest, self.forcing * residual))
+        return self.solver.with_tolerance(tolerance)
+
+    def _failure(self, sequence: SlipBoundSequence, reached: float) -> str:
+        needed = (
+            f"the Coulomb fixed point needs a natural residual below {self.tolerance:.1e}, reached "
+            f"{reached:.1e}"
+        )
+        if sequence.exhausted:
+            fractions = ", ".join(f"{fraction:g}" for fraction in self.damping.fractions)
+            return (
+                f"{needed}: it cycles or stands still with every θ of {fractions}; use FaceNewton, which "
+                "updates the slip bound in every step, or give Damping smaller fractions"
+            )
+        return (
+            f"{needed} after {self.max_steps} Tresca problems: raise max_steps, or use FaceNewton, which "
+            "updates the slip bound in every step"
+        )
+
+
+def _first_slip_bound(problem: DualProblem, start: Start) -> np.ndarray:
+    """Return slip bounds for which the first Tresca problem has an equilibrium. Collective.
+
+    Zero, the obvious choice, might leave a body unheld, and so might the bounds of another load.
+    """
+    if not start.cold:
+        bound = problem.law.bound(start.iterate.multiplier)
+        if find_equilibrium(problem.with_law(TrescaLaw(problem.layout, bound))).motion is None:
+            return bound
+    return FIRST_MARGIN * problem.law.bound(find_equilibrium(problem).multiplier)
+
+
+def _under_own_bound(problem: DualProblem, solution: DualSolution) -> DualSolution:
+    """Return a Tresca solution with slip bound and residuals of its own normal forces. Collective."""
+    residuals = measure(problem, solution.multiplier, solution.product, solution.residual)
+    return replace(solution, slip_bound=problem.law.bound(solution.multiplier), residuals=residuals)
+
+
+def _continued(history: Sequence[SolverStep], steps: Sequence[SolverStep], products: int) -> list[SolverStep]:
+    """Append the steps of another Tresca problem, continuing the count of steps and products."""
+    outer = history[-1].outer + 1 if history else 0
+    counted = (
+        replace(step, iteration=number, products=products + step.products, outer=outer)
+        for number, step in enumerate(steps, len(history))
+    )
+    return [*history, *counted]

@@ -1,0 +1,21 @@
+"""Meshes of other programs: gmsh, CAD, meshio, dolfinx, XDMF."""
+
+from fenics_contact.readers.cad import CadFace, InBox, OnCylinder, OnPlane
+from fenics_contact.readers.dolfinx import DolfinxBodies, from_dolfinx, read_xdmf
+from fenics_contact.readers.gmsh import from_gmsh_model, read_msh
+from fenics_contact.readers.gmsh_session import gmsh_model
+from fenics_contact.readers.meshio import from_meshio
+
+__all__ = [
+    "CadFace",
+    "DolfinxBodies",
+    "InBox",
+    "OnCylinder",
+    "OnPlane",
+    "from_dolfinx",
+    "from_gmsh_model",
+    "from_meshio",
+    "gmsh_model",
+    "read_msh",
+    "read_xdmf",
+]

@@ -1,0 +1,321 @@
+"""From a mesh file's labels to bodies: the cells of each body, and the facets on its boundary.
+
+Content of a mesh file of any format: points, cells, and labels on cells and facets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.faces import boundary_faces, cell_faces, corners_of, match_faces
+
+Label = str | int
+"""A physical name of gmsh, or a numeric tag."""
+
+
+@dataclass(frozen=True, eq=False)
+class TaggedMesh:
+    """Points, cells and their labels.
+
+    Attributes:
+        source: Where it comes from, for messages: ``"file 'beam.msh'"``.
+        points: Coordinates, (n_nodes, 3 | 2).
+        cells: Cell type to node numbers in VTK order, (n_cells, nodes of a cell).
+        groups: Label to cell type to the numbers of its cells.
+        facets: Label to the corners of facets, arrays of (n, 4 | 3 | 2) node numbers; in any order.
+        words: Names of its labels, for messages: ``"physical volume"``, ``"physical surface"``.
+        node_sets: Label to node numbers, in any order: the facets on the boundary of a body all of whose
+            corners are among them.
+    """
+
+    source: str
+    points: np.ndarray
+    cells: Mapping[str, np.ndarray]
+    groups: Mapping[Label, Mapping[str, np.ndarray]]
+    facets: Mapping[Label, Sequence[np.ndarray]]
+    words: tuple[str, str]
+    node_sets: Mapping[Label, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space, 2 or 3."""
+        return int(self.points.shape[1])
+
+
+@dataclass(frozen=True)
+class BodyParts:
+    """The groups of a body.
+
+    Attributes:
+        labels: The groups.
+        regions: Their names as regions, or None for a body without regions.
+    """
+
+    labels: tuple[Label, ...]
+    regions: tuple[str, ...] | None
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceParts:
+    """The parts of a surface.
+
+    Attributes:
+        facets: Corners of facets, arrays of (n, 4 | 3 | 2) node numbers.
+        nodes: Sets of node numbers.
+    """
+
+    facets: Sequence[np.ndarray]
+    nodes: Sequence[np.ndarray]
+
+
+def chosen_bodies(mesh: TaggedMesh, bodies: Any) -> dict[str, BodyParts]:
+    """Resolve the caller's choice of bodies.
+
+    Args:
+        mesh: The mesh with its groups.
+        bodies: None for every group; a list of labels; or name of the body to a label, to a list of labels,
+            or to a mapping from the name of a region to a label.
+
+    Returns:
+        Name of the body to its groups.
+
+    Raises:
+        InvalidInputError: If a label is not there.
+    """
+    if bodies is None:
+        bodies = list(mesh.groups)
+    if isinstance(bodies, (str, int)):
+        bodies = [bodies]
+    if not isinstance(bodies, Mapping):
+        bodies = {str(label): label for label in bodies}
+    chosen = {}
+    for name, wanted in bodies.items():
+        parts = _parts(wanted)
+        labels = _known(parts.labels, mesh.groups, f"body '{name}'", mesh.words[0], mesh.source)
+        chosen[name] = BodyParts(labels, parts.regions)
+    if not chosen:
+        raise InvalidInputError(
+            f"{mesh.source} must have a {mesh.words[0]} for a body, there is none: name what the bodies are"
+        )
+    return chosen
+
+
+def chosen_surfaces(mesh: TaggedMesh, surfaces: Any) -> dict[str, SurfaceParts]:
+    """Resolve the caller's choice of surfaces, in the same forms but without regions.
+
+    Returns:
+        Name of the surface to its facets and sets of nodes.
+
+    Raises:
+        InvalidInputError: If a label is not there.
+    """
+    known = {**mesh.node_sets, **mesh.facets}
+    if surfaces is None:
+        surfaces = list(known)
+    if isinstance(surfaces, (str, int)):
+        surfaces = [surfaces]
+    if not isinstance(surfaces, Mapping):
+        surfaces = {str(label): label for label in surfaces}
+    chosen = {}
+    for name, wanted in surfaces.items():
+        labels = _known(_parts(wanted).labels, known, f"surface '{name}'", mesh.words[1], mesh.source)
+        chosen[name] = SurfaceParts(
+            [block for label in labels for block in mesh.facets.get(label, ())],
+            [mesh.node_sets[label] for label in labels if label not in mesh.facets],
+        )
+    return chosen
+
+
+def _parts(wanted: Any) -> BodyParts:
+    if isinstance(wanted, Mapping):
+        return BodyParts(tuple(wanted.values()), tuple(map(str, wanted)))
+    if isinstance(wanted, (str, int, np.integer)):
+        return BodyParts((wanted,), None)  # type: ignore[arg-type]
+    return BodyParts(tuple(wanted), tuple(map(str, wanted)))
+
+
+def _known(
+    labels: Iterable[Label], known: Mapping[Label, object], what: str, word: str, source: str
+) -> tuple[Label, ...]:
+    """Return the labels as in the mesh; a number may also be given as text."""
+    by_text = {str(label): label for label in known}
+    for label in labels:
+        if not isinstance(label, Hashable) or str(label) not in by_text:
+            there = ", ".join(map(repr, known)) or "none at all"
+            raise InvalidInputError(
+                f"{what} needs the {word} {label!r}, which {source} does not have: it has {there}"
+            )
+    return tuple(by_text[str(label)] for label in labels)
+
+
+Facets = Mapping[str, SurfaceParts]
+"""Name of a surface to its parts."""
+
+
+def bodies_of(mesh: TaggedMesh, bodies: Any = None, surfaces: Any = None) -> dict[str, BodyMesh]:
+    """Build bodies from a mesh with labels.
+
+    Every body has its own nodes: those on a boundary that two bodies share are duplicated.
+
+    Args:
+        mesh: The mesh.
+        bodies: The groups of each body, see `chosen_bodies`.
+        surfaces: The facet labels of each surface, see `chosen_surfaces`.
+
+    Returns:
+        Name to body. A surface belongs to every body on whose boundary some of its facets lie.
+
+    Raises:
+        InvalidInputError: If a label does not exist, cells belong to two bodies or regions, a body has cells
+            of several types or an invalid mesh, or a facet lies inside a body or on no cell at all.
+    """
+    chosen, facets = chosen_bodies(mesh, bodies), chosen_surfaces(mesh, surfaces)
+    _check_facets_belong(mesh, facets)
+    owner = {kind: np.full(len(cells), -1) for kind, cells in mesh.cells.items()}
+    result = {}
+    for number, (name, parts) in enumerate(chosen.items()):
+        kind, cells, region = _cells_of(mesh, name, parts)
+        taken = owner[kind][cells]
+        if np.any(taken >= 0):
+            other = list(chosen)[int(taken.max())]
+            raise InvalidInputError(
+                f"a cell must belong to one body, {np.count_nonzero(taken >= 0)} cells of {mesh.source} "
+                f"belong to '{other}' and '{name}': say which {mesh.words[0]}s are bodies with "
+                "bodies={name: label}"
+            )
+        owner[kind][cells] = number
+        result[name] = _body(mesh, name, mesh.cells[kind][cells], parts.regions, region, facets)
+    if surfaces is not None:
+        _check_nodes_make_facets(mesh, facets, result)
+    return result
+
+
+def cells_of_bodies(mesh: TaggedMesh, bodies: Any = None) -> dict[str, np.ndarray]:
+    """Return the ascending numbers of each body's cells; arguments as in `bodies_of`."""
+    return {name: _cells_of(mesh, name, parts)[1] for name, parts in chosen_bodies(mesh, bodies).items()}
+
+
+def _cells_of(mesh: TaggedMesh, name: str, parts: BodyParts) -> tuple[str, np.ndarray, np.ndarray]:
+    """Return the cell type of a body, its ascending cells, and the group of each."""
+    chosen = [
+        (kind, cells, n) for n, label in enumerate(parts.labels) for kind, cells in mesh.groups[label].items()
+    ]
+    chosen = [(kind, cells, n) for kind, cells, n in chosen if cells.size]
+    kinds = sorted({kind for kind, _, _ in chosen})
+    if len(kinds) > 1:
+        counts = [sum(cells.size for kind, cells, _ in chosen if kind == one) for one in kinds]
+        there = " and ".join(f"{count} of type {kind}" for count, kind in zip(counts, kinds, strict=True))
+        raise InvalidInputError(
+            f"a body must have cells of one type, body '{name}' of {mesh.source} has {there}: mesh it with "
+            "one type, or make bodies of its parts"
+        )
+    if not kinds:
+        raise InvalidInputError(
+            f"a body must have cells, body '{name}' of {mesh.source} has none: mesh it, or leave it out"
+        )
+    cells = np.concatenate([cells for _, cells, _ in chosen])
+    region = np.concatenate([np.full(cells.size, n) for _, cells, n in chosen])
+    order = np.argsort(cells, kind="stable")
+    cells, region = cells[order], region[order]
+    double = np.flatnonzero(np.diff(cells) == 0)
+    if double.size:
+        pair = [parts.labels[region[double[0] + i]] for i in (0, 1)]
+        raise InvalidInputError(
+            f"a cell must belong to one region, {double.size} cells of body '{name}' of {mesh.source} belong "
+            f"to {pair[0]!r} and {pair[1]!r}: leave one of them out"
+        )
+    return kinds[0], cells, region
+
+
+def _body(
+    mesh: TaggedMesh,
+    name: str,
+    cells: np.ndarray,
+    regions: Sequence[str] | None,
+    region: np.ndarray,
+    facets: Facets,
+) -> BodyMesh:
+    """Number the nodes of a body from zero and find the surfaces on its boundary."""
+    nodes, local = np.unique(cells, return_inverse=True)
+    local = local.reshape(cells.shape)
+    number = np.full(mesh.points.shape[0], -1, dtype=np.int64)
+    number[nodes] = np.arange(nodes.size)
+    boundary, _ = boundary_faces(local, mesh.dim)
+    corners = corners_of(boundary, mesh.dim)
+    surfaces = {}
+    for surface, parts in facets.items():
+        members: list[np.ndarray] = [np.zeros(0, dtype=np.int64)]
+        mine = [number[block] for block in parts.facets if block.shape[1] == corners.shape[1]]
+        mine = [block[(block >= 0).all(axis=1)] for block in mine]
+        if mine and (candidates := np.concatenate(mine)).size:
+            matches = match_faces(candidates, corners)
+            _check_none_inside(mesh, name, surface, candidates[matches < 0], local)
+            members.append(matches[matches >= 0])
+        for inside in parts.nodes:
+            members.append(np.flatnonzero(np.isin(nodes[corners], inside).all(axis=1)))
+        if (there := np.unique(np.concatenate(members))).size:
+            surfaces[surface] = boundary[there]
+    named = {} if regions is None else {label: np.flatnonzero(region == n) for n, label in enumerate(regions)}
+    try:
+        return BodyMesh(mesh.points[nodes], local, surfaces, regions=named)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"body '{name}' of {mesh.source} is no sound mesh: {error}") from error
+
+
+def _check_none_inside(
+    mesh: TaggedMesh, name: str, surface: str, facets: np.ndarray, cells: np.ndarray
+) -> None:
+    """Reject facets between two cells of one body; facets that are not faces of it belong to other bodies."""
+    faces = cell_faces(cells, mesh.dim)
+    inside = (
+        np.count_nonzero(match_faces(facets, corners_of(faces.reshape(-1, faces.shape[2]), mesh.dim)) >= 0)
+        if facets.size
+        else 0
+    )
+    if inside:
+        raise InvalidInputError(
+            f"a surface must lie on the boundary of a body, {inside} facets of '{surface}' of {mesh.source} "
+            f"lie inside body '{name}': make bodies of the parts on its two sides, or leave the "
+            f"surface out with "
+            "surfaces=[...]"
+        )
+
+
+def _check_nodes_make_facets(mesh: TaggedMesh, facets: Facets, bodies: Mapping[str, BodyMesh]) -> None:
+    """Reject a requested surface that is a set of nodes without all nodes of any facet."""
+    for name, parts in facets.items():
+        if parts.nodes and not any(name in body.surfaces for body in bodies.values()):
+            count = sum(len(nodes) for nodes in parts.nodes)
+            raise InvalidInputError(
+                f"a set of nodes must hold all corners of some facets to be a surface, the {count} nodes of "
+                f"'{name}' of {mesh.source} hold those of none on the bodies {list(bodies)}: save the "
+                "facets, or all their nodes"
+            )
+
+
+def _check_facets_belong(mesh: TaggedMesh, surfaces: Facets) -> None:
+    """Reject facets that are not faces of cells."""
+    known: dict[int, list[np.ndarray]] = {}
+    for cells in mesh.cells.values():
+        faces = cell_faces(cells, mesh.dim)
+        corners = corners_of(faces.reshape(-1, faces.shape[2]), mesh.dim)
+        known.setdefault(corners.shape[1], []).append(corners)
+    joined = {columns: np.concatenate(blocks) for columns, blocks in known.items()}
+    for name, parts in surfaces.items():
+        for block in parts.facets:
+            faces = joined.get(block.shape[1], np.zeros((0, block.shape[1]), dtype=np.int64))
+            lost = np.flatnonzero(match_faces(block, faces) < 0)
+            if lost.size:
+                place = ", ".join(f"{x:.6g}" for x in mesh.points[block[lost[0]]].mean(axis=0))
+                raise InvalidInputError(
+                    f"a surface must consist of faces of cells, {lost.size} of {len(block)} facets of "
+                    f"'{name}' of {mesh.source} are none, first at ({place}): mesh bodies and "
+                    f"surfaces together, or "
+                    "leave the surface out with surfaces=[...]"
+                )

@@ -1,0 +1,410 @@
+"""The faces of a CAD model: their kinds, sizes and places.
+
+Which faces of a CAD model are which surfaces: by name, by number, or by where they lie.
+
+Bodies from CAD files, meshed by gmsh; their surfaces keep their true shapes.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from fenics_contact._base.checks import check_numbers, checked, require_file, unit_vector
+from fenics_contact._base.display import displayed
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.readers.bodies import Label
+from fenics_contact.readers.cad_shapes import shape_seen
+from fenics_contact.readers.gmsh import Bodies, from_gmsh_model
+from fenics_contact.readers.gmsh_session import gmsh_model, physical_groups
+from fenics_contact.shapes.simple import Circle, Cylinder, Plane, Sphere, SurfaceShape, Torus
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+#: Names of kinds of faces (dimension 2) and of curves (1).
+_KINDS: dict[type, dict[int, str]] = {
+    Plane: {2: "plane", 1: "line"},
+    Cylinder: {2: "cylinder"},
+    Sphere: {2: "sphere"},
+    Circle: {1: "circle"},
+    Torus: {2: "torus"},
+}
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class CadFace:
+    """A face of a CAD model, of a plane part a curve.
+
+    Attributes:
+        number: Its number in gmsh.
+        name: Its name in the file, without a name its number as text.
+        kind: "plane", "cylinder", "sphere", "torus", of a plane part "line" or "circle", else gmsh's word for
+            its surface.
+        area: Area, of a curve the length; NaN if another kernel than Open CASCADE built it.
+        centroid: Centre of mass, NaN likewise, (3,), [length].
+        lower: Least coordinates, (3,), [length].
+        upper: Largest coordinates, (3,), [length].
+        shape: Its true shape if it is one of those kinds; the side of the body is not known.
+        near: Distance up to which places on the model count as the same, [length].
+    """
+
+    number: int
+    name: str
+    kind: str
+    area: float
+    centroid: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    shape: SurfaceShape | None
+    near: float
+
+    @property
+    def radius(self) -> float | None:
+        """Radius of a cylinder, sphere or circle."""
+        return self.shape.radius if isinstance(self.shape, Cylinder | Sphere) else None
+
+    @property
+    def in_words(self) -> str:
+        """One line: ``7 'bore' (cylinder, radius 2, area 62.83, centroid (5, 10, 2.5))``."""
+        facts = [self.kind]
+        if self.radius is not None:
+            facts.append(f"radius {self.radius:.6g}")
+        if np.isfinite(self.area):
+            place = ", ".join(f"{x:.4g}" for x in np.round(self.centroid, 9) + 0.0)
+            facts.append(f"area {self.area:.4g}, centroid ({place})")
+        name = "" if self.name == str(self.number) else f" {self.name!r}"
+        return f"{self.number}{name} ({', '.join(facts)})"
+
+
+def faces_of(gmsh: ModuleType, dim: int) -> list[CadFace]:
+    """Return the faces (dimension 2), of a plane part the curves (1), of gmsh's current model."""
+    box = np.array(gmsh.model.getBoundingBox(-1, -1))
+    near = 1e-6 * float(np.linalg.norm(box[3:] - box[:3]))
+    return [_face(gmsh, (dim, int(tag)), near) for _, tag in gmsh.model.getEntities(dim)]
+
+
+def name_of(gmsh: ModuleType, dim: int, tag: int) -> str:
+    """Return the name of an entity in its file, else its number as text."""
+    name = str(gmsh.model.getEntityName(dim, tag)).rpartition("/")[2]
+    # The library that writes STEP files calls everything "Open CASCADE ...".
+    return str(tag) if not name or name.startswith("Open CASCADE") else name
+
+
+def _face(gmsh: ModuleType, entity: tuple[int, int], near: float) -> CadFace:
+    shape = shape_seen(gmsh, entity)
+    try:
+        area, centroid = gmsh.model.occ.getMass(*entity), gmsh.model.occ.getCenterOfMass(*entity)
+    except Exception:  # gmsh raises no other class; entities of its own kernel have no mass
+        area, centroid = np.nan, (np.nan,) * 3
+    box = np.array(gmsh.model.getBoundingBox(*entity))
+    kind = _KINDS.get(type(shape), {}).get(entity[0], gmsh.model.getType(*entity).lower())
+    name = name_of(gmsh, *entity)
+    return CadFace(entity[1], name, kind, float(area), np.array(centroid), box[:3], box[3:], shape, near)
+
+
+Vector: TypeAlias = tuple[float, float, float]
+#: Largest sine of the angle between directions that count as parallel.
+_PARALLEL = 1e-6
+
+
+@displayed
+@dataclass(frozen=True)
+@checked()
+class InBox:
+    """Chooses the faces that lie wholly in a box along the axes.
+
+    Attributes:
+        lower: Least coordinates, [length].
+        upper: Largest coordinates, [length].
+    """
+
+    lower: Vector
+    upper: Vector
+
+    def __call__(self, face: CadFace) -> bool:
+        """Return whether the face is chosen."""
+        above = face.lower >= np.array(self.lower) - face.near
+        below = face.upper <= np.array(self.upper) + face.near
+        return bool((above & below).all())
+
+
+@displayed
+@dataclass(frozen=True)
+@checked()
+class OnPlane:
+    """Chooses the plane faces that lie in a plane; of a plane part, the straight edges on a line.
+
+    Attributes:
+        point: A point of the plane, [length].
+        normal: Its normal, to either side; scaled to unit length.
+    """
+
+    point: Vector
+    normal: Vector
+
+    def __post_init__(self) -> None:
+        """Scale the normal; reject a zero one."""
+        object.__setattr__(self, "normal", unit_vector("OnPlane.normal", self.normal, 3))
+
+    def __call__(self, face: CadFace) -> bool:
+        """Return whether the face is chosen."""
+        shape = face.shape
+        if not isinstance(shape, Plane):
+            return False
+        normal, point = np.array(self.normal)[: shape.dim], np.array([self.point])[:, : shape.dim]
+        aside = np.linalg.norm(normal - (normal @ shape.normal) * np.array(shape.normal))
+        return bool(aside < _PARALLEL and abs(shape.distance(point)[0]) < face.near)
+
+
+@displayed
+@dataclass(frozen=True)
+@checked()
+class OnCylinder:
+    """Chooses the faces on a cylinder, of holes and of pins; of a plane part, the arcs of a circle.
+
+    Attributes:
+        radius: Its radius, [length].
+        axis: Direction of its axis, to either side; any unless given.
+        point: A point of its axis, [length]; anywhere unless given.
+    """
+
+    radius: float
+    axis: Vector | None = None
+    point: Vector | None = None
+
+    def __post_init__(self) -> None:
+        """Scale the axis; reject a zero one."""
+        if self.axis is not None:
+            object.__setattr__(self, "axis", unit_vector("OnCylinder.axis", self.axis, 3))
+
+    def __call__(self, face: CadFace) -> bool:
+        """Return whether the face is chosen."""
+        shape = face.shape
+        if isinstance(shape, Cylinder):
+            axis, centre = np.array(shape.axis), np.array(shape.point)
+        elif isinstance(shape, Sphere) and shape.dim == 2:
+            axis, centre = np.array([0.0, 0.0, 1.0]), np.array([*shape.centre, 0.0])
+        else:
+            return False
+        wanted = np.array(axis if self.axis is None else self.axis)
+        away = np.array(centre if self.point is None else self.point) - centre
+        return bool(
+            abs(shape.radius - self.radius) < face.near
+            and np.linalg.norm(np.cross(axis, wanted)) < _PARALLEL
+            and np.linalg.norm(np.cross(away, axis)) < face.near
+        )
+
+
+Chosen: TypeAlias = Label | InBox | OnPlane | OnCylinder | Callable[[CadFace], bool]
+"""Name or number of a face or of a group of the file, or what says of a face whether it is chosen."""
+FaceChoice: TypeAlias = Sequence[Label] | Mapping[str, Chosen | Sequence[Chosen]]
+"""Names or numbers, or surface to what is chosen of the faces for it."""
+
+
+def chosen_faces(
+    faces: Sequence[CadFace], groups: Mapping[Label, Sequence[int]], surfaces: Any, source: str
+) -> dict[str, list[int]]:
+    """Resolve the caller's choice of surfaces.
+
+    Args:
+        faces: All faces.
+        groups: Name of a group of the file, or of a face, to numbers of faces.
+        surfaces: The choice.
+        source: The file, for messages.
+
+    Returns:
+        Name of the surface to numbers of its faces.
+
+    Raises:
+        InvalidInputError: If a choice finds no face, or two choose the same; the message lists the faces.
+    """
+    if isinstance(surfaces, str | int):
+        surfaces = [surfaces]
+    if not isinstance(surfaces, Mapping):
+        surfaces = {str(label): label for label in surfaces}
+    known = {str(face.number): [face.number] for face in faces} | {str(k): list(v) for k, v in groups.items()}
+    found: dict[str, list[int]] = {}
+    owner: dict[int, str] = {}
+    for name, wanted in surfaces.items():
+        several = [wanted] if isinstance(wanted, str | int) or callable(wanted) else wanted
+        found[name] = sorted({n for each in several for n in _found(each, name, faces, known, source)})
+        for number in found[name]:
+            if (other := owner.setdefault(number, name)) != name:
+                raise InvalidInputError(
+                    f"a face must belong to one surface, face {number} of {source} is chosen for {other!r} "
+                    f"and for {name!r}: choose less for one of them. {_listed(faces)}"
+                )
+    return found
+
+
+def _found(
+    wanted: Chosen, name: str, faces: Sequence[CadFace], known: Mapping[str, list[int]], source: str
+) -> list[int]:
+    found = [f.number for f in faces if wanted(f)] if callable(wanted) else known.get(str(wanted), [])
+    if not found:
+        raise InvalidInputError(
+            f"surface {name!r} must have a face, none of {source} is {_in_words(wanted)}: {_listed(faces)}"
+        )
+    return found
+
+
+def _in_words(wanted: Chosen) -> str:
+    if isinstance(wanted, InBox):
+        return f"wholly in the box from {wanted.lower} to {wanted.upper}"
+    if isinstance(wanted, OnPlane):
+        return f"on the plane through {wanted.point} with the normal {wanted.normal}"
+    if isinstance(wanted, OnCylinder):
+        where = [] if wanted.axis is None else [f" along {wanted.axis}"]
+        where += [] if wanted.point is None else [f" through {wanted.point}"]
+        return f"on a cylinder of radius {wanted.radius:g}" + (
+            f" about the axis{''.join(where)}" * bool(where)
+        )
+    return "chosen by its function" if callable(wanted) else f"called {wanted!r}"
+
+
+def _listed(faces: Sequence[CadFace], most: int = 60) -> str:
+    """Return all faces in words; of very many the first."""
+    more = f"; and {len(faces) - most} more" if len(faces) > most else ""
+    return "it has " + "; ".join(face.in_words for face in faces[:most]) + more
+
+
+#: Formats that gmsh reads as geometry.
+SUFFIXES = (".step", ".stp", ".iges", ".igs", ".brep", ".geo", ".geo_unrolled")
+
+
+def read_cad(
+    path: str | Path,
+    size: float | None = None,
+    bodies: Bodies | None = None,
+    surfaces: FaceChoice | None = None,
+    *,
+    order: int = 1,
+    comm: MPI.Comm | None = None,
+) -> dict[str, BodyMesh]:
+    """Read a CAD file, mesh it with gmsh, and return its bodies with the true shapes of their surfaces.
+
+    Physical groups of a .geo file define bodies and surfaces, as in `from_gmsh_model`. Without groups, every
+    volume (of a plane part: every surface) is a body and every surface (curve) a surface of it, named as in a
+    STEP file, else by their numbers in gmsh, as text.
+
+    Args:
+        path: A file .step, .stp, .iges, .igs, .brep, .geo or .geo_unrolled; .geo is a script: gmsh runs it.
+        size: Largest edge of a cell, [length]; that of the file unless given.
+        bodies: As in `read_msh`.
+        surfaces: The wanted surfaces: names or numbers of faces, or name of the surface to what chooses its
+            faces: a name, a number, `InBox`, `OnPlane`, `OnCylinder`, a function that says of a `CadFace`
+            whether it is one, or several of these. Every face unless given.
+        order: 1 for linear cells, 2 for quadratic ones, curved like the surfaces.
+        comm: If given, rank 0 reads the file and all ranks receive the bodies.
+
+    Returns:
+        Name to body, with `BodyMesh.shapes`. Whatever unit a STEP or IGES file names, its coordinates come in
+        millimetres; `BodyMesh.placed` scales them to another unit. Other files name no unit.
+
+    Raises:
+        InvalidInputError: As `read_msh`, or if gmsh cannot read or mesh the file, nothing is chosen for a
+            surface, or a face for two; these messages list all faces.
+        MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
+
+    Note:
+        Collective on ``comm`` if given.
+
+    Example:
+        ``read_cad("bracket.step", 2.0, surfaces={"foot": [4, 7], "hole": OnCylinder(5.0)})`` makes bodies of
+        tetrahedra of at most 2 mm. Faces 4 and 7 are the surface "foot"; all on cylinders of radius 5 mm the
+        surface "hole", whose shape is a `Cylinder`.
+    """
+    if comm is None:
+        return _read(Path(path), size, order, bodies, surfaces)
+    made = None
+    with together(comm):
+        made = _read(Path(path), size, order, bodies, surfaces) if comm.rank == 0 else None
+    return comm.bcast(made, root=0)
+
+
+def _read(
+    path: Path,
+    size: float | None,
+    order: int,
+    bodies: Bodies | None,
+    surfaces: FaceChoice | None,
+) -> dict[str, BodyMesh]:
+    require_file(path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise InvalidInputError(
+            f"file '{path}' must be a CAD file, {', '.join(SUFFIXES)}: read a mesh with `read_msh` or "
+            "`read_mesh`"
+        )
+    if size is not None:
+        check_numbers(size=size)
+        if size <= 0:
+            raise InvalidInputError(f"size must be above zero, got {size}: give the largest edge of a cell")
+    if order not in (1, 2):
+        raise InvalidInputError(f"order must be 1 or 2, got {order}: linear or quadratic cells")
+    options: dict[str, float] = {
+        "Mesh.ElementOrder": order,
+        "Mesh.SecondOrderIncomplete": 0,
+        "Mesh.SecondOrderLinear": 0,
+    }
+    options["Mesh.HighOrderOptimize"] = 1  # only where curved cells would be inverted
+    if size is not None:
+        options["Mesh.MeshSizeMax"] = size
+    with gmsh_model("fenics_contact CAD", **options) as gmsh:
+        with _reasons(path):
+            gmsh.merge(str(path))
+        dim = max((dim for dim, _ in gmsh.model.getEntities()), default=0)
+        for each in (dim, dim - 1):
+            _name(gmsh, each, unique=each == dim)
+        if surfaces is not None and dim > 1:
+            _choose(gmsh, dim - 1, surfaces, f"file '{path}'")
+        with _reasons(path):
+            gmsh.model.mesh.generate(dim)
+        return from_gmsh_model(bodies)
+
+
+@contextmanager
+def _reasons(path: Path) -> Iterator[None]:
+    """Say what gmsh says."""
+    try:
+        yield
+    except Exception as reason:  # gmsh raises no other class
+        raise InvalidInputError(
+            f"file '{path}' must be one that gmsh can read and mesh, it says: {reason}: look at it with "
+            "gmsh, or give another size"
+        ) from reason
+
+
+def _name(gmsh: ModuleType, dim: int, *, unique: bool) -> None:
+    """Add physical groups of entities if there are none of their dimension."""
+    if dim < 1 or gmsh.model.getPhysicalGroups(dim):
+        return
+    names = {tag: name_of(gmsh, dim, tag) for _, tag in gmsh.model.getEntities(dim)}
+    times = Counter(names.values())
+    groups: dict[str, list[int]] = {}
+    for tag, name in names.items():
+        groups.setdefault(f"{name} {tag}" if unique and times[name] > 1 else name, []).append(tag)
+    _add_groups(gmsh, dim, groups)
+
+
+def _choose(gmsh: ModuleType, dim: int, surfaces: FaceChoice, source: str) -> None:
+    """Replace the physical groups of faces by those that are chosen."""
+    groups = physical_groups(gmsh, dim)
+    chosen = chosen_faces(faces_of(gmsh, dim), groups, surfaces, source)
+    gmsh.model.removePhysicalGroups([(dim, tag) for _, tag in gmsh.model.getPhysicalGroups(dim)])
+    _add_groups(gmsh, dim, chosen)
+
+
+def _add_groups(gmsh: ModuleType, dim: int, groups: Mapping[str, Sequence[int]]) -> None:
+    for name, tags in groups.items():
+        gmsh.model.setPhysicalName(dim, gmsh.model.addPhysicalGroup(dim, tags), name)

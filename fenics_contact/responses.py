@@ -1,0 +1,486 @@
+"""The result of a response.
+
+From parameters to quantities of interest, by states of a scene or designs.
+
+A collective function called by a program that runs on rank 0 alone, while the other ranks serve.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Literal, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fenics_contact._base.libraries import MPI
+from fenics_contact._equilibrium.problem import ContactProblem
+from fenics_contact._scene.scene import Scene
+from fenics_contact.design.problem import ShapeProblem
+from fenics_contact.errors import (
+    ConvergenceError,
+    InfeasibleError,
+    InvalidDesignError,
+    InvalidInputError,
+    RemoteError,
+    agree,
+    collective,
+    collectively,
+    together,
+    user_code,
+)
+from fenics_contact.qp.solve import DualSolver
+from fenics_contact.results.state import State
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Quantities of interest at one set of parameters, bitwise equal on all ranks.
+
+    Attributes:
+        parameters: Every parameter with its value.
+        values: Quantity to value; nan where there is no state.
+        subgradients: Quantity to a subgradient by the parameters, shape (n_parameters,), where it is known.
+        failure: Why there is no state; empty where there is one.
+        products: Number of products with the dual operator.
+    """
+
+    parameters: Mapping[str, float]
+    values: Mapping[str, float]
+    subgradients: Mapping[str, np.ndarray] = field(default_factory=dict)
+    failure: str = ""
+    products: int = 0
+
+    def __getitem__(self, quantity: str) -> float:
+        """Return the value of a quantity."""
+        return self.values[quantity]
+
+    @property
+    def array(self) -> np.ndarray:
+        """Values in the order of the quantities, shape (n_quantities,)."""
+        return np.array(list(self.values.values()), dtype=float)
+
+
+Parameters = Mapping[str, float] | ArrayLike
+"""All parameters in their order, or some by name."""
+Quantity = Callable[[State], Any]
+"""Takes a state, returns a number. Called by all ranks together."""
+Failures = Literal["raise", "nan"]
+
+#: Errors that mean that there is no answer at these parameters, rather than a mistake in the program.
+NO_ANSWER = (InvalidDesignError, InfeasibleError, ConvergenceError)
+
+
+class Response(ABC):
+    """A function of named numbers.
+
+    Attributes:
+        nominal: Parameter to its default value.
+        evaluations: Number of answers so far, failed ones included.
+        products: Products with the dual operator so far.
+    """
+
+    def __init__(self, nominal: Mapping[str, float], comm: MPI.Comm, failures: Failures) -> None:
+        """Check the parameters and the failure mode."""
+        if failures not in ("raise", "nan"):
+            raise InvalidInputError(f"failures must be 'raise' or 'nan', got {failures!r}")
+        if not nominal:
+            raise InvalidInputError(
+                "a response needs at least one parameter, got none: name them with their usual values, "
+                "{'load': 80e3}"
+            )
+        self.nominal = {name: float(value) for name, value in nominal.items()}
+        self.comm, self._failures = comm, failures
+        self.evaluations, self.products = 0, 0
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters, in the order of arrays."""
+        return tuple(self.nominal)
+
+    @property
+    @abstractmethod
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the quantities of interest, in the order of arrays."""
+
+    @collectively("a response", lambda self, *_, **__: self.comm)
+    def __call__(self, parameters: Parameters | None = None, **named: float) -> Answer:
+        """Evaluate at a set of parameters; the others keep their nominal values. Collective.
+
+        Args:
+            parameters: All of them in their order, shape (n_parameters,), or a mapping from names.
+            **named: Some by name, which override the others.
+
+        Raises:
+            InvalidInputError: If a name is unknown, the shape does not fit or a number is not finite.
+            InvalidDesignError: If the design does not exist (``failures="raise"``).
+            InfeasibleError: If there is no equilibrium (``failures="raise"``).
+            ConvergenceError: If the solver fails (``failures="raise"``).
+        """
+        with together(self.comm):
+            values = self._values(parameters, named)
+        self.evaluations += 1
+        try:
+            results, subgradients, products = self._answer(values)
+        except NO_ANSWER as error:
+            if self._failures == "raise":
+                raise
+            nothing = dict.fromkeys(self.quantities, np.nan)
+            return Answer(values, nothing, failure=str(error) or type(error).__name__)
+        self.products += products
+        # Outer tools on different ranks must see bitwise equal values.
+        results, subgradients = self.comm.bcast((results, subgradients))
+        return Answer(values, results, subgradients, products=products)
+
+    def table(self, samples: ArrayLike) -> np.ndarray:
+        """Evaluate at many sets of parameters, in their order. Collective.
+
+        Args:
+            samples: One row per set, shape (n, n_parameters).
+
+        Returns:
+            Shape (n, n_quantities).
+        """
+        rows = np.array(samples, dtype=float)
+        if rows.ndim != 2:
+            raise InvalidInputError(
+                f"samples must have shape (n, {len(self.nominal)}), one column for each of "
+                f"{list(self.parameters)}, got {rows.shape}"
+            )
+        return np.array([self(row).array for row in rows]).reshape(len(rows), len(self.quantities))
+
+    @abstractmethod
+    def _answer(self, values: dict[str, float]) -> tuple[dict[str, float], dict[str, np.ndarray], int]:
+        """Return the quantities, the known subgradients, and the number of products. Collective."""
+
+    def _values(self, given: Parameters | None, named: Mapping[str, float]) -> dict[str, float]:
+        """Return every parameter's value."""
+        if given is not None and not isinstance(given, Mapping):
+            array = np.array(given, dtype=float)
+            if array.shape != (len(self.nominal),):
+                raise InvalidInputError(
+                    f"parameters must have shape ({len(self.nominal)},), one number for each of "
+                    f"{list(self.parameters)}, got {array.shape}: give them all in this order, or some by "
+                    "name"
+                )
+            given = {name: float(value) for name, value in zip(self.parameters, array, strict=True)}
+        chosen = {**(given or {}), **named}
+        unknown = [name for name in chosen if name not in self.nominal]
+        if unknown:
+            raise InvalidInputError(
+                f"parameters must be some of {list(self.parameters)}, got {unknown}: name them as in nominal"
+            )
+        values = {**self.nominal, **{name: float(value) for name, value in chosen.items()}}
+        bad = [name for name, value in values.items() if not np.isfinite(value)]
+        if bad:
+            raise InvalidInputError(f"parameters must be finite, got {values[bad[0]]} for {bad[0]!r}")
+        return values
+
+
+class SceneResponse(Response):
+    """Quantities of the equilibrium of a scene that depends on parameters.
+
+    A state starts from the one before, and what a parameter does not affect is reused: factors where only
+    loads change, forms and numbering where meshes stay. So let ``build`` reuse the same mesh objects.
+
+    Example:
+        >>> def build(friction, load):  # doctest: +SKIP
+        ...     pair = ContactPair(Surface("block", "z0"), floor, Coulomb(friction))
+        ...     return Scene(bodies, loads=[Pressure("block", "z1", load)], contacts=[pair])
+        >>> peak = {"largest pressure": lambda state: state.contact.pressure.max()}  # doctest: +SKIP
+        >>> response = SceneResponse(build, {"friction": 0.3, "load": 10.0}, peak, comm)  # doctest: +SKIP
+        >>> response(load=12.0)["largest pressure"]  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        build: Callable[..., Scene],
+        nominal: Mapping[str, float],
+        quantities: Mapping[str, Quantity],
+        comm: MPI.Comm,
+        *,
+        partitions: Mapping[str, np.ndarray] | None = None,
+        solver: DualSolver | None = None,
+        tolerance: float | None = None,
+        failures: Failures = "raise",
+        warm: bool = True,
+    ) -> None:
+        """Prepare; nothing is built before the first answer.
+
+        Args:
+            build: Takes the parameters by name, returns the scene, the same on every rank.
+            nominal: Parameter to its default value.
+            quantities: Name to a function of the state, called by all ranks together.
+            comm: Communicator over which the subdomains are spread.
+            partitions: As for `solve_scene`.
+            solver: As for `solve_scene`.
+            tolerance: Relative residual of every state; None for that of the solver, see
+                `ContactProblem.number`.
+            failures: Whether a state that does not exist or does not converge raises, or makes all quantities
+                nan with the reason in `Answer.failure`. Other errors always raise.
+            warm: Whether a state starts from the one before; answers then depend on the order of evaluation,
+                within the tolerance.
+
+        Raises:
+            InvalidInputError: If there is no parameter or no quantity.
+        """
+        super().__init__(nominal, comm, failures)
+        if not quantities:
+            raise InvalidInputError(
+                "a response needs at least one quantity of interest, got none: give {'name': function of "
+                "the state}"
+            )
+        self._build, self._of_state, self._warm = build, dict(quantities), warm
+        self._partitions = partitions
+        self._problem_of = partial(
+            ContactProblem, comm=comm, partitions=partitions, solver=solver, tolerance=tolerance
+        )
+        self._problem: ContactProblem | None = None
+
+    @property
+    def state(self) -> State | None:
+        """The last state, None before the first."""
+        return None if self._problem is None else self._problem.state
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the quantities of interest, in the order of arrays."""
+        return tuple(self._of_state)
+
+    def _answer(self, values: dict[str, float]) -> tuple[dict[str, float], dict[str, np.ndarray], int]:
+        with together(self.comm), user_code("the function that builds the scene of a response"):
+            scene = self._build(**values)
+        with together(self.comm):
+            if self._problem is None:
+                self._problem = self._problem_of(scene)
+            elif not _alike(scene, self._problem.scene):
+                self._problem = self._problem.on(scene, self._partitions)
+        problem = self._problem
+        wanted = problem.number(scene) if problem.tolerance is None else problem.tolerance
+        state = problem.solve(scene, start="last" if self._warm else None, tolerance=wanted)
+        return evaluated(self._of_state, state, self.comm), {}, state.solution.products
+
+
+class DesignResponse(Response):
+    """The objective of a design problem with its subgradient, and other quantities of its state.
+
+    Parameters are the design variables, called "alpha 0" and so on.
+
+    Example:
+        >>> response = DesignResponse(problem)  # doctest: +SKIP
+        >>> answer = response(np.zeros(problem.size))  # doctest: +SKIP
+        >>> answer["objective"], answer.subgradients["objective"]  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        problem: ShapeProblem,
+        quantities: Mapping[str, Quantity] | None = None,
+        *,
+        failures: Failures = "raise",
+    ) -> None:
+        """Wrap the problem.
+
+        Args:
+            problem: The design problem.
+            quantities: Further quantities of the state, in addition to "objective".
+            failures: As for `SceneResponse`.
+        """
+        super().__init__({f"alpha {k}": 0.0 for k in range(problem.size)}, problem.comm, failures)
+        self.problem, self._of_state = problem, dict(quantities or {})
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the quantities of interest, in the order of arrays."""
+        return ("objective", *self._of_state)
+
+    def _answer(self, values: dict[str, float]) -> tuple[dict[str, float], dict[str, np.ndarray], int]:
+        before = self.problem.products
+        point = self.problem.evaluate(np.array(list(values.values())))
+        more = evaluated(self._of_state, point.state, self.comm)
+        results = {"objective": point.value, **more}
+        return results, {"objective": point.gradient}, self.problem.products - before
+
+
+def evaluated(quantities: Mapping[str, Quantity], state: State, comm: MPI.Comm) -> dict[str, float]:
+    """Return the quantities of a state. Collective.
+
+    Raises:
+        InvalidInputError: If one of them is not a number.
+        Exception: The error that a quantity raises on all ranks.
+        UserCodeError: If it raises on some of them only.
+    """
+    values: dict[str, float] = {}
+    for name, quantity in quantities.items():
+        with collective(comm, f"quantity {name!r} of a response", closed=True, users=True):
+            values[name] = _number(name, quantity(state))
+    return values
+
+
+def _number(name: str, value: Any) -> float:
+    """Return the value of a quantity as a number."""
+    array = np.asarray(value)
+    if array.size != 1:
+        raise InvalidInputError(
+            f"a quantity must be one number, {name!r} has shape {array.shape}: take its largest entry or a "
+            "norm, or make a quantity of each entry"
+        )
+    try:
+        return float(array.item())
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(
+            f"a quantity must be one number, {name!r} is {value!r}: return a float, the same on every rank"
+        ) from error
+
+
+def _alike(scene: Scene, other: Scene) -> bool:
+    """Return whether two scenes can share a decomposition."""
+    if scene.body_names != other.body_names:
+        return False
+    return all(
+        np.array_equal(scene.bodies[name].mesh.cells, other.bodies[name].mesh.cells)
+        and np.array_equal(scene.fixed(name), other.fixed(name))
+        for name in scene.body_names
+    )
+
+
+_CALL, _STOP = "call", "stop"
+
+
+@contextmanager
+def served(function: Callable[..., Any], comm: MPI.Comm) -> Iterator[Callable[..., Any] | None]:
+    """Let rank 0 call a collective function as if it were serial, while the other ranks wait and join in.
+
+    The block runs on every rank; on rank 0 it receives the function, on the others None, and these serve at
+    its end until rank 0 leaves its block. An error of the function on any rank is raised by the call on rank
+    0, which may continue; an error that leaves the block of one rank leaves that of all. So no rank waits for
+    one that is gone.
+
+    Arguments are sent from rank 0 (pickled); the value is that of rank 0.
+
+    Example:
+        >>> with served(response, comm) as call:  # doctest: +SKIP
+        ...     if call is not None:
+        ...         study = optuna.create_study()
+        ...         study.optimize(lambda trial: call(load=trial.suggest_float("load", 1.0, 2.0))["peak"])
+
+    Args:
+        function: Called by all ranks with equal arguments. An error on one rank must not leave the others
+            waiting inside the function; those of this package never do.
+        comm: Communicator whose ranks serve.
+
+    Yields:
+        The function for rank 0, None on the other ranks.
+
+    Raises:
+        Exception: The error that left the block, on the rank itself; on the others one of the same class if
+            it is one of this package's, else `RemoteError`.
+
+    Note:
+        Collective on ``comm``. Put code that only rank 0 should run under ``if call is not None``. Waiting
+        ranks keep their cores busy.
+    """
+    if comm.rank == 0:
+        call = _Call(function, comm)
+        try:
+            yield call
+        except (SystemExit, KeyboardInterrupt) as leaving:
+            call.stop(None, leaving)
+            raise
+        except Exception as error:
+            call.stop(error)
+            raise
+        else:
+            call.stop(None)
+    else:
+        mine: BaseException | None = None
+        try:
+            yield None
+        except (Exception, SystemExit, KeyboardInterrupt) as error:
+            mine = error
+        _serve(function, comm, mine)
+
+
+class _Call:
+    """The function as called on rank 0."""
+
+    def __init__(self, function: Callable[..., Any], comm: MPI.Comm) -> None:
+        self._function, self._comm = function, comm
+        self._open, self._process = True, os.getpid()
+        # Two threads of a tool must not communicate with the other ranks at once.
+        self._turn = threading.Lock()
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        """Call the function on all ranks; return what it returns on rank 0."""
+        if os.getpid() != self._process:
+            self._refuse()
+        with self._turn:
+            if not self._open:
+                raise InvalidInputError(
+                    "the function is served within its `with served(...)` block only, this one has ended: "
+                    "call it inside, or open another block on all ranks"
+                )
+            self._comm.bcast((_CALL, arguments, named), root=0)
+            return _called(self._function, self._comm, arguments, named, None)
+
+    def stop(self, error: Exception | None, leaving: BaseException | None = None) -> None:
+        """Release the other ranks."""
+        with self._turn:
+            if not self._open:
+                return
+            self._open = False
+            self._comm.bcast((_STOP, type(leaving), leaving.args) if leaving else (_STOP, None, ()), root=0)
+            if leaving is None:
+                agree(self._comm, error)
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be sent to another process."""
+        self._refuse()
+
+    def _refuse(self) -> NoReturn:
+        raise InvalidInputError(
+            "a served function belongs to the process of rank 0, it was called or sent from there to "
+            "another: let the outer tool run its evaluations one after the other (one worker, no process "
+            "pool); MPI ranks share each of them"
+        )
+
+
+def _called(
+    function: Callable[..., Any],
+    comm: MPI.Comm,
+    arguments: tuple[Any, ...],
+    named: dict[str, Any],
+    earlier: Exception | None,
+) -> Any:
+    """Call the function on this rank; all ranks raise if one does. Collective."""
+    agree(comm, earlier)  # a rank that cannot serve reports it before any other waits for it
+    with collective(comm, "the served function", closed=True):
+        return function(*arguments, **named)
+
+
+def _serve(function: Callable[..., Any], comm: MPI.Comm, left: BaseException | None) -> None:
+    """Join in until rank 0 stops; a rank whose block ended in an error only reports it. Collective."""
+    mine = left if left is None or isinstance(left, Exception) else RemoteError(f"the program left: {left!r}")
+    while True:
+        request = comm.bcast(None, root=0)
+        if request[0] == _STOP:
+            break
+        try:
+            _called(function, comm, request[1], request[2], mine)
+        except BaseException:  # it is raised on rank 0, which decides whether to continue
+            continue
+    _, kind, arguments = request
+    if kind is not None:
+        raise kind(*arguments)
+    try:
+        agree(comm, mine)
+    except RemoteError as error:
+        if left is None or error is not mine:
+            raise
+        raise left from None

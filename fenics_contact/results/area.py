@@ -1,0 +1,131 @@
+"""The area in which surfaces touch."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact._scene.pairs import Surface
+from fenics_contact._scene.parts import surface_of
+from fenics_contact._surfaces.facets import filled_at_corners
+from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.results.state import State
+
+#: Newton steps to the root of a cubic, from above: sufficient in practice for any ratio of its coefficients.
+NEWTON_STEPS = 60
+
+
+def contact_area(state: State, pair: int = 0) -> float:
+    """Return the area in which the surfaces of a pair touch, in the plane the length, [length²] or [length].
+
+    It is measured on the slave, on the deformed one where its material is made for large deformations.
+    Its rim runs between closed and open nodes and is located by pressure and gap: at a distance d inside the
+    rim of a smooth contact the pressure is K √d, at a distance d outside the gap is 4/3 K d^(3/2) / E* with
+    the same K. The sum of closed nodes' areas would jump from node to node, by a quarter where only a few are
+    closed. Where a modulus varies within a material, or metal may yield, the rim is placed half way between
+    the nodes. Collective.
+
+    Args:
+        state: The state.
+        pair: Number of the contact pair in the scene.
+
+    References:
+        Johnson, K. L.: Contact Mechanics. Cambridge University Press (1985), sections 3.2 and 5.1.
+    """
+    scene, contact = state.scene, state.contact
+    mine = contact.on_pair(pair)
+    points, slave = contact.points, scene.contacts[pair].slave
+    surface = surface_of(scene, slave, "faceted")
+    nodes = state.torn.decomposition.tearing.global_nodes(slave.body, surface.nodes)
+    place = np.searchsorted(nodes, points.slave[mine])
+    # Nodes without a contact point are open without a gap: contact beside them reaches up to them.
+    pressure, spread = np.zeros(len(nodes)), np.zeros(len(nodes))
+    pressure[place] = contact.pressure[mine] * (contact.status[mine] > 0)
+    spread[place] = _modulus(state, pair) * np.maximum(contact.gap[mine], 0.0)
+    whole = np.searchsorted(surface.nodes, scene.bodies[slave.body].mesh.surfaces[slave.name])
+    pressure, spread = filled_at_corners(whole, pressure), np.maximum(filled_at_corners(whole, spread), 0.0)
+    closed = pressure > 0.0
+    total, places = 0.0, surface.points
+    if scene.bodies[slave.body].deforms_much:
+        places = places + state.gather_displacement(slave.body)[surface.nodes]
+    for corners, weight in _simplices(surface.corners):
+        facets = surface.facets[:, corners]
+        edges = places[facets[:, 1:]] - places[facets[:, :1]]
+        gram = np.linalg.det(edges @ np.swapaxes(edges, 1, 2))
+        size = np.sqrt(np.maximum(gram, 0.0)) / (len(corners) - 1)
+        total += weight * float(size @ _closed_share(places, facets, closed, pressure, spread))
+    return total
+
+
+def _modulus(state: State, pair: int) -> float:
+    """Return the contact modulus E* of a pair, 1/E* = Σ M / (M² − λ²) over the bodies; NaN if unknown.
+
+    M and λ are the means of the moduli C_iiii and C_iijj; for isotropic bodies λ is Lamé's.
+    """
+    from fenics_contact._accuracy.discretisation import moduli  # not before an area is asked for
+
+    scene, forms = state.scene, state.torn.decomposition.forms
+    compliance = 0.0
+    for surface in (scene.contacts[pair].slave, scene.contacts[pair].master):
+        if isinstance(surface, Surface):
+            body = scene.bodies[surface.body]
+            remembers = isinstance(body.materials[0], HistoryMaterial)
+            if remembers or forms.varies(body.materials[0], body.mesh.cell_type):
+                return float("nan")
+            dim = scene.dim
+            own = moduli(forms, body.materials[0], body.mesh.cell_type)[:: dim + 1, :: dim + 1]
+            along = np.trace(own) / dim
+            across = (own.sum() - np.trace(own)) / (dim * (dim - 1))
+            compliance += along / (along**2 - across**2)
+    return float(1.0 / compliance)
+
+
+def _simplices(corners: int) -> list[tuple[list[int], float]]:
+    """Return the triangles that represent a facet, with their weights; quadrilaterals are cut both ways."""
+    if corners < 4:
+        return [(list(range(corners)), 1.0)]
+    return [([k, (k + 1) % 4, (k + 2) % 4], 0.5) for k in range(4)]
+
+
+def _closed_share(
+    points: np.ndarray, facets: np.ndarray, closed: np.ndarray, pressure: np.ndarray, spread: np.ndarray
+) -> np.ndarray:
+    """Return the share of simplices that touches, shape (n,).
+
+    The rim cuts off one corner: a triangle whose sides are the parts of the edges that meet there.
+    """
+    inside = closed[facets]
+    count = inside.sum(axis=1)
+    share = (count == facets.shape[1]).astype(float)
+    cut = np.flatnonzero((count > 0) & (count < facets.shape[1]))
+    single = np.where(count == 1, 1, 0)[cut, None] == inside[cut]  # the corner that differs from the others
+    alone = np.argmax(single, axis=1)
+    product = np.ones(len(cut))
+    for step in range(1, facets.shape[1]):
+        corner = facets[cut, alone]
+        other = facets[cut, (alone + step) % facets.shape[1]]
+        here = closed[corner]
+        inner, outer = np.where(here, corner, other), np.where(here, other, corner)
+        length = np.linalg.norm(points[inner] - points[outer], axis=1)
+        reach = _reach(pressure[inner], spread[outer], length)
+        product *= np.where(here, reach, 1.0 - reach)
+    share[cut] = np.where(closed[facets[cut, alone]], product, 1.0 - product)
+    return share
+
+
+def _reach(pressure: np.ndarray, spread: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Return how far contact reaches from a closed towards an open node, relative to their distance.
+
+    p = K √d and E* g = 4/3 K (L − d)^(3/2); with y = K^(−2/3): p² y³ + (3/4 E* g)^(2/3) y = L.
+
+    Args:
+        pressure: p of the closed node, shape (n,), [force / length²].
+        spread: E* g of the open node, shape (n,), [force / length].
+        length: Distance L of the nodes, shape (n,), [length].
+    """
+    if np.isnan(spread).any():
+        return np.full(len(length), 0.5)
+    slope = (0.75 * spread) ** (2.0 / 3.0)
+    root = np.cbrt(length / pressure**2)  # convex and increasing: Newton's method descends to the root
+    for _ in range(NEWTON_STEPS):
+        root -= (pressure**2 * root**3 + slope * root - length) / (3.0 * pressure**2 * root**2 + slope)
+    return np.asarray(np.clip(pressure**2 * root**3 / length, 0.0, 1.0))

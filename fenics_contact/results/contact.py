@@ -1,0 +1,178 @@
+"""The result on the contact surfaces of a solved scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+from fenics_contact._base.display import displayed
+from fenics_contact._pairing.points import ContactPoints
+from fenics_contact.qp.solution import Residuals
+
+
+class Status(IntEnum):
+    """Status of a contact point."""
+
+    #: Open: no contact and no force.
+    OPEN = 0
+    #: Closed, and held by friction: ‖τ‖ ≤ Ψ without slip.
+    STICK = 1
+    #: Closed and slipping: ‖τ‖ = Ψ against the slip, or there is no friction.
+    SLIP = 2
+
+
+@dataclass(frozen=True, eq=False)
+class RowValues:
+    """What the law of each row of B depends on at a state, owned by rows.
+
+    Attributes:
+        multiplier: λ, shape (n_owned,), [force].
+        residual: c − B u, shape (n_owned,), [length]: gaps, minus the slip, and openings of glued rows.
+        slip_bound: Ψ, shape (n_friction,), [force].
+        step: ρ of the natural map, zero on equality rows, shape (n_owned,), [force / length].
+        opening: By how much the loads alone, or the next increment, open the rows, (n_owned,), [length].
+        between_supports: Marks of the rows that supports alone determine, shape (n_owned,).
+        residuals: Sizes of all residuals.
+    """
+
+    multiplier: np.ndarray
+    residual: np.ndarray
+    slip_bound: np.ndarray
+    step: np.ndarray
+    opening: np.ndarray
+    between_supports: np.ndarray
+    residuals: Residuals
+
+
+@displayed
+@dataclass(frozen=True)
+class ContactResult:
+    """Forces, distances and status of every contact point, replicated on all ranks.
+
+    Attributes:
+        points: Positions and frames of the contact points.
+        normal_force: λ_N ≥ 0, zero at open points, shape (n,), [force]. What a solver that ends at its
+            tolerance leaves beside that is in balance, reactions and resultants alone.
+        friction_force: τ in the points' tangents, zero without friction, shape (n, dim - 1), [force]. It
+            acts on the master; the slave feels the opposite.
+        slip_bound: Largest friction force, shape (n,), [force].
+        gap: Gap after deformation, shape (n,), [length].
+        slip: Relative tangential displacement in the points' tangents since the last load step, also of
+            frictionless and open points, shape (n, dim - 1), [length].
+        slip_before: The same of all load steps before, shape (n, dim - 1), [length].
+        status: `Status` of each point, shape (n,). A closed point without friction slips.
+        area: Area that belongs to each point, of mortar contact the part of it that faces the master (no less
+            than a half of it with large deformations): where the slave's material is made for these that of
+            the deformed slave, else ``nominal_area``, shape (n,), [length²] or in the plane [length].
+        nominal_area: The same of the undeformed slave, shape (n,).
+    """
+
+    points: ContactPoints
+    normal_force: np.ndarray
+    friction_force: np.ndarray
+    slip_bound: np.ndarray
+    gap: np.ndarray
+    slip: np.ndarray
+    slip_before: np.ndarray
+    status: np.ndarray
+    area: np.ndarray
+    nominal_area: np.ndarray
+
+    def _facts(self) -> dict[str, Any]:
+        normal = self.normal_force
+        return {
+            "points": f"{self.points.count}: {self.counts_in_words}",
+            "normal force": f"up to {normal.max(initial=0.0):.6g}, sum {normal.sum():.6g}",
+            "friction force": f"up to {_longest(self.friction_force):.6g}",
+            "pressure": f"up to {self.pressure.max(initial=0.0):.6g}",
+            "gap": self.gap,
+            "slip": f"up to {_longest(self.slip):.3g}",
+        }
+
+    @property
+    def counts_in_words(self) -> str:
+        """Numbers of points by status: "4 open, 12 stick, 3 slip"."""
+        return ", ".join(f"{self.count(status)} {status.name.lower()}" for status in Status)
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """True pressure, normal force over `area`, shape (n,), [force / length²].
+
+        It is what the Cauchy stress beside it presses with. Where bodies deform little it is the nominal one.
+        """
+        return self.normal_force / self.area
+
+    @property
+    def nominal_pressure(self) -> np.ndarray:
+        """Normal force over `nominal_area`, of the undeformed slave, shape (n,), [force / length²]."""
+        return self.normal_force / self.nominal_area
+
+    @property
+    def traction(self) -> np.ndarray:
+        """True friction force over `area`, in the points' tangents, shape (n, dim - 1), [force / length²]."""
+        return np.asarray(self.friction_force / self.area[:, None])
+
+    @property
+    def nominal_traction(self) -> np.ndarray:
+        """Friction force over `nominal_area`, as `traction`, shape (n, dim - 1), [force / length²]."""
+        return np.asarray(self.friction_force / self.nominal_area[:, None])
+
+    @property
+    def force(self) -> np.ndarray:
+        """Force on the slave at each point in space, n λ_N − t τ, shape (n, dim), [force]."""
+        normal = self.points.normal
+        return self.normal_force[:, None] * normal - self._in_space(self.friction_force)
+
+    @property
+    def slip_in_space(self) -> np.ndarray:
+        """Slip of the last load step as vectors in space, shape (n, dim), [length]."""
+        return self._in_space(self.slip)
+
+    def _in_space(self, tangential: np.ndarray) -> np.ndarray:
+        """Return tangential components as vectors in space."""
+        return np.asarray(np.einsum("na,nad->nd", tangential, self.points.tangents))
+
+    @property
+    def total_slip(self) -> np.ndarray:
+        """Relative tangential displacement since the undeformed state, shape (n, dim - 1), [length]."""
+        return self.slip_before + self.slip
+
+    def travel(self, direction: np.ndarray, pair: int = 0) -> float:
+        """Return how far the unloaded slave may move until the pair touches, [length].
+
+        Args:
+            direction: Unit vector along which it moves as a rigid body, shape (dim,).
+            pair: Number of the contact pair in the scene.
+
+        Returns:
+            The smallest distance over all points that the motion brings closer, negative where bodies
+            overlap; infinite if it brings none closer.
+        """
+        mine = self.on_pair(pair)
+        closing = -self.points.normal[mine] @ np.asarray(direction, dtype=np.float64)
+        ahead = closing > 0.0
+        return float(np.min(self.points.gap[mine][ahead] / closing[ahead], initial=np.inf))
+
+    def count(self, status: Status) -> int:
+        """Return how many points have a status."""
+        return int(np.count_nonzero(self.status == status))
+
+    def on_pair(self, pair: int) -> np.ndarray:
+        """Return the numbers of the points of one contact pair."""
+        return np.flatnonzero(self.points.pair == pair)
+
+
+def _longest(vectors: np.ndarray) -> float:
+    return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
+
+
+def no_contact(points: ContactPoints) -> ContactResult:
+    """Return the result of a scene without contact points."""
+    nothing, vectors = np.zeros(0), np.zeros((0, points.normal.shape[1] - 1))
+    return ContactResult(
+        points, nothing, vectors, nothing, nothing, vectors, vectors, np.zeros(0, dtype=np.int64), nothing,
+        nothing,
+    )  # fmt: skip

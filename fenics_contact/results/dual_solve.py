@@ -1,0 +1,86 @@
+"""Solve the dual system of a scene with its friction, and evaluate the result on its contact surfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.feti.dual import DualSystem
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.qp.face_newton import SlidingError
+from fenics_contact.qp.fixed_point import FixedPoint
+from fenics_contact.qp.smalse import Smalse
+from fenics_contact.qp.solution import DualSolution, contact_step
+from fenics_contact.qp.solve import DualSolver, solve
+from fenics_contact.results.contact import ContactResult, RowValues, Status
+from fenics_contact.results.rigid_motions import motion_in_words, rigid_motions
+
+
+def solve_dual(
+    system: DualSystem, solver: DualSolver, start: DualSolution | np.ndarray | None = None
+) -> DualSolution:
+    """Solve the dual problem of a system with the friction laws of its scene. Collective.
+
+    Args:
+        system: The system.
+        solver: `FaceNewton` and `FixedPoint` handle Coulomb's law; `Smalse` is wrapped in a `FixedPoint`.
+        start: Earlier solution, or multiplier to start from, owned, or None.
+
+    Raises:
+        SlidingError: The load is more than friction bears; names the bodies and how they move.
+        InfeasibleError: Otherwise no equilibrium exists.
+        ConvergenceError: The tolerance was not met.
+    """
+    tresca, coefficient = system.torn.friction
+    if coefficient is not None and isinstance(solver, Smalse):
+        solver = FixedPoint(solver)
+    try:
+        return solve(system.problem, tresca, solver, start, friction_coefficient=coefficient)
+    except SlidingError as error:
+        (motion,) = rigid_motions(system.torn, (system.kernel @ error.motion)[:, None])
+        rounded = {name: np.round(own, 3) + 0.0 for name, own in motion.bodies.items()}
+        words = ", ".join(f"{name!r} by {motion_in_words(own)}" for name, own in rounded.items() if own.any())
+        raise error.named(f"the load makes slide {words}") from error.__cause__
+
+
+def row_values(system: DualSystem, solution: DualSolution) -> RowValues:
+    """Return what the laws of rows depend on at a solution."""
+    problem = system.problem
+    return RowValues(
+        solution.multiplier, solution.residual, solution.slip_bound,
+        contact_step(problem.layout, problem.diagonal), problem.rhs, problem.between_supports,
+        solution.residuals,
+    )  # fmt: skip
+
+
+def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray) -> ContactResult:
+    """Gather forces, gaps and status of all contact points on every rank. Collective."""
+    rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])
+    gathered = [torn.numbering.gather(x, rows) for x in (values.multiplier, values.residual, values.step)]
+    count, frictional = torn.points.count, torn.frictional
+    normal, gap, normal_step = (x[:count] for x in gathered)
+    tau, minus_slip, tangential_step = (x[count:].reshape(-1, torn.dim - 1) for x in gathered)
+    trial_normal = normal - normal_step * gap
+    trial_tangential = tau - tangential_step * minus_slip
+    bound = torn.tresca_bound + torn.friction_coefficient * np.maximum(normal[frictional], 0)
+    status = np.where(trial_normal > 0, Status.SLIP, Status.OPEN).astype(int)
+    sticks = (np.linalg.norm(trial_tangential, axis=1) < bound) & (trial_normal[frictional] > 0)
+    status[frictional[sticks]] = Status.STICK
+
+    def spread(values: np.ndarray, others: float | np.ndarray = 0.0) -> np.ndarray:
+        full = np.empty((count, *values.shape[1:]))
+        full[frictional], full[torn.frictionless] = values, others
+        return full
+
+    origin = torn.numbering.gather(torn.right + torn.supported, torn.tangential_rows.ravel())
+    return ContactResult(
+        torn.points,
+        np.where(trial_normal > 0, np.maximum(normal, 0.0), 0.0),
+        spread(tau),
+        spread(bound),
+        gap,
+        spread(-minus_slip, torn.sliding(displacement) - torn.slid),
+        spread(origin.reshape(-1, torn.dim - 1), torn.slid),
+        status,
+        torn.points.area,
+        torn.points.area,
+    )

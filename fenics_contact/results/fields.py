@@ -1,0 +1,548 @@
+"""Fields of a state on the bodies' own meshes as dolfinx Functions, and back in the order of the bodies.
+
+Stress in the cells of a body: means of the tensor, of its von Mises equivalent, and principal stresses.
+
+The fields of a state as plain arrays in the order of the bodies' meshes, the same on all ranks.
+
+Stresses of materials with a history, which displacements alone do not tell.
+
+Stress at the nodes, averaged around each node within one material.
+
+The displacement gradient is recovered at each node from the displacements of the nodes around it (see
+`accuracy.recovery`), which is more accurate than the means of the cells, above all on surfaces. Where
+materials meet a node has a stress for each of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+import ufl
+from ufl.core.expr import Expr
+
+from fenics_contact import _dolfinx
+from fenics_contact._accuracy.recovery import Sites, find_sites, recovered_gradients
+from fenics_contact._base.display import displayed
+from fenics_contact._base.libraries import MPI
+from fenics_contact._fem.composition import Composition, integrate
+from fenics_contact._fem.forms import Temperature, stress_in_space, temperature_of
+from fenics_contact._fem.mechanics import Response
+from fenics_contact._fem.templates import (
+    Constants,
+    Template,
+    Written,
+    quadrature_degree,
+    scalar_constants,
+    volume_measure,
+)
+from fenics_contact._pairing.points import NodeNumbers
+from fenics_contact._scene.body import Body
+from fenics_contact._scene.scene import Scene
+from fenics_contact._surfaces.facets import filled_at_corners
+from fenics_contact.errors import together
+from fenics_contact.feti.decomposition import Decomposition
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.materials.elastic import Material
+from fenics_contact.materials.hyperelastic import is_nonlinear
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature
+from fenics_contact.mesh.quality import jacobians
+from fenics_contact.results.contact import ContactResult
+
+
+def body_mesh(decomposition: Decomposition, name: str, body: Body) -> _dolfinx.mesh.Mesh:
+    """Build the mesh of one body; a cell lives on the rank that owns its subdomain. Collective."""
+    tearing, mesh = decomposition.tearing, body.mesh
+    first = tearing.subdomain_offset[tearing.body_names.index(name)]
+    rank = tearing.subdomain_rank[first + decomposition.partitions[name]]
+    return _dolfinx.rank_mesh(decomposition.comm, mesh.points, mesh.cells, rank, mesh.cell_type)
+
+
+def displacement_function(mesh: _dolfinx.mesh.Mesh, values: np.ndarray) -> _dolfinx.fem.Function:
+    """Return the displacement as a Function on a body's mesh. Collective.
+
+    Args:
+        mesh: The body's mesh.
+        values: Displacement of the body's nodes, valid at least on those of this rank, shape (n_nodes, dim).
+    """
+    function = _dolfinx.coefficient(mesh, "displacement")
+    nodes, dofs = _dolfinx.node_dofs(function.function_space)
+    function.x.array.reshape(-1, values.shape[1])[dofs] = values[nodes]
+    function.x.scatter_forward()
+    return function
+
+
+def nodal_function(mesh: _dolfinx.mesh.Mesh, name: str, values: np.ndarray) -> _dolfinx.fem.Function:
+    """Return a scalar field on a body's mesh from its nodal values. Collective.
+
+    Args:
+        mesh: The body's mesh.
+        name: Name of the Function.
+        values: Nodal values of the body, on every rank, shape (at least n_nodes,).
+    """
+    function = _dolfinx.fem.Function(_dolfinx.scalar_space(mesh, 1), name=name)
+    nodes, dofs = _dolfinx.node_dofs(function.function_space)
+    function.x.array[dofs] = values[nodes]
+    function.x.scatter_forward()
+    return function
+
+
+def cells_of_body(mesh: _dolfinx.mesh.Mesh, cells: np.ndarray) -> np.ndarray:
+    """Return the number in the body of each cell owned by this rank, shape (n_owned,).
+
+    Args:
+        mesh: The body's mesh in dolfinx.
+        cells: Node numbers of all cells of the body, shape (n_cells, nodes of a cell).
+    """
+    owned = mesh.topology.index_map(mesh.topology.dim).size_local
+    mine = _dolfinx.cell_nodes(mesh).reshape(-1, cells.shape[1])[:owned]
+    # dolfinx reorders cells: they are identified by their nodes.
+    _, key = np.unique(np.sort(np.vstack([cells, mine]), axis=1), axis=0, return_inverse=True)
+    key = key.ravel()
+    place = np.empty(len(cells) + len(mine), dtype=np.int64)
+    place[key[: len(cells)]] = np.arange(len(cells))
+    return place[key[len(cells) :]]
+
+
+def cell_values(function: _dolfinx.fem.Function, cells: np.ndarray) -> np.ndarray:
+    """Gather a cellwise constant Function in the order of a body's cells. Collective on its mesh.
+
+    Args:
+        function: Function on the body's own mesh: numbers, vectors or tensors.
+        cells: Node numbers of all cells of the body, (n_cells, n_vertices).
+
+    Returns:
+        One value for every cell, (n_cells, ...), replicated.
+    """
+    space, shape = function.function_space, function.ufl_shape
+    number = cells_of_body(space.mesh, cells)
+    values = np.zeros((len(cells), *shape))
+    own = _dolfinx.cell_dofs(space).ravel()[: len(number)]
+    values[number] = function.x.array.reshape(-1, *shape)[own]
+    return np.asarray(space.mesh.comm.allreduce(values))
+
+
+#: The six components of a stress in VTK's order: xx, yy, zz, xy, yz, xz.
+COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+#: Their names, as files and menus call them.
+STRESS_COMPONENTS = tuple("xyz"[i] + "xyz"[j] for i, j in COMPONENTS)
+
+#: Builds a number (UFL) from a stress, shape (3, 3), and constants.
+OfStress = Callable[[Expr, Constants], Expr]
+
+
+class CellMeans:
+    """Means of a function of the stress over the cells of one body.
+
+    The stress is that in space, for plane bodies with the component normal to the plane. Thermal stress is
+    subtracted.
+    """
+
+    def __init__(
+        self,
+        mesh: _dolfinx.mesh.Mesh,
+        body: Body,
+        comm: MPI.Comm,
+        temperature: Temperature,
+        quantity: tuple[OfStress, int],
+    ) -> None:
+        """Compile the forms. Collective on ``comm``.
+
+        Args:
+            mesh: The body's mesh, see `body_mesh`.
+            body: The body with its materials.
+            comm: Communicator of the state.
+            temperature: Temperature change of the body.
+            quantity: The function of the stress, and how many constants it takes.
+        """
+        cell_type = body.mesh.cell_type
+        self._parts = _composition(mesh, body)
+        q = ufl.TestFunction(_dolfinx.cellwise_space(cell_type))
+        with together(comm):
+            form, constants, coefficients = _weighted(
+                self._parts.materials, cell_type, q, temperature, quantity
+            )
+            self._fields = temperature.fields(mesh, body.mesh.points)
+        self._form = Template(mesh.comm, form, constants, coefficients)
+        self._numbers = temperature.numbers
+        self._space = _dolfinx.scalar_space(mesh, 0)
+        volume = Template(mesh.comm, q * volume_measure(cell_type, 2), ())
+        self._volume = _dolfinx.assemble_vector(volume.bind([self._space], ()))
+
+    def of(self, displacement: _dolfinx.fem.Function, values: tuple[float, ...] = ()) -> np.ndarray:
+        """Return the means on this rank's cells, shape (n_owned,). Collective.
+
+        Args:
+            displacement: The displacement of the body.
+            values: Values of the constants of the quantity.
+        """
+        numbers = (*values, *self._numbers, *self._parts.parameters)
+        functions = [displacement, *self._fields]
+        bound = self._form.bind([self._space], numbers, functions, cells=self._parts.cells)
+        means = _dolfinx.assemble_vector(bound) / self._volume
+        return np.asarray(means[_dolfinx.cell_dofs(self._space).ravel()[: len(means)]])
+
+
+class CellStress(CellMeans):
+    """Means of the stress over the cells of one body."""
+
+    def __init__(
+        self, mesh: _dolfinx.mesh.Mesh, body: Body, comm: MPI.Comm, temperature: Temperature
+    ) -> None:
+        """Compile the forms. Collective on ``comm``."""
+        super().__init__(mesh, body, comm, temperature, (_weighted_sum, len(COMPONENTS)))
+
+    def components(self, displacement: _dolfinx.fem.Function) -> np.ndarray:
+        """Return the `COMPONENTS` of the stress on this rank's cells, shape (n_owned, 6). Collective."""
+        chosen = np.eye(len(COMPONENTS))
+        return np.stack([self.of(displacement, tuple(row)) for row in chosen], axis=1)
+
+
+def von_mises(
+    displacement: _dolfinx.fem.Function, body: Body, comm: MPI.Comm, temperature: Temperature = Temperature()
+) -> _dolfinx.fem.Function:
+    """Return the von Mises stress averaged over each cell, [force / length²], a piecewise constant Function.
+
+    Collective on ``comm``.
+
+    Args:
+        displacement: The displacement Function of the body.
+        body: The body with its materials.
+        comm: Communicator of the state.
+        temperature: Temperature change of the body.
+    """
+    mesh = displacement.function_space.mesh
+    means = CellMeans(mesh, body, comm, temperature, (_equivalent, 0))
+    return _dolfinx.cell_field(mesh, "von_mises", means.of(displacement))
+
+
+def stress(
+    displacement: _dolfinx.fem.Function, body: Body, comm: MPI.Comm, temperature: Temperature
+) -> _dolfinx.fem.Function:
+    """Return the mean stress of each cell, a piecewise constant Function of shape (3, 3). Collective."""
+    mesh = displacement.function_space.mesh
+    components = CellStress(mesh, body, comm, temperature).components(displacement)
+    return _dolfinx.cell_field(mesh, "stress", tensors(components))
+
+
+def principal_stress(stress: _dolfinx.fem.Function, cells: np.ndarray) -> _dolfinx.fem.Function:
+    """Return the principal stresses σ₁ ≥ σ₂ ≥ σ₃ of a cellwise stress, a Function of shape (3,). Collective.
+
+    Args:
+        stress: The stress of a body.
+        cells: Node numbers of all cells of the body, shape (n_cells, nodes of a cell).
+    """
+    mesh = stress.function_space.mesh
+    own = _dolfinx.cell_dofs(stress.function_space).ravel()[: len(cells_of_body(mesh, cells))]
+    return _dolfinx.cell_field(mesh, "principal_stress", principal(stress.x.array.reshape(-1, 3, 3)[own]))
+
+
+def principal(tensor: np.ndarray) -> np.ndarray:
+    """Return the eigenvalues of symmetric tensors, shape (..., 3, 3), largest first, shape (..., 3)."""
+    return np.linalg.eigvalsh(tensor)[..., ::-1]
+
+
+def von_mises_of(tensor: np.ndarray) -> np.ndarray:
+    """Return the von Mises stress of symmetric tensors, shape (..., 3, 3)."""
+    deviator = tensor - np.trace(tensor, axis1=-2, axis2=-1)[..., None, None] / 3 * np.eye(3)
+    return np.asarray(np.sqrt(1.5 * (deviator**2).sum(axis=(-2, -1))))
+
+
+def tensors(components: np.ndarray) -> np.ndarray:
+    """Return symmetric tensors, shape (..., 3, 3), of their `COMPONENTS`, shape (..., 6)."""
+    full = np.empty((*components.shape[:-1], 3, 3))
+    for number, (i, j) in enumerate(COMPONENTS):
+        full[..., i, j] = full[..., j, i] = components[..., number]
+    return full
+
+
+def components_of(tensor: np.ndarray) -> np.ndarray:
+    """Return the `COMPONENTS` of symmetric tensors, shape (..., 6), of shape (..., 3, 3)."""
+    return np.stack([tensor[..., i, j] for i, j in COMPONENTS], axis=-1)
+
+
+def _equivalent(stress: Expr, _: Constants) -> Expr:
+    deviator = stress - ufl.tr(stress) / 3 * ufl.Identity(3)
+    return ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
+
+
+def _weighted_sum(stress: Expr, weights: Constants) -> Expr:
+    terms = [weight * stress[place] for weight, place in zip(weights, COMPONENTS, strict=True)]
+    return sum(terms[1:], terms[0])
+
+
+def _weighted(
+    materials: tuple[Material, ...],
+    cell_type: str,
+    q: Expr,
+    temperature: Temperature,
+    quantity: tuple[OfStress, int],
+) -> Written:
+    """Return ∫ of a quantity times q dx (a form), its constants and its coefficients."""
+    (u,) = _dolfinx.field_symbols(cell_type, 1)
+    change, numbers, fields = temperature.write(cell_type)
+    of_stress, count = quantity
+    weights = scalar_constants(cell_type, count)
+
+    def density(material: Material, constants: tuple[ufl.Constant, ...]) -> Expr:
+        return of_stress(stress_in_space(material, u, constants, change), weights) * q
+
+    form, constants = integrate(materials, cell_type, density, volume_measure(cell_type, 2))
+    return form, (*weights, *numbers, *constants), [u, *fields]
+
+
+def _composition(mesh: _dolfinx.mesh.Mesh, body: Body) -> Composition:
+    """Return all materials of a body's mesh on every rank, wherever their cells are."""
+    count = len(body.materials)
+    if count == 1:
+        return Composition(body.materials)
+    number = body.material_of_cells[cells_of_body(mesh, body.mesh.cells)]
+    return Composition(body.materials, {k + 1: np.flatnonzero(number == k) for k in range(count)})
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class GatheredFields:
+    """The fields of one body, replicated on all ranks.
+
+    Attributes:
+        points: Fields on nodes by their names: ``displacement``, (n_nodes, dim), [length], what
+            `contact_fields` returns, and ``nodal_stress``, ``nodal_principal_stress`` and
+            ``nodal_von_mises``, averaged around each node within one material, [force / length²]. Where
+            materials meet they are those of the material in which the von Mises stress is largest.
+        cells: Fields on cells: ``von_mises``, (n_cells,), ``stress``, the components xx, yy, zz, xy, yz, xz,
+            (n_cells, 6), and ``principal_stress``, the largest first, (n_cells, 3), all means over the cell,
+            [force / length²]; ``subdomain``, numbered over all bodies, (n_cells,) int.
+    """
+
+    points: dict[str, np.ndarray]
+    cells: dict[str, np.ndarray]
+
+
+def contact_fields(
+    contact: ContactResult, scene: Scene, numbers: NodeNumbers, body: str
+) -> dict[str, np.ndarray]:
+    """Return the contact result of a body's surfaces as fields on all its nodes.
+
+    Args:
+        contact: Result on all contact surfaces.
+        scene: The scene.
+        numbers: Numbers of the nodes of all bodies.
+        body: Name of the body.
+
+    Returns:
+        ``contact_status``, (n_nodes,) int: the value of `Status`, −1 on nodes that are not contact points;
+        and, zero on those, ``contact_pressure``, (n_nodes,), [force / length²], ``contact_force`` on the
+        slave and ``contact_slip``, (n_nodes, 3), [force] and [length]; where a body of the scene deforms much
+        ``contact_nominal_pressure``, too. At the corners of quadratic triangles pressures and slip are
+        interpolated, see `filled_at_corners`. A node that belongs to several pairs has
+        their sum, and the status of the last.
+    """
+    start, end = numbers.node_offset[numbers.body_names.index(body) :][:2]
+    count = int(end - start)
+    nodes = contact.points.slave - start
+    mine = np.flatnonzero((nodes >= 0) & (nodes < count))
+
+    def summed(values: np.ndarray, filled: bool = False) -> np.ndarray:
+        total = np.zeros((count, *values.shape[1:]))
+        for pair in np.unique(contact.points.pair[mine]):
+            field, own = np.zeros_like(total), mine[contact.points.pair[mine] == pair]
+            field[nodes[own]] = values[own]
+            facets = scene.bodies[body].mesh.surfaces[scene.contacts[pair].slave.name]
+            total += filled_at_corners(facets, field) if filled else field
+        return total
+
+    status = np.full(count, -1, dtype=np.int32)
+    status[nodes[mine]] = contact.status[mine]
+    pressures = {"contact_pressure": contact.pressure}
+    if scene.deforms_much:
+        pressures["contact_nominal_pressure"] = contact.nominal_pressure
+    return {
+        "contact_status": status,
+        **{name: np.maximum(summed(values, filled=True), 0.0) for name, values in pressures.items()},
+        "contact_force": summed(contact.force),
+        "contact_slip": summed(contact.slip_in_space, filled=True),
+    }
+
+
+def stress_fields(tensor: np.ndarray, prefix: str = "") -> dict[str, np.ndarray]:
+    """Return components, principal values and von Mises stress of tensors, shape (n, 3, 3), by name.
+
+    Von Mises stress of a mean is below the mean of von Mises stress.
+    """
+    return {
+        f"{prefix}von_mises": von_mises_of(tensor),
+        f"{prefix}stress": components_of(tensor),
+        f"{prefix}principal_stress": principal(tensor),
+    }
+
+
+def most_stressed(by_material: np.ndarray) -> np.ndarray:
+    """Return the stress of each node in the material with the largest von Mises stress there.
+
+    A mean over materials would be the stress of none of them.
+
+    Args:
+        by_material: Shape (n_materials, n_nodes, 3, 3), NaN where a node has no cell of a material.
+
+    Returns:
+        Shape (n_nodes, 3, 3).
+    """
+    size = von_mises_of(by_material)
+    chosen = np.where(np.isnan(size), -1.0, size).argmax(axis=0)
+    return np.asarray(by_material[chosen, np.arange(by_material.shape[1])])
+
+
+def in_space(values: np.ndarray) -> np.ndarray:
+    """Give points and vectors of plane bodies, (n, 2), a third component that is zero; leave others alone."""
+    plane = values.ndim == 2 and values.shape[1] == 2
+    return np.pad(values, ((0, 0), (0, 1))) if plane else values
+
+
+def put_history_stress(
+    field: _dolfinx.fem.Function,
+    torn: TornSystem,
+    name: str,
+    responses: tuple[Response, ...],
+    quantity: Callable[[np.ndarray], np.ndarray],
+) -> None:
+    """Overwrite a field on the cells of materials with a history, all of which this rank knows. Collective.
+
+    Args:
+        field: Function on the body's mesh, constant on cells, of other materials' stresses.
+        torn: The torn system.
+        name: The body.
+        responses: What each of this rank's subdomains answers.
+        quantity: What the field is the mean of, of stresses (..., 3, 3).
+    """
+    body, shape = torn.scene.bodies[name], field.ufl_shape
+    known = np.full((body.mesh.n_cells, *shape), np.nan)
+    for mesh, response in zip(torn.decomposition.meshes, responses, strict=True):
+        if mesh.body == name and response.stress is not None:
+            known[mesh.cells] = _means(body.mesh, mesh.cells, quantity(response.stress))
+    number = cells_of_body(field.function_space.mesh, body.mesh.cells)
+    mine = known[number].reshape(len(number), math.prod(shape))  # a rank may have no cells
+    here = ~np.isnan(mine[:, 0])
+    own = _dolfinx.cell_dofs(field.function_space).ravel()[: len(number)]
+    field.x.array.reshape(-1, mine.shape[1])[own[here]] = mine[here]
+    field.x.scatter_forward()
+
+
+def _means(mesh: BodyMesh, cells: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return means over cells of values at Gauss points, (n_cells, n_gauss, ...) to (n_cells, ...)."""
+    positions, weights = quadrature(CELL_TYPES[mesh.cell_type], quadrature_degree(mesh.cell_type))
+    weights = weights * jacobians(mesh.points, mesh.cells[cells], positions)
+    weights = weights / weights.sum(axis=1, keepdims=True)
+    return np.einsum("cq,cq...->c...", weights, values)
+
+
+def nodal_stress(
+    torn: TornSystem,
+    displacement: np.ndarray,
+    meshes: Mapping[str, _dolfinx.mesh.Mesh],
+    stresses: Mapping[str, _dolfinx.fem.Function],
+) -> dict[str, np.ndarray]:
+    """Return the stress of all bodies at their nodes, material by material. Collective.
+
+    Args:
+        torn: The torn system.
+        displacement: Displacement of all nodes, valid on those of this rank, shape (n_nodes, dim), [length].
+        meshes: The bodies' meshes by name, see `body_mesh`.
+        stresses: Mean stress of the cells of at least the bodies with nonlinear materials, by name.
+
+    Returns:
+        For each body, shape (n_materials, n_nodes, 3, 3), NaN where a node has no cell of the material,
+        replicated, [force / length²].
+    """
+    found = {}
+    for order in sorted({body.mesh.order for body in torn.scene.bodies.values()}):
+        sites = find_sites(torn, order)
+        gradients = recovered_gradients(sites, displacement[sites.node])
+        for name, body in torn.scene.bodies.items():
+            if body.mesh.order == order:
+                if any(map(is_nonlinear, body.materials)):
+                    own = _from_cells(torn, name, sites, stresses[name])
+                else:
+                    own = _at_sites(torn, name, sites, gradients, meshes[name])
+                found[name] = _gathered(torn, name, sites, own)
+    return found
+
+
+def _from_cells(torn: TornSystem, name: str, sites: Sites, stress: _dolfinx.fem.Function) -> np.ndarray:
+    """Return the components of the mean stress around the sites of a body, shape (n_sites, 6). Collective."""
+    space = stress.function_space
+    number = cells_of_body(space.mesh, torn.scene.bodies[name].mesh.cells)
+    own = _dolfinx.cell_dofs(space).ravel()[: len(number)]
+    return _around_sites(torn, name, sites, components_of(stress.x.array.reshape(-1, 3, 3)[own]), number)
+
+
+def _at_sites(
+    torn: TornSystem, name: str, sites: Sites, gradients: np.ndarray, mesh: _dolfinx.mesh.Mesh
+) -> np.ndarray:
+    """Return the components of the stress at the sites of a body, shape (n_sites, 6). Collective.
+
+    It is affine in the gradient. Its coefficients are the stresses of unit gradients, averaged over the cells
+    around a site; they are the same in all of them unless the material or the temperature varies.
+    """
+    body, dim = torn.scene.bodies[name], torn.dim
+    temperature = temperature_of(torn.scene.loads, name)
+    means = CellStress(mesh, body, torn.decomposition.comm, temperature)
+    number = cells_of_body(mesh, body.mesh.cells)
+    places = body.mesh.points - body.mesh.points.mean(axis=0)
+    # A rotation has no stress: the gradients (i, j) and (j, i) have the same.
+    pairs = [(i, j) for i in range(dim) for j in range(i, dim)]
+    units = np.zeros((1 + len(pairs), dim, dim))
+    units[np.arange(1, len(units)), [i for i, _ in pairs], [j for _, j in pairs]] = 1.0
+    on_cells = [means.components(displacement_function(mesh, places @ unit.T)) for unit in units]
+    around = _around_sites(torn, name, sites, np.hstack(on_cells), number)
+    at_rest, *strained = np.split(around, len(units), axis=1)
+    total = at_rest.copy()
+    for (i, j), stress in zip(pairs, strained, strict=True):
+        size = gradients[:, i, j] if i == j else gradients[:, i, j] + gradients[:, j, i]
+        total += size[:, None] * (stress - at_rest)
+    return total
+
+
+def _around_sites(
+    torn: TornSystem, name: str, sites: Sites, values: np.ndarray, number: np.ndarray
+) -> np.ndarray:
+    """Return the means of values on cells over the cells around each site, shape (n_sites, k). Collective.
+
+    Args:
+        torn: The torn system.
+        name: The body.
+        sites: The sites.
+        values: On this rank's cells of the body, shape (n_owned, k).
+        number: Number in the body of each of them, shape (n_owned,).
+    """
+    of_body = np.zeros((torn.scene.bodies[name].mesh.n_cells, values.shape[1] + 1))
+    of_body[number] = np.pad(values, ((0, 0), (0, 1)), constant_values=1.0)
+    total = np.zeros((sites.count, of_body.shape[1]))
+    for mesh in torn.decomposition.meshes:
+        if mesh.body == name:
+            places = sites.of_cells[mesh.number]
+            starts = np.arange(len(places) + 1) * places.shape[1]
+            shape = (len(places), sites.count)
+            around = sp.csr_matrix((np.ones(places.size), places.ravel(), starts), shape=shape).T
+            total += around @ of_body[mesh.cells]
+    total = sites.sharing.add_up(total)
+    return np.asarray(total[:, :-1] / np.maximum(total[:, -1:], 1.0))
+
+
+def _gathered(torn: TornSystem, name: str, sites: Sites, values: np.ndarray) -> np.ndarray:
+    """Return values at the sites of a body by material and node, on every rank. Collective."""
+    body, decomposition = torn.scene.bodies[name], torn.decomposition
+    total = np.zeros((len(body.materials), body.mesh.n_nodes, len(COMPONENTS) + 1))
+    for mesh in decomposition.meshes:
+        if mesh.body == name:
+            site, node = sites.of_cells[mesh.number], body.mesh.cells[mesh.cells]
+            material = np.broadcast_to(body.material_of_cells[mesh.cells][:, None], node.shape)
+            total[material, node, :-1] = values[site]
+            total[material, node, -1] = 1.0
+    total = decomposition.comm.allreduce(total)
+    count = total[..., -1:]
+    return tensors(np.where(count > 0, total[..., :-1] / np.maximum(count, 1.0), np.nan))

@@ -1,0 +1,517 @@
+"""The forces on the nodes of all bodies by what exerts them: loads, supports, contact, ties, beds.
+
+Force and moment of several forces about a point, as one value, and tables of them.
+
+The reactions of supports: what holds each of them, as force and moment.
+
+The balance of all forces on the bodies of a scene.
+
+What contacts and ties transmit: force and moment on the slave of each pair.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact._base.checks import GivenVector, unit_vector
+from fenics_contact._base.display import displayed
+from fenics_contact._base.libraries import MPI
+from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._pairing.points import ContactPoints, NodeNumbers
+from fenics_contact._scene.pairs import Surface
+from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.supports import RigidSurface
+from fenics_contact._surfaces.facets import share_areas, surface_moments
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.averages import nodal_sum
+from fenics_contact.feti.torn import TornSystem
+
+
+@dataclass(frozen=True, eq=False)
+class NodalForces:
+    """Forces on nodes; all replicated, [force].
+
+    The multipliers act on the torn bodies as f − Bᵀλ = K u. Summed over the copies of a node, gluing cancels,
+    and −Bᵀλ is the reaction, where a component is prescribed, less what contacts and ties exert there (their
+    rows of B leave prescribed components out).
+
+    Attributes:
+        places: Where the nodes of all bodies are for moments: undeformed, on bodies that deform much
+            deformed, shape (n_nodes, dim), [length].
+        load: f, shape (n_nodes, dim); thermal strain included, which has no resultant.
+        reaction: Of supports, zero on free components, shape (n_nodes, dim).
+        contact: On the slave at each contact point, shape (n_contact, dim).
+        tie: On the slave at each tied point, shape (n_ties, dim).
+        bed: What materials exert that resist rigid motions (elastic beds), shape (n_nodes, dim).
+    """
+
+    places: np.ndarray
+    load: np.ndarray
+    reaction: np.ndarray
+    contact: np.ndarray
+    tie: np.ndarray
+    bed: np.ndarray
+
+
+def nodal_forces(torn: TornSystem, multiplier: np.ndarray, displacement: np.ndarray) -> NodalForces:
+    """Return the forces on all nodes. Collective.
+
+    Args:
+        torn: The torn system.
+        multiplier: λ, owned, [force].
+        displacement: Torn displacement of this rank as the solver returned it, shape (torn_size,), [length].
+    """
+    decomposition = torn.decomposition
+    contact, tie = _contact_forces(torn, multiplier), _tie_forces(torn, multiplier)
+    joined = torn.points.jump.T @ contact + torn.ties.jump.T @ tie
+    connecting = -nodal_sum(decomposition, torn.force(multiplier))
+    return NodalForces(
+        torn.scene.points,
+        nodal_sum(decomposition, torn.load),
+        np.where(decomposition.fixed, connecting - joined, 0.0),
+        contact,
+        tie,
+        nodal_sum(decomposition, -_resisted(torn, displacement)),
+    )
+
+
+def _contact_forces(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:
+    """Return the forces on the slave nodes of contacts, shape (n_contact, dim), [force]. Collective.
+
+    They balance the others, also where a solver that ends at its tolerance leaves a pull.
+    """
+    points, frictional = torn.points, torn.frictional
+    rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])
+    normal, friction = np.split(torn.numbering.gather(multiplier, rows), [points.count])
+    force = normal[:, None] * points.normal
+    tangential = friction.reshape(-1, torn.dim - 1)
+    force[frictional] -= np.einsum("na,nad->nd", tangential, points.tangents[frictional])
+    return force
+
+
+def _tie_forces(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:
+    """Return the forces on the slave nodes of ties, shape (n_ties, dim), replicated, [force]. Collective."""
+    rows = torn.relations[0]
+    of_ties = torn.numbering.gather(multiplier, np.arange(torn.n_gluing, torn.n_equality))
+    # A row that supports determine is not in B.
+    acting = np.where(rows.held(torn.decomposition.fixed), 0.0, of_ties)
+    force = np.zeros((torn.ties.count, torn.dim))
+    np.add.at(force, rows.which, -acting[:, None] * rows.directions)
+    return force
+
+
+def by_node(points: ContactPoints, force: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Return the forces of chosen points on the nodes of slaves and masters, shape (n_nodes, dim).
+
+    Args:
+        points: Contact or tied points.
+        force: Force on the slave at each of all points, shape (n, dim), [force].
+        chosen: Numbers of the points.
+    """
+    return np.asarray(points.jump[chosen].T @ force[chosen])
+
+
+def _resisted(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:
+    """Return K u of the subdomains whose material resists a rigid motion, zero on others, (torn_size,)."""
+    motions = 3 * (torn.dim - 1)
+    parts = np.split(displacement, np.cumsum([part.mesh.size for part in torn.subdomains])[:-1])
+    return np.concatenate(
+        [
+            part.stiffness @ u if part.kernel.shape[1] < motions else np.zeros(part.mesh.size)
+            for part, u in zip(torn.subdomains, parts, strict=True)
+        ]
+    )
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Resultant:
+    """The resultant of forces that act on a body, in the undeformed geometry.
+
+    Attributes:
+        force: Sum of the forces, shape (dim,), [force].
+        moment: Sum of their moments about ``about``, shape (3,) in space; one number in the plane, positive
+            from x to y; [force·length]. Plane bodies have forces and moments a unit of thickness.
+        about: The point, shape (dim,), [length].
+        surface: The surface on which they act; None for a sum over surfaces.
+    """
+
+    force: np.ndarray
+    moment: np.ndarray | float
+    about: np.ndarray
+    surface: Surface | None = None
+
+    def moment_about(self, point: GivenVector | np.ndarray) -> np.ndarray | float:
+        """Return the moment about another point, shape (3,) or a number, [force·length].
+
+        Args:
+            point: The point, shape (dim,), [length].
+
+        Raises:
+            InvalidInputError: If it is no point of the bodies' space.
+        """
+        return self.moment + moment_of(self.force, self.about - point_of(point, len(self.force)))
+
+    def __add__(self, other: Resultant) -> Resultant:
+        """Return the sum with another one about the same point."""
+        return Resultant(self.force + other.force, self.moment + other.moment, self.about, self.surface)
+
+    def __sub__(self, other: Resultant) -> Resultant:
+        """Return the difference to another one about the same point."""
+        return Resultant(self.force - other.force, self.moment - other.moment, self.about, self.surface)
+
+    def torque(self, point: GivenVector | np.ndarray, direction: GivenVector) -> float:
+        """Return the moment about an axis in space, [force·length].
+
+        Args:
+            point: A point on the axis, shape (3,), [length].
+            direction: Direction of the axis, of any length, shape (3,); turning as a right-handed screw is
+                positive.
+
+        Raises:
+            InvalidInputError: If the bodies are plane, or point or direction are not three numbers.
+        """
+        if len(self.force) == 2:
+            raise InvalidInputError(
+                "an axis needs bodies in space, these are plane: their only axis is normal to the plane, "
+                "and moment_about(point) is the torque about it"
+            )
+        return float(np.dot(self.moment_about(point), unit_vector("the direction of an axis", direction, 3)))
+
+    def __str__(self) -> str:
+        """Return it in words."""
+        moment = _in_brackets(_row(self.moment))
+        return (
+            f"force {_in_brackets(self.force)} [force], moment {moment} [force·length] about "
+            f"{_in_brackets(self.about)}"
+        )
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Resultants:
+    """Resultants in the order of a list of the scene.
+
+    Attributes:
+        kind: What they are, such as "reaction".
+        entries: One for each entry of that list.
+    """
+
+    kind: str
+    entries: tuple[Resultant, ...]
+
+    def __len__(self) -> int:
+        """Return the number of entries."""
+        return len(self.entries)
+
+    def __getitem__(self, number: int) -> Resultant:
+        """Return the entry of a place in the list."""
+        return self.entries[number]
+
+    def __iter__(self) -> Iterator[Resultant]:
+        """Return the entries in their order."""
+        return iter(self.entries)
+
+    def __str__(self) -> str:
+        """Return a table with one line for each entry."""
+        names = [f"{each.surface.body}/{each.surface.name}" if each.surface else "" for each in self.entries]
+        return table([(f"{self.kind} {i}", name) for i, name in enumerate(names)], self.entries)
+
+
+def table(
+    names: list[tuple[str, ...]],
+    resultants: tuple[Resultant, ...],
+    scales: tuple[float, float] | None = None,
+) -> str:
+    """Return forces and moments of several resultants, one per line behind its names, with their units.
+
+    Args:
+        names: Names of each line.
+        resultants: The resultants, all in space or all in the plane.
+        scales: A force and a moment beside which what is only rounding is shown as zero; by default the
+            largest components.
+    """
+    if not resultants:
+        return "none"
+    columns = [
+        np.stack([each.force for each in resultants]),
+        np.stack([_row(each.moment) for each in resultants]),
+    ]
+    sizes = scales or tuple(float(np.abs(part).max()) for part in columns)
+    shown = [
+        np.where(np.abs(part) > ROUNDING * size, part, 0.0) for part, size in zip(columns, sizes, strict=True)
+    ]
+    cells = [
+        (*name, *(f"{value:.5g}" for value in row)) for name, row in zip(names, np.hstack(shown), strict=True)
+    ]
+    dim = len(resultants[0].force)
+    moments = ("Mx", "My", "Mz") if dim == 3 else ("M",)
+    head = (*[""] * len(names[0]), *("Fx", "Fy", "Fz")[:dim], *moments)
+    return "\n".join([*_aligned([head, *cells], len(names[0])), "F in [force], M in [force·length]"])
+
+
+def _aligned(rows: list[tuple[str, ...]], names: int) -> list[str]:
+    """Return rows of cells as lines, the first ``names`` columns to the left and the others to the right."""
+    width = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(
+            cell.ljust(size) if k < names else cell.rjust(size)
+            for k, (cell, size) in enumerate(zip(row, width, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
+
+
+def resultant(
+    forces: np.ndarray, places: np.ndarray, about: np.ndarray, surface: Surface | None = None
+) -> Resultant:
+    """Return force and moment of forces that act at places, both of shape (n, dim), about a point, (dim,)."""
+    moment = moment_of(forces, places - about)
+    total = float(moment.sum()) if forces.shape[1] == 2 else moment.sum(axis=0)
+    return Resultant(forces.sum(axis=0), total, about, surface)
+
+
+def moment_of(force: np.ndarray, arm: np.ndarray) -> np.ndarray:
+    """Return arm × force, shape (..., 3), in the plane the number x·Fy − y·Fx, shape (...,)."""
+    if force.shape[-1] == 2:
+        return np.asarray(arm[..., 0] * force[..., 1] - arm[..., 1] * force[..., 0])
+    return np.cross(arm, force)
+
+
+def point_of(given: GivenVector | np.ndarray, dim: int) -> np.ndarray:
+    """Return a point as an array, shape (dim,).
+
+    Raises:
+        InvalidInputError: If it does not have ``dim`` finite coordinates.
+    """
+    point = np.asarray(given, dtype=np.float64)
+    if point.shape != (dim,) or not np.isfinite(point).all():
+        raise InvalidInputError(
+            f"the point that moments refer to needs {dim} finite coordinates, got {given!r}: give a point in "
+            "the bodies' unit of length, or none for the default"
+        )
+    return point
+
+
+def _row(moment: np.ndarray | float) -> np.ndarray:
+    return np.atleast_1d(np.asarray(moment, dtype=np.float64))
+
+
+def _in_brackets(values: np.ndarray) -> str:
+    return f"({', '.join(f'{value:.5g}' for value in values)})"
+
+
+def support_reactions(
+    scene: Scene, forces: NodalForces, about: GivenVector | np.ndarray | None
+) -> Resultants:
+    """Return the reaction of every support, about a point or the centroid of its surface.
+
+    That of a rigid surface is less the load at its point, to which it refers by default.
+    """
+    shares = support_shares(scene, NodeNumbers.of(scene))
+    entries = []
+    for support, share in zip(scene.supports, shares, strict=True):
+        surface = Surface(support.body, support.surface)
+        own = np.array(support.at) if isinstance(support, RigidSurface) else centroid(scene, surface)
+        point = own if about is None else point_of(about, scene.dim)
+        total = resultant(share * forces.reaction, forces.places, point, surface)
+        entries.append(total - point_load(support, point) if isinstance(support, RigidSurface) else total)
+    return Resultants("reaction", tuple(entries))
+
+
+def point_load(support: RigidSurface, about: np.ndarray) -> Resultant:
+    """Return the load at the point of a rigid surface, about a point."""
+    force, moment = np.split(support.load, [support.dim])
+    load = Resultant(force, float(moment[0]) if support.dim == 2 else moment, np.array(support.at))
+    return Resultant(force, load.moment_about(about), about)
+
+
+def support_shares(scene: Scene, numbers: NodeNumbers) -> list[np.ndarray]:
+    """Return the part of each support in the reaction on every component of a node.
+
+    A component that several supports prescribe at a node is shared by the areas that belong to the node on
+    their surfaces: the forces of an even pressure on both. The parts sum to one.
+
+    Returns:
+        For each support the parts, shape (n_nodes, dim), zero where it holds nothing.
+    """
+    areas = []
+    for support in scene.supports:
+        mesh = scene.bodies[support.body].mesh
+        own = share_areas(mesh, support.surface)
+        area = np.zeros((numbers.n_nodes, scene.dim))
+        given = (0.0,) * scene.dim if isinstance(support, RigidSurface) else support.value
+        held = [component is not None for component in given]
+        area[numbers.global_nodes(support.body, np.arange(mesh.n_nodes))] = own[:, None] * held
+        areas.append(area)
+    total = sum(areas, np.zeros((numbers.n_nodes, scene.dim)))
+    return [area / np.where(total > 0.0, total, 1.0) for area in areas]
+
+
+def centroid(scene: Scene, surface: Surface) -> np.ndarray:
+    """Return the centroid of a surface, shape (dim,)."""
+    mesh = scene.bodies[surface.body].mesh
+    return surface_moments(mesh.points, mesh.surfaces[surface.name]).centroid
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """Forces and moments on all bodies together, about one point, and what is missing to equilibrium.
+
+    Moments on bodies of small strain are those of the undeformed geometry, as in their linear theory, on
+    bodies that deform much those of the deformed one. The imbalance is
+    governed by the equilibrium of the multipliers with the load (``State.solution.coarse_residual``), which
+    every step of a solver keeps to rounding; for one body without multipliers by the rounding of its
+    factorisation, which is larger in slender bodies. It says that no force was forgotten, not how accurate
+    the forces are. That is governed by the tolerance of the solver, and by the mesh.
+
+    Attributes:
+        loads: Of the loads.
+        reactions: Of all supports.
+        obstacles: Of rigid obstacles.
+        gaps: Of contacts and ties between bodies: both sides together have no force, but a moment where
+            friction, a tie or a mean over facets transmits forces across a gap between the meshes, or where
+            one body has moments about undeformed places and the other about deformed ones.
+        beds: Of materials that resist rigid motions, such as elastic beds; zero otherwise.
+        force_scale: Largest sum of the sizes of the nodal forces of one of these, [force]; where nothing acts
+            a force below which bodies count as free of forces.
+        moment_scale: Largest sum of the sizes of nodal forces times their distances from the point,
+            [force·length]; never zero by symmetry, as are the moments of forces that point at the point.
+    """
+
+    loads: Resultant
+    reactions: Resultant
+    obstacles: Resultant
+    gaps: Resultant
+    beds: Resultant
+    force_scale: float
+    moment_scale: float
+
+    @property
+    def parts(self) -> dict[str, Resultant]:
+        """All parts by name."""
+        return {name: getattr(self, name) for name in ("loads", "reactions", "obstacles", "gaps", "beds")}
+
+    @property
+    def total(self) -> Resultant:
+        """The sum of all parts, zero in equilibrium."""
+        forces, moments = zip(*((part.force, part.moment) for part in self.parts.values()), strict=True)
+        return Resultant(np.sum(forces, axis=0), np.sum(moments, axis=0), self.loads.about)
+
+    @property
+    def imbalance(self) -> float:
+        """The larger of the total force and moment, each relative to its scale, dimensionless."""
+        return self._relative(self.total)
+
+    def _relative(self, part: Resultant) -> float:
+        force, moment = np.linalg.norm(part.force), np.linalg.norm(np.atleast_1d(part.moment))
+        return float(max(force / (self.force_scale or 1.0), moment / (self.moment_scale or 1.0)))
+
+    def __str__(self) -> str:
+        """Return a table of all parts that are not zero, their total and the imbalance."""
+        shown = {name: part for name, part in self.parts.items() if self._relative(part) > ROUNDING}
+        shown["total"] = self.total
+        scales = self.force_scale, self.moment_scale
+        lines = table([(name,) for name in shown], tuple(shown.values()), scales)
+        return f"{lines}\nimbalance {self.imbalance:.1e}"
+
+
+def rounding_force(torn: TornSystem, displacement: np.ndarray) -> float:
+    """Return a force far above what rounding makes of a displacement, and far below one that strains by it.
+
+    Collective.
+
+    Args:
+        torn: The system, of linear materials.
+        displacement: u of this rank, torn, shape (torn_size,), [length].
+    """
+    comm = torn.decomposition.comm
+    stiff = max((float(part.stiffness.diagonal().max()) for part in torn.subdomains), default=0.0)
+    square, count = comm.allreduce(np.array([displacement @ displacement, displacement.size]))
+    return float(np.sqrt(ROUNDING * square / count) * comm.allreduce(stiff, op=MPI.MAX))
+
+
+def force_balance(
+    torn: TornSystem, forces: NodalForces, about: GivenVector | np.ndarray | None, least: float
+) -> Balance:
+    """Return the balance of all forces, about a point or the middle of the box around all bodies.
+
+    Args:
+        torn: The system.
+        forces: Forces of all nodes.
+        about: The point, or None.
+        least: A force below which bodies count as free of forces, [force].
+    """
+    point = _middle(forces.places) if about is None else point_of(about, torn.dim)
+    parts = _parts(torn, forces)
+    resultants = {name: resultant(force, forces.places, point) for name, force in parts.items()}
+    for support in torn.scene.supports:
+        if isinstance(support, RigidSurface):  # the load at its point comes in through its nodes
+            resultants["loads"] += point_load(support, point)
+            resultants["reactions"] -= point_load(support, point)
+    arms = forces.places - point
+    sizes = [np.linalg.norm(force, axis=1) for force in parts.values()]
+    reach = np.linalg.norm(arms, axis=1)
+    return Balance(
+        **resultants,
+        force_scale=float(max(least, *(size.sum() for size in sizes))),
+        moment_scale=float(max(least * reach.max(), *(size @ reach for size in sizes))),
+    )
+
+
+def _parts(torn: TornSystem, forces: NodalForces) -> dict[str, np.ndarray]:
+    """Return the nodal forces of each part, shape (n_nodes, dim)."""
+    between = np.array([isinstance(pair.master, Surface) for pair in torn.scene.contacts], dtype=bool)
+    meets_body = between[torn.points.pair]
+    tied = by_node(torn.ties, forces.tie, np.arange(torn.ties.count))
+    return {
+        "loads": forces.load,
+        "reactions": forces.reaction,
+        "obstacles": by_node(torn.points, forces.contact, np.flatnonzero(~meets_body)),
+        "gaps": by_node(torn.points, forces.contact, np.flatnonzero(meets_body)) + tied,
+        "beds": forces.bed,
+    }
+
+
+def _middle(places: np.ndarray) -> np.ndarray:
+    """Return the middle of the box around all bodies, shape (dim,)."""
+    return np.asarray(0.5 * (places.min(axis=0) + places.max(axis=0)))
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class PairResultants:
+    """Forces and moments on the slaves of all pairs.
+
+    Attributes:
+        contacts: One for each contact pair of the scene, in its order.
+        ties: One for each tie of the scene, in its order.
+    """
+
+    contacts: Resultants
+    ties: Resultants
+
+    def __str__(self) -> str:
+        """Return both tables, without that of an empty list."""
+        tables = [str(each) for each in (self.contacts, self.ties) if len(each)]
+        return "\n".join(tables) or "none"
+
+
+def pair_resultants(
+    torn: TornSystem, forces: NodalForces, about: GivenVector | np.ndarray | None
+) -> PairResultants:
+    """Return force and moment on the slave of every pair, about a point or the centroid of its surface."""
+    scene = torn.scene
+
+    def of_pair(points: ContactPoints, force: np.ndarray, number: int, slave: Surface) -> Resultant:
+        mine = np.flatnonzero(points.pair == number)
+        point = centroid(scene, slave) if about is None else point_of(about, scene.dim)
+        return resultant(force[mine], forces.places[points.slave[mine]], point, slave)
+
+    contacts = (of_pair(torn.points, forces.contact, k, pair.slave) for k, pair in enumerate(scene.contacts))
+    ties = (of_pair(torn.ties, forces.tie, k, tie.slave) for k, tie in enumerate(scene.ties))
+    return PairResultants(Resultants("contact", tuple(contacts)), Resultants("tie", tuple(ties)))

@@ -1,0 +1,130 @@
+"""The state of a scene with linear materials and small strains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from fenics_contact._base.display import displayed
+from fenics_contact._base.progress import Task
+from fenics_contact.errors import InvalidInputError, collectively
+from fenics_contact.feti.direct import DirectSolution, DirectSystem
+from fenics_contact.feti.dual import DualSystem
+from fenics_contact.qp.solution import DualSolution
+from fenics_contact.results.contact import RowValues
+from fenics_contact.results.dual_solve import row_values
+from fenics_contact.results.forces import rounding_force
+from fenics_contact.results.geometry_error import geometry_error
+from fenics_contact.results.rigid_motions import UnheldMotion, unheld_motions
+from fenics_contact.results.state import State, comm_of, errors_in_words
+
+if TYPE_CHECKING:
+    from fenics_contact._accuracy.state_errors import StateErrors
+
+
+@displayed
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LinearState(State):
+    """The equilibrium of linear materials and small strains.
+
+    Attributes:
+        system: The system that was solved: a dual one, or that of a single body that needs none.
+
+    Example:
+        >>> print(state.estimate_errors())  # doctest: +SKIP
+    """
+
+    solution: DualSolution | DirectSolution
+    system: DualSystem | DirectSystem
+
+    def _errors_in_words(self) -> dict[str, str]:
+        return errors_in_words(self.known_errors)
+
+    @property
+    def dual(self) -> DualSystem:
+        """The dual system.
+
+        Raises:
+            InvalidInputError: If the state was computed without one.
+        """
+        self._require_multipliers()
+        return cast(DualSystem, self.system)
+
+    @property
+    def dual_solution(self) -> DualSolution:
+        """The result of the dual solver; raises as `dual` does."""
+        self._require_multipliers()
+        return cast(DualSolution, self.solution)
+
+    def _require_multipliers(self) -> None:
+        if isinstance(self.system, DirectSystem):
+            raise InvalidInputError(
+                "this needs multipliers, but the state of one body that supports hold was solved directly: "
+                "solve with sensitivity=True"
+            )
+
+    @cached_property
+    def rows(self) -> RowValues:
+        """Multipliers, residuals and steps of the natural map by row; raises as `dual` does."""
+        return row_values(self.dual, self.dual_solution)
+
+    @collectively("LinearState.estimate_errors", comm_of)
+    def estimate_errors(self, *, geometry: bool = True) -> StateErrors:
+        """Bound or estimate the errors by solver, friction law, mesh and geometry, in energy norm.
+
+        Collective. Costs at most one product and recovery of the stress, which a balanced solve has done
+        already; the error by the geometry up to two solutions of the contact problem with the same factors,
+        unless surfaces are flat or their shapes known and used. Estimates are kept in `known_errors`.
+
+        Args:
+            geometry: Whether to estimate that, too; else it is NaN unless it is known.
+
+        Raises:
+            ConvergenceError: If the solver fails on the better geometry.
+        """
+        from fenics_contact._accuracy.discretisation import discretisation_error
+        from fenics_contact._accuracy.state_errors import solver_errors, state_errors
+
+        with Task("errors"):
+            errors = self.known_errors
+            if errors is None:
+                solver = solver_errors(self.system, self.solution)
+                estimate = discretisation_error(self.torn, self.conforming_displacement)
+                errors = state_errors(solver, estimate, self.energies.norm)
+            if geometry and np.isnan(errors.geometry):
+                better = geometry_error(self.system, self.solution)
+                errors = errors.with_geometry(better.energy, better.peak_pressure)
+        object.__setattr__(self, "known_errors", errors)
+        return errors
+
+    @cached_property
+    def unheld(self) -> tuple[UnheldMotion, ...]:
+        """Rigid motions that nothing resists and nothing loads; the bodies stay. Collective on first use."""
+        return unheld_motions(self.system) if isinstance(self.system, DualSystem) else ()
+
+    @cached_property
+    @collectively("LinearState.conforming_displacement", comm_of)
+    def conforming_displacement(self) -> np.ndarray:
+        """See `State.conforming_displacement`; without iteration. Collective on first use."""
+        return self.system.conforming(self.torn_displacement)
+
+    @cached_property
+    def _least_force(self) -> float:
+        return rounding_force(self.torn, self.torn_displacement)
+
+
+def as_linear(state: State, what: str) -> LinearState:
+    """Return a state as that of linear materials, which something needs.
+
+    Raises:
+        InvalidInputError: If it has others.
+    """
+    if isinstance(state, LinearState):
+        return state
+    raise InvalidInputError(
+        f"{what} need small strains and linear materials, this state has nonlinear materials: compare states "
+        "on two meshes instead"
+    )

@@ -1,0 +1,142 @@
+"""Rigid motions that nothing resists, in words: bodies that the load does not move stay where they are.
+
+How the points of rigid surfaces move.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._base.display import displayed
+from fenics_contact._scene.pairs import Surface
+from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.supports import RigidSurface
+from fenics_contact.feti.dual import DualSystem
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.materials.kernels import rigid_body_modes
+
+#: Parts of a motion below this fraction of the largest are rounding.
+MOTION_ROUNDING = 1e-9
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class UnheldMotion:
+    """A rigid motion, such as one that no support, tie or contact resists and no load drives.
+
+    Attributes:
+        bodies: Body name -> coefficients of its `rigid_body_modes`, translations first, shape (3,) in the
+            plane, (6,) in space; the largest of all is one. Bodies that stay are left out.
+    """
+
+    bodies: Mapping[str, np.ndarray]
+
+    def _facts(self) -> dict[str, str]:
+        return {name: motion_in_words(motion) for name, motion in self.bodies.items()}
+
+    def __str__(self) -> str:
+        """Return it in words."""
+        return "; ".join(f"{name!r}: {motion_in_words(motion)}" for name, motion in self.bodies.items())
+
+
+def unheld_motions(system: DualSystem) -> tuple[UnheldMotion, ...]:
+    """Return the motions that a dual system leaves out. Collective.
+
+    Args:
+        system: The system.
+    """
+    return rigid_motions(system.torn, system.unheld) if system.unheld.shape[1] else ()
+
+
+def rigid_motions(torn: TornSystem, fields: sp.spmatrix) -> tuple[UnheldMotion, ...]:
+    """Return rigid displacements of bodies as motions. Collective.
+
+    Args:
+        torn: The torn system.
+        fields: Torn displacements of this rank, one a column, shape (torn_size, n).
+    """
+    count, coefficients, fields = fields.shape[1], [], sp.csr_matrix(fields)
+    starts = np.cumsum([0] + [part.mesh.size for part in torn.subdomains])
+    for name, body in torn.scene.bodies.items():
+        modes = rigid_body_modes(body.mesh.points)
+        size = modes.shape[2]
+        sums = np.zeros((size, size + count))
+        for part, start in zip(torn.subdomains, starts, strict=False):
+            if part.mesh.body == name:
+                own = modes[part.mesh.nodes].reshape(part.mesh.size, size)
+                moved = fields[start : start + part.mesh.size].toarray()
+                sums += own.T @ np.hstack([own, moved])
+        sums = torn.numbering.comm.allreduce(sums)
+        coefficients.append(np.linalg.solve(sums[:, :size], sums[:, size:]))
+    motions = np.stack(coefficients)  # (n_bodies, n_modes, count)
+    motions /= np.abs(motions).max(axis=(0, 1))
+    motions[np.abs(motions) <= MOTION_ROUNDING] = 0.0
+    return tuple(
+        UnheldMotion({name: own for name, own in zip(torn.scene.bodies, motion, strict=True) if own.any()})
+        for motion in np.moveaxis(motions, 2, 0)
+    )
+
+
+def motion_in_words(motion: np.ndarray) -> str:
+    """Return coefficients of rigid modes, shape (3,) or (6,), as translation and rotation."""
+    dim = 2 if len(motion) == 3 else 3
+    return " with ".join(
+        f"{kind} ({', '.join(f'{component:.2g}' for component in part)})"
+        for kind, part in (("translation", motion[:dim]), ("rotation", motion[dim:]))
+        if np.any(part)
+    )
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class RigidMotion:
+    """The motion of a rigid surface: u = U + θ × (x − p), of bodies that deform much U + (R(θ) − I)(x − p).
+
+    Attributes:
+        surface: The surface.
+        about: The point p of its `RigidSurface`, shape (dim,), [length].
+        displacement: U, shape (dim,), [length].
+        rotation: θ, shape (3,) in space; one number in the plane, positive from x to y; in radians.
+    """
+
+    surface: Surface
+    about: np.ndarray
+    displacement: np.ndarray
+    rotation: np.ndarray | float
+
+    def __str__(self) -> str:
+        """Return it in words; what is only rounding beside other components is zero."""
+        words = []
+        for values in map(np.atleast_1d, (self.displacement, self.rotation, self.about)):
+            known = np.where(np.abs(values) > MOTION_ROUNDING * np.abs(values).max(), values, 0.0)
+            words.append(f"({', '.join(f'{number:.5g}' for number in known)})")
+        moved, turned, about = words
+        return (
+            f"{self.surface.body} {self.surface.name}: displacement {moved} [length] of {about}, "
+            f"rotation {turned} rad"
+        )
+
+
+def rigid_motion(scene: Scene, support: RigidSurface, displacement: np.ndarray) -> RigidMotion:
+    """Return the motion of a rigid surface.
+
+    Args:
+        scene: The scene.
+        support: The surface.
+        displacement: Displacement of the nodes of its body, shape (n_nodes, dim), [length].
+    """
+    body, where = scene.bodies[support.body], Surface(support.body, support.surface)
+    if body.deforms_much:  # all of it is prescribed
+        moved, turned = np.split(support.prescribed, [scene.dim])
+        return RigidMotion(where, np.array(support.at), moved, float(turned[0]) if scene.dim == 2 else turned)
+    mesh = body.mesh
+    nodes = np.unique(mesh.surfaces[support.surface])
+    modes = support.modes(mesh.points[nodes]).reshape(-1, len(support.motion))
+    size = np.linalg.norm(modes, axis=0)
+    motion = np.linalg.lstsq(modes / size, displacement[nodes].ravel(), rcond=None)[0] / size
+    moved, turned = np.split(motion, [scene.dim])
+    return RigidMotion(where, np.array(support.at), moved, float(turned[0]) if scene.dim == 2 else turned)

@@ -1,0 +1,543 @@
+"""The equilibrium of a scene.
+
+Energies of a state, primal and dual.
+
+What was found in a state and what it cost, in words.
+
+How accurately a state is solved: to a number, or as accurately as its mesh deserves.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from fenics_contact._base.checks import GivenVector
+from fenics_contact._base.display import counted, displayed, in_lines
+from fenics_contact._base.libraries import MPI
+from fenics_contact._fem.forms import temperature_of
+from fenics_contact._scene.pairs import ContactPair
+from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.supports import RigidSurface
+from fenics_contact.errors import InvalidInputError, collectively
+from fenics_contact.feti.averages import nodal_mean
+from fenics_contact.feti.direct import DirectSolution
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.qp.solution import Solution
+from fenics_contact.results.contact import ContactResult, RowValues, Status
+from fenics_contact.results.fields import (
+    GatheredFields,
+    body_mesh,
+    cell_values,
+    contact_fields,
+    displacement_function,
+    most_stressed,
+    nodal_function,
+    principal_stress,
+    stress,
+    stress_fields,
+    von_mises,
+)
+from fenics_contact.results.forces import (
+    Balance,
+    NodalForces,
+    PairResultants,
+    Resultants,
+    force_balance,
+    nodal_forces,
+    pair_resultants,
+    support_reactions,
+)
+from fenics_contact.results.rigid_motions import RigidMotion, UnheldMotion, rigid_motion
+
+if TYPE_CHECKING:
+    import dolfinx
+    import pyvista
+
+    from fenics_contact._accuracy.state_errors import BalancedTolerance, StateErrors
+
+
+@dataclass(frozen=True)
+class Energies:
+    """Energies of all bodies, [force · length].
+
+    Attributes:
+        strain: Stored energy, of linear materials ½ uᵀK u; NaN where materials dissipate.
+        load: Work of the loads, of dead ones fᵀu; NaN where pressures follow their surfaces.
+        friction: Σ Ψ ‖slip‖, the dissipation by friction if the whole load step acts at once: what slips to
+            and fro within it counts by where it ends, take more load steps and add up. Where parts of a step
+            have histories of their own (`AutomaticSteps.finer_history`), the sum over these.
+        dual: Value of the dual functional, −½ (f − Bᵀλ)ᵀK⁺(f − Bᵀλ) − λᵀc; None for nonlinear materials.
+    """
+
+    strain: float
+    load: float
+    friction: float
+    dual: float | None = None
+
+    @property
+    def norm(self) -> float:
+        """Energy norm of the displacement, √(uᵀK u), [√(force · length)]."""
+        return float(np.sqrt(max(2.0 * self.strain, 0.0)))
+
+    @property
+    def total_potential(self) -> float:
+        """The stored energy less the work of the loads."""
+        return self.strain - self.load
+
+    @property
+    def primal(self) -> float:
+        """Functional that the displacement minimises for given slip bounds, total potential plus friction."""
+        return self.total_potential + self.friction
+
+    def __str__(self) -> str:
+        """List the energies, one per line."""
+        names = ("strain", "load", "friction", "total_potential", "primal", "dual")
+        known = [(name, getattr(self, name)) for name in names if getattr(self, name) is not None]
+        return "\n".join(f"{name.replace('_', ' '):16s}{value:14.6e}" for name, value in known)
+
+
+def compute_energies(
+    torn: TornSystem,
+    displacement: np.ndarray,
+    multiplier: np.ndarray,
+    friction: float,
+    rigid: np.ndarray | float = 0.0,
+) -> Energies:
+    """Compute all energies. Collective.
+
+    Args:
+        torn: The torn system.
+        displacement: Torn displacement of this rank, [length].
+        multiplier: λ, owned, [force].
+        friction: Σ Ψ ‖slip‖ of all ranks.
+        rigid: Rigid motions R α in the displacement: they cause no strain, but forces that are slightly out
+            of balance do work on them.
+    """
+    internal = torn.load - torn.force(multiplier)  # = K u
+    strained = 0.5 * internal @ (displacement - rigid)
+    mine = np.array([strained, multiplier @ torn.right])
+    strain, prescribed = (float(total) for total in torn.numbering.comm.allreduce(mine))
+    return Energies(strain, torn.load_work(displacement), friction, -strain - prescribed)
+
+
+def answer_in_words(
+    contact: ContactResult,
+    solution: Solution | DirectSolution,
+    energies: Energies,
+    counts: Mapping[str, int],
+) -> dict[str, str]:
+    """Return the size of a problem, its answer and the work of its solver, by name."""
+    return {
+        "unknowns": f"{counts['torn_unknowns']} in {counted(counts['subdomains'], 'subdomain')}",
+        "contact": f"{counted(contact.points.count, 'point')}, {contact.counts_in_words}",
+        "largest force": f"{np.linalg.norm(contact.force, axis=1).max(initial=0.0):.6g}",
+        "strain energy": f"{energies.strain:.6g}",
+        "total potential": f"{energies.total_potential:.6g}",
+        "work": f"{counted(counts['solver_steps'], 'step')}, "
+        f"{counted(counts['f_products'], 'product')} with F",
+        "residuals": f"natural {solution.natural_residual:.1e}, gluing {solution.gluing_residual:.1e}",
+    }
+
+
+def errors_in_words(errors: StateErrors | None) -> dict[str, str]:
+    """Return the errors of a state by name, or where to get them."""
+    if errors is None:
+        return {"errors": "not estimated yet: call state.estimate_errors()"}
+    return {f"error, {name}": words for name, words in errors.in_words.items()}
+
+
+def first_pairs(scene: Scene, contact: ContactResult, most: int = 8) -> dict[str, str]:
+    """Return a summary of the first contact pairs, and how many there are beside, by name."""
+    words = pairs_in_words(scene, contact)
+    shown = {f"contact {number}": line for number, line in enumerate(words[:most])}
+    more = len(words) - most
+    return shown | ({"more": f"{more} further contact pairs"} if more > 0 else {})
+
+
+def pairs_in_words(scene: Scene, contact: ContactResult, force: str = "", stress: str = "") -> list[str]:
+    """Return a summary of each contact pair: points by status, resultants, largest pressure.
+
+    Args:
+        scene: The scene.
+        contact: The result on its contact surfaces.
+        force: Name of the unit of force.
+        stress: Name of the unit of stress.
+    """
+    rows = []
+    for number, pair in enumerate(scene.contacts):
+        mine = contact.on_pair(number)
+        pressing = contact.normal_force[mine, None] * contact.points.normal[mine]
+        resultant = f"normal force {_size(pressing, force)}"
+        if pair.has_friction:
+            resultant += f", friction {_size(contact.force[mine] - pressing, force)}"
+        pressure = f"{contact.pressure[mine].max(initial=0.0):.5g} {stress}".rstrip()
+        if scene.deforms_much:
+            nominal = contact.nominal_pressure[mine].max(initial=0.0)
+            pressure += f", nominal {nominal:.5g} {stress}".rstrip()
+        rows.append(
+            f"{pair.place}: {counted(len(mine), 'point')}, {_kinds(pair, contact.status[mine])}; "
+            f"{resultant}, pressure up to {pressure}"
+        )
+    return rows
+
+
+def _size(forces: np.ndarray, unit: str) -> str:
+    """Return the magnitude of the sum of forces, shape (n, dim), with its unit."""
+    return f"{np.linalg.norm(forces.sum(axis=0)):.6g} {unit}".rstrip()
+
+
+def _kinds(pair: ContactPair, status: np.ndarray) -> str:
+    """Return the numbers of points by status; without friction open or closed."""
+    counts = {kind.name.lower(): int(np.count_nonzero(status == kind)) for kind in Status}
+    if not pair.has_friction:
+        counts = {"open": counts["open"], "closed": len(status) - counts["open"]}
+    return ", ".join(f"{count} {name}" for name, count in counts.items())
+
+
+#: A largest relative residual, a share of the discretisation error, or None for the default.
+Tolerance: TypeAlias = "float | BalancedTolerance | None"
+
+
+def checked_tolerance(tolerance: object) -> float | BalancedTolerance | None:
+    """Return a valid tolerance.
+
+    Raises:
+        InvalidInputError: If it is neither a number between 0 and 1 nor `BalancedTolerance`.
+    """
+    if tolerance is None:
+        return None
+    if isinstance(tolerance, float | int | np.floating):
+        if 0.0 < tolerance < 1.0:
+            return float(tolerance)
+        raise InvalidInputError(
+            f"tolerance must lie between 0 and 1, got {float(tolerance):g}: it is a relative residual, "
+            "1e-6 is a good one"
+        )
+    from fenics_contact._accuracy.state_errors import BalancedTolerance  # imported already if one was given
+
+    if isinstance(tolerance, BalancedTolerance):
+        return tolerance
+    raise InvalidInputError(
+        f"tolerance must be a number, BalancedTolerance(...) or None, got {type(tolerance).__name__}: give a "
+        "relative residual such as 1e-6, or leave it out"
+    )
+
+
+def comm_of(state: State, *_: Any, **__: Any) -> MPI.Comm:
+    """Return the communicator of a state."""
+    return state.torn.decomposition.comm
+
+
+@displayed
+@dataclass(frozen=True, eq=False, kw_only=True)
+class State(ABC):
+    """Displacements, contact forces and how they were computed: a `LinearState` or a `DeformedState`.
+
+    No attribute solves anything. Fields on the bodies' own meshes are built on first access, by all ranks
+    together.
+
+    Attributes:
+        torn: The torn system: subdomains, rows and contact points, with the loads on it.
+        solution: Multiplier, residuals and history of the solver.
+        torn_displacement: This rank's torn displacement as the solver returned it, shape (torn_size,),
+            [length]; that of whole bodies is `conforming_displacement`.
+        contact: Result on the contact surfaces, replicated.
+        energies: Energies of all bodies.
+        seconds: Wall time of this rank by phase, of all work up to this state that shares its timer.
+        tolerance: Tolerance of the solution, a relative residual or `BalancedTolerance`; None where no solver
+            iterated.
+        known_errors: Errors estimated so far, by a balanced solve or by `LinearState.estimate_errors`; None
+            before, and where materials are nonlinear.
+
+    Example:
+        >>> state = solve_scene(scene, comm)  # doctest: +SKIP
+        >>> state.displacement["block"]  # a dolfinx Function on the block's own mesh  # doctest: +SKIP
+        >>> state.contact.count(Status.SLIP)  # doctest: +SKIP
+    """
+
+    torn: TornSystem
+    solution: Solution | DirectSolution
+    torn_displacement: np.ndarray
+    contact: ContactResult
+    energies: Energies
+    seconds: Mapping[str, float]
+    tolerance: Tolerance = None
+    known_errors: StateErrors | None = field(default=None, repr=False)
+
+    def __str__(self) -> str:
+        """List what was found and what it cost, without communication: any rank may print alone."""
+        return in_lines(self, 25, 200)
+
+    def _facts(self) -> dict[str, str]:
+        return {
+            **answer_in_words(self.contact, self.solution, self.energies, self.counts),
+            "seconds": ", ".join(f"{name} {spent:.2f}" for name, spent in self.seconds.items()),
+            **self._errors_in_words(),
+            **first_pairs(self.scene, self.contact),
+        }
+
+    @abstractmethod
+    def _errors_in_words(self) -> dict[str, str]:
+        """Return what is known of errors, by name."""
+
+    @property
+    @abstractmethod
+    def rows(self) -> RowValues:
+        """Multipliers, residuals and steps of the natural map by row."""
+
+    @property
+    @abstractmethod
+    def conforming_displacement(self) -> np.ndarray:
+        """Displacement, continuous across subdomains, used by all fields, shape (torn_size,), [length].
+
+        Copies of a node agree, being their mean weighted by stiffness, and prescribed values are met exactly;
+        distances and slips of contact points are those of `torn_displacement`. Collective on first use.
+        """
+
+    @property
+    def unheld(self) -> tuple[UnheldMotion, ...]:
+        """Rigid motions that nothing resists and nothing loads; the bodies stay. Collective on first use."""
+        return ()
+
+    @property
+    def scene(self) -> Scene:
+        """The scene in the geometry of this state, with loads and supports of the end of its load step."""
+        return self.torn.scene
+
+    @property
+    def time(self) -> float:
+        """The time at which obstacles that move are where they are: with small displacements zero."""
+        return 0.0
+
+    @cached_property
+    def contact_places(self) -> np.ndarray:
+        """Positions of the contact points' slave nodes before deformation, shape (n, dim), [length]."""
+        return np.asarray(self.scene.points[self.contact.points.slave])
+
+    @cached_property
+    @collectively("State.displacement", comm_of)
+    def displacement(self) -> dict[str, dolfinx.fem.Function]:
+        """Displacement of each body as a Function on its own mesh, [length]. Collective on first use."""
+        decomposition = self.torn.decomposition
+        return {
+            name: displacement_function(body_mesh(decomposition, name, body), self._at_nodes(name))
+            for name, body in self.scene.bodies.items()
+        }
+
+    @cached_property
+    @collectively("State.von_mises", comm_of)
+    def von_mises(self) -> dict[str, dolfinx.fem.Function]:
+        """Von Mises stress of each body, constant on cells, [force / length²]. Collective on first use."""
+        return {
+            name: von_mises(
+                self.displacement[name], body, comm_of(self), temperature_of(self.scene.loads, name)
+            )
+            for name, body in self.scene.bodies.items()
+        }
+
+    @cached_property
+    @collectively("State.stress", comm_of)
+    def stress(self) -> dict[str, dolfinx.fem.Function]:
+        """Stress tensor of each body, its mean on each cell, shape (3, 3), [force / length²].
+
+        Plane bodies have the component normal to the plane, too. Collective on first use.
+        """
+        return {
+            name: stress(self.displacement[name], body, comm_of(self), temperature_of(self.scene.loads, name))
+            for name, body in self.scene.bodies.items()
+        }
+
+    @cached_property
+    @collectively("State.principal_stress", comm_of)
+    def principal_stress(self) -> dict[str, dolfinx.fem.Function]:
+        """Principal values σ₁ ≥ σ₂ ≥ σ₃ of `stress`, shape (3,), [force / length²].
+
+        Collective on first use.
+        """
+        return {
+            name: principal_stress(self.stress[name], body.mesh.cells)
+            for name, body in self.scene.bodies.items()
+        }
+
+    @cached_property
+    @collectively("State.contact_pressure", comm_of)
+    def contact_pressure(self) -> dict[str, dolfinx.fem.Function]:
+        """Contact pressure of each body as a Function on its own mesh, [force / length²].
+
+        At the nodes of slave surfaces it is that of the contact points, at all other nodes, also on masters,
+        zero. Collective on first use.
+        """
+        return self._contact_functions("contact_pressure")
+
+    def _contact_functions(self, key: str) -> dict[str, dolfinx.fem.Function]:
+        return {
+            name: nodal_function(u.function_space.mesh, key, self._contact_fields(name)[key])
+            for name, u in self.displacement.items()
+        }
+
+    @collectively("State.gather_displacement", comm_of)
+    def gather_displacement(self, body: str) -> np.ndarray:
+        """Return the displacement of a body's nodes on every rank, (n_nodes, dim), [length]. Collective."""
+        comm, mine = self.torn.decomposition.comm, self._at_nodes(body)
+        known = ~np.isnan(mine[:, 0])
+        total = comm.allreduce(np.where(known[:, None], mine, 0.0))
+        count = comm.allreduce(known.astype(float))
+        return np.asarray(total / count[:, None])
+
+    def _at_nodes(self, body: str) -> np.ndarray:
+        """Return the displacement of a body's nodes, NaN at those not on this rank. Collective at first."""
+        tearing = self.torn.decomposition.tearing
+        nodes = tearing.global_nodes(body, np.arange(self.scene.bodies[body].mesh.n_nodes))
+        return np.asarray(self._nodal_displacement[nodes])
+
+    @cached_property
+    def _nodal_displacement(self) -> np.ndarray:
+        return nodal_mean(self.torn.decomposition, self.conforming_displacement)
+
+    @collectively("State.gather_von_mises", comm_of)
+    def gather_von_mises(self, body: str) -> np.ndarray:
+        """Return the von Mises stress of a body's cells on every rank, shape (n_cells,). Collective."""
+        return cell_values(self.von_mises[body], self.scene.bodies[body].mesh.cells)
+
+    @collectively("State.gather_stress", comm_of)
+    def gather_stress(self, body: str) -> np.ndarray:
+        """Return the mean stress of a body's cells on every rank, shape (n_cells, 3, 3). Collective."""
+        return cell_values(self.stress[body], self.scene.bodies[body].mesh.cells)
+
+    @collectively("State.gather_nodal_stress", comm_of)
+    def gather_nodal_stress(self, body: str) -> np.ndarray:
+        """Return the stress of a body at its nodes, averaged within one material, on every rank. Collective.
+
+        Recovered from displacements around each node: on surfaces more accurate than means of cells.
+
+        Returns:
+            Shape (n_materials, n_nodes, 3, 3), materials in the order of `Body.materials`; NaN where a node
+            has no cell of the material, [force / length²].
+        """
+        return self._nodal_stress[body]
+
+    @cached_property
+    def _nodal_stress(self) -> dict[str, np.ndarray]:
+        # Recovery is part of estimates, which a state with a fixed tolerance need not import.
+        from fenics_contact.results.fields import nodal_stress
+
+        meshes = {name: u.function_space.mesh for name, u in self.displacement.items()}
+        on_cells = self.stress if self.scene.is_nonlinear else {}
+        return nodal_stress(self.torn, self._nodal_displacement, meshes, on_cells)
+
+    @collectively("State.gather_fields", comm_of)
+    def gather_fields(self, body: str) -> GatheredFields:
+        """Return all fields of a body on every rank. Collective."""
+        decomposition = self.torn.decomposition
+        first = decomposition.tearing.subdomain_offset[decomposition.tearing.body_names.index(body)]
+        subdomain = np.asarray(decomposition.partitions[body], dtype=np.int32) + np.int32(first)
+        on_cells = stress_fields(self.gather_stress(body))
+        on_nodes = stress_fields(most_stressed(self.gather_nodal_stress(body)), "nodal_")
+        return GatheredFields(
+            {"displacement": self.gather_displacement(body), **self._contact_fields(body), **on_nodes},
+            {**on_cells, "von_mises": self.gather_von_mises(body), "subdomain": subdomain},
+        )
+
+    def _contact_fields(self, body: str) -> dict[str, np.ndarray]:
+        return contact_fields(self.contact, self.scene, self.torn.decomposition.tearing, body)
+
+    @collectively("State.reactions", comm_of)
+    def reactions(self, about: GivenVector | np.ndarray | None = None) -> Resultants:
+        """Return force and moment that every support exerts on its body, in the scene's order. Collective.
+
+        They balance the other forces (see `balance`), and are as accurate as the tolerance of the solver. A
+        component that several supports prescribe at a node is shared by its areas on their surfaces.
+
+        Args:
+            about: Point for all moments, shape (dim,), [length]; by default the centroid of the surface of
+                each support.
+
+        Example:
+            >>> print(state.reactions())  # doctest: +SKIP
+            >>> state.reactions()[0].torque((0, 0, 0), (0, 0, 1))  # doctest: +SKIP
+        """
+        return support_reactions(self.scene, self._nodal_forces, about)
+
+    @collectively("State.rigid_motions", comm_of)
+    def rigid_motions(self) -> tuple[RigidMotion, ...]:
+        """Return displacement and rotation of the points of all rigid surfaces, in the scene's order.
+
+        Collective.
+        """
+        rigid = [support for support in self.scene.supports if isinstance(support, RigidSurface)]
+        return tuple(rigid_motion(self.scene, each, self.gather_displacement(each.body)) for each in rigid)
+
+    @collectively("State.resultants", comm_of)
+    def resultants(self, about: GivenVector | np.ndarray | None = None) -> PairResultants:
+        """Return force and moment on the slave of every contact pair and tie. Collective.
+
+        Args:
+            about: Point for all moments, shape (dim,), [length]; by default the centroid of each slave
+                surface.
+        """
+        return pair_resultants(self.torn, self._nodal_forces, about)
+
+    @collectively("State.balance", comm_of)
+    def balance(self, about: GivenVector | np.ndarray | None = None) -> Balance:
+        """Return loads, reactions and forces of rigid obstacles and what is missing between them. Collective.
+
+        Args:
+            about: Point for all moments, shape (dim,), [length]; by default the middle of all bodies' box.
+        """
+        return force_balance(self.torn, self._nodal_forces, about, self._least_force)
+
+    @property
+    @abstractmethod
+    def _least_force(self) -> float:
+        """A force below which bodies count as free of forces, [force]. Collective."""
+
+    @cached_property
+    def _nodal_forces(self) -> NodalForces:
+        return nodal_forces(self.torn, self.solution.multiplier, self.torn_displacement)
+
+    @collectively("State.to_pyvista", comm_of)
+    def to_pyvista(self, deformed: float = 0.0, *, linear: bool = False) -> pyvista.MultiBlock:
+        """Return all bodies with their fields for pyvista, the same on every rank. Collective.
+
+        Args:
+            deformed: Scale factor of the displacement added to the points; 0 for the undeformed bodies.
+            linear: Cut quadratic cells into linear ones on the same nodes, as pictures of `viz` do.
+
+        Returns:
+            A ``pyvista.MultiBlock`` with an ``UnstructuredGrid`` for each body under its name, which holds
+            the fields of `GatheredFields`, which `io.write_vtu` writes: on points ``displacement``, stresses
+            ``nodal_...`` and contact ``contact_...``, on cells ``von_mises``, ``stress``,
+            ``principal_stress`` and ``subdomain``. Plane bodies lie in the plane z = 0.
+
+        Raises:
+            InvalidInputError: If ``deformed`` is not finite.
+            MissingRequirementError: If pyvista is not installed.
+
+        Example:
+            >>> blocks = state.to_pyvista(deformed=10.0)  # doctest: +SKIP
+            >>> blocks["block"].plot(scalars="von_mises")  # doctest: +SKIP
+        """
+        from fenics_contact.results.multi_block import multi_block
+
+        meshes = {name: body.mesh for name, body in self.scene.bodies.items()}
+        return multi_block(comm_of(self), meshes, self.gather_fields, deformed, linear=linear)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Sizes and work, such as torn unknowns, multipliers by kind, products, steps."""
+        torn = self.torn
+        return {
+            "torn_unknowns": torn.decomposition.torn_unknowns,
+            "subdomains": torn.decomposition.tearing.n_subdomains,
+            "equality_multipliers": torn.n_equality,
+            "normal_multipliers": torn.points.count,
+            "tangential_multipliers": torn.tangential_rows.size,
+            "f_products": self.solution.products,
+            "solver_steps": self.solution.iterations,
+        }
