@@ -344,8 +344,8 @@ assert imbalance < 1e-9
 # - `checkpoint=Checkpoint(output / "run.npz")` in `minimize` (from `fenics_contact.design`): a run that is
 #   interrupted goes on from there when it is started again. Within `with interruptible(comm):` (from
 #   `fenics_contact`) Ctrl-C lets the evaluation under way come to its end first.
-# - `tolerance=AdaptiveTolerance()` in `ShapeProblem` (from `fenics_contact.design`): states are solved no more
-#   accurately than the optimiser needs, which saves a third of the products.
+# - `tolerance=design.AdaptiveTolerance()` in `ShapeProblem`: states are solved no more accurately than the
+#   optimiser needs, which saves a third of the products.
 # - A finer net, or `LinkShape(cell="tetrahedron")`.
 # - `result_page(after.state, output / "links.html")` (from `fenics_contact._page`): a page on which the mouse
 #   turns the links; `after.state.to_pyvista()` for pictures of your own.

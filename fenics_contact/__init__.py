@@ -1,8 +1,9 @@
 """Contact mechanics with friction, and contact shape optimisation, on FEniCSx by Total FETI.
 
-What a script needs is here; nothing is loaded before it is used.
+What a script needs is here; nothing is loaded before it is used:
 
-Scenes: Scene, Body, BodyMesh, Surface, Support, RigidSurface, ContactPair, Tie, AutomaticContact, LoadStep, box_partition
+Scenes: Scene, Body, BodyMesh, Surface, Support, RigidSurface, ContactPair, Tie, AutomaticContact, LoadStep,
+    box_partition
 
 Friction laws: Coulomb, Tresca
 
@@ -12,7 +13,8 @@ Loads: Traction, Pressure, TotalForce, BodyForce, gravity, ThermalStrain
 
 Values of loads: SampledField, read_field, Ufl
 
-Equilibrium: solve_scene, solve_steps, ContactProblem, LoadSequence, AutomaticSteps, TangentNewton, FixedPoint, Tolerance
+Equilibrium: solve_scene, solve_steps, ContactProblem, LoadSequence, AutomaticSteps, TangentNewton, FixedPoint,
+    Tolerance
 
 Results: State, DeformedState, NewtonSteps, Status, contact_area
 
@@ -26,10 +28,10 @@ Long runs: show_progress, Checkpoint, interruptible, Interrupted, PhaseTimer, cl
 
 Tests of material models: check_hyperelastic, check_history_material
 
-Rooms with more: `materials`, `gallery` (meshes of simple bodies), `readers` (gmsh, CAD, dolfinx, meshio), `mesh`,
-`shapes` (true surfaces), `design` (objectives, constraints, optimisers), `results` (what states consist of),
-`pictures`, `output` (files), `study` (what accuracy costs), `errors`, `theory` (contacts known by formula),
-`qp` (dual solvers) and `feti` (subdomains).
+Public modules with more: `materials`, `gallery` (meshes of simple bodies), `readers` (gmsh, CAD, dolfinx,
+meshio), `mesh`, `shapes` (true surfaces), `design` (objectives, constraints, optimisers), `results` (what
+states consist of), `pictures`, `output` (files), `study` (what accuracy costs), `errors`, `theory` (contacts
+known by formula), `qp` (dual solvers) and `feti` (subdomains).
 """
 
 from __future__ import annotations

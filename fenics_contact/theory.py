@@ -35,6 +35,18 @@ from scipy.special import ellipe, ellipkm1, elliprd
 
 from fenics_contact.errors import InvalidInputError
 
+__all__ = [
+    "LineContact",
+    "PinContact",
+    "PointContact",
+    "contact_modulus",
+    "hertz_line",
+    "hertz_point",
+    "pin_in_hole",
+    "relative_curvatures",
+    "roller_relief",
+]
+
 
 def require_numbers(**given: Any) -> None:
     """Reject arguments, given by their names, that are not finite numbers."""

@@ -12,7 +12,8 @@ Debian's FEniCSx lacks, without any saving: a file that must be complete is rewr
 | ``_format``, ``_version`` | "fenics_contact checkpoint", 2 |
 | ``_kind`` | "load history" or "minimisation by the bundle trust method" |
 | ``_fingerprint`` | JSON text: parts of the problem by name with their descriptions, see `described` |
-| ``_digest`` | SHA-256, hexadecimal, of all other arrays in the order of their names: of each the text "NAME TYPE SHAPE " as NumPy prints type and shape, then its bytes in C order |
+| ``_digest`` | SHA-256 of all other arrays in the order of their names: of each the text "NAME TYPE SHAPE " \
+as NumPy prints type and shape, then its bytes in C order |
 
 A load history has ``steps``, the number of steps done, and for each, numbered from 000000, ``NUMBER.step``
 (JSON text that describes it), ``NUMBER.multiplier`` (λ of all rows, [force]), ``NUMBER.origin`` (from where

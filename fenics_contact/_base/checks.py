@@ -118,7 +118,7 @@ def checked(*own: str) -> Callable[[Class], Class]:
         ...     radius: float
         >>> Wire("thick")
         Traceback (most recent call last):
-        fenics_contact.errors.kinds.InvalidInputError: Wire.radius must be a number, got 'thick': above zero
+        fenics_contact.errors.InvalidInputError: Wire.radius must be a number, got 'thick': above zero
     """
 
     def with_check(cls: Class) -> Class:

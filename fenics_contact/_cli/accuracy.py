@@ -22,7 +22,7 @@ from fenics_contact.study.study import BALANCED, DISCRETISATIONS, RunTolerance, 
 NAMES = ", ".join(BUILT_IN)
 ABOUT = (
     f"Measure what accuracy costs in time. SCENE is one of {NAMES}, or a Python file that defines "
-    "`study`, a fenics_contact.study.study.StudyScene. Results, tables and figures are written to a folder; "
+    "`study`, a fenics_contact.study.StudyScene. Results, tables and figures are written to a folder; "
     "what was measured already is not measured again. Runs have processes of their own: ask for ranks with "
     "--ranks. Options of the sweep are given once for each value: --sizes 2 --sizes 3."
 )

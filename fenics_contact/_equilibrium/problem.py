@@ -219,7 +219,7 @@ class ContactProblem:
         solver: Dual solver with its tolerance; None: the one that `Scene.plan` names.
         tolerance: Largest relative residual of the solutions, see `solve_scene`.
         steps: How loads on nonlinear materials are followed; None: the default
-            `fenics_contact._large_deformations.load_steps.AutomaticSteps`.
+            `fenics_contact.AutomaticSteps`.
         timer: Wall time of this rank by phase, over all solutions.
         state: The last solution, None before the first.
 
@@ -396,7 +396,7 @@ class ContactProblem:
             if self.solver is not None:
                 raise InvalidInputError(
                     f"dual solvers are for linear materials, this scene has others, got {self.solver!r}: "
-                    "give steps=AutomaticSteps(TangentNewton(...)) of fenics_contact._large_deformations instead"
+                    "give steps=AutomaticSteps(TangentNewton(...)) instead"
                 )
             self.state = self._equilibria(scene).solve(scene, slip_from, wanted, time, step, overlap=overlap)
             self._passing_bodies.warn(self.state)
@@ -512,7 +512,7 @@ def solve_scene(
             balanced. Give a number, 1e-6 or less, where the status of single contact points matters, or small
             differences between states. Where materials are nonlinear a number, 1e-8 by default.
         steps: How loads on nonlinear materials are followed; None: the default
-            `fenics_contact._large_deformations.load_steps.AutomaticSteps`.
+            `fenics_contact.AutomaticSteps`.
 
     Raises:
         InvalidInputError: If scene or partition cannot be used.

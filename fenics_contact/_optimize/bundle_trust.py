@@ -321,7 +321,7 @@ class BundleTrust:
     def minimize(
         self, problem: PosedProblem, callback: Callback | None = None, checkpoint: Checkpoint | None = None
     ) -> Result:
-        """Run the method on a checked problem; `fenics_contact._optimize.bundle_trust.minimize` is the usual entry point.
+        """Run the method on a checked problem; `fenics_contact.minimize` is the usual entry point.
 
         Args:
             problem: The result of `pose`.

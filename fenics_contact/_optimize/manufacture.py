@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 class Net(Protocol):
-    """A net of control points over a surface; `fenics_contact.design.design.SurfaceDesign` is one."""
+    """A net of control points over a surface; `fenics_contact.SurfaceDesign` is one."""
 
     @property
     def counts(self) -> tuple[int, ...]:

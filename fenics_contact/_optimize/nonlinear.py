@@ -115,7 +115,7 @@ def _components(given: Any, start: Array) -> list[NonlinearConstraint]:
     if not callable(given.jac):
         raise InvalidInputError(
             f"a NonlinearConstraint must have its derivative as the function jac, got {given.jac!r}: give "
-            "it, or fenics_contact._optimize.nonlinear.NonlinearConstraint with a function x -> (value, subgradient)"
+            "it, or fenics_contact.design.NonlinearConstraint with a function x -> (value, subgradient)"
         )
     values = np.atleast_1d(np.asarray(given.fun(start.copy()), dtype=float))
     if np.size(given.lb) not in (1, values.size) or np.size(given.ub) not in (1, values.size):

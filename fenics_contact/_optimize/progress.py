@@ -48,7 +48,7 @@ class Resumable(Function, Protocol):
         """Communicator on which it is evaluated."""
 
     def fingerprint(self) -> Mapping[str, str]:
-        """Identify the function, see `fenics_contact._base.described`."""
+        """Identify the function, see `fenics_contact._base.fingerprint.described`."""
 
     def memory(self) -> Mapping[str, NDArray[Any]]:
         """Return what the next values depend on. Collective."""

@@ -165,7 +165,7 @@ def obstacle_entries(record: Mapping[str, Any], points: np.ndarray) -> list[dict
     """Return type and lines of each different rigid obstacle; no lines if it is of another shape.
 
     Args:
-        record: The record of the result, see `fenics_contact.output.reading.read_result`.
+        record: The record of the result, see `fenics_contact.output.read_result`.
         points: All nodes of the bodies, (n, 3).
     """
     scene = record.get("scene") or {}

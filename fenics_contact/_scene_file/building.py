@@ -257,7 +257,7 @@ class ShapeTask:
         """Run it. Collective; a stop before the tolerance is met is reported by the result's reason.
 
         Args:
-            callback: Called after every evaluation, see `fenics_contact._optimize.bundle_trust.minimize`.
+            callback: Called after every evaluation, see `fenics_contact.minimize`.
             checkpoint: File from which an interrupted run continues, or None.
         """
         return minimize(
@@ -343,7 +343,7 @@ def _objective(name: Any, source: Source) -> Objective:
     if missing or isinstance(given, type):
         raise InvalidInputError(
             f"objective {name!r} must be an object with value and partials, got {given!r}: see "
-            "fenics_contact.design.objective.Objective, and give an instance, not a class"
+            "fenics_contact.design.Objective, and give an instance, not a class"
         )
     objective: Objective = given
     return objective

@@ -325,7 +325,7 @@ def _with_mirror_images(
     return away, centre
 
 
-#: Representation of a surface between its nodes, see `fenics_contact._scene.pairs.ContactPair`.
+#: Representation of a surface between its nodes, see `fenics_contact.ContactPair`.
 Geometry: TypeAlias = Literal["best", "reconstructed", "faceted"]
 
 _KNOWN: WeakKeyDictionary[BodyMesh, dict[Hashable, Relief | None]] = WeakKeyDictionary()

@@ -119,7 +119,7 @@ def _check_differentiable(scene: Scene) -> None:
         if missing:
             raise InvalidInputError(
                 f"designs of bodies that deform much need {needed}, this scene has others: optimise it with "
-                "a tool that takes plain functions, see fenics_contact.responses"
+                "a tool that takes plain functions, see fenics_contact.DesignResponse"
             )
 
 

@@ -65,7 +65,7 @@ class LoadStepError(ConvergenceError):
     """A load that cannot be followed to its end, however small its steps.
 
     Attributes:
-        state: The last equilibrium (`fenics_contact.results.deformed_state.DeformedState`); None if there was none after the
+        state: The last equilibrium (`fenics_contact.DeformedState`); None if there was none after the
             start of the step.
     """
 
@@ -126,7 +126,7 @@ def user_code(what: str) -> Iterator[None]:
         ...     1 / 0
         Traceback (most recent call last):
         ...
-        fenics_contact.errors.kinds.UserCodeError: the stress of material Foam failed with ZeroDivisionError...
+        fenics_contact.errors.UserCodeError: the stress of material Foam failed with ZeroDivisionError...
     """
     try:
         yield

@@ -91,8 +91,7 @@ def chain_link(shape: LinkShape | None = None, comm: MPI.Comm | None = None) -> 
     """Build a chain link with gmsh.
 
     The ring lies in the x-z plane, the middle of the contact crown's inner side at the origin and the link on
-    the -x side of its contact crown, see `fenics_contact.gallery.ring`. The same shape gives bitwise the same
-    mesh.
+    the -x side of its contact crown, see `Link`. The same shape gives bitwise the same mesh.
 
     Args:
         shape: Proportions and mesh size; `LinkShape()` unless given.

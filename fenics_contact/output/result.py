@@ -60,7 +60,7 @@ def described_scene(scene: Scene, subdomains: Mapping[str, int], time: float = 0
     """Return bodies, supports, loads and pairs of a scene as plain data.
 
     Returns:
-        See `fenics_contact.output.result.write_result`. Functions are given by their names, numbers by their values.
+        See `fenics_contact.write_result`. Functions are given by their names, numbers by their values.
     """
     return {
         "dimension": scene.dim,

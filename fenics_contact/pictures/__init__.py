@@ -5,6 +5,7 @@ plane bodies. On several ranks the fields are gathered by all and drawn by rank 
 returns a `Picture`, which Jupyter shows and which is written to a file if a path is given.
 """
 
+from fenics_contact.pictures import _libraries  # noqa: F401
 from fenics_contact.pictures.canvas import Picture, Units
 from fenics_contact.pictures.curves import plot_curves
 from fenics_contact.pictures.designs import plot_before_after, plot_control_net, plot_convergence

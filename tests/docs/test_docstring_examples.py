@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import fenics_contact
-from fenics_contact import LoadSequence, Scene, ShapeProblem, State, errors
+from fenics_contact import LoadSequence, Scene, ShapeProblem, State
 from fenics_contact.design import Result
 from fenics_contact.output import ResultSeries
 
@@ -60,10 +60,9 @@ def modules() -> Iterator[ModuleType]:
 
 
 def public_names() -> dict[str, Any]:
-    packages = [info.name for info in pkgutil.iter_modules(fenics_contact.__path__) if info.ispkg]
-    rooms = [importlib.import_module(f"fenics_contact.{package}") for package in packages]
-    offered = {name: getattr(room, name) for room in rooms for name in getattr(room, "__all__", ())}
-    return {**vars(errors), **offered}
+    offered = {name: getattr(fenics_contact, name) for name in fenics_contact.__all__}
+    rooms = [value for value in offered.values() if isinstance(value, ModuleType)]
+    return {name: getattr(room, name) for room in rooms for name in room.__all__} | offered
 
 
 def examples() -> list[doctest.DocTest]:

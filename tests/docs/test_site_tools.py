@@ -87,7 +87,10 @@ def test_a_name_of_another_room_is_described_there() -> None:
     assert reference.homes("optimize")["minimize"] == "fenics_contact.minimize"
 
 
-@pytest.mark.parametrize("target", ["fenics_contact.BodyMesh", "BodyMesh", "fenics_contact.BodyMesh"])
+NAMES = ["fenics_contact.mesh.body_mesh.BodyMesh", "BodyMesh", "fenics_contact.BodyMesh"]
+
+
+@pytest.mark.parametrize("target", NAMES)
 def test_a_class_is_found_by_every_name_that_it_has(target: str) -> None:
     found = [*reference.candidates(target), target]
     assert "fenics_contact.BodyMesh" in found

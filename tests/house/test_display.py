@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+import fenics_contact
 from fenics_contact import (
     AutomaticContact,
     BodyForce,
@@ -99,7 +100,7 @@ from tests.contact.gallery import partitions
 from tests.nonlinear.scenes import pressed, rounded
 from tests.shape.blocks import block_on_floor, designs_of
 
-FACES = ("scene", "mesh", "contact", "shape", "optimize", "accuracy")
+FACES = ("materials", "mesh", "results", "design")
 MOST_PRINTED = 25
 #: Protocols, and classes to derive from.
 NO_OBJECTS = {
@@ -183,11 +184,9 @@ def _collect(value: Any, found: dict[str, Any]) -> None:
 
 def public_classes() -> list[str]:
     """Return the names of the classes that the faces offer and of which there are objects."""
-    offered = [
-        getattr(module, name)
-        for module in (importlib.import_module(f"fenics_contact.{face}") for face in FACES)
-        for name in module.__all__
-    ]
+    rooms = (importlib.import_module(f"fenics_contact.{face}") for face in FACES)
+    offered = [getattr(room, name) for room in rooms for name in room.__all__]
+    offered += [getattr(fenics_contact, name) for name in fenics_contact.__all__]
     classes = [one for one in offered if inspect.isclass(one) and not issubclass(one, Enum | BaseException)]
     return sorted({one.__name__ for one in classes} - NO_OBJECTS)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import graphlib
-import importlib
 from pathlib import Path
 
 import pytest
@@ -13,77 +12,64 @@ from tests.house.floors import FLOORS
 from tests.house.source import PACKAGE, Module, modules, room_of
 
 FLOOR = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
-BESIDE = {"viz", "io", "study", "scene_file"}
-#: On top of everything: the study of accuracy and web pages draw and write, the command line does all that
-#: there is.
-ABOVE = {
-    "study": {"viz", "io"},
-    "page": {"viz", "io"},
-    "cli": {"viz", "io", "study", "scene_file", "page"},
-    "__main__": {"cli"},
-}
+ROOMS = {f"{PACKAGE}.{room}" for room in FLOOR if room not in {"theory", "responses"}}
 #: Rooms that are tested with small dense matrices, and what they never meet.
 WITHOUT_FENICS = {
     "qp": {"dolfinx", "ufl", "basix", "ffcx", "gmsh"},
-    "optimize": {"dolfinx", "ufl", "basix", "ffcx", "gmsh", "petsc4py", "mpi4py"},
+    "_optimize": {"dolfinx", "ufl", "basix", "ffcx", "gmsh", "petsc4py", "mpi4py"},
 }
 
 #: What stands for libraries that are loaded when they are first used.
-LATE = {f"{PACKAGE}._libraries.MPI": "mpi4py", f"{PACKAGE}._libraries.PETSc": "petsc4py"}
+LATE = {f"{PACKAGE}._base.libraries.MPI": "mpi4py", f"{PACKAGE}._base.libraries.PETSc": "petsc4py"}
+
+
+#: Rooms whose names are imported from their faces; all others from the modules that define them.
+FACES = {"errors", "_dolfinx"}
 
 
 def pointing_up(module: Module) -> list[str]:
-    """List the imports of a module that do not point to a lower floor, or point beside the house."""
-    here = module.room
+    """List the imports of a module that do not point to a lower floor."""
     wrong = []
     for found in module.imports():
         there = room_of(found.target)
-        if there is None or there == here:
+        if there is None or there == module.room or module.room == "":
             continue
-        on_top = here in BESIDE or here in ABOVE or here == ""
-        below = (there in FLOOR and (on_top or FLOOR[there] < FLOOR[here])) or there in ABOVE.get(here, set())
-        # The package itself is above everything: it may offer names, and nobody asks it for them.
-        if not below:
+        # The package itself is above everything: it offers names, and no module takes them from it.
+        if there not in FLOOR or module.room not in FLOOR or FLOOR[there] >= FLOOR[module.room]:
             wrong.append(f"{module.path.name}:{found.line} ({module.name}) imports {found.target}")
     return wrong
 
 
-def hidden_files(house: list[Module]) -> set[str]:
-    """Return the files of rooms; not those after whose one function they are called, which a face offers."""
-    offered = {
-        f"{module.name}.{found.target.rpartition('.')[2]}"
-        for module in house
-        if module.path.name == "__init__.py"
-        for found in module.imports()
-    }
-    return {module.name for module in house if module.name.count(".") > 1} - offered
-
-
-def past_faces(module: Module, hidden: set[str]) -> list[str]:
-    """List the imports of a module that reach past the ``__init__`` of another room into one of its files."""
-    return [
-        f"{module.name}:{found.line} imports {found.target}"
-        for found in module.imports()
-        if room_of(found.target) not in {None, module.room}
-        and (found.target.count(".") > 2 or found.target in hidden)
-    ]
+def detours(module: Module, house: set[str]) -> list[str]:
+    """List the imports from a face instead of the module that defines the name, and of private names."""
+    wrong = []
+    for found in module.imports():
+        place, _, name = found.target.rpartition(".")
+        room = room_of(found.target)
+        if room is None or module.path.name == "__init__.py" or found.target in house:
+            continue
+        past = place == PACKAGE or (place in ROOMS and room not in FACES)
+        private = name.startswith("_") and not name.startswith("__")
+        if past or private:
+            wrong.append(f"{module.name}:{found.line} imports {found.target}")
+    return wrong
 
 
 def reached(room: str, house: list[Module]) -> set[str]:
-    """Return the outside libraries that a room imports, itself or through other rooms."""
-    rooms, waiting, outside = {room}, [room], set()
+    """Return the outside libraries that the modules of a room import, themselves or through others."""
+    by_name = {module.name: module for module in house}
+    waiting, seen, outside = [module for module in house if module.room == room], set(), set()
     while waiting:
-        current = waiting.pop()
-        for module in house:
-            if module.room != current:
-                continue
-            for found in module.imports():
-                there = room_of(found.target)
-                if (there is None or found.target in LATE) and not found.for_types:
-                    outside.add(LATE.get(found.target, found.target.partition(".")[0]))
-                elif there and there not in rooms:
-                    rooms.add(there)
-                    waiting.append(there)
+        module = waiting.pop()
+        seen.add(module.name)
+        for found in module.imports():
+            place = found.target if found.target in by_name else found.target.rpartition(".")[0]
+            if found.target in LATE or room_of(found.target) is None:
+                outside |= (
+                    set() if found.for_types else {LATE.get(found.target, found.target.partition(".")[0])}
+                )
+            elif place in by_name and place not in seen:
+                waiting.append(by_name[place])
     return outside
 
 
@@ -105,8 +91,8 @@ def a_module(room: str, source: str, root: Path) -> Module:
     return module
 
 
-def test_every_module_has_a_floor_or_stands_beside_the_house() -> None:
-    homeless = [module.name for module in modules() if module.room not in {"", *FLOOR, *BESIDE, *ABOVE}]
+def test_every_module_has_a_floor() -> None:
+    homeless = [module.name for module in modules() if module.room not in {"", *FLOOR}]
     assert homeless == [], "give it a floor here and in the architecture"
 
 
@@ -124,19 +110,17 @@ def test_imports_point_down() -> None:
 @pytest.mark.parametrize(
     ("room", "line"),
     [
-        ("feti", "from fenics_contact._equilibrium import coulomb"),
-        ("feti", "from fenics_contact import contact"),
-        ("feti", "from ..contact.coulomb import solve"),
+        ("feti", "from fenics_contact._equilibrium import steps"),
+        ("feti", "from fenics_contact import design"),
+        ("feti", "from ..design.problem import ShapeProblem"),
         ("feti", "def f():\n    import fenics_contact.design"),
-        ("feti", "from fenics_contact import solve"),
-        ("scene", "from fenics_contact.qp import minimise"),
-        ("optimize", "import fenics_contact.pictures"),
-        ("viz", "import fenics_contact.output"),
-        ("viz", "import fenics_contact.study"),
-        ("io", "from fenics_contact.study import run_study"),
-        ("scene_file", "from fenics_contact.pictures import Units"),
-        ("io", "from fenics_contact._scene_file import read_scene_file"),
-        ("study", "from fenics_contact._cli import main"),
+        ("feti", "from fenics_contact import solve_scene"),
+        ("_scene", "from fenics_contact.gallery.blocks import block"),
+        ("_optimize", "import fenics_contact.pictures"),
+        ("pictures", "import fenics_contact.output"),
+        ("pictures", "import fenics_contact.study"),
+        ("output", "from fenics_contact._scene_file.reading import read_scene_file"),
+        ("study", "from fenics_contact._cli.app import main"),
     ],
 )
 def test_an_import_that_does_not_point_down_is_found(room: str, line: str, tmp_path: Path) -> None:
@@ -146,13 +130,11 @@ def test_an_import_that_does_not_point_down_is_found(room: str, line: str, tmp_p
 @pytest.mark.parametrize(
     ("room", "line"),
     [
-        ("feti", "from fenics_contact._scene import Scene"),
-        ("feti", "from . import rows\nfrom .rows import gap\nfrom ..qp import minimise"),
-        ("viz", "from fenics_contact._equilibrium import State"),
+        ("feti", "from fenics_contact._scene.scene import Scene"),
+        ("feti", "from . import rows\nfrom .rows import gap\nfrom ..qp.solve import solve"),
         ("study", "def draw():\n    from fenics_contact.pictures.canvas import sheet"),
-        ("__main__", "from fenics_contact import cli"),
-        ("cli", "from fenics_contact.study.scenes import find_study"),
-        ("scene_file", "from fenics_contact.design import ShapeProblem"),
+        ("__main__", "from fenics_contact._cli import app"),
+        ("_scene_file", "from fenics_contact.design.problem import ShapeProblem"),
         ("qp", "import numpy"),
     ],
 )
@@ -162,25 +144,27 @@ def test_an_import_that_points_down_passes(room: str, line: str, tmp_path: Path)
     assert pointing_up(module) == []
 
 
-def test_rooms_are_entered_by_their_faces() -> None:
+def test_names_are_imported_from_where_they_are_defined() -> None:
     house = modules()
-    hidden = hidden_files(house)
-    assert f"{PACKAGE}.qp.face" in hidden, "no files of rooms were found: nothing was tested"
-    assert [line for module in house for line in past_faces(module, hidden)] == []
+    names = {module.name for module in house}
+    assert f"{PACKAGE}.qp.face" in names, "no modules were found: nothing was tested"
+    assert [line for module in house for line in detours(module, names)] == []
 
 
 @pytest.mark.parametrize(
-    "line",
+    ("line", "is_one"),
     [
-        "from fenics_contact.qp.face import Face",
-        "from fenics_contact.qp import face",
-        "def f():\n    import fenics_contact.qp.face",
+        ("from fenics_contact.qp import Face", True),
+        ("from fenics_contact import solve_scene", True),
+        ("from fenics_contact.qp.face import _faces", True),
+        ("from fenics_contact.qp.face import Face", False),
+        ("from fenics_contact.errors import InvalidInputError", False),
+        ("from fenics_contact._scene import loads", False),
     ],
 )
-def test_an_import_past_a_face_is_found(line: str, tmp_path: Path) -> None:
-    hidden = {f"{PACKAGE}.qp.face"}
-    assert len(past_faces(a_module("feti", line, tmp_path), hidden)) == 1
-    assert past_faces(a_module("qp", line, tmp_path / "inside"), hidden) == []
+def test_an_import_by_a_detour_is_found(line: str, is_one: bool, tmp_path: Path) -> None:
+    house = {f"{PACKAGE}.qp.face", f"{PACKAGE}._scene.loads"}
+    assert bool(detours(a_module("feti", line, tmp_path), house)) == is_one
 
 
 @pytest.mark.parametrize("room", sorted(WITHOUT_FENICS))
@@ -228,18 +212,18 @@ def test_dolfinx_is_found_inside_functions_and_allowed_for_types(tmp_path: Path)
 
 def test_only_dolfinx_and_requirements_ask_for_its_version() -> None:
     asking = {module.room for module in modules() if "fenics-dolfinx" in module.path.read_text()}
-    assert "_requirements" in asking, "the name has changed: nothing was tested"
-    assert asking <= {"_requirements", "_dolfinx"}
+    assert "_base" in asking, "the name has changed: nothing was tested"
+    assert asking <= {"_base", "_dolfinx"}
 
 
-def test_contact_alone_loads_neither_sensitivity_nor_pictures() -> None:
-    code = f"import sys, {PACKAGE}.contact; print(*sorted(sys.modules))"
+def test_equilibrium_alone_loads_neither_sensitivity_nor_pictures() -> None:
+    code = f"import sys, {PACKAGE} as fc; fc.solve_scene; print(*sorted(sys.modules))"
     answer = launch(1, "-c", code)
     assert answer.returncode == 0, answer.stderr
     loaded = set(answer.stdout.split())
-    assert f"{PACKAGE}.contact" in loaded
-    rooms = {f"{PACKAGE}.{room}" for room in ("shape", "viz", "optimize", "outer", "study")}
-    assert loaded & (rooms | {"pyvista", "matplotlib"}) == set()
+    assert f"{PACKAGE}._equilibrium" in loaded
+    rooms = {f"{PACKAGE}.{room}" for room in ("design", "pictures", "_optimize", "responses", "study")}
+    assert loaded & (rooms | {"pyvista", "matplotlib", f"{PACKAGE}._large_deformations.newton"}) == set()
 
 
 def order(house: list[Module]) -> list[str]:
@@ -270,14 +254,3 @@ def test_modules_that_import_each_other_are_found(tmp_path: Path) -> None:
         (folder / f"{name}.py").write_text(line)
     with pytest.raises(graphlib.CycleError, match=r"qp\.(first|second)"):
         order(modules(tmp_path))
-
-
-def test_a_name_of_a_face_stands_for_one_thing() -> None:
-    rooms = sorted({module.room for module in modules()} - {"", "__main__"})
-    faces = {room: importlib.import_module(f"{PACKAGE}.{room}") for room in rooms if room[0] != "_"}
-    meanings: dict[str, dict[str, object]] = {}
-    for room, face in faces.items():
-        for name in getattr(face, "__all__", []):
-            meanings.setdefault(name, {})[room] = getattr(face, name)
-    assert len(meanings) > 300, "no names were found: nothing was tested"
-    assert {name: list(of) for name, of in meanings.items() if len(set(map(id, of.values()))) > 1} == {}
