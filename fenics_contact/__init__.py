@@ -13,8 +13,8 @@ Loads: Traction, Pressure, TotalForce, BodyForce, gravity, ThermalStrain
 
 Values of loads: SampledField, read_field, Ufl
 
-Equilibrium: solve_scene, solve_steps, ContactProblem, LoadSequence, AutomaticSteps, TangentNewton, FixedPoint,
-    Tolerance
+Equilibrium: solve_scene, solve_steps, ContactProblem, LoadSequence, AutomaticSteps, TangentNewton,
+    FixedPoint, Tolerance
 
 Results: State, DeformedState, NewtonSteps, Status, contact_area
 
