@@ -21,16 +21,9 @@ from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._scene.scene import Scene
 from fenics_contact.design.adjoint import WeakChoice, linearise_face, require_from_rest
+from fenics_contact.design.base import SingleProblem, comm_of, with_fewest_weak_points, with_objective
 from fenics_contact.design.design import SurfaceDesign
-from fenics_contact.design.design_function import SingleProblem, comm_of, with_objective
-from fenics_contact.design.memory import (
-    AdaptiveTolerance,
-    DesignMemory,
-    DesignPoint,
-    Stored,
-    tightest_of,
-    with_fewest_weak_points,
-)
+from fenics_contact.design.memory import AdaptiveTolerance, DesignMemory, DesignPoint, Stored, tightest_of
 from fenics_contact.design.motion import DesignGeometry
 from fenics_contact.design.objective import Objective, Partials, asking, finite, finite_partials, finite_value
 from fenics_contact.design.sensitivity import adjoint_of, by_nodes, products_of

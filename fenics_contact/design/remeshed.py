@@ -21,8 +21,8 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import shape_functions
 from fenics_contact._surfaces.projection import project
 from fenics_contact._surfaces.true_surface import true_surface
+from fenics_contact.design.base import SingleProblem, with_objective
 from fenics_contact.design.design import SurfaceDesign, checked_variables
-from fenics_contact.design.design_function import SingleProblem, with_objective
 from fenics_contact.design.memory import DesignPoint, record_of_values
 from fenics_contact.design.problem import ShapeProblem
 from fenics_contact.errors import InvalidDesignError, InvalidInputError, safe_log, together, user_code

@@ -17,9 +17,9 @@ from fenics_contact._base.fingerprint import described
 from fenics_contact._base.libraries import MPI
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact.design.adjoint import WeakPoints, by_slip_origin, with_later_steps
-from fenics_contact.design.design_function import DesignProblem, comm_of
+from fenics_contact.design.base import DesignProblem, comm_of, with_fewest_weak_points
 from fenics_contact.design.forms import ShapeForms
-from fenics_contact.design.memory import DesignPoint, JointPoint, record_of_values, with_fewest_weak_points
+from fenics_contact.design.memory import DesignPoint, JointPoint, record_of_values
 from fenics_contact.design.objective import Objective, Partials, asking, finite_value
 from fenics_contact.design.problem import ShapeProblem
 from fenics_contact.errors import InvalidInputError, collectively, together

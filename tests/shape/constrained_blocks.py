@@ -16,7 +16,7 @@ from fenics_contact.design import (
     Result,
     TotalPotential,
 )
-from fenics_contact.design.design_function import DesignFunction
+from fenics_contact.design.base import DesignFunction
 from fenics_contact.qp import FaceNewton
 from fenics_contact.results import ContactResult
 from tests.contact.gallery import partitions

@@ -18,7 +18,7 @@ from fenics_contact.design import (
     Result,
     TotalPotential,
 )
-from fenics_contact.design.design_function import DesignFunction
+from fenics_contact.design.base import DesignFunction
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.output import read_result, write_optimisation_result
 from tests.shape.constrained_blocks import BOUND, FORCE, largest_force, minimised, posed

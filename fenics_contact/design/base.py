@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from typing import Any, Generic, TypeVar
@@ -17,7 +17,7 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact.design.design import SurfaceDesign
 from fenics_contact.design.memory import DesignPoint, DesignRecord, JointPoint
 from fenics_contact.design.objective import Objective
-from fenics_contact.errors import collectively
+from fenics_contact.errors import InvalidDesignError, collectively
 from fenics_contact.results.deformed_state import AnyState
 
 Point = TypeVar("Point", DesignPoint, JointPoint)
@@ -279,3 +279,38 @@ class DesignFunction:
         point = replace(self._own.differentiate(state), alpha=np.array(alpha, dtype=float))
         self._last = point
         return point
+
+
+def with_fewest_weak_points(
+    alpha: np.ndarray,
+    end: np.ndarray,
+    evaluate: Callable[[np.ndarray], Point],
+    *,
+    parts: tuple[float, ...] = (1e-2, 1.0),
+) -> Point:
+    """Return the design with the fewest weak points of a few on the way from one to another. Collective.
+
+    In a generic direction, points leave their switches, and their branches together are those of an actual
+    design. A point that is still on its switch far away does not depend on the design to first order: either
+    branch gives the same derivative.
+
+    Args:
+        alpha: Design variables, shape (size,), [length].
+        end: A design nearby, shape (size,), [length].
+        parts: Fractions of the way at which designs are evaluated, nearest first.
+    """
+    best: Point | None = None
+    refused: InvalidDesignError | None = None
+    for part in parts:
+        try:
+            point = evaluate(alpha + part * (end - alpha))
+        except InvalidDesignError as error:
+            refused = error
+            continue
+        if best is None or point.weak.count < best.weak.count:
+            best = point
+        if best.weak.count == 0:
+            break
+    if best is None:
+        raise InvalidDesignError(f"no design near one with weak points can be evaluated: {refused}")
+    return best
