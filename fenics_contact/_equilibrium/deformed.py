@@ -21,11 +21,7 @@ from fenics_contact._equilibrium.warnings import ContactWarnings, TurnedBodies, 
 from fenics_contact._large_deformations.equations import Equations, ResidualState
 from fenics_contact._large_deformations.load_steps import AutomaticSteps, Path, PathEndsError, Snap
 from fenics_contact._large_deformations.loading import FollowingPressures, Loading, TurnedSurface
-from fenics_contact._large_deformations.moving_contact import (
-    ContactConfiguration,
-    MovingContact,
-    StillContact,
-)
+from fenics_contact._large_deformations.moving_contact import ContactConfiguration, MovingContact
 from fenics_contact._large_deformations.newton import NotHeldError
 from fenics_contact._large_deformations.starts import Effort, NonlinearEquilibrium
 from fenics_contact._scene.scene import LoadStep, Scene
@@ -143,7 +139,7 @@ class DeformedEquilibria:
             raise LoadStepError(words, failure.history, last) from failure
         state = _state_after(path, origin, timer)
         self._turned.tell(state)
-        if isinstance(equations.contact, StillContact):
+        if not isinstance(equations.contact, MovingContact):
             self._doubts.warn_of_sliding(state)
         return state
 

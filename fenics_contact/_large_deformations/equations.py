@@ -22,7 +22,6 @@ from fenics_contact._large_deformations.moving_contact import (
     ContactConfiguration,
     FurtherRows,
     MovingContact,
-    StillContact,
     stiffened,
     unsymmetric_at,
     with_added,
@@ -60,15 +59,8 @@ def relative_residuals(
 ) -> Residuals:
     """Return the relative residuals of a configuration: forces out of balance as `coarse`. Collective.
 
-    Args:
-        torn: The system.
-        natural: λ − P(λ − ρ r), owned, [force].
-        violation: Largest violation of a bound or disc by this rank's multipliers, [force].
-        forces: Out of balance, internal, Bᵀλ, loads; each torn, shape (torn_size,), [force].
-        constraint_residual: c − B u, owned, [length].
-        displacement: u of this rank, torn, shape (torn_size,), [length].
-        largest: A norm that displacements have had on the way, with which small ones are compared, [length].
-        stiff: Largest entry of the tangents' diagonals, [force / length].
+    ``natural`` is λ − P(λ − ρ r), owned; ``forces`` are those out of balance, internal ones, Bᵀλ and loads,
+    torn; small displacements are compared with the ``largest`` on the way.
     """
     comm, contact = torn.numbering.comm, torn.numbering.owned >= torn.n_equality
     lengths = displacement, constraint_residual[~contact], torn.right[~contact]
@@ -138,7 +130,7 @@ class ResidualState:
     """The equations at a configuration, under a load.
 
     Attributes:
-        equations: Internal forces, and how bodies meet.
+        equations: Internal forces, and contact.
         load: What acts.
         at: The configuration; its history and its time are those before the load step.
         responses: Internal forces and tangents of this rank's subdomains.
@@ -162,13 +154,7 @@ class ResidualState:
     least_jacobian: float
 
     def evaluate(self, displacement: Vector, multiplier: Vector, caution: float = 1.0) -> ResidualState:
-        """Return the equations after a Newton step from here. Collective.
-
-        Args:
-            displacement: u of this rank, torn, shape (torn_size,), [length].
-            multiplier: λ on the rows of the present contact points, owned, [force].
-            caution: Factor on ρ of the natural map.
-        """
+        """Return the equations after a Newton step from here, given λ on the present rows. Collective."""
         at = replace(self.at, displacement=displacement, multiplier=multiplier)
         return self.equations.evaluate(self.load, at, caution, self.at.displacement)
 
@@ -228,9 +214,6 @@ class ResidualState:
     def passed_on(self, moved: Vector) -> Vector:
         """Return what neighbours and supports take of the unsymmetric part of the loads' growth. Collective.
 
-        Args:
-            moved: A change of the displacement of this rank, torn, shape (torn_size,), [length].
-
         Returns:
             Change of multipliers, owned, zero but in gluing rows and those of supports, [force].
         """
@@ -248,10 +231,6 @@ class ResidualState:
 
     def linearised(self, timer: PhaseTimer, known: Linearisation | None) -> Linearisation:
         """Factor the tangents. Collective.
-
-        Args:
-            timer: Collects the wall time.
-            known: That of a neighbouring configuration, or None.
 
         Raises:
             ConvergenceError: If the tangents are not finite, or have no factors.
@@ -321,7 +300,7 @@ class Equations:
     Attributes:
         decomposition: The subdomains.
         rigid_start: Moves bodies as their supports do.
-        contact: How bodies meet: at their undeformed places unless some deform much.
+        contact: How contact points are found: at undeformed places unless some body deforms much.
     """
 
     def __init__(self, scene: Scene, decomposition: Decomposition) -> None:
@@ -332,9 +311,8 @@ class Equations:
         with together(decomposition.comm):
             self._mechanics = tuple(self._of(scene, number) for number in range(len(decomposition.meshes)))
         meshes = [body.mesh for body in scene.bodies.values()]
-        self.contact: Contact = StillContact()
-        if scene.contacts and scene.deforms_much:
-            self.contact = MovingContact(scene, decomposition)
+        moves = bool(scene.contacts) and scene.deforms_much
+        self.contact = MovingContact(scene, decomposition) if moves else Contact()
         self._reach = max(float(np.abs(mesh.points).max()) for mesh in meshes)
         self._cell = max(float(mesh.volume / mesh.n_cells) ** (1.0 / scene.dim) for mesh in meshes)
 
@@ -378,13 +356,10 @@ class Equations:
     def evaluate(
         self, load: Loading, near: Configuration, caution: float = 1.0, origin: Vector | None = None
     ) -> ResidualState:
-        """Search for the contact points at a displacement; return forces, openings and residuals. Collective.
+        """Search for the contact points at a displacement, and evaluate the equations there. Collective.
 
-        Args:
-            load: What acts.
-            near: The displacement, with contact points of a neighbouring one, whose rows the forces have.
-            caution: Factor on ρ of the natural map.
-            origin: Displacement before the last Newton step, torn; None where there was none.
+        Multipliers have the rows of the contact points of ``near``; ``caution`` is a factor on ρ of the
+        natural map, ``origin`` the displacement before the last Newton step.
         """
         contact = self.contact.at(load, near.displacement, near.contact)
         return self.evaluate_at(load, near.on(contact), caution, origin)

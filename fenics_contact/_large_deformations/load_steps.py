@@ -94,14 +94,7 @@ class Snapping:
         load: Callable[[Configuration, TornSystem], Loading],
         timer: PhaseTimer,
     ) -> None:
-        """Prepare; nothing is computed yet.
-
-        Args:
-            newton: Solves each stage, and the end as accurately as it asks for.
-            equations: Internal forces, and how bodies meet.
-            load: What acts, for slip that begins at a configuration, with the system in which it was found.
-            timer: Collects the wall time.
-        """
+        """Prepare; ``load`` returns what acts, with slip from a configuration and its system."""
         self._newton, self._equations, self._load, self._timer = newton, equations, load, timer
         self.effort, self.stages, self.dissipated = Effort(), 0, 0.0
 
@@ -109,11 +102,6 @@ class Snapping:
         self, at: Configuration, torn: TornSystem, known: Linearisation | None
     ) -> NonlinearEquilibrium:
         """Return the equilibrium where bodies come to rest. Collective.
-
-        Args:
-            at: The configuration at the start.
-            torn: The system in which it was found.
-            known: A linearisation near it, or None.
 
         Raises:
             ConvergenceError: They do not; with the history.
@@ -235,7 +223,7 @@ class AutomaticSteps:
         first: First part of the load that is tried, in (0, 1].
         smallest: Smallest part of the load; a step that fails there ends the path.
         snaps: Whether bodies that have no equilibrium near, as where structures snap through or an edge jumps
-            over another one, move on through a viscous medium to the next one; `DeformedState.snaps` tells.
+            over another one, move on through a viscous medium to the next one; see `DeformedState.snaps`.
             The medium takes the work that inertia and radiation would, and like them may decide where bodies
             come to rest. Histories begin anew at each stage of that motion.
         finer_history: Whether each part is a step of its own for slip and the histories of materials. A path
@@ -275,7 +263,7 @@ class AutomaticSteps:
         """Return the equilibrium at a load, with the path to it. Collective.
 
         Args:
-            equations: Internal forces, and how bodies meet.
+            equations: Internal forces, and contact.
             before: What acts at the start; None for bodies at rest without loads.
             target: What acts at the end.
             start: The configuration at the start.

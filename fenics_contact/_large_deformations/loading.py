@@ -108,9 +108,6 @@ class Loading:
     def at(self, displacement: Vector) -> tuple[Vector, sp.csr_matrix | None]:
         """Return the forces on deformed bodies, and the stiffness of those that follow their surfaces.
 
-        Args:
-            displacement: u of this rank, torn, shape (torn_size,), [length].
-
         Returns:
             Forces of this rank, torn, shape (torn_size,), [force]; less their growth with u, shape
             (torn_size, torn_size), None where all are dead.

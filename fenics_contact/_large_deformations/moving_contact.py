@@ -1,6 +1,6 @@
 """Forces that turn with their surfaces: how they change as these do.
 
-Where bodies meet: at the points of the undeformed bodies, or wherever they have moved to.
+Contact points: those of the undeformed bodies, or wherever bodies have moved to.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -158,13 +158,7 @@ def _lengths(columns: sp.csr_matrix) -> np.ndarray:
 def unsymmetric_at(
     decomposition: Decomposition, stiffness: sp.csr_matrix, nodes: np.ndarray
 ) -> UnevenStiffness:
-    """Return the unsymmetric part of a torn stiffness on the free dofs of some nodes. Collective.
-
-    Args:
-        decomposition: The subdomains.
-        stiffness: This rank's, torn, shape (torn_size, torn_size), [force / length].
-        nodes: Marks of the nodes, shape (n_nodes,).
-    """
+    """Return the unsymmetric part of a torn stiffness on the free dofs of some nodes. Collective."""
     tearing, dim = decomposition.tearing, decomposition.tearing.dim
     here, block = decomposition.held
     node = np.empty(len(here), dtype=np.int64)
@@ -275,7 +269,7 @@ def with_added(
     return [(K + added[part, part]).tocsr() for K, part in each]
 
 
-#: Number of facets that supports and obstacles may pass within a step: contact is searched where nodes stand.
+#: Number of facets that supports and obstacles may pass within a step: contact is searched where nodes are.
 FACETS = 2.0
 
 
@@ -333,12 +327,7 @@ class ContactConfiguration:
         return np.asarray(across & held)
 
     def turning(self, multiplier: Vector, pressure: UnevenStiffness | None) -> TurningForces | None:
-        """Return the stiffness of forces that turn with their surfaces; None without any. Collective.
-
-        Args:
-            multiplier: λ, owned.
-            pressure: The unsymmetric stiffness of pressures.
-        """
+        """Return the stiffness of forces that turn with their surfaces; None without any. Collective."""
         further = [] if pressure is None else [pressure]
         if self.points is None or self.start is None:
             return TurningForces.of(None, further) if further else None
@@ -361,10 +350,7 @@ class ContactConfiguration:
     def carried(self, values: Vector, other: ContactConfiguration, spread: bool = False) -> Vector:
         """Return a vector on the rows of other points on the rows of these. Collective.
 
-        Args:
-            values: By row, owned there.
-            other: The other points.
-            spread: Whether points that are new get the mean of the others, rather than zero.
+        Points that are new get zero, with ``spread`` the mean of the others.
         """
         if self.points is None or other.points is None:
             return values
@@ -427,43 +413,24 @@ class ContactConfiguration:
         return meeting_at(self.torn, points, self.prescribed, further)
 
 
-class Contact(Protocol):
-    """How bodies meet."""
-
-    def longest_part(self, first: Loading, last: Loading) -> float:
-        """Return the part of the way between two loads that one step may take. Collective.
-
-        What moves must be found again.
-        """
-
-    def at(
-        self, load: Loading, displacement: Vector, last: ContactConfiguration | None
-    ) -> ContactConfiguration:
-        """Return the contact points at a displacement. Collective.
-
-        Args:
-            load: What acts.
-            displacement: u of this rank, torn, shape (torn_size,), [length].
-            last: The points at a neighbouring displacement, with the start of their slip; None where slip
-                starts here.
-        """
-
-
-class StillContact:
+class Contact:
     """Contact at the points of the undeformed bodies: small displacements."""
 
     def longest_part(self, first: Loading, last: Loading) -> float:
-        """Return the whole way."""
+        """Return the part between two loads in which contact points can be found again. Collective."""
         return 1.0
 
     def at(
         self, load: Loading, displacement: Vector, last: ContactConfiguration | None
     ) -> ContactConfiguration:
-        """Return the points of the undeformed bodies."""
+        """Return the contact points at a displacement of this rank, torn. Collective.
+
+        The last ones, at a neighbouring displacement, have the start of slip; without any it starts here.
+        """
         return ContactConfiguration(load.torn, None, None, load.prescribed)
 
 
-class MovingContact:
+class MovingContact(Contact):
     """Contact wherever the bodies have moved to."""
 
     def __init__(self, scene: Scene, decomposition: Decomposition) -> None:
@@ -517,7 +484,7 @@ class MovingContact:
         return ContactConfiguration(torn, found, start, load.prescribed)
 
     def _coordinates(self, load: Loading, displacement: Vector) -> np.ndarray:
-        """Return where all nodes are that may meet, shape (n_nodes, dim), [length]. Collective."""
+        """Return where all nodes of contact surfaces are, shape (n_nodes, dim), [length]. Collective."""
         coordinates = self._places.copy()
         coordinates[self._nodes] += nodal_mean_at(load.torn.decomposition, displacement, self._nodes)
         # Prescribed components reach their values within the step: gaps are those after it.

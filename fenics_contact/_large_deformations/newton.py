@@ -113,7 +113,7 @@ class TangentNewton:
         """Return the equilibrium next to a configuration. Collective.
 
         Args:
-            equations: Internal forces, and how bodies meet.
+            equations: Internal forces, and contact.
             load: What acts, with the origin of slip where bodies do not move far.
             start: Where Newton's method starts, with the start of slip and with the history of materials
                 before the load step.
@@ -131,21 +131,13 @@ class TangentNewton:
 
 @dataclass(frozen=True)
 class _Pace:
-    """How accurately a step is solved, and how cautiously its face is chosen.
+    """How accurately a step is solved, and how cautiously its face is chosen."""
 
-    Attributes:
-        forcing: η, residual of the linear system relative to its start.
-        late: The last residuals since the last stall, oldest first.
-        care: Factor on η.
-        caution: Factor on ρ of the natural map.
-        stalls: How often residuals have not halved in time.
-    """
-
-    forcing: float
-    late: tuple[float, ...] = ()
-    care: float = 1.0
-    caution: float = 1.0
-    stalls: int = 0
+    forcing: float  # η, residual of the linear system relative to its start
+    late: tuple[float, ...] = ()  # the last residuals since the last stall, oldest first
+    care: float = 1.0  # factor on η
+    caution: float = 1.0  # factor on ρ of the natural map
+    stalls: int = 0  # how often residuals have not halved in time
 
     def after(self, method: TangentNewton, worst: float) -> _Pace:
         """Return the pace of the next step, given the residual at its start."""
@@ -163,24 +155,14 @@ class _Pace:
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """The data passed from one Newton step to the next.
-
-    Attributes:
-        evaluation: The equations at the start of the next step.
-        near: The last linearisation; None before the first.
-        pace: That of the last step.
-        before: Residuals before the last step; None before the first.
-        instead: Where to start from if the first step fails; None otherwise.
-        loose: Whether contact had to be solved as a whole since its face did not hold every body.
-        effort: That of all steps.
-    """
+    """The data passed from one Newton step to the next."""
 
     evaluation: ResidualState
-    near: Linearisation | None
-    pace: _Pace
-    before: Residuals | None = None
-    instead: Configuration | None = None
-    loose: bool = False
+    near: Linearisation | None  # the last one, None before the first
+    pace: _Pace  # that of the last step
+    before: Residuals | None = None  # before the last step
+    instead: Configuration | None = None  # where to start from if the first step fails
+    loose: bool = False  # whether the last face did not hold every body
     effort: Effort = field(default_factory=Effort)
 
     @property
@@ -360,9 +342,8 @@ class _Run:
     ) -> SolverStep:
         """Return the line of history of a step. Collective."""
         assert state.near is not None
-        face, comm, softened = taken.face, state.evaluation.torn.numbering.comm, state.near.system.softened
-        counts = global_sum(comm, *(np.count_nonzero(m) for m in (face.closed, face.stick, face.slip)))
-        closed, stick, slip = (round(float(count)) for count in counts)
+        closed, stick, slip = taken.face.counts(state.evaluation.torn.numbering.comm)
+        softened = state.near.system.softened
         notes = ["contact solved as a whole"] if whole else [f"forcing {state.pace.forcing:.1e}"]
         notes += [f"cut to {damped.fraction:g} of the step"] if damped.fraction < 1.0 else []
         notes += [taken.stop.value] if taken.stop is not Stop.CONVERGED else []

@@ -33,11 +33,6 @@ class RigidStart:
         Supports hold whole nodes of such a body, and these move from one load to the other like those of a
         rigid body, whose motion they determine.
 
-        Args:
-            before: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
-            load: What acts next.
-            displacement: That before, of this rank, torn, shape (torn_size,), [length].
-
         Returns:
             That of this rank, torn; None if no body moves like that.
         """

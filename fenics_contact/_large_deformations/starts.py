@@ -88,11 +88,6 @@ def starts(
     Bodies that touch nothing, there as here, start where their supports take them as rigid ones. So do bodies
     that slide: with their forces, on surfaces that are found where they come to lie, they are in equilibrium
     but for what lies under them. Where points stick or are pressed, the tangent knows better where bodies go.
-
-    Args:
-        evaluated: Evaluates the equations at a configuration.
-        at: Where bodies are.
-        moved: The displacement to which supports take them, torn, shape (torn_size,); None without any.
     """
     contact = at.contact
     touching = contact is not None and _acts(contact.torn, at.multiplier)

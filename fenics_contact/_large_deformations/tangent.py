@@ -117,29 +117,24 @@ class IndefiniteFactor(RefillableFactor):
         return bool(self._factor.getMumpsInfog(1) >= 0)
 
 
-def with_inertia(matrix: sp.csr_matrix, spent: RefillableFactor | None) -> IndefiniteFactor:
-    """Return factors of a matrix that know its negative eigenvalues.
-
-    Args:
-        matrix: The matrix, shape (n, n).
-        spent: Factors that nothing uses any more, to be refilled where they fit; None without any.
-    """
-    if isinstance(spent, IndefiniteFactor) and spent.refill(matrix):
-        return spent
+def with_inertia(matrix: sp.csr_matrix, unused: RefillableFactor | None) -> IndefiniteFactor:
+    """Return factors that know the negative eigenvalues of a matrix, refilled unused ones where they fit."""
+    if isinstance(unused, IndefiniteFactor) and unused.refill(matrix):
+        return unused
     return IndefiniteFactor(matrix)
 
 
-def mostly_positive(matrix: sp.csr_matrix, spent: RefillableFactor | None) -> RefillableFactor:
+def mostly_positive(matrix: sp.csr_matrix, unused: RefillableFactor | None) -> RefillableFactor:
     """Return factors of a matrix that is positive definite but for few exceptions; see `with_inertia`.
 
     Cholesky factors, which are much faster in small problems, unless their solutions are wrong.
     """
     try:
-        if spent is None or isinstance(spent, IndefiniteFactor) or not spent.refill(matrix):
-            spent = RefillableFactor(matrix)
+        if unused is None or isinstance(unused, IndefiniteFactor) or not unused.refill(matrix):
+            unused = RefillableFactor(matrix)
     except (PETSc.Error, ConvergenceError):  # as later versions say that it is not positive definite
         return with_inertia(matrix, None)
-    return spent if spent.fits(matrix) else with_inertia(matrix, None)
+    return unused if unused.fits(matrix) else with_inertia(matrix, None)
 
 
 #: Fixing nodes relative to the cube root of the number of nodes: held at its corners alone, a body under
@@ -162,7 +157,7 @@ class TangentOperator(FactoredOperator):
     displacements, and their stiffness S keep the dual problem exact for any C.
 
     The Schur complement is that of K_ρ − C (CᵀK_ρ⁻¹C)⁻¹Cᵀ, which is K without stress: positive, and without
-    forces where the modes move. Multipliers bear their stiffness, which preconditioners must leave out.
+    forces where the modes move. Their stiffness is left to multipliers, preconditioners must leave it out.
 
     Attributes:
         modes: Φ, shape (n, m).
@@ -173,23 +168,17 @@ class TangentOperator(FactoredOperator):
     _fixing: np.ndarray
     _searched: np.ndarray
     _softest: float
-    _spent: tuple[RefillableFactor | None, RefillableFactor | None] = (None, None)
+    _released: tuple[RefillableFactor | None, RefillableFactor | None] = (None, None)
 
     def __init__(self, subdomain: Subdomain, interface: np.ndarray, earlier: TangentOperator | None) -> None:
-        """Factor a subdomain.
-
-        Args:
-            subdomain: Its tangent and the rigid motions of its present shape, as kernel.
-            interface: Interface dofs b, shape (n_b,).
-            earlier: That of an earlier shape, whose soft motions are a start; None for the first.
-        """
+        """Factor a subdomain."""
         K, size = subdomain.stiffness, subdomain.mesh.size
         typical = float(np.abs(K.diagonal()).max())
         self._fixing = _well_spread(subdomain.points) if earlier is None else earlier._fixing
-        spent, inner = (None, None) if earlier is None else earlier._spent
+        unused, inner = (None, None) if earlier is None else earlier._released
         dofs, basis = self._fixing, motions_at(self._fixing, subdomain.kernel)
         held = held_by(K, dofs, basis, typical)
-        factor = with_inertia(held, spent)
+        factor = with_inertia(held, unused)
         columns = np.zeros((size, basis.shape[1]))
         columns[dofs] = basis
         weights = np.full(basis.shape[1], typical)
@@ -210,7 +199,7 @@ class TangentOperator(FactoredOperator):
 
     def release_factors(self) -> None:
         """Hand the factorisation to the operator of the next shape; do not use this one afterwards."""
-        self._spent = self._factors
+        self._released = self._factors
 
     def _soft_motions(
         self, held: sp.csr_matrix, factor: IndefiniteFactor, earlier: TangentOperator | None, typical: float
@@ -270,14 +259,7 @@ class _Updated:
 def _softest(
     held: sp.csr_matrix, factor: IndefiniteFactor, start: np.ndarray, sweeps: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return approximate eigenvalues next to zero, ascending, and their vectors, by inverse iteration.
-
-    Args:
-        held: The matrix, shape (n, n).
-        factor: Its factors.
-        start: Vectors to start from, shape (n, k).
-        sweeps: Number of iterations.
-    """
+    """Return approximate eigenvalues next to zero, ascending, and their vectors, by inverse iteration."""
     basis = start
     for _ in range(sweeps):
         basis, _ = np.linalg.qr(factor.solve_many(basis))
@@ -364,14 +346,7 @@ class TangentSystem(DualSystem):
         diagonal: np.ndarray | None = None,
         earlier: Mapping[int, TangentOperator] | None = None,
     ) -> None:
-        """Factor the tangents and assemble d, G, S, e. Collective.
-
-        Args:
-            torn: The linearised system.
-            timer: Collects the wall time.
-            diagonal: That of F on contact rows, owned, if it is known well enough.
-            earlier: Operators of an earlier shape by number of subdomain.
-        """
+        """Factor the tangents and assemble d, G, S, e. Collective."""
         self._known_diagonal, self._earlier = diagonal, earlier or {}
         super().__init__(torn, timer, kind=LocalKind.IMPLICIT)
 
@@ -427,17 +402,9 @@ def linearised(
     displacement: np.ndarray,
     tangents: Sequence[sp.csr_matrix],
     unbalanced: np.ndarray,
-    lacking: np.ndarray,
+    constraint_residual: np.ndarray,
 ) -> TornSystem:
-    """Return the torn system of increments at a displacement.
-
-    Args:
-        torn: The system with its load and right side.
-        displacement: u of this rank, torn, shape (torn_size,), [length].
-        tangents: K of each of this rank's subdomains at u.
-        unbalanced: The forces out of balance, this rank's, torn, shape (torn_size,), [force].
-        lacking: c − B u, owned, shape (n_owned,), [length].
-    """
+    """Return the torn system of increments at a displacement."""
     subdomains, start = [], 0
     for subdomain, tangent in zip(torn.subdomains, tangents, strict=True):
         part = slice(start, start + subdomain.mesh.size)
@@ -448,7 +415,7 @@ def linearised(
             replace(subdomain, points=points, kernel=kernel, load=unbalanced[part], matrix=matrix)
         )
         start = part.stop
-    return replace(torn, subdomains=tuple(subdomains), right=lacking)
+    return replace(torn, subdomains=tuple(subdomains), right=constraint_residual)
 
 
 def _itself(matrix: sp.csr_matrix) -> sp.csr_matrix:

@@ -21,10 +21,10 @@ from fenics_contact._large_deformations.moving_contact import FurtherRows
 from fenics_contact._large_deformations.tangent import TangentSystem
 from fenics_contact.qp.face import Face, classify
 from fenics_contact.qp.face_newton import FaceNewton
-from fenics_contact.qp.face_system import CoupledSystem, FaceSystem
+from fenics_contact.qp.face_system import CoupledSystem, FaceSystem, growing_basis
 from fenics_contact.qp.krylov import Kept, Stop, gmres
 from fenics_contact.qp.problem import CountedOperator, DualProblem, FacePreconditioner
-from fenics_contact.qp.reductions import Vector, global_max, global_sum
+from fenics_contact.qp.reductions import Vector, global_sum
 from fenics_contact.qp.solution import apply_unless_zero
 from fenics_contact.qp.solve import solve
 
@@ -123,11 +123,8 @@ def tangent_step(
     ratio = step if factor is None else np.asarray(step / factor**2, dtype=np.float64)
     face = classify(problem.layout, bound, at.multiplier, at.residual, ratio)
     operator = CountedOperator(problem.operator)
-    growth, coupling, fixed = problem.law.growth, None, face.fixed
-    if global_max(problem.comm, float(np.any(growth[face.slip] > 0.0))) > 0.0:
-        coupling = face.growth(growth)
-        fixed = fixed - coupling @ np.maximum(face.restrict(at.multiplier), 0.0)
-    solved = _StiffFace.build(at, face, coupling, operator)
+    moving, fixed = growing_basis(problem.comm, face, problem.law.growth, at.multiplier)
+    solved = _StiffFace.build(at, face, face.restriction if moving is None else moving, operator)
     if solved is None:
         return None
     change, motions, stop = solved.solve(fixed, forcing, floor, max_products)
@@ -141,20 +138,12 @@ def whole_step(system: TangentSystem, multiplier: Vector, step: Vector, solver: 
     """Solve the linearised contact problem as a whole, its rigid motions without stiffness. Collective.
 
     At the start of a history nothing is known of the active set, and without stress they have none.
-
-    Args:
-        system: The tangents.
-        multiplier: λ, owned, without rows of forces that turn.
-        step: ρ of the natural map on all rows, owned.
-        solver: Solves the dual problem.
     """
     torn, before, problem = system.torn, system.products, system.problem
     multiplier = np.concatenate([multiplier, np.zeros(len(step) - len(multiplier))])
     load = problem.coarse.load + problem.coarse.apply(multiplier)
-    scaling = None if problem.scaling is None else problem.scaling.with_load(load)
     flexed = apply_unless_zero(problem, system.apply, multiplier)
-    coarse = problem.coarse.with_load(load)
-    problem = replace(problem, rhs=problem.rhs + flexed, coarse=coarse, scaling=scaling, reach=None)
+    problem = replace(problem.with_load(problem.rhs + flexed, load), reach=None)
     tresca, coefficient = torn.friction
     solution = solve(problem, tresca, solver, multiplier, friction_coefficient=coefficient)
     bound = torn.law.bound(solution.multiplier)
@@ -190,13 +179,13 @@ def tangent_adjoint(
     """
     problem = tangent.problem
     factor = 1.0 if problem.scaling is None else problem.scaling.factor
-    scaling = None if problem.scaling is None else problem.scaling.with_load(load)
-    problem = replace(problem, rhs=right, coarse=problem.coarse.with_load(load), scaling=scaling)
+    problem = problem.with_load(right, load)
     nothing = np.zeros_like(tangent.multiplier)
     at = replace(tangent, problem=problem, multiplier=nothing, residual=nothing).scaled()
     flexibility = face.flexibility * (factor * np.ones_like(nothing))[problem.layout.tangential[:, 0]] ** 2
     operator = CountedOperator(at.problem.operator)
-    solved = _StiffFace.build(at, replace(face, flexibility=flexibility), coupling, operator)
+    face, moving = replace(face, flexibility=flexibility), (face.restriction + coupling).tocsr()
+    solved = _StiffFace.build(at, face, moving, operator)
     if solved is None:
         return None
     transposed = solved.coupled.transposed(at.problem.coarse)
@@ -213,23 +202,17 @@ class _StiffFace:
 
     W and Z have the columns of the face in common but for growing friction; then W has the rows that measure
     without multipliers, and Z those whose multipliers act without being measured.
-
-    Attributes:
-        at: The linearised problem.
-        coupled: The face without S; κ is that of slipping discs, of rows with a compliance, and one of rows
-            that act.
-        shared: Columns of the face that W and Z have in common, as numbers, shape (n_shared,).
-        soft: Marks of the columns with a compliance of their own, shape (n,).
     """
 
-    at: TangentProblem
+    at: TangentProblem  # the linearised problem
+    # The face without S; κ is that of slipping discs, of rows with a compliance, and one of rows that act.
     coupled: CoupledSystem
-    shared: np.ndarray
-    soft: np.ndarray
+    shared: np.ndarray  # columns of the face that W and Z have in common, as numbers, shape (n_shared,)
+    soft: np.ndarray  # marks of the columns with a compliance of their own, shape (n,)
 
     @classmethod
     def build(
-        cls, at: TangentProblem, face: Face, coupling: sp.csr_matrix | None, operator: CountedOperator
+        cls, at: TangentProblem, face: Face, moving: sp.csr_matrix, operator: CountedOperator
     ) -> _StiffFace | None:
         """Prepare the face; None where it does not hold every body. Collective."""
         problem, further, equality = at.problem, at.further, at.problem.layout.equality
@@ -239,7 +222,6 @@ class _StiffFace:
             for rows in (further.displacement_rows, further.force_rows, further.correction_rows)
         )
         shared = np.setdiff1d(np.arange(basis.shape[1]), np.concatenate([measuring, acting, correcting]))
-        moving = basis if coupling is None else (basis + coupling).tocsr()
         tested = at.corrected(basis[:, np.concatenate([shared, measuring])])
         moving = moving[:, np.concatenate([shared, acting])]
         own, share = face.restrict(at.compliance), further.share
@@ -267,12 +249,6 @@ class _StiffFace:
 
         GMRES on the whole residual v of the first equation: its part across the rigid motions is cancelled by
         multipliers in equilibrium, the rest by the motions, with multipliers that balance their stiffness.
-
-        Args:
-            fixed: The part of λ that is given on the face, owned.
-            forcing: As for `tangent_step`.
-            floor: As there.
-            max_products: As there.
         """
         problem, comm, coupled = self.at.problem, self.at.problem.comm, self.coupled
         oblique, moving, operator = coupled.oblique, coupled.moving, coupled.system.operator

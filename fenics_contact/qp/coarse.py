@@ -279,13 +279,7 @@ class SquareInverse(Protocol):
 
 
 def invert_square(comm: MPI.Comm, share: sp.csr_matrix, scale: Vector) -> SquareInverse | None:
-    """Factor the sum of the ranks' shares; None if it is singular. Collective.
-
-    Args:
-        comm: Communicator of the ranks.
-        share: This rank's summand, shape (m, m).
-        scale: Factors for rows and columns that bring the entries to order one, shape (m,), replicated.
-    """
+    """Factor the sum of shares, scaled to order one; None if it is singular. Collective."""
     matrix = summed_if_small(comm, share)
     if isinstance(matrix, np.ndarray):
         dense = DenseSquareInverse(matrix, scale)

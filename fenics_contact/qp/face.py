@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from fenics_contact._base.libraries import MPI
 from fenics_contact.qp.layout import ContactLayout
-from fenics_contact.qp.reductions import Vector
+from fenics_contact.qp.reductions import Vector, global_sum
 
 #: A boolean for each multiplier.
 Marks = npt.NDArray[np.bool_]
@@ -105,9 +106,6 @@ class Face:
 
         Entries ``rate`` · ŵ in the tangential rows of a slipping disc, in the column of its normal
         multiplier.
-
-        Args:
-            rate: dΨ/dλ_N of each disc, shape (n_friction,), owned.
         """
         layout = self.layout
         column_of_contact = np.full(layout.n_contact, -1)
@@ -118,6 +116,12 @@ class Face:
         values = rate[growing, None] * self.direction[growing]
         columns = np.broadcast_to(column[growing, None], rows.shape)
         return sp.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=self.restriction.shape)
+
+    def counts(self, comm: MPI.Comm) -> tuple[int, int, int]:
+        """Count closed contacts, sticking and slipping discs of all ranks. Collective."""
+        marks = self.closed, self.stick, self.slip
+        closed, stick, slip = global_sum(comm, *(np.count_nonzero(each) for each in marks))
+        return round(float(closed)), round(float(stick)), round(float(slip))
 
     def changes(self, other: Face) -> int:
         """Count this rank's contacts and discs whose status differs between two faces."""

@@ -41,12 +41,7 @@ PLAIN = 1e-2
 
 
 def without_contact(history: Sequence[SolverStep], count: int) -> bool:
-    """Return whether all contacts stay open while only they could balance the load.
-
-    Args:
-        history: Steps of Newton's method and rescues.
-        count: Number of last Newton steps that must agree; those before a rescue do not count.
-    """
+    """Return whether contacts that alone balance the load stayed open in the last ``count`` steps."""
     late = history[-count:]
     return len(late) == count and all(_open(step) for step in late)
 
@@ -125,13 +120,8 @@ class FrictionAlone:
 
         With friction along the motion that it resists least, bodies are pressed otherwise than without; with
         the slip bounds of these forces that motion is another one, and so on. If friction then bears less
-        than the load, bodies accelerate.
-
-        Args:
-            start: Forces of the last load, owned, which may hold bodies where they were driven in; None at
-                the first load.
-            settled: Forces are known once friction bears the same part of the load to this accuracy.
-            times: How often they are computed at most; nothing is rejected then.
+        than the load, bodies accelerate. Forces of the last load may hold bodies where they were driven in.
+        They are computed ``times`` times at most, until friction bears the same to ``settled``.
 
         Raises:
             SlidingError: They do.
@@ -292,67 +282,39 @@ class FaceNewton:
 
 @dataclass(frozen=True, eq=False)
 class _LastRescue:
-    """The data of the last rescue that the next one needs.
+    """The data of the last rescue that the next one needs."""
 
-    Attributes:
-        origin: Its initial iterate.
-        result: Its final iterate.
-        budget: Products that it was allowed.
-        vain: Consecutive rescues, including this one, that led to the same iterate.
-    """
-
-    origin: Iterate
-    result: Iterate
-    budget: int
-    vain: int
+    origin: Iterate  # its initial iterate
+    result: Iterate  # its final iterate
+    budget: int  # products that it was allowed
+    vain: int  # consecutive rescues, including this one, that led to the same iterate
 
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """State of a solve by face Newton.
+    """State of a solve by face Newton."""
 
-    Attributes:
-        newton: The present iterate, with faces and ρ.
-        best: The last iterate that halved the residual, or the outcome of a later rescue.
-        memory: Estimates from SMALSE.
-        history: One line per step or rescue.
-        since_best: Newton steps since the best iterate.
-        care: Factor on the tolerance of the next face.
-        rescues: Rescues so far.
-        last_rescue: The last of them.
-        answer: The certified solution, once there is one.
-    """
-
-    newton: FaceState
-    best: Iterate
-    memory: SmalseMemory | None
-    history: tuple[SolverStep, ...] = ()
-    since_best: int = 0
-    care: float = 1.0
+    newton: FaceState  # the present iterate, with faces and ρ
+    best: Iterate  # the last iterate that halved the residual, or the outcome of a later rescue
+    memory: SmalseMemory | None  # estimates from SMALSE
+    history: tuple[SolverStep, ...] = ()  # one line per step or rescue
+    since_best: int = 0  # Newton steps since the best iterate
+    care: float = 1.0  # factor on the tolerance of the next face
     rescues: int = 0
     last_rescue: _LastRescue | None = None
-    answer: Certificate | None = None
+    answer: Certificate | None = None  # the certified solution, once there is one
 
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """One solve by face Newton: the data that all its steps share.
-
-    Attributes:
-        parameters: Those of the method.
-        problem: The dual problem.
-        start: Its start.
-        steps: Newton's method.
-        rescue: The fallback when that stagnates.
-        friction_alone: The test whether friction can suffice.
-    """
+    """One solve by face Newton: the data that all its steps share."""
 
     parameters: FaceNewton
     problem: DualProblem
     start: Start
-    steps: FaceSteps
-    rescue: Rescue
-    friction_alone: FrictionAlone
+    steps: FaceSteps  # Newton's method
+    rescue: Rescue  # the fallback when that stagnates
+    friction_alone: FrictionAlone  # the test whether friction can suffice
 
     @classmethod
     def build(cls, parameters: FaceNewton, problem: DualProblem, start: Start) -> _Run:
@@ -407,12 +369,16 @@ class _Run:
         # (e) Progress: without any, faces are solved more accurately, and at last a rescue is called.
         best, now = state.best.residuals, iterate.residuals
         state = replace(state, newton=newton, history=history)
-        if now.worst_beside(best) < 0.5 * best.worst_beside(now):
+        if now.worst_in_scales_with(best) < 0.5 * best.worst_in_scales_with(now):
             state = replace(state, best=iterate, since_best=0, care=1.0)
         else:
             factor = self.parameters.care if state.since_best >= CARELESS else 1.0
             state = replace(state, since_best=state.since_best + 1, care=factor * state.care)
-        stuck = lost or state.since_best >= self.parameters.patience or not now.worst_beside(best) < DIVERGED
+        stuck = (
+            lost
+            or state.since_best >= self.parameters.patience
+            or not now.worst_in_scales_with(best) < DIVERGED
+        )
         return self._rescued(state) if stuck else state
 
     def _rescued(self, state: _State) -> _State:

@@ -162,7 +162,7 @@ class DampedEquilibrium:
         """Return v − D² ZᵀGᵀ (G Z D² ZᵀGᵀ)⁻¹ G Z v. Collective."""
         return self.damping * self.coarse.project(v / self.damping)
 
-    def bearing(self, resultant: Vector) -> Vector:
+    def balancing(self, resultant: Vector) -> Vector:
         """Return the shortest y in the norm of D⁻¹ with G Z y = resultant. Collective."""
         return self.damping * self.coarse.transpose(self.coarse.solve(resultant))
 
@@ -248,7 +248,7 @@ class CoupledSystem:
         """Return y moved so that G Z y = load, shape (n_face,). Collective."""
         missing = self.oblique.moving.apply(y) - load
         if self.damped is not None:
-            return y - self.damped.bearing(missing)
+            return y - self.damped.balancing(missing)
         return y - self.oblique.transposed @ self.oblique.solve(missing)
 
 
@@ -281,23 +281,28 @@ class CoupledFace:
         return self.coupled.oblique.coefficients(gradient)
 
 
+def growing_basis(
+    comm: MPI.Comm, face: Face, growth: Vector, multiplier: Vector
+) -> tuple[sp.csr_matrix | None, Vector]:
+    """Return Z of a face with growing friction, None without, and the part of λ that is fixed. Collective.
+
+    Friction grows by dΨ/dλ_N, owned by disc, from the multiplier at which the face was determined.
+    """
+    if global_max(comm, float(np.any(growth[face.slip] > 0.0))) == 0.0:
+        return None, face.fixed
+    coupling = face.growth(growth)
+    fixed = face.fixed - coupling @ np.maximum(face.restrict(multiplier), 0.0)
+    return (face.restriction + coupling).tocsr(), fixed
+
+
 def couple(system: FaceSystem, coarse: CoarseSpace, growth: Vector, multiplier: Vector) -> CoupledFace | None:
     """Add the growth of friction to a face system. Collective.
-
-    Args:
-        system: The symmetric system of the face.
-        coarse: Equilibrium of all multipliers.
-        growth: dΨ/dλ_N of each disc, shape (n_friction,), owned.
-        multiplier: λ at which the face was determined, owned.
 
     Returns:
         The coupled face; None where no disc grows, or where the face does not hold every body.
     """
-    face = system.face
-    if global_max(system.comm, float(np.any(growth[face.slip] > 0.0))) == 0.0:
+    moving, fixed = growing_basis(system.comm, system.face, growth, multiplier)
+    if moving is None:
         return None
-    coupling = face.growth(growth)
-    coupled = CoupledSystem.build(system, coarse, face.restriction, (face.restriction + coupling).tocsr())
-    if coupled is None:
-        return None
-    return CoupledFace(coupled, coarse, face.fixed - coupling @ np.maximum(face.restrict(multiplier), 0.0))
+    coupled = CoupledSystem.build(system, coarse, system.face.restriction, moving)
+    return None if coupled is None else CoupledFace(coupled, coarse, fixed)

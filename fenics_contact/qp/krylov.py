@@ -245,16 +245,7 @@ def gmres(
     max_iterations: int,
     patience: int,
 ) -> Krylov:
-    """Combine directions whose images sum up to ``first``, by GMRES without restart. Collective.
-
-    Args:
-        comm: Communicator over which vectors are distributed.
-        first: The right side, owned.
-        expand: Maps a Krylov vector to the image of its preconditioned direction, and what to keep of that.
-        tolerance: Stop when the norm of the residual is at most this.
-        max_iterations: Largest number of directions.
-        patience: Directions without progress after which to give up.
-    """
+    """Combine directions whose images sum up to ``first``, by GMRES without restart. Collective."""
     size = float(np.sqrt(global_sum(comm, first @ first)[0]))
     basis, kept, small, stop = _Rows(len(first)), list[Kept](), _LeastSquares(size), Stop.CONVERGED
     vector: Vector = np.asarray(first / (size or 1.0), dtype=np.float64)

@@ -42,7 +42,7 @@ from fenics_contact.qp.solution import (
 
 @dataclass(frozen=True, eq=False)
 class Contradiction:
-    """What rows demand of each other where B_Fᵀ N = 0: a node that sticks to a floor and meets a wall.
+    """What rows demand of each other where B_Fᵀ N = 0: a node that sticks to a floor and touches a wall.
 
     There Nᵀr is the same for all multipliers of the face, and zero only where the rows agree. The dual
     objective falls without end along −N Nᵀr: forces grow until a disc slips or a contact opens.
@@ -60,14 +60,7 @@ class Contradiction:
     n_groups: int
 
     def relieved(self, problem: DualProblem, face: Face, multiplier: Vector, trial: Vector) -> Vector:
-        """Return the multiplier with each group moved until the first of its contacts changes. Collective.
-
-        Args:
-            problem: The dual problem.
-            face: The face.
-            multiplier: λ, owned.
-            trial: w = λ − ρ r, owned, by which contacts are classified.
-        """
+        """Return the multiplier with each group moved until the first of its contacts changes. Collective."""
         layout, moved, law = problem.layout, self.direction, problem.law
         longest = np.full(self.n_groups, np.inf)
         closed, discs = layout.normal[face.closed], layout.tangential[face.stick]
@@ -83,13 +76,7 @@ class Contradiction:
 
 
 def contradiction(problem: DualProblem, system: FaceSystem, gradient: Vector) -> Contradiction | None:
-    """Return what no multiplier of a face changes in a residual; None where that is nothing. Collective.
-
-    Args:
-        problem: The dual problem.
-        system: The system of the face.
-        gradient: The residual on the face, shape (n_face,), owned.
-    """
+    """Return what no multiplier of a face changes in a residual; None where that is nothing. Collective."""
     face, rows = system.face, system.preconditioner
     if not isinstance(rows, RowsOfFace):
         return None
@@ -109,21 +96,14 @@ def _until_open(trial: Vector, moved: Vector) -> Vector:
 
 
 def _until_slip(trial: Vector, moved: Vector, bound: Vector, pressing: Vector) -> Vector:
-    """Return the least t ≥ 0 with ‖w + t v‖ = Ψ + t ψ for discs, infinite where there is none.
-
-    Args:
-        trial: w, shape (n, t).
-        moved: v, shape (n, t).
-        bound: Ψ, shape (n,).
-        pressing: ψ, by which the bound grows, shape (n,).
-    """
+    """Return the least t ≥ 0 with ‖w + t v‖ = Ψ + t ψ for discs, infinite where there is none."""
     a = np.einsum("ia,ia->i", moved, moved) - pressing**2
     b = np.einsum("ia,ia->i", trial, moved) - bound * pressing
     c = np.minimum(np.einsum("ia,ia->i", trial, trial) - bound**2, 0.0)
     root = b * b - a * c
     divisor = b + np.sqrt(np.maximum(root, 0.0))
-    meets = (root >= 0.0) & (divisor > 0.0)
-    return np.where(meets, -c / np.where(meets, divisor, 1.0), np.inf)
+    reached = (root >= 0.0) & (divisor > 0.0)
+    return np.where(reached, -c / np.where(reached, divisor, 1.0), np.inf)
 
 
 #: Fractions of a step that are tried where its end is worse than its start and the point before that.
@@ -189,14 +169,7 @@ class Forcing:
         return max(wanted, 0.3 * self.tolerance)
 
     def by_reduction(self, worst: float, before: float | None, last: float, care: float) -> float:
-        """Return the residual of a linear system relative to its start, by choice 2 with γ = 0.9.
-
-        Args:
-            worst: The residual.
-            before: That before the last step, None before the first.
-            last: The last forcing term.
-            care: Factor on all of them, at most one.
-        """
+        """Return the residual of a linear system relative to its start, by choice 2 with γ = 0.9."""
         term = self.largest
         if before and before < 1.0:
             safeguard = 0.9 * last**2
@@ -235,17 +208,11 @@ def damp(
     if any(old is not None and not end.is_worse_than(old) for old in earlier):
         return Damped(full, 1.0)
     tried = [Damped(full, 1.0), *(Damped(at(part), part) for part in fractions)]
-    return min(tried, key=lambda each: measured(each.point).worst_beside(end))
+    return min(tried, key=lambda each: measured(each.point).worst_in_scales_with(end))
 
 
 def residual_weights(face: Face, residuals: Residuals, step: Vector) -> Vector:
-    """Return the weights that turn a residual on a face into the natural and the gluing residual.
-
-    Args:
-        face: The face.
-        residuals: The last residuals, for their scales.
-        step: ρ of the natural map, 0 on equality rows, owned.
-    """
+    """Return the weights that turn a residual on a face into the natural and the gluing residual."""
     gluing = residuals.gluing_scale or 1.0
     weights = np.sqrt(face.restriction.power(2).T @ step**2) * face.damping**2
     weights /= residuals.force_scale or np.inf
@@ -330,22 +297,15 @@ class FaceState:
 
 @dataclass(frozen=True, eq=False)
 class _SolvedFace:
-    """The multiplier of a face with its product F λ, and how the Krylov method ended.
+    """The multiplier of a face with its product F λ, and how the Krylov method ended."""
 
-    Attributes:
-        system: The symmetric system of the face.
-        linear: The system that was solved: the symmetric one, or that with growing friction.
-        multiplier: λ, owned.
-        product: F λ, owned.
-        inner: The step of the Krylov method.
-        contradiction: What rows of the face demand of each other beyond its tolerance; None where they agree.
-    """
-
-    system: FaceSystem
+    system: FaceSystem  # the symmetric system of the face
+    # The system that was solved: the symmetric one, or that with growing friction.
     linear: FaceSystem | CoupledFace
-    multiplier: Vector
-    product: Vector
-    inner: FaceStep
+    multiplier: Vector  # λ, owned
+    product: Vector  # F λ, owned
+    inner: FaceStep  # the step of the Krylov method
+    # What rows of the face demand of each other beyond its tolerance; None where they agree.
     contradiction: Contradiction | None
 
 
@@ -410,22 +370,16 @@ class FaceSteps:
         return iterate_at(problem, iterate.multiplier, iterate.product, alpha)
 
     def step(self, state: FaceState, number: int, care: float = 1.0) -> tuple[FaceState, SolverStep]:
-        """Take one step and return the state after it with its line of history. Collective.
-
-        Args:
-            state: The state before.
-            number: Number of the step in the history.
-            care: Factor on the tolerance of the face, at most one.
-        """
+        """Take one step and return the state after it with its line of history. Collective."""
         before = state.iterate
-        # 1. The face that the natural map selects, and the number of status changes since the last one.
+        # (b) The face that the natural map selects, and the number of status changes since the last one.
         step, face = self._next_face(state)
         count = face.changes(state.faces[0]) if state.faces else 0
         changed = round(float(global_sum(self.problem.comm, count)[0]))
-        # 2. Its solution, as accurate as the last face's prediction warrants.
+        # (a), (c) Its solution, as accurate as the last face's prediction warrants.
         expected = None if changed else state.mismatch
         solved = self._solve(face, before, self.forcing.by_prediction(before.residuals, expected, care))
-        # 3. Rigid motions, then the damped step.
+        # (d) Rigid motions, then the damped step.
         alpha = self._motions(solved, before, step)
         after = iterate_at(self.problem, self._relieved(solved, alpha, step), solved.product, alpha)
         mismatch = abs(after.residuals.size - solved.inner.measure) / (before.residuals.size or 1.0)
@@ -495,13 +449,7 @@ class FaceSteps:
 
     def _record(self, number: int, taken: Damped[Iterate], solved: _SolvedFace, changed: int) -> SolverStep:
         inner, face, coarse = solved.inner, solved.system.face, solved.system.coarse
-        counts = global_sum(
-            self.problem.comm,
-            np.count_nonzero(face.closed),
-            np.count_nonzero(face.stick),
-            np.count_nonzero(face.slip),
-        )
-        closed, stick, slip = (round(float(count)) for count in counts)
+        closed, stick, slip = face.counts(self.problem.comm)
         note = f"{inner.iterations} CG steps, {changed} status changes"
         if solved.contradiction is not None:
             note += ", rows that contradict each other"

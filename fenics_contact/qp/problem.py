@@ -129,6 +129,11 @@ class DualProblem:
         """Return the same problem under another law of friction."""
         return replace(self, friction=law)
 
+    def with_load(self, rhs: Vector, load: Vector) -> DualProblem:
+        """Return the same problem with other right sides d, owned, and e, shape (m,), replicated."""
+        scaling = None if self.scaling is None else self.scaling.with_load(load)
+        return replace(self, rhs=rhs, coarse=self.coarse.with_load(load), scaling=scaling)
+
     @cached_property
     def scaled_problem(self) -> DualProblem:
         """The problem in multipliers scaled by `scaling`, itself where there is none."""
@@ -265,12 +270,7 @@ class CountedOperator:
     """
 
     def __init__(self, operator: Operator, report: Report | None = None) -> None:
-        """Wrap ``operator``.
-
-        Args:
-            operator: F.
-            report: Called with the number of products after each of them.
-        """
+        """Wrap ``operator``."""
         self._operator, self._report = operator, report
         self.products = 0
 

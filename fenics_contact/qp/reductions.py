@@ -14,10 +14,6 @@ Vector = npt.NDArray[np.float64]
 def global_sum(comm: MPI.Comm, *parts: npt.ArrayLike) -> Vector:
     """Sum arrays over all ranks, joined in one message. Collective on ``comm``.
 
-    Args:
-        comm: Communicator of the ranks.
-        *parts: This rank's contributions, scalars or arrays of any shape.
-
     Returns:
         The sums, flattened and concatenated in the order given, the same on every rank.
     """

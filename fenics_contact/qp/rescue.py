@@ -77,13 +77,7 @@ class ProximalPoint:
 
     @classmethod
     def build(cls, problem: DualProblem, operator: CountedOperator, stiffness: float) -> ProximalPoint:
-        """Add springs of stiffness ``stiffness`` / diag F to all contacts and discs, without a centre yet.
-
-        Args:
-            problem: The dual problem.
-            operator: F, counted.
-            stiffness: 1/D in units of 1/diag F.
-        """
+        """Add springs of stiffness ``stiffness`` / diag F to all contacts and discs, without a centre yet."""
         layout = problem.layout
         shift = np.zeros(layout.size)
         shift[layout.contact] = 1.0 / (stiffness * contact_step(layout, problem.diagonal)[layout.contact])
@@ -125,12 +119,6 @@ def descend(
     The potential energy of displacements u(λ, α) together with that of springs ρ in all contacts and discs is
     convex; its derivative along a step is the product of that of r with the force λ that deforms the bodies
     less the force P_Λ(λ − ρ r) of the springs. Torn bodies are joined first, whatever the potential.
-
-    Args:
-        problem: Problem of a proximal point, F + D with ρ = 1/D.
-        before: Start of the step.
-        after: End of the step.
-        earlier: Residuals before that, which are not used.
     """
     slope = _slope(problem, before, after)
     first, last = slope(0.0), slope(1.0)
@@ -207,13 +195,7 @@ class Rescue:
     smalse: Smalse
 
     def __call__(self, start: Start, budget: int, *, further: bool = False) -> Rescued:
-        """Improve an iterate. Collective.
-
-        Args:
-            start: The iterate that Newton could not improve.
-            budget: Largest number of products.
-            further: Whether an earlier rescue from the same iterate did not help.
-        """
+        """Improve an iterate. Collective."""
         limit, memory = start.operator.products + budget, start.memory
         if self.problem.preconditioner is None:
             iterate, line, memory = self._by_smalse(start, limit)
@@ -249,13 +231,7 @@ class Rescue:
         return _ProximalPath(point, steps, steps.init(steps.at_rest(point.enter(start.iterate))))
 
     def _next_centre(self, path: _ProximalPath, operator: CountedOperator, iterate: Iterate) -> _ProximalPath:
-        """Move the centre to the spring forces, and stiffen the springs if convergence was quick. Collective.
-
-        Args:
-            path: The converged steps.
-            operator: F, counted.
-            iterate: The iterate there without springs.
-        """
+        """Move the centre to the spring forces; stiffen springs that converged quickly. Collective."""
         force = path.point.force(path.newton.iterate)
         if path.since <= FEW:
             point = ProximalPoint.build(self.problem, operator, STIFFER * path.point.stiffness).centred(force)
@@ -286,22 +262,15 @@ class Rescue:
 
 @dataclass(frozen=True, eq=False)
 class _ProximalPath:
-    """State of a rescue by proximal points.
+    """State of a rescue by proximal points."""
 
-    Attributes:
-        point: Springs and their centre.
-        steps: Newton's method with these springs.
-        newton: Its state.
-        since: Steps since the centre moved.
-    """
-
-    point: ProximalPoint
-    steps: FaceSteps
-    newton: FaceState
-    since: int = 0
+    point: ProximalPoint  # springs and their centre
+    steps: FaceSteps  # Newton's method with these springs
+    newton: FaceState  # its state
+    since: int = 0  # steps since the centre moved
 
 
 def _improved(after: Residuals, before: Residuals, further: bool) -> bool:
-    better = after.worst_beside(before) <= REDUCTION * before.worst_beside(after)
+    better = after.worst_in_scales_with(before) <= REDUCTION * before.worst_in_scales_with(after)
     # Almost any iterate is far better than a very bad one, but not always good enough for Newton to progress.
     return better and (not further or after.worst <= REDUCTION)

@@ -57,18 +57,12 @@ class RigidMotionCorrection:
         motions = _floating_motions(problem)
         rows = np.asarray(problem.coarse.matrix.T @ motions)
         # Rows that are rounding would let forces of rounding size move a body arbitrarily far.
-        felt = np.sqrt(problem.coarse.matrix.power(2).sum(axis=0)).reshape(-1, 1)
-        rows[np.abs(rows) <= ROUNDING * np.asarray(felt)] = 0.0
+        sizes = np.sqrt(problem.coarse.matrix.power(2).sum(axis=0)).reshape(-1, 1)
+        rows[np.abs(rows) <= ROUNDING * np.asarray(sizes)] = 0.0
         return cls(problem, motions, rows)
 
     def __call__(self, multiplier: Vector, residual: Vector, step: Vector) -> Vector:
-        """Return δα = N β, shape (m,), replicated. Collective.
-
-        Args:
-            multiplier: λ, owned.
-            residual: r = F λ − d − Gᵀα, owned.
-            step: ρ, 0 on equality rows, owned.
-        """
+        """Return δα = N β, shape (m,), replicated. Collective."""
         if self.motions.shape[1] == 0:
             return np.zeros(len(self.motions))
         problem = self.problem
@@ -89,13 +83,7 @@ class RigidMotionCorrection:
 
 
 def keep_free_motions(face: CoarseSpace, earlier: Vector, alpha: Vector) -> Vector:
-    """Return α with the motions that a face leaves undetermined unchanged.
-
-    Args:
-        face: Coarse space of the face.
-        earlier: α before the step, shape (m,), replicated.
-        alpha: α from the rows of the face, shape (m,), replicated.
-    """
+    """Return α with the motions that a face leaves undetermined unchanged."""
     if face.gram.null_space.shape[1] == 0:
         return alpha
     basis, _ = np.linalg.qr(face.gram.null_space)
@@ -133,23 +121,14 @@ class _Balance:
 
 @dataclass(frozen=True, eq=False)
 class _Springs:
-    """Trial forces as functions of a motion z, in units in which the total spring stiffness is one.
-
-    Attributes:
-        problem: The dual problem.
-        start: w = λ − ρ r at z = 0, owned.
-        step: ρ, the stiffness of the springs, owned.
-        rows: Gᵀ N in the coordinates z, shape (n_owned, k).
-        load: Nᵀ e in the coordinates z, shape (k,).
-        forces: ‖λ‖ over all rows of the problem.
-    """
+    """Trial forces as functions of a motion z, in units in which the total spring stiffness is one."""
 
     problem: DualProblem
-    start: Vector
-    step: Vector
-    rows: Vector
-    load: Vector
-    forces: float
+    start: Vector  # w = λ − ρ r at z = 0, owned
+    step: Vector  # ρ, the stiffness of the springs, owned
+    rows: Vector  # Gᵀ N in the coordinates z, shape (n_owned, k)
+    load: Vector  # Nᵀ e in the coordinates z, shape (k,)
+    forces: float  # ‖λ‖ over all rows of the problem
 
     def at(self, z: Vector, bound: Vector | None = None) -> _Balance:
         """Return the balance at a motion, with a frozen bound or that of the trial force. Collective."""
@@ -181,12 +160,7 @@ class _Springs:
         return float(max(np.linalg.norm(self.load), np.linalg.norm(sizes)))
 
     def slope(self, balance: _Balance, growth: Vector | None) -> Vector:
-        """Return the derivative of the imbalance, shape (k, k). Collective.
-
-        Args:
-            balance: The balance at the motion.
-            growth: dΨ/dλ_N where the bound follows the trial normal force, None where it is frozen.
-        """
+        """Return the derivative of the imbalance, shape (k, k). Collective."""
         normal, pairs = self.problem.layout.normal, self.problem.layout.tangential
         closed = normal[balance.trial[normal] > 0.0]
         local = self.rows[closed].T @ (self.step[closed, None] * self.rows[closed])
@@ -199,10 +173,6 @@ class _Springs:
 
         Along it the potential falls without end: no contact is pressed, and friction takes less than the load
         does.
-
-        Args:
-            direction: The direction, shape (k,).
-            bound: The bound, owned.
         """
         direction = direction / (np.linalg.norm(direction) or 1.0)
         along = self.rows @ direction
@@ -230,12 +200,7 @@ class _Springs:
 
 
 def _equilibrium_motion(springs: _Springs, bound: Vector) -> Vector:
-    """Return the motion that balances the load, or that of linear springs where none does. Collective.
-
-    Args:
-        springs: Trial forces.
-        bound: Friction that bodies may use while their trial forces indicate separation, owned.
-    """
+    """Return the motion that balances the load, or that of linear springs where none does. Collective."""
     begin = springs.at(np.zeros(len(springs.load)))
     target = springs.target(begin)
     balance = _coupled(springs, begin, target)

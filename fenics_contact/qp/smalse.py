@@ -115,13 +115,6 @@ def minimise(
     followed by a gradient projection (expansion). Otherwise one gradient projection releases constraints
     (proportioning). The reduced gradients of the test are those of a step of length ᾱ.
 
-    Args:
-        quadratic: Objective and set.
-        start: Any owned vector; it is projected on the set.
-        target: Norm of the projected gradient to be reached, as a function of x; collective.
-        parameters: Step length and proportioning.
-        max_iterations: Largest number of steps.
-
     References:
         Z. Dostál, T. Kozubek, Math. Program. 135 (2012), algorithm MPGP.
     """
@@ -133,19 +126,21 @@ def minimise(
     for iteration in range(max_iterations):
         if split.projected <= target(x):
             return BoundedMinimum(x, gradient, split.projected, iteration, True)
-        if split.proportional:
+        if split.proportional:  # 1. x is proportional: a trial step of conjugate gradients
             image = quadratic.operator(direction)
             slope, curvature = global_sum(quadratic.comm, gradient @ direction, direction @ image)
             limit = global_min(quadratic.comm, quadratic.feasible.step_to_boundary(x, direction))
             length = slope / curvature if curvature > 0.0 else np.inf
-            if length <= limit and np.isfinite(length):
+            if length <= limit and np.isfinite(length):  # 2. feasible: take it
                 x, gradient = x - length * direction, gradient - length * image
                 split = _split(quadratic, x, gradient, step, parameters)
                 overlap = global_sum(quadratic.comm, split.free @ image)[0]
                 direction = split.free - (overlap / curvature) * direction
                 continue
+            # 3. Not feasible: as far as the boundary, then expansion by the projection below.
             limit = limit if np.isfinite(limit) else 0.0
             x, gradient = x - limit * direction, gradient - limit * image
+        # 4. Expansion, or proportioning where x is not proportional.
         x = quadratic.projected_step(x, gradient, step)
         gradient = quadratic.gradient(x)
         split = _split(quadratic, x, gradient, step, parameters)
@@ -177,20 +172,13 @@ def largest_eigenvalue(
     above the eigenvalue it belongs to. Iterated until the two agree to ``accuracy``; the upper one is
     returned, because a fixed step length 1.9/‖A‖ must not be too long.
 
-    Args:
-        comm: Communicator over which the vectors are distributed.
-        operator: Symmetric positive semidefinite A, owned to owned, collective.
-        size: Length of this rank's owned vector.
-        accuracy: Relative distance of the bounds at which to stop.
-        max_products: Largest number of operator applications.
-
     Returns:
         The estimate, the same on every rank; 0 for an operator that maps the start to zero.
     """
     start = np.random.default_rng(comm.rank).standard_normal(size)
     basis: list[Vector] = [np.asarray(start / (_norm(comm, start) or 1.0), dtype=np.float64)]
     diagonal: list[float] = []
-    beside: list[float] = []
+    off_diagonal: list[float] = []
     for _ in range(max_products):
         image = operator(basis[-1])
         block = np.array(basis)
@@ -199,11 +187,11 @@ def largest_eigenvalue(
         image -= global_sum(comm, block @ image) @ block
         diagonal.append(float(weights[-1]))
         length = _norm(comm, image)
-        values, vectors = scipy.linalg.eigh_tridiagonal(diagonal, beside)
+        values, vectors = scipy.linalg.eigh_tridiagonal(diagonal, off_diagonal)
         bound = float(values[-1] + length * abs(vectors[-1, -1]))
         if bound - values[-1] <= accuracy * values[-1] or length <= 1e-14 * abs(bound):
             break
-        beside.append(length)
+        off_diagonal.append(length)
         basis.append(np.asarray(image / length, dtype=np.float64))
     return bound
 
@@ -388,6 +376,7 @@ def outer_iterations(problem: DualProblem, start: Start, parameters: Smalse) -> 
     floor = lagrangian.floor(start.iterate.residuals, parameters.tolerance)
     previous, caution = -np.inf, 1.0
     while True:
+        # 1. The Lagrangian is minimised until its projected gradient is below M times the equilibrium error.
         minimum = minimise(
             lagrangian.quadratic(feasible, v),
             x,
@@ -396,6 +385,7 @@ def outer_iterations(problem: DualProblem, start: Start, parameters: Smalse) -> 
             max_iterations=max(parameters.max_products - start.operator.products, 1),
         )
         x, residual = minimum.x, lagrangian.norm * minimum.gradient
+        # 2. M falls where the Lagrangian has not risen enough. 3. The multiplier of equilibrium.
         value = lagrangian.value(minimum, v)
         rise = 0.5 * lagrangian.imbalance(x) ** 2
         if value < previous + rise - ROUNDING * abs(value):

@@ -56,7 +56,7 @@ class Residuals:
         """√(natural² + gluing²), which the solution of a face predicts."""
         return float(np.hypot(self.natural, self.gluing))
 
-    def worst_beside(self, other: Residuals) -> float:
+    def worst_in_scales_with(self, other: Residuals) -> float:
         """The worst residual in the smaller scales of two, so that two iterates can be compared.
 
         A huge wrong force divided by itself is 1, no worse than the missing part of a nearly correct one.
@@ -68,7 +68,9 @@ class Residuals:
 
     def is_worse_than(self, other: Residuals) -> bool:
         """Return whether these are worse, in their own scales and in the smaller ones of both."""
-        return self.worst > other.worst and self.worst_beside(other) > other.worst_beside(self)
+        return self.worst > other.worst and self.worst_in_scales_with(other) > other.worst_in_scales_with(
+            self
+        )
 
     @property
     def at_rows(self) -> Residuals:
@@ -102,12 +104,6 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
     them. No force closes gaps between supports: rows that these alone determine have a ρ that is not a
     stiffness, and excuse only their own error. Where no normal force acts at all, ‖λ‖ over all contact rows
     replaces ‖λ_N‖.
-
-    Args:
-        problem: The dual problem.
-        multiplier: λ, owned.
-        product: F λ, owned.
-        residual: r = F λ − d − Gᵀα, owned.
     """
     layout, equality, contact = problem.layout, problem.layout.equality, problem.layout.contact
     step = contact_step(layout, problem.diagonal)
@@ -418,14 +414,7 @@ class Certificate:
 
 
 def certify(problem: DualProblem, multiplier: Vector, product: Vector, residual: Vector) -> Certificate:
-    """Recompute α and residuals of a multiplier. Collective.
-
-    Args:
-        problem: The dual problem.
-        multiplier: λ, owned.
-        product: F λ, owned, computed, not updated by recursion.
-        residual: A solver's own r, owned; only its α is used.
-    """
+    """Recompute α and residuals of λ with its exact product F λ, from the α of a solver's r. Collective."""
     alpha = problem.coarse.coefficients(product - problem.rhs - residual)
     return Certificate(problem, answer_at(problem, multiplier, product, alpha), alpha)
 

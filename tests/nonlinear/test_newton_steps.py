@@ -160,3 +160,25 @@ def test_contact_is_solved_as_a_whole_on_the_way_without_asking_why_it_fails(
     at_rest, later = solvers
     assert at_rest == FaceNewton(at_rest.tolerance)
     assert later == replace(at_rest, doubts=False, max_products=TangentNewton().max_products)
+
+
+def test_a_step_from_the_same_state_is_the_same_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a step tries and gives up leaves nothing behind: no start of slip, no care and no products."""
+    take, compared = newton._Run.step, list[Any]()
+
+    def twice(run: Any, state: Any) -> Any:
+        before = state.evaluation.at.displacement.copy()
+        once, again = take(run, state), take(run, state)
+        assert np.array_equal(once.evaluation.at.displacement, again.evaluation.at.displacement)
+        assert np.array_equal(once.evaluation.constraint_residual, again.evaluation.constraint_residual)
+        assert (once.pace, once.effort) == (again.pace, again.effort)
+        assert np.array_equal(state.evaluation.at.displacement, before)
+        assert not np.array_equal(once.evaluation.at.displacement, before)
+        compared.append(once)
+        return again
+
+    monkeypatch.setattr(newton._Run, "step", twice)
+    mesh = rounded(3)
+    scene = of(NeoHooke(1.0, 0.3), pressed(mesh, 0.1, 0.1))
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=cut(mesh, 2))
+    assert len(compared) >= len(state.solution.history) > 3

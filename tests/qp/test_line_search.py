@@ -59,7 +59,8 @@ def test_a_huge_wrong_force_is_worse_than_one_that_is_nearly_right():
     huge = iterate(problem, -1e4 * np.abs(solution.multiplier), solution.alpha)
     small = iterate(problem, np.zeros_like(solution.multiplier), solution.alpha)
     assert small.residuals.worst > 0.5 * huge.residuals.worst
-    assert huge.residuals.worst_beside(small.residuals) > 100 * small.residuals.worst_beside(huge.residuals)
+    one, other = huge.residuals, small.residuals
+    assert one.worst_in_scales_with(other) > 100 * other.worst_in_scales_with(one)
     assert shorten(with_bounds(problem), huge, small).point is small
 
 

@@ -87,3 +87,14 @@ def test_the_last_faces_say_why_steps_led_nowhere(faces: list[Face], reason: str
     far = dual.coarse.particular()
     state = FaceState(iterate_fitted(dual, far, dual.operator(far)), far, tuple(faces))
     assert state.stall(MPI.COMM_SELF) == reason
+
+
+def test_forcing_terms_are_those_of_eisenstat_and_walker() -> None:
+    """Choice 2 with γ = 0.9, its safeguard above 0.1, no more accurate than the tolerance."""
+    forcing = Forcing(0.9, np.inf, 1e-8)
+    assert forcing.by_reduction(0.5, None, 0.9, 1.0) == 0.9, "nothing is known before the first step"
+    assert forcing.by_reduction(1e-3, 1e-1, 1e-3, 1.0) == pytest.approx(0.9e-4)
+    assert forcing.by_reduction(1e-3, 1e-1, 0.5, 1.0) == pytest.approx(0.9 * 0.5**2), "a safeguard"
+    assert forcing.by_reduction(1e-3, 1e-1, 1e-3, 0.1) == pytest.approx(0.9e-5), "care"
+    assert forcing.by_reduction(1e-7, 1e-1, 1e-3, 1.0) == pytest.approx(0.3e-8 / 1e-7)
+    assert forcing.by_reduction(0.99, 1.0 - 1e-9, 1e-3, 1.0) == pytest.approx(0.9 * 0.99**2)

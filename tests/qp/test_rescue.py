@@ -39,7 +39,7 @@ def test_a_rescue_comes_nearer_from_anywhere(preconditioned: bool) -> None:
     rescue = Rescue(dual, Forcing(0.25, 0.1, 1e-6), 20_000, Smalse())
     rescued = rescue(Start(begin, operator, None, cold=False), 400)
     before, after = begin.residuals, rescued.iterate.residuals
-    assert after.worst_beside(before) < 0.3 * before.worst_beside(after)
+    assert after.worst_in_scales_with(before) < 0.3 * before.worst_in_scales_with(after)
     assert rescued.line.method == ("proximal rescue" if preconditioned else "SMALSE rescue")
     assert rescued.line.residuals == after
     assert rescued.line.products == operator.products < 400
