@@ -45,12 +45,7 @@ def solve_balanced(
     """Tighten the tolerance until the solver's error is a share of the mesh's. Collective.
 
     Args:
-        system: The system.
-        solve: Solves its problem with a solver from a start.
-        solver: The solver; its tolerance is not used.
-        balanced: When to stop.
         start: Multiplier to start from, owned, or None.
-        timer: Collects the wall time of solving and estimating.
 
     Returns:
         The rounds; the last one holds the solution.

@@ -17,7 +17,7 @@ from fenics_contact._equilibrium.static_admissibility import (
     unresisted_motions,
 )
 from fenics_contact._equilibrium.stored import Stored, stored_configuration
-from fenics_contact._equilibrium.warnings import ContactWarnings, TurnedBodies, advice
+from fenics_contact._equilibrium.warnings import advice
 from fenics_contact._large_deformations.equations import Equations, ResidualState
 from fenics_contact._large_deformations.load_steps import AutomaticSteps, Path, PathEndsError, Snap
 from fenics_contact._large_deformations.loading import FollowingPressures, Loading, TurnedSurface
@@ -58,13 +58,6 @@ class DeformedEquilibria:
     ) -> None:
         """Prepare the forms of all materials. Collective.
 
-        Args:
-            scene: The scene.
-            decomposition: Its subdomains.
-            steps: How loads are followed; None for the default.
-            timer: Collects the wall time.
-            beside: Those of another geometry, whose unchanged parts are reused.
-
         Raises:
             InvalidInputError: If the scene has a rigid surface that is free to move.
         """
@@ -74,12 +67,11 @@ class DeformedEquilibria:
         self._equations = Equations(scene, decomposition)
         self._assembled: TornSystem | None = None if beside is None else beside._assembled
         self._unresisted: tuple[UnheldMotion, ...] | None = None
-        self._turned, self._doubts = TurnedBodies(), ContactWarnings()
 
     def solve(
         self,
         scene: Scene,
-        origin: State | None,
+        before: State | None,
         tolerance: Tolerance,
         time: float,
         step: LoadStep | None = None,
@@ -87,14 +79,6 @@ class DeformedEquilibria:
         overlap: bool = False,
     ) -> DeformedState:
         """Compute the equilibrium of a scene. Collective.
-
-        Args:
-            scene: The scene with its loads.
-            origin: The state before, whose history goes on; None for bodies at rest.
-            tolerance: Of all residuals; None for that of the solver.
-            time: Time at the end, for obstacles that move and materials that creep.
-            step: The load step, with its functions of time; None without any.
-            overlap: Whether bodies may overlap at the start, as those of a design do.
 
         Raises:
             InvalidInputError: If the tolerance is no number, or time runs backwards and materials remember.
@@ -110,45 +94,37 @@ class DeformedEquilibria:
                 )
             steps = replace(steps, newton=replace(steps.newton, tolerance=tolerance))
         equations, timer = self._equations, self._timer
-        before, start, known = None, equations.at_rest(), None
-        if isinstance(origin, DeformedState):
-            before, known = origin.load, origin.equilibrium.linearisation
-            start = origin.equilibrium.configuration
+        acted, start, known = None, equations.at_rest(), None
+        if isinstance(before, DeformedState):
+            acted, known = before.load, before.equilibrium.linearisation
+            start = before.equilibrium.configuration
         self._require_later(scene, start.time, time)
         with timer.phase("assemble"):
             load = self._loading(scene, time, overlap)
             if step is not None and (callable(step.loads) or callable(step.supports)):
                 course = _LoadHistory(step, scene, self._loading, self._decomposition.comm)
                 load = replace(load, course=course)
-            if before is None:
+            if acted is None:
                 check_held(load.torn)
             if self._unresisted is None:  # supports stay what they are in later steps
                 self._unresisted = unresisted_motions(load.torn)
             require_resisted(self._unresisted, load.torn, load.prescribed)
         try:
-            path = steps.follow(equations, before, load, start, timer, known, held=not self._unresisted)
+            path = steps.follow(equations, acted, load, start, timer, known, held=not self._unresisted)
         except (InfeasibleError, NotHeldError) as failure:
             if not self._unresisted:
                 raise
             raise InfeasibleError(unresisted_in_words(self._unresisted)) from failure
         except PathEndsError as failure:
-            last = None if failure.path is None else _state_after(failure.path, origin, timer)
+            last = None if failure.path is None else _state_after(failure.path, before, timer, steps)
             where = "" if step is None else f"load step {step.name!r}: "
-            hints = advice(scene, last or origin, moves=isinstance(equations.contact, MovingContact))
+            hints = advice(scene, last or before, moves=isinstance(equations.contact, MovingContact))
             words = f"{where}{failure}{hints}"
             raise LoadStepError(words, failure.history, last) from failure
-        state = _state_after(path, origin, timer)
-        self._turned.tell(state)
-        if not isinstance(equations.contact, MovingContact):
-            self._doubts.warn_of_sliding(state)
-        return state
+        return _state_after(path, before, timer, steps)
 
     def restored(self, stored: Stored, scene: Scene) -> DeformedState:
         """Build a state from what `stored_deformed` returned, with one factorisation. Collective.
-
-        Args:
-            stored: The arrays.
-            scene: The scene with the loads of the state.
 
         Raises:
             InvalidInputError: If the arrays are those of another system.
@@ -167,14 +143,14 @@ class DeformedEquilibria:
         since = float(stored.get("since", 0.0))
         rubbed = float(stored.get("rubbed", 0.0))
         path = Path(whole, end, None, None, fractions, since, snaps, rubbed, end.effort)
-        return _state_after(path, None, timer, stored.get("slip"))
+        return _state_after(path, None, timer, None, stored.get("slip"))
 
-    def _require_later(self, scene: Scene, before: float, time: float) -> None:
+    def _require_later(self, scene: Scene, earlier: float, time: float) -> None:
         materials = [each for body in scene.bodies.values() for each in body.materials]
-        if time < before and any(isinstance(each, HistoryMaterial) for each in materials):
+        if time < earlier and any(isinstance(each, HistoryMaterial) for each in materials):
             raise InvalidInputError(
                 f"the time of load steps must not decrease where materials have a history, got {time:g} "
-                f"after {before:g}: give later times, or none"
+                f"after {earlier:g}: give later times, or none"
             )
 
     def _loading(self, scene: Scene, time: float, overlap: bool = False) -> Loading:
@@ -222,16 +198,13 @@ class _LoadHistory:
 
 
 def _state_after(
-    path: Path, origin: State | None, timer: PhaseTimer, known: np.ndarray | None = None
+    path: Path,
+    before: State | None,
+    timer: PhaseTimer,
+    steps: AutomaticSteps | None,
+    known: np.ndarray | None = None,
 ) -> DeformedState:
-    """Return the state at the end of a path from another state. Collective.
-
-    Args:
-        path: The path.
-        origin: The state at its start.
-        timer: Collects the wall time.
-        known: The slip of its contact and that before, if the path has none.
-    """
+    """Return the state at the end of a path from another state. Collective."""
     end, evaluation = path.end, path.end.evaluation
     ended = f", at {path.fractions[-1]:.3g} of the load step" if path.fractions[-1] < 1.0 else ""
     values, torn, moved = row_values_at(end), evaluation.loaded, evaluation.at.displacement
@@ -248,7 +221,7 @@ def _state_after(
     with timer.phase("state"):
         contact = contact_result(torn, values, moved)
         if evaluation.contact.points is not None and path.start is not None:
-            contact = _of_moved(contact, evaluation.contact, path.start, origin)
+            contact = _of_moved(contact, evaluation.contact, path.start, before)
         if known is not None:
             contact = replace(contact, slip=known[0], slip_before=known[1])
         energies = _energies(evaluation, path.rubbed)
@@ -256,21 +229,22 @@ def _state_after(
         torn=torn, solution=solution, torn_displacement=moved, contact=contact, energies=energies,
         seconds=dict(timer.seconds), equilibrium=end, load=path.load, begun=path.begun,
         fractions=path.fractions, since=path.since, snaps=path.snaps,
+        tolerance=None if steps is None else steps.newton.tolerance,
         factorisations=path.effort.factorisations,
     )  # fmt: skip
 
 
 def _of_moved(
-    contact: ContactResult, now: ContactConfiguration, start: MaterialPoints, origin: State | None
+    contact: ContactResult, now: ContactConfiguration, start: MaterialPoints, before: State | None
 ) -> ContactResult:
     """Return the contact of moved bodies with its areas, the slip of its load step and of all before."""
     slip, points = now.slip(start), now.points
     assert points is not None
-    before = np.zeros_like(slip)
-    if isinstance(origin, DeformedState) and (old := origin.equilibrium.evaluation.contact.points):
-        before = points.carry_slip(origin.contact.total_slip, old)
+    slipped = np.zeros_like(slip)
+    if isinstance(before, DeformedState) and (old := before.equilibrium.evaluation.contact.points):
+        slipped = points.carry_slip(before.contact.total_slip, old)
     areas = points.areas(now.torn.scene)
-    return replace(contact, slip=slip, slip_before=before, area=areas.true, nominal_area=areas.nominal)
+    return replace(contact, slip=slip, slip_before=slipped, area=areas.true, nominal_area=areas.nominal)
 
 
 def _energies(evaluation: ResidualState, rubbed: float) -> Energies:
@@ -279,7 +253,6 @@ def _energies(evaluation: ResidualState, rubbed: float) -> Energies:
     The work of pressures that follow their surfaces depends on the way: then it is not known.
 
     Args:
-        evaluation: The equations at the end.
         rubbed: Work of friction before the last step of histories, [force · length].
     """
     stored = [np.nan if response.energy is None else response.energy for response in evaluation.responses]

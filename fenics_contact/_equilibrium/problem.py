@@ -2,7 +2,7 @@
 
 Transfer a multiplier to the system of another geometry or load.
 
-From a torn system to its state.
+Equilibria of scenes with linear materials: from a torn system to its state.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._equilibrium.followed_loads import FollowedLoads
 from fenics_contact._equilibrium.static_admissibility import check_held
 from fenics_contact._equilibrium.stored import Stored, restored_solution, with_stored_slip
-from fenics_contact._equilibrium.warnings import ContactWarnings, PassingBodies, TurnedBodies
+from fenics_contact._equilibrium.warnings import ContactWarnings
 from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._scene.loads import Load
 from fenics_contact._scene.obstacles import MovingObstacle
@@ -98,76 +98,124 @@ def _put(system: DualSystem, vector: np.ndarray, rows: np.ndarray, values: np.nd
 LINEAR_TOLERANCE = 1e-10
 
 
-def dual_state(
-    torn: TornSystem,
-    previous: State | None,
-    known: State | None,
-    solver: DualSolver,
-    tolerance: float | BalancedTolerance | None,
-    timer: PhaseTimer,
-) -> LinearState:
-    """Compute a state by its multipliers. Collective.
+class LinearEquilibria:
+    """Equilibria of linear materials on the subdomains of one decomposition."""
 
-    Args:
-        torn: The torn system.
-        previous: LinearState of a neighbouring geometry or load to start from, or None.
-        known: LinearState of which unchanged parts are reused, or None.
-        solver: The dual solver.
-        tolerance: Its tolerance, or its share of the discretisation error; None: `BalancedTolerance()`.
-        timer: Collects the wall time.
-    """
-    system, start = _dual_system(torn, previous, known, timer)
-    before = known_system(known)
-    solve = solve_dual if before is None else FollowedLoads(before, timer).solve
-    if isinstance(tolerance, float):
-        return _to_tolerance(system, solve, solver.with_tolerance(tolerance), start, timer)
-    return _balanced(system, solve, solver, tolerance, start, timer)
+    def __init__(self, decomposition: Decomposition, solver: DualSolver | None, timer: PhaseTimer) -> None:
+        """Prepare; ``solver`` is None for that of each scene's plan."""
+        self._decomposition, self._solver, self._timer = decomposition, solver, timer
+
+    def solve(
+        self,
+        scene: Scene,
+        kind: SolverKind,
+        tolerance: Tolerance,
+        earlier: Mapping[str, State | None],
+        *,
+        design: bool = False,
+    ) -> LinearState:
+        """Compute the equilibrium of a scene. Collective.
+
+        Args:
+            earlier: States or None: "start" gives the first multipliers, "before" is that from which slip is
+                measured, "known" has parts that may be reused.
+
+        Raises:
+            InfeasibleError: If nothing holds some body.
+            ConvergenceError: If the solver does not reach its tolerance.
+        """
+        before, known = earlier["before"], earlier["known"]
+        with self._timer.phase("assemble"):
+            torn = self._torn(scene, known, overlap=design)
+            if before is not None:
+                moved = before.torn_displacement
+                torn = torn.with_slip_from(before.torn.relative(moved), before.torn.sliding(moved))
+            same = known is not None and torn.points is known.torn.points
+            if known is None or not same or _loads_of(torn.scene) != _loads_of(known.scene):
+                check_held(torn)
+        if self._solver is None and kind is SolverKind.DIRECT:
+            return self._directly(torn, known)
+        solver = self._solver or default_solver(kind)
+        # Derivatives need the status of every contact point, which a balanced state leaves uncertain.
+        if tolerance is None and (self._solver is not None or design):
+            tolerance = solver.tolerance
+        system, reused = DualSystem(torn, self._timer, previous=known_system(known)), known_system(known)
+        start = _start_from(earlier["start"], system)
+        solve = solve_dual if reused is None else FollowedLoads(reused, self._timer).solve
+        if isinstance(tolerance, float):
+            return self._to_tolerance(system, solve, solver.with_tolerance(tolerance), start)
+        return self._balanced(system, solve, solver, tolerance, start)
+
+    def restored(self, stored: Stored, scene: Scene, known: State | None) -> LinearState:
+        """Build a state from what `stored_state` returned, with at most one product. Collective."""
+        torn = self._torn(scene, known, overlap=True)
+        if not stored:
+            return self._directly(torn, known)
+        with self._timer.phase("assemble"):
+            torn = with_stored_slip(torn, stored)
+        system = DualSystem(torn, self._timer, previous=known_system(known))
+        with self._timer.phase("state"):
+            solution = restored_solution(system, stored)
+            displacement = system.displacement(solution.multiplier, solution.alpha)
+        return state_of(system, solution, displacement, self._timer)
+
+    def _torn(self, scene: Scene, known: State | None, *, overlap: bool) -> TornSystem:
+        previous = None if known is None else known.torn
+        return build_torn_system(scene, self._decomposition, overlap=overlap, previous=previous)
+
+    def _directly(self, torn: TornSystem, known: State | None) -> LinearState:
+        """Compute the state of one body without multipliers."""
+        earlier = known.system if isinstance(known, LinearState) else None
+        reused = earlier if isinstance(earlier, DirectSystem) else None
+        system = DirectSystem(torn, self._timer, previous=reused)
+        with self._timer.phase("solve"):
+            solution = system.solve()
+        return LinearState(
+            torn=torn, system=system, solution=solution, torn_displacement=solution.displacement,
+            contact=no_contact(torn.points), seconds=dict(self._timer.seconds),
+            energies=compute_energies(torn, solution.displacement, solution.multiplier, 0.0),
+        )  # fmt: skip
+
+    def _to_tolerance(
+        self, system: DualSystem, solve: Solve, solver: DualSolver, start: np.ndarray | None
+    ) -> LinearState:
+        with self._timer.phase("solve"):
+            solution = solve(system, solver, start)
+        with self._timer.phase("state"):
+            displacement = system.displacement(solution.multiplier, solution.alpha)
+        return replace(state_of(system, solution, displacement, self._timer), tolerance=solver.tolerance)
+
+    def _balanced(
+        self,
+        system: DualSystem,
+        solve: Solve,
+        solver: DualSolver,
+        balanced: BalancedTolerance | None,
+        start: np.ndarray | None,
+    ) -> LinearState:
+        """Compute the state as accurately as the mesh deserves."""
+        # A fixed tolerance needs no estimates and should not import them.
+        from fenics_contact._accuracy.state_errors import BalancedTolerance
+        from fenics_contact._equilibrium.balancing import solve_balanced
+
+        wanted = balanced or BalancedTolerance()
+        rounds = solve_balanced(system, solve, solver, wanted, start, self._timer)
+        state = state_of(system, rounds.solution, rounds.displacement, self._timer)
+        return replace(state, known_errors=rounds.state_errors(state.energies.norm), tolerance=wanted)
 
 
-def _dual_system(
-    torn: TornSystem, previous: State | None, known: State | None, timer: PhaseTimer
-) -> tuple[DualSystem, np.ndarray | None]:
-    """Return the dual system, with parts of a known state, and a start from the previous one. Collective."""
-    system, old = DualSystem(torn, timer, previous=known_system(known)), known_system(previous)
-    if previous is not None and old is not None and isinstance(previous.solution, DualSolution):
-        return system, carried_over(old, previous.solution, system)
-    return system, None
+def _start_from(state: State | None, system: DualSystem) -> np.ndarray | None:
+    """Return the multipliers of an earlier state on the rows of a system, None without any. Collective."""
+    old = known_system(state)
+    if state is None or old is None or not isinstance(state.solution, DualSolution):
+        return None
+    return carried_over(old, state.solution, system)
 
 
 def known_system(state: State | None) -> DualSystem | None:
     """Return the dual system of a state, whose unchanged parts the next one reuses."""
     system = state.system if isinstance(state, LinearState) else None
     return system if isinstance(system, DualSystem) else None
-
-
-def _to_tolerance(
-    system: DualSystem, solve: Solve, solver: DualSolver, start: np.ndarray | None, timer: PhaseTimer
-) -> LinearState:
-    """Compute the state to the tolerance of a solver. Collective."""
-    with timer.phase("solve"):
-        solution = solve(system, solver, start)
-    with timer.phase("state"):
-        displacement = system.displacement(solution.multiplier, solution.alpha)
-    return replace(state_of(system, solution, displacement, timer), tolerance=solver.tolerance)
-
-
-def _balanced(
-    system: DualSystem,
-    solve: Solve,
-    solver: DualSolver,
-    balanced: BalancedTolerance | None,
-    start: np.ndarray | None,
-    timer: PhaseTimer,
-) -> LinearState:
-    """Compute the state as accurately as the mesh deserves. Collective."""
-    # A fixed tolerance needs no estimates and should not import them.
-    from fenics_contact._accuracy.state_errors import BalancedTolerance
-    from fenics_contact._equilibrium.balancing import solve_balanced
-
-    wanted = balanced or BalancedTolerance()
-    rounds = solve_balanced(system, solve, solver, wanted, start, timer)
-    state = state_of(system, rounds.solution, rounds.displacement, timer)
-    return replace(state, known_errors=rounds.state_errors(state.energies.norm), tolerance=wanted)
 
 
 def state_of(
@@ -185,25 +233,16 @@ def state_of(
     )  # fmt: skip
 
 
-def direct_state(torn: TornSystem, previous: State | None, timer: PhaseTimer) -> LinearState:
-    """Compute the state of one body without multipliers. Collective."""
-    system = previous.system if isinstance(previous, LinearState) else None
-    known = system if isinstance(system, DirectSystem) else None
-    system = DirectSystem(torn, timer, previous=known)
-    with timer.phase("solve"):
-        solution = system.solve()
-    return LinearState(
-        torn=torn, system=system, solution=solution, torn_displacement=solution.displacement,
-        contact=no_contact(torn.points), seconds=dict(timer.seconds),
-        energies=compute_energies(torn, solution.displacement, solution.multiplier, 0.0),
-    )  # fmt: skip
-
-
 def default_solver(kind: SolverKind) -> DualSolver:
     """Return the dual solver of a kind, with its tolerance."""
     if kind is SolverKind.FACE_NEWTON:
         return FaceNewton()
     return ProjectedCG(tolerance=LINEAR_TOLERANCE)
+
+
+def _loads_of(scene: Scene) -> tuple[list[Load], list[RigidSurface]]:
+    """Return the loads of a scene, and the rigid surfaces, at whose points loads act."""
+    return list(scene.loads), [each for each in scene.supports if isinstance(each, RigidSurface)]
 
 
 @displayed
@@ -244,8 +283,7 @@ class ContactProblem:
         self.timer = PhaseTimer()
         self.state = None
         self._partitions, self._decomposition = partitions, None
-        self._contact_doubts, self._turned = ContactWarnings(), TurnedBodies()
-        self._passing_bodies = PassingBodies()
+        self._warnings = ContactWarnings()
 
     state: AnyState | None
     _decomposition: Decomposition | None
@@ -305,8 +343,7 @@ class ContactProblem:
             scene, self.comm,
             partitions=partitions, solver=self.solver, tolerance=self.tolerance, steps=self.steps,
         )  # fmt: skip
-        other._contact_doubts, other._turned = self._contact_doubts, self._turned
-        other._passing_bodies = self._passing_bodies
+        other._warnings = self._warnings
         return other
 
     def number(self, scene: Scene | None = None) -> float:
@@ -323,14 +360,12 @@ class ContactProblem:
             given = checked_tolerance(self.tolerance)
         if isinstance(given, float):
             return given
-        if scene.is_nonlinear:
+        kind = self._kind(scene, sensitivity=True)
+        if kind is SolverKind.TANGENT_NEWTON:
             from fenics_contact._large_deformations.load_steps import AutomaticSteps
 
             return (self.steps or AutomaticSteps()).newton.tolerance
-        if self.solver is not None:
-            return self.solver.tolerance
-        count = self._decomposed(scene).tearing.n_subdomains
-        return default_solver(choose_solver(scene, count, sensitivity=True)).tolerance
+        return (self.solver or default_solver(kind)).tolerance
 
     @collectively("ContactProblem.check_apart", lambda self, *_, **__: self.comm)
     def check_apart(self, scene: Scene) -> None:
@@ -347,7 +382,7 @@ class ContactProblem:
 
         Of nonlinear materials, none.
         """
-        return () if state.scene.is_nonlinear else self._contact_doubts.overlaps(state)
+        return self._warnings.overlaps(state) if isinstance(state, LinearState) else ()
 
     @collectively("ContactProblem.solve", lambda self, *_, **__: self.comm)
     def solve(
@@ -355,29 +390,24 @@ class ContactProblem:
         scene: Scene | None = None,
         *,
         start: State | Literal["last"] | None = "last",
-        slip_from: State | None = None,
+        before: State | None = None,
         tolerance: Tolerance = None,
-        overlap: bool = False,
-        sensitivity: bool = False,
-        time: float = 1.0,
+        design: bool = False,
         step: LoadStep | None = None,
     ) -> AnyState:
         """Compute an equilibrium. Collective.
 
         Args:
             scene: The scene with other loads, values of supports or coordinates; None: the original one.
-            start: State of a neighbouring geometry or load to start from, None for that from which slip is
-                measured, or none.
-            slip_from: State from which slip is measured, that of the last load step; by default the
-                undeformed state.
+            start: State of a neighbouring geometry or load whose forces are the first guess, by default the
+                last one; None for ``before``. Nonlinear materials start from ``before``.
+            before: State at the end of the load step before, from which slip is measured and histories of
+                materials go on; None: the undeformed bodies.
             tolerance: Overrides the problem's tolerance.
-            overlap: Whether bodies may overlap before they are loaded, as those of a design do.
-            sensitivity: Whether derivatives of the state are wanted; they need the dual system, and the
-                default tolerance is then a number.
-            time: Time of the equilibrium, for obstacles that move (`MovingObstacle`) and materials that
-                creep.
-            step: The load step, of whose functions of time a load of which parts are followed has the values
-                in between.
+            design: Whether it is the state of a design: its bodies may overlap before they are loaded, and
+                derivatives are wanted, which need the dual system and a number for default tolerance.
+            step: The load step: its time, for obstacles that move and materials that creep, by default 1,
+                and its functions of time, of which a load that is followed in parts has the values between.
 
         Raises:
             InvalidInputError: If scene or partition cannot be used, or supports hold other components than
@@ -387,51 +417,41 @@ class ContactProblem:
         """
         check_not_forked()
         scene = self.scene if scene is None else scene
+        time = 1.0 if step is None or step.time is None else step.time
         with together(self.comm):
             _require_obstacles_at(scene, time)
-        wanted = self.tolerance if tolerance is None else tolerance
-        with together(self.comm):
-            wanted = checked_tolerance(wanted)
-        if scene.is_nonlinear:
-            if self.solver is not None:
-                raise InvalidInputError(
-                    f"dual solvers are for linear materials, this scene has others, got {self.solver!r}: "
-                    "give steps=AutomaticSteps(TangentNewton(...)) instead"
-                )
-            self.state = self._equilibria(scene).solve(scene, slip_from, wanted, time, step, overlap=overlap)
-            self._passing_bodies.warn(self.state)
-            return self.state
-        previous = (self.state if start == "last" else start) or slip_from
-        decomposition = self._decomposed(scene)
-        check_same_input(self.comm, scene, solver=self.solver, tolerance=wanted)
-        with together(self.comm):
-            kind = choose_solver(scene, decomposition.tearing.n_subdomains, sensitivity=sensitivity)
-        known = self._alike(scene, previous)
-        with self.timer.phase("assemble"):
-            torn = self._torn(scene, known, overlap)
-            if slip_from is not None:
-                earlier, moved = slip_from.torn, slip_from.torn_displacement
-                torn = torn.with_slip_from(earlier.relative(moved), earlier.sliding(moved))
-            same = known is not None and torn.points is known.torn.points
-            if known is None or not same or _loads_of(torn.scene) != _loads_of(known.scene):
-                check_held(torn)
-        if self.solver is None and kind is SolverKind.DIRECT:
-            self.state = direct_state(torn, known, self.timer)
-            self._turned.tell(self.state)
-            return self.state
-        solver = self.solver or default_solver(kind)
-        # Derivatives need the status of every contact point, which a balanced state leaves uncertain.
-        if wanted is None and (self.solver is not None or sensitivity):
-            wanted = solver.tolerance
-        self.state = dual_state(torn, previous, known, solver, wanted, self.timer)
-        if not (overlap and self._contact_doubts.asked):  # designs differ little from the first one
-            with self.timer.phase("state"):
-                self._contact_doubts.warn(self.state, overlap=overlap)
-                self._turned.tell(self.state)
-                self._passing_bodies.warn(self.state)
-        return self.state
+            wanted = checked_tolerance(self.tolerance if tolerance is None else tolerance)
+        kind = self._kind(scene, sensitivity=design)
+        if kind is SolverKind.TANGENT_NEWTON:
+            self._require_no_dual_solver()
+            state: AnyState = self._deformed(scene).solve(scene, before, wanted, time, step, overlap=design)
+        else:
+            check_same_input(self.comm, scene, solver=self.solver, tolerance=wanted)
+            first = (self.state if start == "last" else start) or before
+            earlier = {"start": first, "before": before, "known": self._alike(scene, first)}
+            state = self._linear(scene).solve(scene, kind, wanted, earlier, design=design)
+        self.state = state
+        with self.timer.phase("state"):
+            self._warnings.warn(state, design=design)
+        return state
 
-    def _equilibria(self, scene: Scene) -> DeformedEquilibria:
+    def _kind(self, scene: Scene, *, sensitivity: bool) -> SolverKind:
+        """Return how a scene is solved, also whether by large deformations. Collective."""
+        count = self._decomposed(scene).tearing.n_subdomains
+        with together(self.comm):
+            return choose_solver(scene, count, sensitivity=sensitivity)
+
+    def _require_no_dual_solver(self) -> None:
+        if self.solver is not None:
+            raise InvalidInputError(
+                f"dual solvers are for linear materials, this scene has others, got {self.solver!r}: "
+                "give steps=AutomaticSteps(TangentNewton(...)) instead"
+            )
+
+    def _linear(self, scene: Scene) -> LinearEquilibria:
+        return LinearEquilibria(self._decomposed(scene), self.solver, self.timer)
+
+    def _deformed(self, scene: Scene) -> DeformedEquilibria:
         """Return what finds equilibria of nonlinear materials. Collective on first use."""
         from fenics_contact._equilibrium.deformed import DeformedEquilibria
 
@@ -461,32 +481,15 @@ class ContactProblem:
             InvalidInputError: If the arrays are those of another system.
         """
         scene = self.scene if scene is None else scene
-        if scene.is_nonlinear:
-            return self._equilibria(scene).restored(stored, scene)
-        if not stored:
-            torn = self._torn(scene, self.state, overlap=True)
-            return direct_state(torn, self.state, self.timer)
-        with self.timer.phase("assemble"):
-            torn = with_stored_slip(self._torn(scene, self.state, overlap=True), stored)
-        system = DualSystem(torn, self.timer, previous=known_system(self.state))
-        with self.timer.phase("state"):
-            solution = restored_solution(system, stored)
-            displacement = system.displacement(solution.multiplier, solution.alpha)
-        return state_of(system, solution, displacement, self.timer)
+        if self._kind(scene, sensitivity=False) is SolverKind.TANGENT_NEWTON:
+            return self._deformed(scene).restored(stored, scene)
+        return self._linear(scene).restored(stored, scene, self.state)
 
     def _alike(self, scene: Scene, start: State | None) -> State | None:
         """Return the state to reuse: the last one if it has the scene's meshes, else the start."""
         if start is None or self.state is None:
             return start
         return self.state if scene.has_meshes_of(self.state.scene) else start
-
-    def _torn(self, scene: Scene, previous: State | None, overlap: bool) -> TornSystem:
-        return build_torn_system(
-            scene,
-            self._decomposed(scene),
-            overlap=overlap,
-            previous=None if previous is None else previous.torn,
-        )
 
 
 @collectively("solve_scene", lambda scene, comm, **_: comm)
@@ -545,8 +548,3 @@ def _require_obstacles_at(scene: Scene, time: float) -> None:
                 f"time {time:g}: move the bodies against it by their supports, or give a body a material for "
                 "large deformations"
             )
-
-
-def _loads_of(scene: Scene) -> tuple[list[Load], list[RigidSurface]]:
-    """Return the loads of a scene, and the rigid surfaces, at whose points loads act."""
-    return list(scene.loads), [each for each in scene.supports if isinstance(each, RigidSurface)]

@@ -44,9 +44,6 @@ def check_held(torn: TornSystem) -> None:
     takes. If that takes all friction but a fraction `MARGIN`, forces exist, but the amount of sliding along
     that motion is undetermined.
 
-    Args:
-        torn: The torn system; its matrices are not used.
-
     Raises:
         InfeasibleError: Names the body and the motion, and whether it is only just held.
     """
@@ -209,7 +206,6 @@ class _Balance:
         The smallest distance, unlike feasibility, is well determined also where forces only just suffice.
 
         Args:
-            part: The fraction of the friction that may be used.
             speed: Sliding speeds s for the associated law to be freed of lift-off, shape (n_friction,).
 
         Returns:
@@ -367,9 +363,6 @@ def unresisted_motions(torn: TornSystem) -> tuple[UnheldMotion, ...]:
 
     Contact counts wherever its surfaces face each other, also across a gap, and in both directions. Surfaces
     with friction and obstacles that move may meet anywhere later: they count against all motions.
-
-    Args:
-        torn: The torn system of the undeformed bodies; its matrices are not used.
     """
     comm = torn.numbering.comm
     found: tuple[UnheldMotion, ...] = ()
@@ -385,8 +378,6 @@ def require_resisted(motions: tuple[UnheldMotion, ...], torn: TornSystem, prescr
     Stress would drive it, if only by rounding. Bodies at which nothing happens may stay until they are met.
 
     Args:
-        motions: What `unresisted_motions` returned.
-        torn: The torn system with its load.
         prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
 
     Raises:

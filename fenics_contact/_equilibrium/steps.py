@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -38,10 +39,6 @@ class StepCheckpoint:
     def __init__(self, checkpoint: Checkpoint | None, problem: ContactProblem) -> None:
         """Read the file if it exists. Collective.
 
-        Args:
-            checkpoint: The file, or None.
-            problem: The problem of the history.
-
         Raises:
             InvalidInputError: If the file is not a checkpoint of this problem; says what to do.
         """
@@ -71,11 +68,6 @@ class StepCheckpoint:
         problem: ContactProblem,
     ) -> AnyState | None:
         """Return the state after the next step if it is stored, else None. Collective.
-
-        Args:
-            step: The step.
-            scene: The scene with its loads and supports.
-            problem: The problem, whose last solution is the state before the step.
 
         Raises:
             InvalidInputError: If the stored step is a different one.
@@ -124,12 +116,7 @@ class StepCheckpoint:
                 self.write()
 
     def summary(self, done: int, count: int | None) -> str:
-        """Describe what a run that ends now leaves, and how to continue it.
-
-        Args:
-            done: Number of completed steps.
-            count: Number of all steps, None if unknown.
-        """
+        """Describe what a run that ends now leaves, and how to continue it."""
         if self._checkpoint is None:
             return without_checkpoint(counted(done, "load step"))
         number = self._written
@@ -245,7 +232,7 @@ class LoadSequence:
         state = self._done.recalled(step, scene, self.problem)
         if state is None:
             time = self._number + 1.0 if step.time is None else step.time
-            state = self.problem.solve(scene, slip_from=self.state, time=time, step=step)
+            state = self.problem.solve(scene, before=self.state, step=replace(step, time=time))
             self._done.keep(step, state)
         self.scene = scene
         return state

@@ -148,12 +148,6 @@ def stored_configuration(
 ) -> tuple[Configuration, Loading]:
     """Return the configuration of a stored state, with its contact points, and its load. Collective.
 
-    Args:
-        stored: What `stored_deformed` returned.
-        load: What acts.
-        contact: How the bodies meet.
-        decomposition: The subdomains.
-
     Raises:
         InvalidInputError: If the arrays are those of another system.
     """

@@ -1,19 +1,9 @@
-"""Words for load steps that end: what a scene has that often ends them.
-
-Doubts about the largest pressure of contacts that are only a few points wide.
-
-How far nodes of a master pass between those of a coarser slave, where contact is by nodes.
-
-Warnings about states that rest on doubtful gaps, or in which surfaces slide away from each other.
-
-Bodies that pass through each other unseen are told of.
-
-Bodies of small strain that turn so far that they are strained by it.
-"""
+"""Warnings about states: doubtful gaps and pressures, bodies that turn or pass; hints where steps end."""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,267 +23,65 @@ from fenics_contact.errors import InvalidInputError, safe_log, together
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import computed_rounding, vector_areas
+from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State
-
-#: Facets lie in one plane if the cosine of the angle between them differs from one by no more than this.
-FLAT = 1e-9
-
-
-def advice(scene: Scene, last: State | None = None, *, moves: bool) -> str:
-    """Return words to append to the message of a load step that ends, empty where there is nothing to say.
-
-    Args:
-        scene: The scene.
-        last: The last state that was reached, or None.
-        moves: Whether contact is that of bodies that move far.
-    """
-    moving = _on_contact(scene) + ("" if last is None else _on_ends(last)) if moves else ""
-    return moving + _on_symmetry(scene)
-
-
-def _on_ends(last: State) -> str:
-    """Return words on nodes that press on masters from beyond their ends, empty if there are none.
-
-    Where such a node is lost, its force ends at once, and it may come back: no equilibrium is near.
-    """
-    contact, points, found = last.contact, last.contact.points, []
-    total = contact.normal_force.sum()
-    for index, pair in enumerate(last.scene.contacts):
-        mine = np.flatnonzero((points.pair == index) & (points.facet >= 0) & (contact.normal_force > 0.0))
-        if isinstance(pair.master, Surface) and len(mine):
-            corners = last.scene.facets(pair.master).shape[1]
-            beyond = mine[outside(points.local[mine], corners) > 0.0]
-            share = contact.normal_force[beyond].sum() / total
-            if share > 0.0:
-                surface = f"of surface {pair.slave.name!r}"
-                nodes = counted(len(beyond), f"node {surface} presses", f"nodes {surface} press")
-                found.append(
-                    f"; {nodes} on {pair.master.name!r} from beyond its end with {share:.1%} of the normal "
-                    "force, which ends where the master is left: let that reach further there"
-                )
-    return "".join(found)
-
-
-def _on_contact(scene: Scene) -> str:
-    """Return words on surfaces that slide by nodes and could by mortar, empty if there are none.
-
-    Slave nodes rest in hollows between nodes of the master; where they leave them together, as two bodies
-    that are pressed in perfect symmetry, no equilibrium may be near that mortar has.
-    """
-
-    def by_nodes(pair: ContactPair) -> bool:
-        if pair.by_mortar or pair.within_body or not isinstance(pair.master, Surface):
-            return False
-        return all(scene.bodies[side.body].mesh.order == 1 for side in (pair.slave, pair.master))
-
-    if not any(map(by_nodes, scene.contacts)):
-        return ""
-    return "; surfaces of bodies meet more smoothly with discretisation='mortar' than by nodes"
-
-
-def _on_symmetry(scene: Scene) -> str:
-    """Return words on flat sides beside contact on which nothing acts, as on a forgotten plane of symmetry.
-
-    A side with another one parallel to it is more likely to be free.
-    """
-    acting = [*scene.supports, *(load for load in scene.loads if hasattr(load, "surface"))]
-    used = {(each.body, each.surface) for each in acting}
-    sides = [side for pair in scene.contacts for side in (pair.slave, pair.master)]
-    sides += [side for tie in scene.ties for side in (tie.slave, tie.master)]
-    used |= {(side.body, side.name) for side in sides if isinstance(side, Surface)}
-    found = []
-    for name, body in scene.bodies.items():
-        mesh = body.mesh
-        touching = [mesh.surfaces[side].ravel() for side in mesh.surfaces if _meets(scene, name, side)]
-        flat = {side: normal for side in mesh.surfaces if (normal := _normal(scene, name, side)) is not None}
-        for side, normal in flat.items():
-            alone = sum(abs(normal @ other) > 1.0 - FLAT for other in flat.values()) == 1
-            beside = touching and np.isin(mesh.surfaces[side], np.concatenate(touching)).any()
-            if alone and beside and (name, side) not in used:
-                found.append(f"surface {side!r} of body {name!r}")
-    if not found:
-        return ""
-    which = f"{', '.join(found)}, on which nothing acts"
-    return f"; where a flat side is a plane of symmetry it needs a support along its normal: see {which}"
-
-
-def _meets(scene: Scene, body: str, side: str) -> bool:
-    """Return whether a surface is one of a contact pair."""
-    return any(Surface(body, side) in (pair.slave, pair.master) for pair in scene.contacts)
-
-
-def _normal(scene: Scene, body: str, side: str) -> np.ndarray | None:
-    """Return the normal of a surface, shape (dim,), None where it is not flat."""
-    mesh = scene.bodies[body].mesh
-    areas = vector_areas(mesh.points, mesh.surfaces[side])
-    normals = areas / np.linalg.norm(areas, axis=1, keepdims=True)
-    return normals[0] if len(normals) and np.all(normals @ normals[0] >= 1.0 - FLAT) else None
-
-
-#: Gaps that grow by this share of how far the point of the largest pressure is pressed in are curved.
-CURVED = 0.1
-#: The kind of doubt that is no more than a remark.
-ROUGH = "rough peak"
-#: By how much the largest pressure may be off, by the edges of facets from its point to the next open one.
-OFF = {1: "by a half or more", 2: "by a tenth"}
-
-
-def coarse_peak(state: State, number: int, pressed_in: np.ndarray) -> list[tuple[int, str, str]]:
-    """Return the doubt about a pair whose largest pressure lies beside its edge, where there is one.
-
-    So it is of round bodies. Contact that ends where a surface ends, or between planes that lift off each
-    other, has no peak that more points would resolve.
-
-    Args:
-        state: A state of small strain.
-        number: Number of the pair.
-        pressed_in: How far its force presses each contact point in, shape (n,), [length].
-    """
-    contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
-    mine = contact.on_pair(number)
-    pressing = contact.normal_force[mine] > 0.0
-    if not pressing.any():
-        return []
-    slave = surface_of(scene, pair.slave, "faceted")
-    node = np.searchsorted(
-        slave.nodes, contact.points.slave[mine] - NodeNumbers.of(scene).first_of(pair.slave.body)
-    )
-    top = np.argmax(contact.pressure[mine])
-    beside, rim = _beside(slave)
-    if rim[node[top]] and not slave.mirrored[node[top]].any():
-        return []
-    gap = np.full(len(slave.nodes), np.nan)
-    gap[node[~pressing]] = contact.points.gap[mine[~pressing]]
-    near = beside[node[top]].indices
-    for steps, reached in ((1, near), (2, beside[near].indices)):
-        opened = gap[reached][~np.isnan(gap[reached])]
-        if len(opened):
-            grown = opened.min() - contact.points.gap[mine[top]]
-            if grown > CURVED * pressed_in[mine[top]]:
-                return [
-                    (number, "peak" if steps == 1 else ROUGH, _in_words(pair, int(pressing.sum()), steps))
-                ]
-            break
-    return []
-
-
-def _beside(surface: FacetedSurface) -> tuple[sp.csr_matrix, np.ndarray]:
-    """Return which nodes an edge of a facet joins, (n, n), and which lie on the rim, (n,)."""
-    ends = surface.facets.ravel(), np.roll(surface.facets, -1, axis=1).ravel()
-    one, other = np.concatenate(ends), np.concatenate(ends[::-1])
-    count = np.bincount(surface.facets.ravel())
-    beside = sp.csr_matrix((np.ones(len(one)), (one, other)), shape=(len(count), len(count)))
-    return beside, (beside.getnnz(axis=1) != count) | (count == 1)
-
-
-def _in_words(pair: ContactPair, count: int, steps: int) -> str:
-    points = counted(count, "point presses", "points press")
-    cells = counted(steps, "cell")
-    return (
-        f"the contact of {pair.place} is too small for its cells: {points}, and it ends within "
-        f"{cells} of the largest pressure, which may be off {OFF[steps]}; four cells on the half width of a "
-        "contact have it to about a percent: refine the meshes there"
-    )
-
-
-def passing_nodes(state: State, number: int, moved: float, share: float) -> list[tuple[int, str, str]]:
-    """Return the doubt about a pair whose master passes between the nodes of its slave. Collective.
-
-    Args:
-        state: A state of small strain.
-        number: Number of the pair.
-        moved: How far its surfaces move against each other, [length].
-        share: Share of that which is told of no more.
-    """
-    pair = state.scene.contacts[number]
-    if pair.by_mortar or not isinstance(pair.master, Surface) or pair.within_body:
-        return []
-    deep = _depth(state, number, pair, pair.master)
-    if deep <= share * moved:
-        return []
-    words = (
-        f"nodes of the master of {pair.place} pass between those of the slave, which is too coarse, by up to "
-        f"{deep:.2g}, where surfaces move by {moved:.2g} against each other: refine the slave, or let the "
-        "finer surface be the slave; linear cells have discretisation='mortar', which has no such error"
-    )
-    return [(number, "between nodes", words)]
-
-
-def _depth(state: State, number: int, pair: ContactPair, other: Surface) -> float:
-    """Return the largest depth of master nodes below facets of the slave that press, [length].
-
-    Zero where no more master nodes meet these than they have nodes: the slave is the finer surface.
-    """
-    contact, scene = state.contact, state.scene
-    mine = contact.on_pair(number)
-    mine = mine[contact.normal_force[mine] > 0.0]
-    slave, master = (surface_of(scene, side, pair.geometry) for side in (pair.slave, other))
-    first = NodeNumbers.of(scene).first_of(pair.slave.body)
-    presses = np.isin(slave.nodes, contact.points.slave[mine] - first)
-    if not presses.any():
-        return 0.0
-    pressed = slave.facets[presses[slave.facets].any(axis=1)]
-    size = np.linalg.norm(np.ptp(slave.points[pressed], axis=1), axis=1).max()
-    reach = size + np.abs(contact.points.gap[mine]).max()
-    away, _ = cKDTree(slave.points[presses]).query(master.points, distance_upper_bound=reach)
-    near = np.flatnonzero(np.isfinite(away))
-    hit = project(master.points[near], master.normals[near], slave)
-    inside = presses[slave.facets[hit.facet]].all(axis=1)
-    if np.count_nonzero(inside) <= np.count_nonzero(presses):
-        return 0.0
-    own = state.gather_displacement(pair.slave.body)[slave.nodes]
-    moves = state.gather_displacement(other.body)[master.nodes[near[hit.point]]]
-    gap = hit.gap + np.einsum("nd,nd->n", hit.normal, moves - node_weights(slave, hit) @ own)
-    return -float(gap[inside].min(initial=0.0))
-
 
 #: Errors up to this share of what moves are small.
 SHARE = 0.1
+#: Gaps that grow by this share of how far the point of the largest pressure is pressed in are curved.
+CURVED = 0.1
+#: By how much the largest pressure may be off, by the edges of facets from its point to the next open one.
+OFF = {1: "by a half or more", 2: "by a tenth"}
+#: Rotation [rad], as the root mean square of all cells, that triggers the warning: it strains a body of small
+#: strain by half of its square.
+FAR = 0.05
+#: Facets lie in one plane if the cosine of the angle between them differs from one by no more than this.
+FLAT = 1e-9
 
 _LOG = logging.getLogger(__name__)
 
 
 class ContactWarnings:
-    """What is doubtful about the contact of a problem; each pair is warned of once."""
+    """Warnings about the states of a problem; each pair, body and two bodies are warned of once."""
 
     def __init__(self) -> None:
         """Start without any."""
+        self._given: set[Hashable] = set()
         self._points: ContactPoints | None = None
         self._finer = np.zeros(0)
-        self._told: set[tuple[int, str]] = set()
+        self._rotations = dict[str, tuple[BodyMesh, float]]()
+        self._outlines: dict[str, tuple[BodyMesh, Outline]] = {}
 
-    @property
-    def asked(self) -> bool:
-        """Whether a state with contact points was judged."""
-        return self._points is not None
-
-    def warn(self, state: State, *, overlap: bool = False) -> None:
-        """Warn of pairs that slide far, or whose measured gaps are not known well enough. Collective.
-
-        The error of flat facets, or of surfaces reconstructed from nodes, is the difference to gaps between
-        surfaces that are known better, see `fenics_contact._surfaces.true_surface`; it is computed once for
-        all loads, by one more search for contact and without another solve, and only where a surface is
-        curved and its shape not known. Gaps that a pair gives are not doubted.
+    def warn(self, state: State, *, design: bool = False) -> None:
+        """Warn of what is doubtful about a state. Collective.
 
         Args:
-            state: The state.
-            overlap: Whether surfaces may overlap before they are loaded, as those of a design do.
+            design: Whether it is that of a design: surfaces may overlap before they are loaded, and designs
+                differ little from the first one, which is judged alone.
         """
-        for pair, kind, words in self._doubts(state):
-            if not (overlap and kind == "overlap"):
-                self._tell(state.torn, pair, kind, words)
+        if isinstance(state, LinearState):
+            if design and self._points is not None:
+                return
+            for pair, kind, words in self._doubts(state):
+                if not (design and kind == "overlap"):
+                    self._log(state, (pair, kind), words, _LOG.info if kind == "rough peak" else None)
+        elif not state.scene.deforms_much:
+            for number in range(len(state.scene.contacts)):
+                for pair, kind, words in _slid_far(state, number):
+                    self._log(state, (pair, kind), words)
+        self._warn_of_large_rotations(state)
+        self._warn_of_passing_bodies(state)
 
-    def warn_of_sliding(self, state: State) -> None:
-        """Warn of pairs that slide far alone, as where materials are nonlinear. Collective."""
-        for number in range(len(state.scene.contacts)):
-            for doubt in _slid_far(state, number):
-                self._tell(state.torn, *doubt)
-
-    def overlaps(self, state: State) -> tuple[str, ...]:
+    def overlaps(self, state: LinearState) -> tuple[str, ...]:
         """Return words about the pairs whose surfaces overlap before they are loaded. Collective."""
         return tuple(words for _, kind, words in self._doubts(state) if kind == "overlap")
 
-    def _doubts(self, state: State) -> list[tuple[int, str, str]]:
+    def _log(self, state: State, key: Hashable, words: str, log: Callable[..., None] | None = None) -> None:
+        if key not in self._given and state.torn.decomposition.comm.rank == 0:
+            safe_log(log or _LOG.warning, "%s", words)
+        self._given.add(key)
+
+    def _doubts(self, state: LinearState) -> list[tuple[int, str, str]]:
         """Return pair, kind and words of all doubts about a state. Collective."""
         torn, contact, found = state.torn, state.contact, list[tuple[int, str, str]]()
         if contact.points.count == 0:
@@ -310,22 +98,115 @@ class ContactWarnings:
             moved = _largest_motion(after - before, pressed_in[mine], touching)
             if moved <= computed_rounding(torn.scene.bodies[pair.slave.body].mesh.points):
                 continue  # nothing moves
-            found += passing_nodes(state, number, moved, SHARE)
+            found += _passing_nodes(state, number, moved)
             nearest = np.minimum(before, after) + np.minimum(change[mine], 0.0)
             error = float(np.abs(change[mine][nearest <= moved]).max(initial=0.0))
             if error > SHARE * moved:  # which points press is not known then
                 found.append((number, "facets", _words_of_facets(pair, error, moved)))
             else:
-                found += coarse_peak(state, number, pressed_in)
+                found += _coarse_peak(state, number, pressed_in)
             overlap = -float(before[touching].min(initial=0.0))
             if overlap > max(error, SHARE * moved):
                 found.append((number, "overlap", _words_of_overlap(pair, overlap, moved)))
         return found
 
-    def _tell(self, torn: TornSystem, pair: int, kind: str, words: str) -> None:
-        if (pair, kind) not in self._told and torn.decomposition.comm.rank == 0:
-            safe_log(_LOG.info if kind == ROUGH else _LOG.warning, "%s", words)
-        self._told.add((pair, kind))
+    def _warn_of_large_rotations(self, state: State) -> None:
+        """Warn of bodies of small strain that turn so far that they are strained by it. Collective."""
+        comm = state.torn.decomposition.comm
+        moved = state.torn_displacement.reshape(-1, state.torn.dim)
+        longest = float(comm.allreduce(np.linalg.norm(moved, axis=1).max(initial=0.0), op=MPI.MAX))
+        for name, body in state.scene.bodies.items():
+            if body.deforms_much or name in self._given or longest * self._bound(name, body.mesh) <= FAR:
+                continue
+            angle = rotation_of(body.mesh, state.gather_displacement(name))
+            if angle > FAR:
+                words = (
+                    f"body {name!r} has turned by {angle:.2g} rad; its material is for small rotations, "
+                    f"{angle**2 / 2:.1g} of strain is due to this alone: give it a material for large "
+                    "deformations, such as StVenantKirchhoff"
+                )
+                self._log(state, name, words)
+
+    def _bound(self, name: str, mesh: BodyMesh) -> float:
+        """Bound rotations by displacements of length one, [1/length]; computed once for a mesh."""
+        if name not in self._rotations or self._rotations[name][0] is not mesh:
+            self._rotations[name] = mesh, _Gradients.of(mesh).largest
+        return self._rotations[name][1]
+
+    def _warn_of_passing_bodies(self, state: State) -> None:
+        """Warn of bodies with facets in one another, or that touch without a pair or tie. Collective.
+
+        Only bodies whose bounding boxes come near each other are gathered; ranks share their facets.
+        """
+        scene, comm = state.scene, state.torn.decomposition.comm
+        moved = state.torn_displacement.reshape(-1, scene.dim)
+        reach = max(comm.allgather(float(np.linalg.norm(moved, axis=1).max(initial=0.0))))
+        near = [both for both in bodies_near(scene, reach) if both not in self._given]
+        names = sorted({name for both in near for name in both})
+        displacement = {name: state.gather_displacement(name) for name in names}
+        share = slice(comm.rank, None, comm.size)
+        with together(comm):
+            outlines = {name: self._outline(scene, name) for name in names}
+            parts = [unpaired(scene, both, outlines, displacement, reach, share) for both in near]
+        counts = comm.allreduce(np.array([part.counts for part in parts], dtype=int)).tolist()
+        for part, whole in zip(parts, counts, strict=True):
+            if words := replace(part, counts=tuple(whole)).in_words():
+                self._log(state, part.bodies, words)
+
+    def _outline(self, scene: Scene, name: str) -> Outline:
+        """Return the boundary of a body, which meshes of the same cells share."""
+        mesh = scene.bodies[name].mesh
+        known = self._outlines.get(name)
+        if known is None or known[0].cells is not mesh.cells:
+            known = self._outlines[name] = (mesh, outline_of(mesh))
+        return known[1]
+
+
+@dataclass(frozen=True)
+class _Gradients:
+    """How gradients of cells follow from the displacements of their corners, by least squares.
+
+    Attributes:
+        corners: Corners of the cells, shape (n, k).
+        inverse: Gradient by the displacement of each corner, shape (n, k, dim), [1 / length].
+        size: Volumes up to a factor, shape (n,).
+    """
+
+    corners: np.ndarray
+    inverse: np.ndarray
+    size: np.ndarray
+
+    @classmethod
+    def of(cls, mesh: BodyMesh) -> _Gradients:
+        corners = mesh.linear.cells
+        arms = mesh.points[corners]
+        arms = arms - arms.mean(axis=1, keepdims=True)
+        metric = np.einsum("nkd,nke->nde", arms, arms)
+        return cls(corners, arms @ np.linalg.inv(metric), np.sqrt(np.linalg.det(metric)))
+
+    @property
+    def largest(self) -> float:
+        """A bound on the rotation of any cell by displacements of length one, [1 / length]."""
+        return float(np.linalg.norm(self.inverse, axis=2).sum(axis=1).max())
+
+    def rotation(self, displacement: np.ndarray) -> float:
+        """Return the root mean square of the rotations of cells, in radians.
+
+        Args:
+            displacement: Of the nodes, shape (n_nodes, dim), [length].
+        """
+        gradient = np.einsum("nkd,nke->nde", self.inverse, displacement[self.corners])
+        square = ((gradient - gradient.transpose(0, 2, 1)) ** 2).sum(axis=(1, 2)) / 8.0
+        return float(np.sqrt(np.average(square, weights=self.size)))
+
+
+def rotation_of(mesh: BodyMesh, displacement: np.ndarray) -> float:
+    """Return by how much the cells of a body turn, as a root mean square, in radians.
+
+    Args:
+        displacement: Of the nodes, shape (n_nodes, dim), [length].
+    """
+    return _Gradients.of(mesh).rotation(displacement)
 
 
 def _slid_far(state: State, number: int) -> list[tuple[int, str, str]]:
@@ -430,132 +311,189 @@ def _is_curved(scene: Scene, side: Surface, pair: ContactPair) -> bool:
     return not known and surface_of(scene, side, "reconstructed").relief is not None
 
 
-class PassingBodies:
-    """Bodies that touch, overlap or pass through each other unseen; each two are warned of once."""
+def _coarse_peak(state: State, number: int, pressed_in: np.ndarray) -> list[tuple[int, str, str]]:
+    """Return the doubt about a pair whose largest pressure lies beside its edge, where there is one.
 
-    def __init__(self) -> None:
-        """Start without any."""
-        self._outlines: dict[str, tuple[BodyMesh, Outline]] = {}
-        self._told: set[tuple[str, str]] = set()
-
-    def warn(self, state: State) -> None:
-        """Warn of bodies with facets in one another, or that touch without a pair or tie. Collective.
-
-        Only bodies whose bounding boxes come near each other are gathered; ranks share their facets.
-
-        Args:
-            state: The state; places before and after its loads are compared.
-        """
-        scene, comm = state.scene, state.torn.decomposition.comm
-        moved = state.torn_displacement.reshape(-1, scene.dim)
-        reach = max(comm.allgather(float(np.linalg.norm(moved, axis=1).max(initial=0.0))))
-        near = [both for both in bodies_near(scene, reach) if both not in self._told]
-        names = sorted({name for both in near for name in both})
-        displacement = {name: state.gather_displacement(name) for name in names}
-        share = slice(comm.rank, None, comm.size)
-        with together(comm):
-            outlines = {name: self._outline(scene, name) for name in names}
-            parts = [unpaired(scene, both, outlines, displacement, reach, share) for both in near]
-        counts = comm.allreduce(np.array([part.counts for part in parts], dtype=int)).tolist()
-        for part, whole in zip(parts, counts, strict=True):
-            if words := replace(part, counts=tuple(whole)).in_words():
-                self._told.add(part.bodies)
-                if comm.rank == 0:
-                    safe_log(_LOG.warning, "%s", words)
-
-    def _outline(self, scene: Scene, name: str) -> Outline:
-        """Return the boundary of a body, which meshes of the same cells share."""
-        mesh = scene.bodies[name].mesh
-        known = self._outlines.get(name)
-        if known is None or known[0].cells is not mesh.cells:
-            known = self._outlines[name] = (mesh, outline_of(mesh))
-        return known[1]
-
-
-#: Rotation in radians, as the root mean square of all cells, beyond which it is told: half of its square is
-#: the strain that it makes.
-FAR = 0.05
-
-
-class TurnedBodies:
-    """Bodies of small strain that have turned far; each is told of once."""
-
-    def __init__(self) -> None:
-        """Start without any."""
-        self._told: set[str] = set()
-        self._bounds = dict[str, tuple[BodyMesh, float]]()
-
-    def tell(self, state: State) -> None:
-        """Log a warning for each body of small strain that has turned far. Collective."""
-        comm = state.torn.decomposition.comm
-        steps = state.torn_displacement.reshape(-1, state.torn.dim)
-        longest = float(comm.allreduce(np.linalg.norm(steps, axis=1).max(initial=0.0), op=MPI.MAX))
-        for name, body in state.scene.bodies.items():
-            if body.deforms_much or name in self._told or longest == 0.0:
-                continue
-            if longest * self._bound(name, body.mesh) <= FAR:
-                continue
-            angle = rotation_of(body.mesh, state.gather_displacement(name))
-            if angle <= FAR:
-                continue
-            self._told.add(name)
-            if comm.rank == 0:
-                words = (
-                    "body %r has turned by %.2g rad; its material is for small rotations, %.1g of strain is "
-                    "due to this alone: give it a material for large deformations, such as StVenantKirchhoff"
-                )
-                safe_log(_LOG.warning, words, name, angle, angle**2 / 2)
-
-    def _bound(self, name: str, mesh: BodyMesh) -> float:
-        """Return `_Arms.largest` of a body, computed once for a mesh."""
-        if name not in self._bounds or self._bounds[name][0] is not mesh:
-            self._bounds[name] = mesh, _Arms.of(mesh).largest
-        return self._bounds[name][1]
-
-
-@dataclass(frozen=True)
-class _Arms:
-    """How gradients of cells follow from the displacements of their corners, by least squares.
-
-    Attributes:
-        corners: Corners of the cells, shape (n, k).
-        inverse: Gradient by the displacement of each corner, shape (n, k, dim), [1 / length].
-        size: Volumes up to a factor, shape (n,).
-    """
-
-    corners: np.ndarray
-    inverse: np.ndarray
-    size: np.ndarray
-
-    @classmethod
-    def of(cls, mesh: BodyMesh) -> _Arms:
-        corners = mesh.linear.cells
-        arms = mesh.points[corners]
-        arms = arms - arms.mean(axis=1, keepdims=True)
-        metric = np.einsum("nkd,nke->nde", arms, arms)
-        return cls(corners, arms @ np.linalg.inv(metric), np.sqrt(np.linalg.det(metric)))
-
-    @property
-    def largest(self) -> float:
-        """A bound on the rotation of any cell by displacements of length one, [1 / length]."""
-        return float(np.linalg.norm(self.inverse, axis=2).sum(axis=1).max())
-
-    def rotation(self, displacement: np.ndarray) -> float:
-        """Return the root mean square of the rotations of cells, in radians.
-
-        Args:
-            displacement: Of the nodes, shape (n_nodes, dim), [length].
-        """
-        gradient = np.einsum("nkd,nke->nde", self.inverse, displacement[self.corners])
-        square = ((gradient - gradient.transpose(0, 2, 1)) ** 2).sum(axis=(1, 2)) / 8.0
-        return float(np.sqrt(np.average(square, weights=self.size)))
-
-
-def rotation_of(mesh: BodyMesh, displacement: np.ndarray) -> float:
-    """Return by how much the cells of a body turn, as a root mean square, in radians.
+    So it is of round bodies. Contact that ends where a surface ends, or between planes that lift off each
+    other, has no peak that more points would resolve.
 
     Args:
-        mesh: Its mesh.
-        displacement: Of the nodes, shape (n_nodes, dim), [length].
+        pressed_in: How far its force presses each contact point in, shape (n,), [length].
     """
-    return _Arms.of(mesh).rotation(displacement)
+    contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
+    mine = contact.on_pair(number)
+    pressing = contact.normal_force[mine] > 0.0
+    if not pressing.any():
+        return []
+    slave = surface_of(scene, pair.slave, "faceted")
+    node = np.searchsorted(
+        slave.nodes, contact.points.slave[mine] - NodeNumbers.of(scene).first_of(pair.slave.body)
+    )
+    top = np.argmax(contact.pressure[mine])
+    beside, rim = _beside(slave)
+    if rim[node[top]] and not slave.mirrored[node[top]].any():
+        return []
+    gap = np.full(len(slave.nodes), np.nan)
+    gap[node[~pressing]] = contact.points.gap[mine[~pressing]]
+    near = beside[node[top]].indices
+    for steps, reached in ((1, near), (2, beside[near].indices)):
+        opened = gap[reached][~np.isnan(gap[reached])]
+        if len(opened):
+            grown = opened.min() - contact.points.gap[mine[top]]
+            if grown > CURVED * pressed_in[mine[top]]:
+                kind = "peak" if steps == 1 else "rough peak"
+                return [(number, kind, _words_of_peak(pair, int(pressing.sum()), steps))]
+            break
+    return []
+
+
+def _beside(surface: FacetedSurface) -> tuple[sp.csr_matrix, np.ndarray]:
+    """Return which nodes an edge of a facet joins, (n, n), and which lie on the rim, (n,)."""
+    ends = surface.facets.ravel(), np.roll(surface.facets, -1, axis=1).ravel()
+    one, other = np.concatenate(ends), np.concatenate(ends[::-1])
+    count = np.bincount(surface.facets.ravel())
+    beside = sp.csr_matrix((np.ones(len(one)), (one, other)), shape=(len(count), len(count)))
+    return beside, (beside.getnnz(axis=1) != count) | (count == 1)
+
+
+def _words_of_peak(pair: ContactPair, count: int, steps: int) -> str:
+    points = counted(count, "point presses", "points press")
+    cells = counted(steps, "cell")
+    return (
+        f"the contact of {pair.place} is too small for its cells: {points}, and it ends within "
+        f"{cells} of the largest pressure, which may be off {OFF[steps]}; four cells on the half width of a "
+        "contact have it to about a percent: refine the meshes there"
+    )
+
+
+def _passing_nodes(state: State, number: int, moved: float) -> list[tuple[int, str, str]]:
+    """Return the doubt about a pair whose master passes between the nodes of its slave. Collective.
+
+    Args:
+        moved: How far its surfaces move against each other, [length].
+    """
+    pair = state.scene.contacts[number]
+    if pair.by_mortar or not isinstance(pair.master, Surface) or pair.within_body:
+        return []
+    deep = _depth(state, number, pair, pair.master)
+    if deep <= SHARE * moved:
+        return []
+    words = (
+        f"nodes of the master of {pair.place} pass between those of the slave, which is too coarse, by up to "
+        f"{deep:.2g}, where surfaces move by {moved:.2g} against each other: refine the slave, or let the "
+        "finer surface be the slave; linear cells have discretisation='mortar', which has no such error"
+    )
+    return [(number, "between nodes", words)]
+
+
+def _depth(state: State, number: int, pair: ContactPair, other: Surface) -> float:
+    """Return the largest depth of master nodes below facets of the slave that press, [length].
+
+    Zero where no more master nodes meet these than they have nodes: the slave is the finer surface.
+    """
+    contact, scene = state.contact, state.scene
+    mine = contact.on_pair(number)
+    mine = mine[contact.normal_force[mine] > 0.0]
+    slave, master = (surface_of(scene, side, pair.geometry) for side in (pair.slave, other))
+    first = NodeNumbers.of(scene).first_of(pair.slave.body)
+    presses = np.isin(slave.nodes, contact.points.slave[mine] - first)
+    if not presses.any():
+        return 0.0
+    pressed = slave.facets[presses[slave.facets].any(axis=1)]
+    size = np.linalg.norm(np.ptp(slave.points[pressed], axis=1), axis=1).max()
+    reach = size + np.abs(contact.points.gap[mine]).max()
+    away, _ = cKDTree(slave.points[presses]).query(master.points, distance_upper_bound=reach)
+    near = np.flatnonzero(np.isfinite(away))
+    hit = project(master.points[near], master.normals[near], slave)
+    inside = presses[slave.facets[hit.facet]].all(axis=1)
+    if np.count_nonzero(inside) <= np.count_nonzero(presses):
+        return 0.0
+    own = state.gather_displacement(pair.slave.body)[slave.nodes]
+    moves = state.gather_displacement(other.body)[master.nodes[near[hit.point]]]
+    gap = hit.gap + np.einsum("nd,nd->n", hit.normal, moves - node_weights(slave, hit) @ own)
+    return -float(gap[inside].min(initial=0.0))
+
+
+def advice(scene: Scene, last: State | None = None, *, moves: bool) -> str:
+    """Return words to append to the message of a load step that ends, empty where there is nothing to say."""
+    moving = _on_contact(scene) + ("" if last is None else _on_ends(last)) if moves else ""
+    return moving + _on_symmetry(scene)
+
+
+def _on_ends(last: State) -> str:
+    """Return words on nodes that press on masters from beyond their ends, empty if there are none.
+
+    Where such a node is lost, its force ends at once, and it may come back: no equilibrium is near.
+    """
+    contact, points, found = last.contact, last.contact.points, []
+    total = contact.normal_force.sum()
+    for index, pair in enumerate(last.scene.contacts):
+        mine = np.flatnonzero((points.pair == index) & (points.facet >= 0) & (contact.normal_force > 0.0))
+        if isinstance(pair.master, Surface) and len(mine):
+            corners = last.scene.facets(pair.master).shape[1]
+            beyond = mine[outside(points.local[mine], corners) > 0.0]
+            share = contact.normal_force[beyond].sum() / total
+            if share > 0.0:
+                surface = f"of surface {pair.slave.name!r}"
+                nodes = counted(len(beyond), f"node {surface} presses", f"nodes {surface} press")
+                found.append(
+                    f"; {nodes} on {pair.master.name!r} from beyond its end with {share:.1%} of the normal "
+                    "force, which ends where the master is left: let that reach further there"
+                )
+    return "".join(found)
+
+
+def _on_contact(scene: Scene) -> str:
+    """Return words on surfaces that slide by nodes and could by mortar, empty if there are none.
+
+    Slave nodes rest in hollows between nodes of the master; where they leave them together, as two bodies
+    that are pressed in perfect symmetry, no equilibrium may be near that mortar has.
+    """
+
+    def by_nodes(pair: ContactPair) -> bool:
+        if pair.by_mortar or pair.within_body or not isinstance(pair.master, Surface):
+            return False
+        return all(scene.bodies[side.body].mesh.order == 1 for side in (pair.slave, pair.master))
+
+    if not any(map(by_nodes, scene.contacts)):
+        return ""
+    return "; surfaces of bodies meet more smoothly with discretisation='mortar' than by nodes"
+
+
+def _on_symmetry(scene: Scene) -> str:
+    """Return words on flat sides beside contact on which nothing acts, as on a forgotten plane of symmetry.
+
+    A side with another one parallel to it is more likely to be free.
+    """
+    acting = [*scene.supports, *(load for load in scene.loads if hasattr(load, "surface"))]
+    used = {(each.body, each.surface) for each in acting}
+    sides = [side for pair in scene.contacts for side in (pair.slave, pair.master)]
+    sides += [side for tie in scene.ties for side in (tie.slave, tie.master)]
+    used |= {(side.body, side.name) for side in sides if isinstance(side, Surface)}
+    found = []
+    for name, body in scene.bodies.items():
+        mesh = body.mesh
+        touching = [mesh.surfaces[side].ravel() for side in mesh.surfaces if _meets(scene, name, side)]
+        flat = {side: normal for side in mesh.surfaces if (normal := _normal(scene, name, side)) is not None}
+        for side, normal in flat.items():
+            alone = sum(abs(normal @ other) > 1.0 - FLAT for other in flat.values()) == 1
+            beside = touching and np.isin(mesh.surfaces[side], np.concatenate(touching)).any()
+            if alone and beside and (name, side) not in used:
+                found.append(f"surface {side!r} of body {name!r}")
+    if not found:
+        return ""
+    which = f"{', '.join(found)}, on which nothing acts"
+    return f"; where a flat side is a plane of symmetry it needs a support along its normal: see {which}"
+
+
+def _meets(scene: Scene, body: str, side: str) -> bool:
+    """Return whether a surface is one of a contact pair."""
+    return any(Surface(body, side) in (pair.slave, pair.master) for pair in scene.contacts)
+
+
+def _normal(scene: Scene, body: str, side: str) -> np.ndarray | None:
+    """Return the normal of a surface, shape (dim,), None where it is not flat."""
+    mesh = scene.bodies[body].mesh
+    areas = vector_areas(mesh.points, mesh.surfaces[side])
+    normals = areas / np.linalg.norm(areas, axis=1, keepdims=True)
+    return normals[0] if len(normals) and np.all(normals @ normals[0] >= 1.0 - FLAT) else None

@@ -13,7 +13,6 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.checks import checked
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact._scene.pairs import AnyDiscretisation, ContactPair, Friction, Surface
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError, safe_log
@@ -134,6 +133,8 @@ class AutomaticContact(Sequence[ContactPair]):
 
     def _pair(self, scene: SceneParts, one: str, other: str) -> ContactPair:
         """Return the pair of two bodies with the better slave."""
+        from fenics_contact._scene.pair_geometry import master_share
+
         sides = Surface(one, f"near {other}"), Surface(other, f"near {one}")
         pair = ContactPair(*sides, self.friction, self.discretisation, self.geometry)
         sizes = [_size(scene.bodies[side.body].mesh, side.name) for side in sides]

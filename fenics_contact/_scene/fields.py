@@ -106,10 +106,7 @@ def evaluate(name: str, function: OfPosition, points: np.ndarray, shape: tuple[i
     """Evaluate a function of position.
 
     Args:
-        name: Name of the values in messages.
-        function: The function.
         points: Points, shape (n, dim), [length].
-        shape: Shape of one value: () or (dim,).
 
     Raises:
         InvalidInputError: If it returns another shape or something other than finite numbers.
@@ -135,10 +132,7 @@ def gradients_of(name: str, function: OfPosition, points: np.ndarray, shape: tup
     outside the body by one step.
 
     Args:
-        name: Name of the values in messages.
-        function: The function.
         points: Points, shape (n, dim), [length].
-        shape: Shape of one value: () or (dim,).
 
     Returns:
         Shape ``(n, *shape, dim)``, the derivatives last.

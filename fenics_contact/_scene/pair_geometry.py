@@ -414,12 +414,8 @@ def unpaired(
     other. Those that go there behind a named surface are left out: how far that passes is the pair's matter.
 
     Args:
-        scene: The scene.
-        both: Names of the bodies.
-        outlines: Body name -> its boundary and inside.
         moved: Body name -> displacement of its nodes, shape (n_nodes, dim), [length].
         reach: The largest displacement of all bodies, [length].
-        share: Which of the facets are looked at, for ranks to share them.
     """
     named = _named(scene, both)
     counts, deep = np.zeros(3, dtype=int), DEEP * reach

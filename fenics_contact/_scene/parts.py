@@ -331,10 +331,6 @@ def with_discretisation(scene: SceneParts, pairs: Sequence[Pair]) -> tuple[Pair,
     """Return pairs with the discretisation that they were given, or with the better one of the scene.
 
     It is that of the undeformed meshes before any design moved them, the same for all loads.
-
-    Args:
-        scene: The scene.
-        pairs: Its contact pairs or ties.
     """
     return tuple(_with_choice(scene, pair) for pair in pairs)
 
@@ -391,10 +387,6 @@ def surfaces_match(slave: FacetedSurface, master: FacetedSurface) -> bool:
 
     Their nodes lie over each other along the slave's normals within `MATCHING`, also across a gap, and no
     slave node without such a partner meets the master. Then contact by nodes passes the patch test.
-
-    Args:
-        slave: The slave.
-        master: The master.
     """
     if slave.corners != master.corners:
         return False
@@ -458,13 +450,6 @@ def mirrored(scene: SceneParts, body: str) -> np.ndarray:
 def surface_of(
     scene: SceneParts, surface: Surface, geometry: Geometry, *, finer: bool = False
 ) -> FacetedSurface:
-    """Return a named surface; its normals lie in the planes of symmetry that cut it.
-
-    Args:
-        scene: The scene.
-        surface: The surface.
-        geometry: How it is represented between its nodes, see `ContactPair`.
-        finer: Use a better representation than that if there is one, see `true_surface`.
-    """
+    """Return a named surface; its normals lie in the planes of symmetry that cut it."""
     mesh = scene.bodies[surface.body].mesh
     return true_surface(mesh, surface.name, geometry, mirrored=mirrored(scene, surface.body), finer=finer)

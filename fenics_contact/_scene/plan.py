@@ -17,7 +17,6 @@ import numpy as np
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._base.sparse import expected_bytes
 from fenics_contact._scene.loads import BodyForce, ThermalStrain
-from fenics_contact._scene.pair_geometry import PairGeometry, pair_geometry, unpaired_bodies
 from fenics_contact._scene.pairs import Coulomb, Surface, Tresca
 from fenics_contact._scene.parts import in_words
 from fenics_contact._scene.supports import RigidSurface
@@ -27,6 +26,7 @@ from fenics_contact.materials.kernels import rigid_body_modes
 from fenics_contact.mesh.body_mesh import BodyMesh
 
 if TYPE_CHECKING:
+    from fenics_contact._scene.pair_geometry import PairGeometry
     from fenics_contact._scene.parts import SceneParts
 
 
@@ -114,8 +114,6 @@ def held_components(scene: SceneParts, body: str, modes: np.ndarray) -> np.ndarr
     Of a rigid surface with free components the others count, as displacement and rotation of its point.
 
     Args:
-        scene: The scene.
-        body: Name of the body.
         modes: Motions at its nodes, shape (n_nodes, dim, n_modes).
     """
     mesh = scene.bodies[body].mesh
@@ -255,10 +253,10 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
     """Decide what a scene needs.
 
     Args:
-        scene: The scene.
-        partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
         sensitivity: Whether derivatives by the shape are wanted.
     """
+    from fenics_contact._scene.pair_geometry import pair_geometry, unpaired_bodies
+
     effects = effects_of(scene)
     names = {effect.name for effect in effects}
     counts = [_node_counts(body.mesh, partitions[name]) for name, body in scene.bodies.items()]
@@ -288,13 +286,7 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
 
 
 def choose_solver(scene: SceneParts, subdomains: int, *, sensitivity: bool = False) -> SolverKind:
-    """Return how the equilibrium of a scene is computed.
-
-    Args:
-        scene: The scene.
-        subdomains: Subdomains of all bodies.
-        sensitivity: Whether derivatives are wanted, which need the dual system.
-    """
+    """Return how the equilibrium of a scene is computed."""
     effects = {effect.name for effect in effects_of(scene)}
     if EffectName.NONLINEAR_MATERIAL in effects:
         return SolverKind.TANGENT_NEWTON

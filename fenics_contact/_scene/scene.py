@@ -1,4 +1,4 @@
-"""A scene: bodies, supports, loads and contact pairs. Nothing numerical has happened yet.
+"""A scene: bodies, supports, loads and contact pairs. Nothing is solved yet.
 
 Bodies of a scene from the meshes of a file, materials by name.
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -20,13 +20,16 @@ from fenics_contact._scene.automatic import AutomaticContact
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.loads import Load
 from fenics_contact._scene.parts import SceneParts, with_discretisation
-from fenics_contact._scene.plan import Effect, Plan, effects_of, make_plan
 from fenics_contact._scene.supports import AnySupport
 from fenics_contact.errors import InvalidInputError, user_code
 from fenics_contact.materials.elastic import Material
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.bisection import default_partition
 from fenics_contact.mesh.body_mesh import BodyMesh
+
+if TYPE_CHECKING:
+    from fenics_contact._scene.plan import Effect, Plan
+
 
 OfBody = Material | Mapping[str, Material]
 """A material, or a mapping from region to material."""
@@ -153,6 +156,8 @@ class Scene(SceneParts):
 
     def effects(self) -> tuple[Effect, ...]:
         """List the effects in the scene; only what these need is built."""
+        from fenics_contact._scene.plan import effects_of
+
         return effects_of(self)
 
     def plan(
@@ -164,6 +169,8 @@ class Scene(SceneParts):
     ) -> Plan:
         """Return what will be built: unknowns, multipliers, solver, memory.
 
+        Gaps between surfaces, overlaps and approaches are computed here, not when the scene is made.
+
         Args:
             partitions: Body name -> subdomain of every cell; by default what `partition` returns.
             ranks: Number of ranks, if the partition is left open.
@@ -172,6 +179,8 @@ class Scene(SceneParts):
         Example:
             >>> print(scene.plan())  # doctest: +SKIP
         """
+        from fenics_contact._scene.plan import make_plan
+
         cut = self.partition(ranks) if partitions is None else partitions
         return make_plan(self, cut, sensitivity=sensitivity)
 

@@ -48,22 +48,20 @@ def design_state(
     start: AnyState | None,
     tolerance: float,
     *,
-    slip_from: AnyState | None = None,
+    before: AnyState | None = None,
 ) -> AnyState:
     """Compute the equilibrium of a design, whose surfaces may overlap before they are loaded. Collective.
 
     Args:
         scene: The scene in the shape of the design.
         start: State of a neighbouring design, or None for the first one.
-        slip_from: State of the same design after the last load step, or None.
+        before: State of the same design after the last load step, or None.
     """
-    if scene.is_nonlinear and slip_from is not None:
+    if scene.is_nonlinear and before is not None:
         raise InvalidInputError(
             "designs of bodies that deform much have one load step, got a state before it: leave out LoadPath"
         )
-    solve = partial(
-        contact.solve, scene, slip_from=slip_from, tolerance=tolerance, sensitivity=True, overlap=True
-    )
+    solve = partial(contact.solve, scene, before=before, tolerance=tolerance, design=True)
     try:
         return solve(start=start)
     except InfeasibleError as error:
@@ -419,7 +417,7 @@ class ShapeProblem(SingleProblem):
             self._apart = True
         with self._timer.phase("mesh motion"):
             scene = self.scene_of(alpha) if known is None else known.state.scene
-        state = design_state(self.contact, scene, previous, tolerance, slip_from=after)
+        state = design_state(self.contact, scene, previous, tolerance, before=after)
         self._memory.record_state(alpha, state)
         self._memory.products += products_of(state)
         return state

@@ -76,7 +76,6 @@ class SlipBoundSequence:
         Args:
             bound: Ψ of the last Tresca problem, shape (n_friction,), owned.
             image: The slip bound that belongs to its solution, shape (n_friction,), owned.
-            residual: Natural residual of that solution with ``image``.
         """
         self._bounds = [*self._bounds[1 - MEMORY :], bound]
         period, change = self._returned(image)

@@ -21,8 +21,6 @@ def solve_dual(
     """Solve the dual problem of a system with the friction laws of its scene. Collective.
 
     Args:
-        system: The system.
-        solver: `FaceNewton` and `FixedPoint` handle Coulomb's law; `Smalse` is wrapped in a `FixedPoint`.
         start: Earlier solution, or multiplier to start from, owned, or None.
 
     Raises:

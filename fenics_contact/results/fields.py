@@ -66,7 +66,6 @@ def displacement_function(mesh: _dolfinx.mesh.Mesh, values: np.ndarray) -> _dolf
     """Return the displacement as a Function on a body's mesh. Collective.
 
     Args:
-        mesh: The body's mesh.
         values: Displacement of the body's nodes, valid at least on those of this rank, shape (n_nodes, dim).
     """
     function = _dolfinx.coefficient(mesh, "displacement")
@@ -80,8 +79,6 @@ def nodal_function(mesh: _dolfinx.mesh.Mesh, name: str, values: np.ndarray) -> _
     """Return a scalar field on a body's mesh from its nodal values. Collective.
 
     Args:
-        mesh: The body's mesh.
-        name: Name of the Function.
         values: Nodal values of the body, on every rank, shape (at least n_nodes,).
     """
     function = _dolfinx.fem.Function(_dolfinx.scalar_space(mesh, 1), name=name)
@@ -95,7 +92,6 @@ def cells_of_body(mesh: _dolfinx.mesh.Mesh, cells: np.ndarray) -> np.ndarray:
     """Return the number in the body of each cell owned by this rank, shape (n_owned,).
 
     Args:
-        mesh: The body's mesh in dolfinx.
         cells: Node numbers of all cells of the body, shape (n_cells, nodes of a cell).
     """
     owned = mesh.topology.index_map(mesh.topology.dim).size_local
@@ -110,10 +106,6 @@ def cells_of_body(mesh: _dolfinx.mesh.Mesh, cells: np.ndarray) -> np.ndarray:
 
 def cell_values(function: _dolfinx.fem.Function, cells: np.ndarray) -> np.ndarray:
     """Gather a cellwise constant Function in the order of a body's cells. Collective on its mesh.
-
-    Args:
-        function: Function on the body's own mesh: numbers, vectors or tensors.
-        cells: Node numbers of all cells of the body, (n_cells, n_vertices).
 
     Returns:
         One value for every cell, (n_cells, ...), replicated.
@@ -150,15 +142,7 @@ class CellMeans:
         temperature: Temperature,
         quantity: tuple[OfStress, int],
     ) -> None:
-        """Compile the forms. Collective on ``comm``.
-
-        Args:
-            mesh: The body's mesh, see `body_mesh`.
-            body: The body with its materials.
-            comm: Communicator of the state.
-            temperature: Temperature change of the body.
-            quantity: The function of the stress, and how many constants it takes.
-        """
+        """Compile the forms. Collective on ``comm``."""
         cell_type = body.mesh.cell_type
         self._parts = _composition(mesh, body)
         q = ufl.TestFunction(_dolfinx.cellwise_space(cell_type))
@@ -174,12 +158,7 @@ class CellMeans:
         self._volume = _dolfinx.assemble_vector(volume.bind([self._space], ()))
 
     def of(self, displacement: _dolfinx.fem.Function, values: tuple[float, ...] = ()) -> np.ndarray:
-        """Return the means on this rank's cells, shape (n_owned,). Collective.
-
-        Args:
-            displacement: The displacement of the body.
-            values: Values of the constants of the quantity.
-        """
+        """Return the means on this rank's cells, shape (n_owned,). Collective."""
         numbers = (*values, *self._numbers, *self._parts.parameters)
         functions = [displacement, *self._fields]
         bound = self._form.bind([self._space], numbers, functions, cells=self._parts.cells)
@@ -208,12 +187,6 @@ def von_mises(
     """Return the von Mises stress averaged over each cell, [force / length²], a piecewise constant Function.
 
     Collective on ``comm``.
-
-    Args:
-        displacement: The displacement Function of the body.
-        body: The body with its materials.
-        comm: Communicator of the state.
-        temperature: Temperature change of the body.
     """
     mesh = displacement.function_space.mesh
     means = CellMeans(mesh, body, comm, temperature, (_equivalent, 0))
@@ -233,7 +206,6 @@ def principal_stress(stress: _dolfinx.fem.Function, cells: np.ndarray) -> _dolfi
     """Return the principal stresses σ₁ ≥ σ₂ ≥ σ₃ of a cellwise stress, a Function of shape (3,). Collective.
 
     Args:
-        stress: The stress of a body.
         cells: Node numbers of all cells of the body, shape (n_cells, nodes of a cell).
     """
     mesh = stress.function_space.mesh
@@ -328,12 +300,6 @@ def contact_fields(
 ) -> dict[str, np.ndarray]:
     """Return the contact result of a body's surfaces as fields on all its nodes.
 
-    Args:
-        contact: Result on all contact surfaces.
-        scene: The scene.
-        numbers: Numbers of the nodes of all bodies.
-        body: Name of the body.
-
     Returns:
         ``contact_status``, (n_nodes,) int: the value of `Status`, −1 on nodes that are not contact points;
         and, zero on those, ``contact_pressure``, (n_nodes,), [force / length²], ``contact_force`` on the
@@ -410,15 +376,7 @@ def put_history_stress(
     responses: tuple[Response, ...],
     quantity: Callable[[np.ndarray], np.ndarray],
 ) -> None:
-    """Overwrite a field on the cells of materials with a history, all of which this rank knows. Collective.
-
-    Args:
-        field: Function on the body's mesh, constant on cells, of other materials' stresses.
-        torn: The torn system.
-        name: The body.
-        responses: What each of this rank's subdomains answers.
-        quantity: What the field is the mean of, of stresses (..., 3, 3).
-    """
+    """Overwrite a field on the cells of materials with a history, which this rank knows. Collective."""
     body, shape = torn.scene.bodies[name], field.ufl_shape
     known = np.full((body.mesh.n_cells, *shape), np.nan)
     for mesh, response in zip(torn.decomposition.meshes, responses, strict=True):
@@ -449,9 +407,7 @@ def nodal_stress(
     """Return the stress of all bodies at their nodes, material by material. Collective.
 
     Args:
-        torn: The torn system.
         displacement: Displacement of all nodes, valid on those of this rank, shape (n_nodes, dim), [length].
-        meshes: The bodies' meshes by name, see `body_mesh`.
         stresses: Mean stress of the cells of at least the bodies with nonlinear materials, by name.
 
     Returns:
@@ -513,9 +469,6 @@ def _around_sites(
     """Return the means of values on cells over the cells around each site, shape (n_sites, k). Collective.
 
     Args:
-        torn: The torn system.
-        name: The body.
-        sites: The sites.
         values: On this rank's cells of the body, shape (n_owned, k).
         number: Number in the body of each of them, shape (n_owned,).
     """

@@ -60,7 +60,6 @@ def nodal_forces(torn: TornSystem, multiplier: np.ndarray, displacement: np.ndar
     """Return the forces on all nodes. Collective.
 
     Args:
-        torn: The torn system.
         multiplier: λ, owned, [force].
         displacement: Torn displacement of this rank as the solver returned it, shape (torn_size,), [length].
     """
@@ -107,9 +106,7 @@ def by_node(points: ContactPoints, force: np.ndarray, chosen: np.ndarray) -> np.
     """Return the forces of chosen points on the nodes of slaves and masters, shape (n_nodes, dim).
 
     Args:
-        points: Contact or tied points.
         force: Force on the slave at each of all points, shape (n, dim), [force].
-        chosen: Numbers of the points.
     """
     return np.asarray(points.jump[chosen].T @ force[chosen])
 
@@ -229,8 +226,6 @@ def table(
     """Return forces and moments of several resultants, one per line behind its names, with their units.
 
     Args:
-        names: Names of each line.
-        resultants: The resultants, all in space or all in the plane.
         scales: A force and a moment beside which what is only rounding is shown as zero; by default the
             largest components.
     """
@@ -426,7 +421,6 @@ def rounding_force(torn: TornSystem, displacement: np.ndarray) -> float:
     Collective.
 
     Args:
-        torn: The system, of linear materials.
         displacement: u of this rank, torn, shape (torn_size,), [length].
     """
     comm = torn.decomposition.comm
@@ -441,9 +435,6 @@ def force_balance(
     """Return the balance of all forces, about a point or the middle of the box around all bodies.
 
     Args:
-        torn: The system.
-        forces: Forces of all nodes.
-        about: The point, or None.
         least: A force below which bodies count as free of forces, [force].
     """
     point = _middle(forces.places) if about is None else point_of(about, torn.dim)

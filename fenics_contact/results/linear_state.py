@@ -63,7 +63,7 @@ class LinearState(State):
         if isinstance(self.system, DirectSystem):
             raise InvalidInputError(
                 "this needs multipliers, but the state of one body that supports hold was solved directly: "
-                "solve with sensitivity=True"
+                "solve with design=True"
             )
 
     @cached_property

@@ -44,11 +44,7 @@ class UnheldMotion:
 
 
 def unheld_motions(system: DualSystem) -> tuple[UnheldMotion, ...]:
-    """Return the motions that a dual system leaves out. Collective.
-
-    Args:
-        system: The system.
-    """
+    """Return the motions that a dual system leaves out. Collective."""
     return rigid_motions(system.torn, system.unheld) if system.unheld.shape[1] else ()
 
 
@@ -56,7 +52,6 @@ def rigid_motions(torn: TornSystem, fields: sp.spmatrix) -> tuple[UnheldMotion, 
     """Return rigid displacements of bodies as motions. Collective.
 
     Args:
-        torn: The torn system.
         fields: Torn displacements of this rank, one a column, shape (torn_size, n).
     """
     count, coefficients, fields = fields.shape[1], [], sp.csr_matrix(fields)
@@ -125,8 +120,6 @@ def rigid_motion(scene: Scene, support: RigidSurface, displacement: np.ndarray) 
     """Return the motion of a rigid surface.
 
     Args:
-        scene: The scene.
-        support: The surface.
         displacement: Displacement of the nodes of its body, shape (n_nodes, dim), [length].
     """
     body, where = scene.bodies[support.body], Surface(support.body, support.surface)

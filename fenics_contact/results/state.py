@@ -112,10 +112,8 @@ def compute_energies(
     """Compute all energies. Collective.
 
     Args:
-        torn: The torn system.
         displacement: Torn displacement of this rank, [length].
         multiplier: λ, owned, [force].
-        friction: Σ Ψ ‖slip‖ of all ranks.
         rigid: Rigid motions R α in the displacement: they cause no strain, but forces that are slightly out
             of balance do work on them.
     """
@@ -161,14 +159,7 @@ def first_pairs(scene: Scene, contact: ContactResult, most: int = 8) -> dict[str
 
 
 def pairs_in_words(scene: Scene, contact: ContactResult, force: str = "", stress: str = "") -> list[str]:
-    """Return a summary of each contact pair: points by status, resultants, largest pressure.
-
-    Args:
-        scene: The scene.
-        contact: The result on its contact surfaces.
-        force: Name of the unit of force.
-        stress: Name of the unit of stress.
-    """
+    """Return a summary of each contact pair: points by status, resultants, largest pressure."""
     rows = []
     for number, pair in enumerate(scene.contacts):
         mine = contact.on_pair(number)

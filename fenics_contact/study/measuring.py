@@ -148,7 +148,7 @@ def true_errors(states: tuple[State, ...]) -> TrueErrors | None:
 
 def _compared(state: LinearState, earlier: tuple[State, ...], solver: FaceNewton) -> TrueErrors:
     problem = ContactProblem.following(state, solver=solver)
-    exact = as_linear(problem.solve(slip_from=earlier[-1] if earlier else None), "true errors")
+    exact = as_linear(problem.solve(before=earlier[-1] if earlier else None), "true errors")
     norm = exact.energies.norm
     total = _distance(state, exact.dual_solution, exact.torn_displacement) / norm
     if not np.any(state.torn.friction_coefficient > 0.0):

@@ -125,7 +125,7 @@ def test_a_number_beats_the_tolerance_of_the_solver() -> None:
 
 def test_derivatives_have_a_fixed_tolerance() -> None:
     scene = CASES[PAIR].make()
-    state = ContactProblem(scene, MPI.COMM_SELF, partitions=CASES[PAIR].cut(scene)).solve(sensitivity=True)
+    state = ContactProblem(scene, MPI.COMM_SELF, partitions=CASES[PAIR].cut(scene)).solve(design=True)
     assert state.dual_solution.residuals.within(1e-6)
     assert not remarks(state)
 

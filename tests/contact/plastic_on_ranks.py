@@ -25,7 +25,7 @@ problem = ContactProblem(
     twisted(0.0), COMM, partitions={"bar": box_partition(MESH, (4, 1, 1))}, tolerance=1e-9
 )
 for part in (0.5, 1.0, 0.6):
-    state = problem.solve(twisted(part), slip_from=problem.state)
+    state = problem.solve(twisted(part), before=problem.state)
 assert isinstance(state, DeformedState)
 answer = {
     "displacement": state.gather_displacement("bar"),

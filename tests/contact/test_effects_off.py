@@ -225,7 +225,7 @@ def test_the_direct_solve_has_no_coarse_problem_and_no_products() -> None:
 def test_only_sensitivities_put_one_held_body_on_multipliers(sensitivity: bool, calls: Counter[str]) -> None:
     case = CASES["surface load"]
     problem = ContactProblem(case.scene, MPI.COMM_SELF, partitions=cuts(case), tolerance=1e-10)
-    state = problem.solve(sensitivity=sensitivity)
+    state = problem.solve(design=sensitivity)
     assert set(calls) == (LINEAR if sensitivity else set())
     compiled = {kind for kind, *_ in state.torn.decomposition.forms.compiled}
     assert compiled == {"stiffness", "surface load"}, "derivatives by the shape are not compiled for a state"

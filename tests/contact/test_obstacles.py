@@ -14,6 +14,7 @@ from fenics_contact import (
     ContactProblem,
     Coulomb,
     DistanceObstacle,
+    LoadStep,
     MovingObstacle,
     RigidCylinder,
     RigidPlane,
@@ -162,6 +163,6 @@ def test_with_small_displacements_an_obstacle_must_not_move(material: Material) 
         )
 
     with pytest.raises(InvalidInputError, match=r"has moved by time 0\.5: move the bodies against"):
-        pressing(0.1).solve(time=0.5)
-    assert pressing(0.1).solve(time=0.0).contact.count(Status.OPEN) == 9
-    assert pressing(0.0).solve(time=0.5).contact.count(Status.OPEN) == 9
+        pressing(0.1).solve(step=LoadStep("push", time=0.5))
+    assert pressing(0.1).solve(step=LoadStep("push", time=0.0)).contact.count(Status.OPEN) == 9
+    assert pressing(0.0).solve(step=LoadStep("push", time=0.5)).contact.count(Status.OPEN) == 9

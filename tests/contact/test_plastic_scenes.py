@@ -59,7 +59,7 @@ def test_a_torn_bar_remembers_from_step_to_step(material: HistoryMaterial, size:
     )
     expected, _ = in_tension(material, path)
     for stretch, nominal in zip(path, expected, strict=True):
-        state = problem.solve(pulled(material, stretch), slip_from=problem.state)
+        state = problem.solve(pulled(material, stretch), before=problem.state)
         assert isinstance(state, DeformedState)
         lateral = 1 + state.gather_displacement("bar")[:, 1].min()
         true = nominal / lateral**2 if material.finite else nominal

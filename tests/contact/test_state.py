@@ -126,3 +126,13 @@ def test_forces_are_never_below_zero_whatever_the_tolerance_leaves_and_still_bal
     acting = nodal_forces(state.torn, multiplier, state.torn_displacement).contact
     left = np.einsum("nd,nd->n", (acting - contact.force)[opened], contact.points.normal[opened])
     assert left == pytest.approx([-7e-4, 1e-6], rel=1e-9)
+
+
+def test_no_attribute_of_a_state_solves_anything() -> None:
+    state = solved(block_on_plane(Coulomb(0.6)))
+    before = state.system.products
+    names = [name for name in dir(type(state)) if not name.startswith("_")]
+    assert len([getattr(state, name) for name in names]) > 20
+    assert state.system.products == before
+    assert state.estimate_errors(geometry=False) is state.known_errors
+    assert state.system.products == before + 1

@@ -76,7 +76,7 @@ def test_a_step_without_another_start_begins_at_the_step_before() -> None:
     pressed = problem.solve()
     scene = replace(problem.scene, loads=driven(0.0))
 
-    again, anew = (problem.solve(scene, start=None, slip_from=each) for each in (pressed, None))
+    again, anew = (problem.solve(scene, start=None, before=each) for each in (pressed, None))
 
     assert again.contact.normal_force.sum() > 0.5 * pressed.contact.normal_force.sum()
     assert not anew.contact.normal_force.any()

@@ -147,8 +147,8 @@ MUTATIONS = (
     Mutation(
         "load steps forget the slip before",
         "_equilibrium/problem.py",
-        "if slip_from is not None:",
-        "if slip_from is None:",
+        "if before is not None:",
+        "if before is None:",
         ("tests/contact/test_steps.py::test_unloading_does_not_return_to_the_start",),
     ),
     Mutation(
@@ -309,8 +309,8 @@ MUTATIONS = (
     Mutation(
         "slip of earlier steps does not turn with the master",
         "_equilibrium/deformed.py",
-        "points.carry_slip(origin.contact.total_slip, old)",
-        "points.carry_tangential(origin.contact.total_slip, old)",
+        "points.carry_slip(before.contact.total_slip, old)",
+        "points.carry_tangential(before.contact.total_slip, old)",
         ("tests/nonlinear/test_reported_values.py::test_slip_of_earlier_steps_turns_about_the_normal",),
     ),
     Mutation(

@@ -169,11 +169,16 @@ def test_two_blocks_turned_in_space_give_the_turned_answer() -> None:
         assert np.abs(turn.gather_displacement(name) - moved).max() < 1e-9 * np.abs(moved).max()
 
 
-def test_a_deformed_state_says_what_it_has() -> None:
-    words = str(solve_scene(pressed(rounded(2), 0.05), MPI.COMM_SELF))
+def test_a_deformed_state_says_what_it_has_and_refuses_no_attribute() -> None:
+    state = solve_scene(pressed(rounded(2), 0.05), MPI.COMM_SELF)
+    words = str(state)
     assert "out of balance" in words
     assert "compare two meshes" in words
     assert "call state.estimate_errors()" not in words
+    names = [name for name in dir(type(state)) if not name.startswith("_")]
+    assert len([getattr(state, name) for name in names]) > 20
+    assert not {"dual", "system", "estimate_errors"} & set(names)
+    assert state.tolerance == TangentNewton().tolerance
 
 
 @pytest.mark.parametrize("friction", [None, Coulomb(0.3)])

@@ -77,7 +77,7 @@ class Column:
             [Traction("block", "z1", (0.0, 0.0, -pressure * self.stress)), *more],
             [ContactPair(Surface("block", "z0"), floor)],
         )
-        return ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-11).solve(sensitivity=True)
+        return ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-11).solve(design=True)
 
 
 def value(objective: Objective, state: State) -> float:
@@ -190,7 +190,7 @@ def test_the_potential_is_what_is_stored_and_what_the_load_gains_on_the_gaps() -
     sides = [Support("block", "x0", (0.0, None, None)), Support("block", "y0", (None, 0.0, None))]
     pair = ContactPair(Surface("block", "z0"), FLOOR)
     scene = Scene({"block": Body(mesh, RUBBER)}, sides, [Traction("block", "z1", (0, 0, -2.0))], [pair])
-    state = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-11).solve(sensitivity=True)
+    state = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-11).solve(design=True)
     gained = float(state.contact.normal_force @ state.contact.points.gap)
     stored = value(StrainEnergy(), state)
     assert min(gained, stored) > 1e-3

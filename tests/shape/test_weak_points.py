@@ -75,7 +75,7 @@ def test_weak_points_are_counted_and_their_branch_is_named(switch: str, choice: 
 def test_weak_points_are_recognised_at_the_accuracy_of_the_state(switch: str, tolerance: float) -> None:
     exact = lines(switch)[WeakChoice.HELD].problem
     problem = ContactProblem(exact.scene, MPI.COMM_SELF, partitions=partitions(exact.scene))
-    state = problem.solve(exact.scene_of(DESIGN), tolerance=tolerance, sensitivity=True)
+    state = problem.solve(exact.scene_of(DESIGN), tolerance=tolerance, design=True)
     weak = linearise_face(state, WeakChoice.HELD).weak
     assert (weak.contacts > 0, weak.discs > 0) == tuple(count > 0 for count in COUNTS[switch])
     assert weak.count < 6, "a state tells most points apart"
@@ -198,7 +198,7 @@ def test_points_on_edges_are_those_that_project_on_one(cell: str, discretisation
     scene = two_blocks(Coulomb(0.38), cell)
     scene = replace(scene, contacts=[replace(scene.contacts[0], discretisation=discretisation)])
     problem = ContactProblem(scene, MPI.COMM_SELF, partitions=partitions(scene))
-    state = problem.solve(sensitivity=True)
+    state = problem.solve(design=True)
     places = state.contact_places[state.contact.normal_force > 0]
     on_edges = int(np.count_nonzero(distance_to_edges(places, scene.bodies["lower"].mesh, "z1") < 1e-9))
     assert 3 < on_edges < len(places) - 3

@@ -54,7 +54,7 @@ def block_among_movers() -> tuple[State, State, State]:
     steps = [LoadStep(f"{time}", time=time) for time in (0.5, 1.0)]
     half, whole = solve_steps(ContactProblem(_among_movers(NeoHooke(1.0, 0.3)), MPI.COMM_SELF), steps)
     linear = ContactProblem(_among_movers(IsotropicElasticity(1.0, 0.3)), MPI.COMM_SELF, tolerance=1e-6)
-    at_rest = linear.solve(time=0.0)
+    at_rest = linear.solve(step=LoadStep("rest", time=0.0))
     return at_rest, half, whole
 
 
