@@ -1,7 +1,4 @@
-"""The bundle: cutting planes of the objective, seen from the current centre.
-
-Small convex quadratic programmes, solved by Clarabel: min ½ yᵀ diag(h) y + qᵀy, E y = e, C y ≤ c.
-"""
+"""Cutting planes of a function seen from a centre, and the quadratic programmes in which they stand."""
 
 from __future__ import annotations
 

@@ -1,14 +1,6 @@
 """The bundle trust method: null and serious steps until the model predicts no decrease.
 
-The result of a minimisation, or the error that ends it.
-
-The starting point, evaluated, and checked against the nonlinear constraints.
-
-Records of the evaluations of a minimisation.
-
-When to stop: the predicted decrease, the certificate, and the limits.
-
-Entry point of the package: min J(x) over a box, linear and nonlinear constraints.
+`BundleTrust` has its parameters, `_Run` its steps, `MethodState` what one step hands to the next.
 """
 
 from __future__ import annotations
@@ -44,7 +36,6 @@ from fenics_contact._optimize.problem import (
     again,
     demand,
     evaluate_constraint,
-    evaluate_problem,
     pose,
 )
 from fenics_contact._optimize.progress import Callback, Progress
@@ -52,49 +43,9 @@ from fenics_contact._optimize.result import MethodState, NotConvergedError, Reas
 from fenics_contact._optimize.subproblem import Step, Trial, Trust, solve_step
 from fenics_contact.errors import InvalidDesignError, InvalidInputError, safe_log
 
+Array = NDArray[np.float64]
+
 _LOG = logging.getLogger(__name__)
-
-
-def conclude(problem: PosedProblem, state: MethodState, reason: Reason, *, raises: bool) -> Result:
-    """Return the result at the centre."""
-    centre = state.centre
-    result = Result(
-        x=centre.x,
-        value=centre.value,
-        subgradient=centre.subgradient,
-        reason=reason,
-        iterations=state.iterations,
-        evaluations=state.evaluations,
-        history=state.history,
-        error=centre.error,
-        constraints=_constraints(problem, state),
-    )
-    if isinstance(problem.fun, Remarked):
-        for words in dict.fromkeys(problem.fun.remarks(centre.x.copy())):
-            safe_log(_LOG.warning, "at the end of the minimisation: %s", words)
-    if reason.success or not raises:
-        return result
-    refusals = [record.note for record in state.history if record.kind is StepKind.REJECTED]
-    last = f"; the last trial: {refusals[-1]}" if reason is Reason.INVALID_DESIGNS else ""
-    broken = [str(one) for one in result.constraints if one.violation > 0.0]
-    violated = f"; violated: {'; '.join(broken)}" if reason is Reason.INFEASIBLE else ""
-    raise NotConvergedError(
-        f"{reason.value} (after {result.iterations} serious steps and {result.evaluations} evaluations, "
-        f"best value {result.value:.9g}{last}{violated})",
-        result.history,
-        result,
-    )
-
-
-def _constraints(problem: PosedProblem, state: MethodState) -> tuple[ConstraintValue, ...]:
-    violations = problem.constraints_at(state.centre).violations
-    values, multipliers = state.centre.constraints, state.multipliers
-    return tuple(
-        ConstraintValue(
-            one.name, float(values[k]), one.lower, one.upper, float(violations[k]), float(multipliers[k])
-        )
-        for k, one in enumerate(problem.nonlinear)
-    )
 
 
 def first_centre(problem: PosedProblem, subgradient: float, feasibility: float) -> Evaluation:
@@ -109,7 +60,7 @@ def first_centre(problem: PosedProblem, subgradient: float, feasibility: float) 
             known = {k: evaluate_constraint(problem.nonlinear[k], x, 1) for k in equal}
             constraints = tuple(problem.nonlinear[k] for k in known)
             _refuse(constraints, [one.value for one in known.values()], feasibility)
-        centre = evaluate_problem(problem, x, 1, accuracy, penalties, known)
+        centre = problem.evaluate(x, 1, accuracy, penalties, known)
     except InvalidDesignError as error:
         raise InvalidDesignError(f"the starting design must be valid: {error}") from error
     here = problem.constraints_at(centre)
@@ -131,35 +82,6 @@ def _refuse(constraints: tuple[NonlinearConstraint, ...], values: list[float], f
             f"x0 must meet the nonlinear constraints, but {'; '.join(words)}: start from a feasible point, "
             "or let the method restore it with restore=True"
         )
-
-
-def recorded(
-    problem: PosedProblem,
-    state: MethodState,
-    step: Step,
-    kind: StepKind,
-    evaluation: Evaluation | None,
-    note: str = "",
-) -> tuple[Record, ...]:
-    """Return the history with one more evaluation, None for a trial point that does not exist."""
-    value = np.nan if evaluation is None else evaluation.value
-    record = Record(
-        iteration=state.iterations + (kind is StepKind.SERIOUS),
-        kind=kind,
-        value=value,
-        best=value if kind in (StepKind.SERIOUS, StepKind.REFINED) else state.centre.value,
-        predicted_decrease=step.decrease,
-        t=step.t,
-        step_length=step.length,
-        aggregate_norm=step.aggregate_norm,
-        aggregate_error=step.aggregate_error,
-        bundle_size=state.bundle.size,
-        evaluations=state.evaluations + 1,
-        error=0.0 if evaluation is None else evaluation.error,
-        violation=np.nan if evaluation is None else problem.constraints_at(evaluation).violation,
-        note=note,
-    )
-    return (*state.history, record)
 
 
 _CERTIFICATE = 10.0  # slack of the certificate beside the predicted decrease
@@ -203,9 +125,6 @@ def stopping_test(
     """Return the test for a centre with this value of J."""
     rounding = 4.0 * float(np.finfo(float).eps) * abs(value)
     return StoppingTest(tolerance * (value_scale + abs(value)), rounding, reach, first_t)
-
-
-Array = NDArray[np.float64]
 
 
 _RADIUS = 3.0  # first trust radius, in lengths of the problem
@@ -323,35 +242,35 @@ class BundleTrust:
     ) -> Result:
         """Run the method on a checked problem; `fenics_contact.minimize` is the usual entry point.
 
-        Args:
-            problem: The result of `pose`.
-            callback: Called with each record and a copy of the best point.
-            checkpoint: File to continue from and to write to.
-
-        Returns:
-            The best point, the reason for the stop and the history.
-
         Raises:
             NotConvergedError: If the stop is a failure and ``raise_on_failure`` is set.
             InvalidInputError: If the checkpoint cannot be used.
             CheckpointError: If the checkpoint cannot be written.
         """
-        progress = Progress(checkpoint, self, problem, callback)
+        progress, run = Progress(checkpoint, self, problem, callback), _Run(self, problem)
         with progress.reporting() as task:
-            state, reason = self._run(problem, progress)
+            state, reason = run.to_the_stop(progress)
             task.outcome = reason.name.lower().replace("_", " ")
-        return conclude(problem, state, reason, raises=self.raise_on_failure)
+        return run.conclude(state, reason)
 
-    def _run(self, problem: PosedProblem, progress: Progress) -> tuple[MethodState, Reason]:
+
+@dataclass(frozen=True)
+class _Run:
+    """The method on a problem: `start`, then `step` until it has a reason to stop, then `conclude`."""
+
+    method: BundleTrust
+    problem: PosedProblem
+
+    def to_the_stop(self, progress: Progress) -> tuple[MethodState, Reason]:
         """Run from where an earlier run ended, or from the start, to the stop."""
         state = progress.recalled()
         if state is None:
-            state = _start(self, problem)
+            state = self.start()
             progress.evaluated(state)
         reason: Reason | None = None
         while reason is None:
             try:
-                state, reason = _iterated(self, problem, state)
+                state, reason = self.step(state)
             except SubproblemError as error:
                 safe_log(_LOG.warning, "%s", error)
                 reason = Reason.STEP_FAILED
@@ -360,206 +279,252 @@ class BundleTrust:
         progress.keep(state, last=True)
         return state, reason
 
+    def start(self) -> MethodState:
+        """Evaluate the starting point; its planes are the bundle."""
+        method, problem = self.method, self.problem
+        centre = first_centre(problem, _FIRST_SUBGRADIENT, method.feasibility)
+        planes = merit_planes(problem, centre)
+        first, norm, locality = planes[0], planes[0].length, method.locality / problem.length
+        t, radius = method.first_step * problem.length / (norm or 1.0), _RADIUS * problem.length
+        bundle = Bundle.of_centre(first, method.locality * norm / problem.length)
+        bundle = with_pieces(bundle, problem, centre, centre.value, np.zeros(problem.start.size))
+        trust = Trust(t, radius, _T_LEAST * t, _T_MOST * t, _RADIUS_LEAST * problem.length)
+        error, violation = centre.error, problem.constraints_at(centre).violation
+        values = centre.value, centre.value, 0.0, t, 0.0, norm, 0.0, 1, 1, error, violation
+        history = (Record(0, StepKind.START, *values),)
+        soft, none = first_soft(planes, locality), np.zeros(len(problem.nonlinear))
+        return MethodState(centre, bundle, trust, t, history, False, soft, none)
 
-def _start(method: BundleTrust, problem: PosedProblem) -> MethodState:
-    centre = first_centre(problem, _FIRST_SUBGRADIENT, method.feasibility)
-    planes = merit_planes(problem, centre)
-    norm = planes[0].length
-    t = method.first_step * problem.length / (norm or 1.0)
-    locality, first = method.locality * norm / problem.length, planes[0]
-    bundle = Bundle.of_centre(first, locality)
-    bundle = with_pieces(bundle, problem, centre, centre.value, np.zeros(problem.start.size))
-    radius = _RADIUS * problem.length
-    trust = Trust(t, radius, _T_LEAST * t, _T_MOST * t, _RADIUS_LEAST * problem.length)
-    violation = problem.constraints_at(centre).violation
-    record = Record(
-        0, StepKind.START, centre.value, centre.value, 0.0, t, 0.0, norm, 0.0, 1, 1, centre.error, violation
-    )
-    soft = first_soft(planes, method.locality / problem.length)
-    return MethodState(centre, bundle, trust, t, (record,), False, soft, np.zeros(len(problem.nonlinear)))
-
-
-def _iterated(
-    method: BundleTrust, problem: PosedProblem, state: MethodState
-) -> tuple[MethodState, Reason | None]:
-    step, state = _guarded_step(method, problem, state)
-    test = stopping_test(
-        state.centre.value,
-        tolerance=method.tolerance,
-        value_scale=method.size_of(state.history[0].value),
-        reach=method.first_step * problem.length,
-        first_t=state.first_t,
-    )
-    reason = _reason_to_stop(method, problem, state, step, test)
-    wanted = _wanted(method, problem, state, step, test, claim=reason is not None and reason.success)
-    if wanted is not None and state.evaluations < method.max_evaluations:
-        return _refined(problem, state, step, wanted), None
-    if reason in _OF_THE_MODEL and state.doubtful:
-        return _reconsidered(method, problem, state, step)
-    if reason is not None:
-        return state, reason
-    if step.decrease <= max(test.limit, test.rounding) and _violated(method, problem, state):
-        step = correcting_step(state.bundle, surroundings(problem, state.centre), state.soft, step)
-        if step.decrease <= test.rounding:
-            return state, Reason.INFEASIBLE
-    return _advanced(method, problem, state, step, _demand(method, state, step, test)), None
-
-
-def _evaluated(
-    problem: PosedProblem, state: MethodState, x: Array, accuracy: Accuracy, known: Known
-) -> Evaluation:
-    """Call the functions, and once more near x where needed."""
-    number = state.evaluations + 1
-    penalties = {k: one.penalty for k, one in zip(problem.inequalities, state.soft, strict=True)}
-    evaluation = evaluate_problem(problem, x, number, accuracy, penalties, known)
-    return verified(problem, evaluation, number) if state.careful else evaluation
-
-
-def _guarded_step(method: BundleTrust, problem: PosedProblem, state: MethodState) -> tuple[Step, MethodState]:
-    """Solve the step's programme, with t small enough to stay in the trust region."""
-    near, trust = surroundings(problem, state.centre), state.trust
-    step, soft = priced_step(state.bundle, near, trust.t, state.soft, method.feasibility)
-    while step.length > 1.001 * trust.radius and not trust.exhausted:
-        # A kink can keep the length constant while t falls, so t must be able to fall fast.
-        t = trust.t * max(0.05, min(0.5, 0.95 * trust.radius / step.length))
-        trust = replace(trust, t=max(t, trust.t_least))
-        step = replace(solve_step(state.bundle, near, trust.t, soft), stuck=step.stuck)
-    state = replace(state, trust=trust, soft=soft)
-    return step, replace(state, multipliers=multipliers(problem, state, step))
-
-
-def _demand(
-    method: BundleTrust, state: MethodState, step: Step, test: StoppingTest, reach: float = 0.0
-) -> Demand:
-    """Return the accuracy needed by a trial of the step, or by a claim about all points within ``reach``."""
-    norm = float(np.linalg.norm(state.bundle.gradients[0]))
-    norm += sum(one.penalty * float(np.linalg.norm(one.bundle.gradients[0])) for one in state.soft)
-    worth = max(step.decrease, test.limit if reach else test.rounding)
-    return demand(worth, max(step.length, reach), norm, (method.inexactness, _SLOPE_SHARE))
-
-
-def _wanted(
-    method: BundleTrust,
-    problem: PosedProblem,
-    state: MethodState,
-    step: Step,
-    test: StoppingTest,
-    *,
-    claim: bool,
-) -> Accuracy | None:
-    """Return the accuracy with which the centre must be re-evaluated, None where it is sufficient."""
-    if not can_be_inexact(problem.fun):
-        return None
-    needed = _demand(method, state, step, test, test.reach if claim else 0.0)
-    if needed.missed_by(state.centre) or (claim and not needed.confirmed_by(state.centre)):
-        return needed.sharper_than(state.centre)
-    return None
-
-
-def _refined(problem: PosedProblem, state: MethodState, step: Step, accuracy: Accuracy) -> MethodState:
-    """Re-evaluate the centre, more accurately."""
-    centre, equal = state.centre, problem.equalities
-    met = {k: replace(centre, value=centre.constraints[k], subgradient=centre.slopes[k]) for k in equal}
-    evaluation = again(centre, _evaluated(problem, state, centre.x, accuracy, met))
-    (first, *others), change = merit_planes(problem, evaluation), evaluation.value - centre.value
-    return replace(
-        state,
-        centre=evaluation,
-        bundle=state.bundle.refined(first, change),
-        soft=tuple(one.refined(plane) for one, plane in zip(state.soft, others, strict=True)),
-        history=recorded(problem, state, step, StepKind.REFINED, evaluation),
-    )
-
-
-def _reconsidered(
-    method: BundleTrust, problem: PosedProblem, state: MethodState, step: Step
-) -> tuple[MethodState, Reason | None]:
-    """Drop the doubtful subgradients on which the method would stop, and test again."""
-    if not state.centre.doubtful:
-        return _iterated(method, problem, with_verified_centre(problem, state))
-    if state.evaluations >= method.max_evaluations:
-        return state, Reason.EVALUATION_LIMIT
-    sure = with_verified_centre(problem, state)
-    history = recorded(problem, state, step, StepKind.REFINED, sure.centre, _GRADIENT_NEAR)
-    return replace(sure, history=history), None
-
-
-def _reason_to_stop(
-    method: BundleTrust, problem: PosedProblem, state: MethodState, step: Step, test: StoppingTest
-) -> Reason | None:
-    """Return why the method must stop before trying the step, or None."""
-    near = surroundings(problem, state.centre)
-    solved = test.reason(step, lambda t: solve_step(state.bundle, near, t, state.soft))
-    if _violated(method, problem, state):
-        solved = None
-        if state.trust.exhausted or step.stuck:
-            return Reason.INFEASIBLE
-    if solved is not None:
-        return solved
-    if state.trust.cornered:
-        return Reason.INVALID_DESIGNS
-    if state.trust.exhausted:
-        return Reason.NO_DESCENT
-    if state.iterations >= method.max_iterations:
-        return Reason.ITERATION_LIMIT
-    return Reason.EVALUATION_LIMIT if state.evaluations >= method.max_evaluations else None
-
-
-def _violated(method: BundleTrust, problem: PosedProblem, state: MethodState) -> bool:
-    return problem.constraints_at(state.centre).violation > method.feasibility
-
-
-def _advanced(
-    method: BundleTrust, problem: PosedProblem, state: MethodState, step: Step, needed: Demand
-) -> MethodState:
-    """Try the step and return the state after its null, serious or rejected trial."""
-    # The subproblem meets constraints only to its tolerance: the projected step is tried and recorded.
-    x = problem.allowed.project(state.centre.x + problem.scale * step.move)
-    step = replace(step, move=(x - state.centre.x) / problem.scale)
-    try:
-        x, known = restored(problem, x, state.evaluations + 1, method.feasibility)
-        evaluation = _evaluated(problem, state, x, needed.asked, known)
-    except InvalidDesignError as error:
-        safe_log(_LOG.info, "trial design %d is invalid: %s", state.evaluations + 1, error)
-        trust = state.trust.after_rejection(step.length)
-        return replace(
-            state, trust=trust, history=recorded(problem, state, step, StepKind.REJECTED, None, str(error))
+    def step(self, state: MethodState) -> tuple[MethodState, Reason | None]:
+        """Re-evaluate the centre, or try a step from it; or return why the method must stop."""
+        step, state = self._guarded_step(state)
+        test = stopping_test(
+            state.centre.value,
+            tolerance=self.method.tolerance,
+            value_scale=self.method.size_of(state.history[0].value),
+            reach=self.method.first_step * self.problem.length,
+            first_t=state.first_t,
         )
-    return _judged(method, problem, state, step, evaluation)
+        reason = self.terminate(state, step, test)
+        wanted = self._wanted(state, step, test, claim=reason is not None and reason.success)
+        if wanted is not None and state.evaluations < self.method.max_evaluations:
+            return self._refined(state, step, wanted), None
+        if reason in _OF_THE_MODEL and state.doubtful:
+            return self._reconsidered(state, step)
+        if reason is not None:
+            return state, reason
+        if step.decrease <= max(test.limit, test.rounding) and self._violated(state):
+            step = correcting_step(state.bundle, surroundings(self.problem, state.centre), state.soft, step)
+            if step.decrease <= test.rounding:
+                return state, Reason.INFEASIBLE
+        return self._advanced(state, step, self._demand(state, step, test)), None
 
+    def _evaluated(self, state: MethodState, x: Array, accuracy: Accuracy, known: Known) -> Evaluation:
+        """Call the functions, and once more near x where needed."""
+        number = state.evaluations + 1
+        penalties = {k: one.penalty for k, one in zip(self.problem.inequalities, state.soft, strict=True)}
+        evaluation = self.problem.evaluate(x, number, accuracy, penalties, known)
+        return verified(self.problem, evaluation, number) if state.careful else evaluation
 
-def _judged(
-    method: BundleTrust, problem: PosedProblem, state: MethodState, step: Step, evaluation: Evaluation
-) -> MethodState:
-    """Return the state after a trial that exists: a serious or a null step."""
-    first, *others = merit_planes(problem, evaluation)
-    change, slope = evaluation.value - state.centre.value, float(first.gradient @ step.move)
-    error, room = slope - change, method.max_bundle - 1
-    # Reduced before the cuts are added: the weights belong to the old planes, and the new ones must stay.
-    bundle = state.bundle.reduced(step.weights, max(2, room - evaluation.pieces.size))
-    bundle = with_pieces(bundle, problem, evaluation, state.centre.value, step.move)
-    bundle = bundle.with_cut(first, error, step.length)
-    cuts = [
-        one.reduced(weights, room).with_cut(plane, step.move)
-        for one, weights, plane in zip(state.soft, step.soft_weights, others, strict=True)
-    ]
-    soft, rises = tuple(one for one, _ in cuts), [rise for _, rise in cuts]
-    measure = float(bundle.measures[-1]) + sum(rise.slope - rise.predicted for rise in rises)
-    merit = change + sum(rise.change for rise in rises)
-    trial = Trial(step, merit, slope + sum(rise.slope for rise in rises), measure)
-    if merit > -method.descent * step.decrease:
-        history = recorded(problem, state, step, StepKind.NULL, evaluation)
-        trust = state.trust.after_null(trial)
-        return replace(state, bundle=bundle, soft=soft, trust=trust, history=history)
-    locality, nearness = method.locality / problem.length, method.locality * first.length / problem.length
-    return replace(
-        state,
-        centre=evaluation,
-        bundle=bundle.moved(step.move, change, nearness, 1 + evaluation.pieces.size),
-        soft=tuple(one.moved(plane, step.move, locality) for one, plane in zip(soft, others, strict=True)),
-        trust=state.trust.after_serious(trial),
-        history=recorded(problem, state, step, StepKind.SERIOUS, evaluation),
-    )
+    def _guarded_step(self, state: MethodState) -> tuple[Step, MethodState]:
+        """Solve the step's programme, with t small enough to stay in the trust region."""
+        near, trust = surroundings(self.problem, state.centre), state.trust
+        step, soft = priced_step(state.bundle, near, trust.t, state.soft, self.method.feasibility)
+        while step.length > 1.001 * trust.radius and not trust.exhausted:
+            # A kink can keep the length constant while t falls, so t must be able to fall fast.
+            t = trust.t * max(0.05, min(0.5, 0.95 * trust.radius / step.length))
+            trust = replace(trust, t=max(t, trust.t_least))
+            step = replace(solve_step(state.bundle, near, trust.t, soft), stuck=step.stuck)
+        state = replace(state, trust=trust, soft=soft)
+        return step, replace(state, multipliers=multipliers(self.problem, state, step))
+
+    def _demand(self, state: MethodState, step: Step, test: StoppingTest, reach: float = 0.0) -> Demand:
+        """Return the accuracy that a trial of the step needs, or a claim about points within ``reach``."""
+        norm = float(np.linalg.norm(state.bundle.gradients[0]))
+        norm += sum(one.penalty * float(np.linalg.norm(one.bundle.gradients[0])) for one in state.soft)
+        worth = max(step.decrease, test.limit if reach else test.rounding)
+        return demand(worth, max(step.length, reach), norm, (self.method.inexactness, _SLOPE_SHARE))
+
+    def _wanted(
+        self,
+        state: MethodState,
+        step: Step,
+        test: StoppingTest,
+        *,
+        claim: bool,
+    ) -> Accuracy | None:
+        """Return the accuracy with which the centre must be re-evaluated, None where it is sufficient."""
+        if not can_be_inexact(self.problem.fun):
+            return None
+        needed = self._demand(state, step, test, test.reach if claim else 0.0)
+        if needed.missed_by(state.centre) or (claim and not needed.confirmed_by(state.centre)):
+            return needed.sharper_than(state.centre)
+        return None
+
+    def _refined(self, state: MethodState, step: Step, accuracy: Accuracy) -> MethodState:
+        """Re-evaluate the centre, more accurately."""
+        centre, equal = state.centre, self.problem.equalities
+        met = {k: replace(centre, value=centre.constraints[k], subgradient=centre.slopes[k]) for k in equal}
+        evaluation = again(centre, self._evaluated(state, centre.x, accuracy, met))
+        (first, *others), change = merit_planes(self.problem, evaluation), evaluation.value - centre.value
+        return replace(
+            state,
+            centre=evaluation,
+            bundle=state.bundle.refined(first, change),
+            soft=tuple(one.refined(plane) for one, plane in zip(state.soft, others, strict=True)),
+            history=self._recorded(state, step, StepKind.REFINED, evaluation),
+        )
+
+    def _reconsidered(self, state: MethodState, step: Step) -> tuple[MethodState, Reason | None]:
+        """Drop the doubtful subgradients on which the method would stop, and test again."""
+        if not state.centre.doubtful:
+            return self.step(with_verified_centre(self.problem, state))
+        if state.evaluations >= self.method.max_evaluations:
+            return state, Reason.EVALUATION_LIMIT
+        sure = with_verified_centre(self.problem, state)
+        history = self._recorded(state, step, StepKind.REFINED, sure.centre, _GRADIENT_NEAR)
+        return replace(sure, history=history), None
+
+    def terminate(self, state: MethodState, step: Step, test: StoppingTest) -> Reason | None:
+        """Return why the method must stop before trying the step, or None."""
+        near = surroundings(self.problem, state.centre)
+        solved = test.reason(step, lambda t: solve_step(state.bundle, near, t, state.soft))
+        if self._violated(state):
+            solved = None
+            if state.trust.exhausted or step.stuck:
+                return Reason.INFEASIBLE
+        if solved is not None:
+            return solved
+        if state.trust.cornered:
+            return Reason.INVALID_DESIGNS
+        if state.trust.exhausted:
+            return Reason.NO_DESCENT
+        if state.iterations >= self.method.max_iterations:
+            return Reason.ITERATION_LIMIT
+        return Reason.EVALUATION_LIMIT if state.evaluations >= self.method.max_evaluations else None
+
+    def _violated(self, state: MethodState) -> bool:
+        return self.problem.constraints_at(state.centre).violation > self.method.feasibility
+
+    def _advanced(self, state: MethodState, step: Step, needed: Demand) -> MethodState:
+        """Try the step and return the state after its null, serious or rejected trial."""
+        # The subproblem meets constraints only to its tolerance: the projected step is tried and recorded.
+        x = self.problem.allowed.project(state.centre.x + self.problem.scale * step.move)
+        step = replace(step, move=(x - state.centre.x) / self.problem.scale)
+        try:
+            x, known = restored(self.problem, x, state.evaluations + 1, self.method.feasibility)
+            evaluation = self._evaluated(state, x, needed.asked, known)
+        except InvalidDesignError as error:
+            safe_log(_LOG.info, "trial design %d is invalid: %s", state.evaluations + 1, error)
+            trust = state.trust.after_rejection(step.length)
+            return replace(
+                state, trust=trust, history=self._recorded(state, step, StepKind.REJECTED, None, str(error))
+            )
+        return self._judged(state, step, evaluation)
+
+    def _judged(self, state: MethodState, step: Step, evaluation: Evaluation) -> MethodState:
+        """Return the state after a trial that exists: a serious or a null step."""
+        first, *others = merit_planes(self.problem, evaluation)
+        change, slope = evaluation.value - state.centre.value, float(first.gradient @ step.move)
+        error, room = slope - change, self.method.max_bundle - 1
+        # Reduced before the cuts are added: the weights belong to the old planes, and the new ones must stay.
+        bundle = state.bundle.reduced(step.weights, max(2, room - evaluation.pieces.size))
+        bundle = with_pieces(bundle, self.problem, evaluation, state.centre.value, step.move)
+        bundle = bundle.with_cut(first, error, step.length)
+        cuts = [
+            one.reduced(weights, room).with_cut(plane, step.move)
+            for one, weights, plane in zip(state.soft, step.soft_weights, others, strict=True)
+        ]
+        soft, rises = tuple(one for one, _ in cuts), [rise for _, rise in cuts]
+        measure = float(bundle.measures[-1]) + sum(rise.slope - rise.predicted for rise in rises)
+        merit = change + sum(rise.change for rise in rises)
+        trial = Trial(step, merit, slope + sum(rise.slope for rise in rises), measure)
+        if merit > -self.method.descent * step.decrease:
+            history = self._recorded(state, step, StepKind.NULL, evaluation)
+            trust = state.trust.after_null(trial)
+            return replace(state, bundle=bundle, soft=soft, trust=trust, history=history)
+        locality, nearness = (
+            self.method.locality / self.problem.length,
+            self.method.locality * first.length / self.problem.length,
+        )
+        return replace(
+            state,
+            centre=evaluation,
+            bundle=bundle.moved(step.move, change, nearness, 1 + evaluation.pieces.size),
+            soft=tuple(
+                one.moved(plane, step.move, locality) for one, plane in zip(soft, others, strict=True)
+            ),
+            trust=state.trust.after_serious(trial),
+            history=self._recorded(state, step, StepKind.SERIOUS, evaluation),
+        )
+
+    def _recorded(
+        self,
+        state: MethodState,
+        step: Step,
+        kind: StepKind,
+        evaluation: Evaluation | None,
+        note: str = "",
+    ) -> tuple[Record, ...]:
+        """Return the history with one more evaluation, None for a trial point that does not exist."""
+        value = np.nan if evaluation is None else evaluation.value
+        record = Record(
+            iteration=state.iterations + (kind is StepKind.SERIOUS),
+            kind=kind,
+            value=value,
+            best=value if kind in (StepKind.SERIOUS, StepKind.REFINED) else state.centre.value,
+            predicted_decrease=step.decrease,
+            t=step.t,
+            step_length=step.length,
+            aggregate_norm=step.aggregate_norm,
+            aggregate_error=step.aggregate_error,
+            bundle_size=state.bundle.size,
+            evaluations=state.evaluations + 1,
+            error=0.0 if evaluation is None else evaluation.error,
+            violation=np.nan if evaluation is None else self.problem.constraints_at(evaluation).violation,
+            note=note,
+        )
+        return (*state.history, record)
+
+    def conclude(self, state: MethodState, reason: Reason) -> Result:
+        """Return the result at the centre."""
+        centre = state.centre
+        result = Result(
+            x=centre.x,
+            value=centre.value,
+            subgradient=centre.subgradient,
+            reason=reason,
+            iterations=state.iterations,
+            evaluations=state.evaluations,
+            history=state.history,
+            error=centre.error,
+            constraints=self._constraints(state),
+        )
+        if isinstance(self.problem.fun, Remarked):
+            for words in dict.fromkeys(self.problem.fun.remarks(centre.x.copy())):
+                safe_log(_LOG.warning, "at the end of the minimisation: %s", words)
+        if reason.success or not self.method.raise_on_failure:
+            return result
+        refusals = [record.note for record in state.history if record.kind is StepKind.REJECTED]
+        last = f"; the last trial: {refusals[-1]}" if reason is Reason.INVALID_DESIGNS else ""
+        broken = [str(one) for one in result.constraints if one.violation > 0.0]
+        violated = f"; violated: {'; '.join(broken)}" if reason is Reason.INFEASIBLE else ""
+        raise NotConvergedError(
+            f"{reason.value} (after {result.iterations} serious steps and {result.evaluations} evaluations, "
+            f"best value {result.value:.9g}{last}{violated})",
+            result.history,
+            result,
+        )
+
+    def _constraints(self, state: MethodState) -> tuple[ConstraintValue, ...]:
+        violations = self.problem.constraints_at(state.centre).violations
+        values, multipliers = state.centre.constraints, state.multipliers
+        return tuple(
+            ConstraintValue(
+                one.name, float(values[k]), one.lower, one.upper, float(violations[k]), float(multipliers[k])
+            )
+            for k, one in enumerate(self.problem.nonlinear)
+        )
 
 
 def minimize(

@@ -1,7 +1,4 @@
-"""The feasible set of designs: a box and linear constraints, also relative to a point.
-
-Which linear constraints contradict each other.
-"""
+"""The feasible set of designs: a box and linear constraints, also relative to a point."""
 
 from __future__ import annotations
 

@@ -1,8 +1,6 @@
 """The merit function J + Σ ρ_k max(c_k, 0), its planes, and the step that they predict.
 
-Doubtful subgradients: before the method stops on them, gradients at nearby points replace them.
-
-Equalities: points are corrected until they meet them.
+Doubtful subgradients are replaced by gradients nearby; points are corrected to satisfy the equalities.
 """
 
 from __future__ import annotations
@@ -17,7 +15,7 @@ from fenics_contact._optimize.bundle import Bundle, Plane, SubproblemError, shor
 from fenics_contact._optimize.constraints import Surroundings
 from fenics_contact._optimize.nonlinear import Scaled, SoftConstraint, scaled_constraints
 from fenics_contact._optimize.objective import Evaluation
-from fenics_contact._optimize.problem import Known, PosedProblem, evaluate_constraint, with_gradients_near
+from fenics_contact._optimize.problem import Known, PosedProblem, evaluate_constraint
 from fenics_contact._optimize.result import MethodState
 from fenics_contact._optimize.subproblem import Step, solve_step
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
@@ -209,7 +207,7 @@ def verified(problem: PosedProblem, given: Evaluation, number: int) -> Evaluatio
         optimization, SIAM J. Optim. 15 (2005) 751-779.
     """
     return (
-        with_gradients_near(problem, given, neighbour(problem, given.x), number) if given.doubtful else given
+        problem.with_gradients_near(given, neighbour(problem, given.x), number) if given.doubtful else given
     )
 
 

@@ -1,7 +1,4 @@
-"""Nonlinear constraints, and what a result says about them.
-
-Cutting planes of a nonlinear constraint whose violation costs a penalty.
-"""
+"""Nonlinear constraints, their cutting planes, and what a result says about them."""
 
 from __future__ import annotations
 

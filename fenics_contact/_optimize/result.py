@@ -1,7 +1,4 @@
-"""What a minimisation returns, records and raises.
-
-State of the bundle trust method between two evaluations, also as arrays for a checkpoint.
-"""
+"""What a minimisation returns, records, raises and stores."""
 
 from __future__ import annotations
 

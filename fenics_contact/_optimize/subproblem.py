@@ -1,7 +1,4 @@
-"""The step: minimise the cutting-plane model plus a proximal term within the constraints.
-
-Control of the step length: the proximal parameter t and the radius of the trust region.
-"""
+"""The step: minimise the cutting-plane model within the constraints and a trust region."""
 
 from __future__ import annotations
 

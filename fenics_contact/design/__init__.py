@@ -1,4 +1,4 @@
-"""Shape sensitivity of scenes with contact and friction."""
+"""Contact shape optimisation: designs, problems, objectives, constraints and optimisers."""
 
 from fenics_contact._base.checkpoint import Checkpoint
 from fenics_contact._base.files import CheckpointError

@@ -1,11 +1,4 @@
-"""The adjoint of the linearised contact problem: one linear solve with the operators of the state.
-
-The branch of the contact law on which a state is differentiated.
-
-How load steps depend on the one before: slip is measured from where it left the contact points.
-
-Effect of an inexact state on the objective: its residuals weighted by the adjoint.
-"""
+"""The adjoint of the contact problem on a branch of the contact law, and the errors that it weighs."""
 
 from __future__ import annotations
 

@@ -1,16 +1,7 @@
-"""Derivative of an objective by the slip bounds of friction, and by what these depend on.
+"""Derivatives of an objective by the geometry of contact and ties, in reverse mode.
 
-Displacements of the two sides of contact or tied points, of several fields.
-
-Reverse mode through averaged normals and nodal areas of a faceted surface.
-
-Reverse mode through the closest-point projection: from gap, normal and weights back to coordinates.
-
-Reverse mode through mortar contact points: from gaps, normals, weights and areas back to coordinates.
-
-Derivative of an objective by the geometry of the contact points: gap, normal, tangents, weights, areas.
-
-Derivative of an objective by the geometry of tied points: weights, and normals where a tie slides.
+From gaps, normals, tangents, weights, areas and slip bounds at points back to the nodes of both surfaces:
+through closest points, mortar couplings, averaged normals and nodal areas.
 """
 
 from __future__ import annotations

@@ -1,9 +1,4 @@
-"""Design variables: control points that move a surface, or a curve of a plane body, along its normals.
-
-Tensor-product Bernstein polynomials on the unit interval and square.
-
-The surface that a design moves as a smooth function of the net's parameters.
-"""
+"""Design variables: control points that move a surface, or a curve of a plane body, along its normals."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""Derivative by the places of the nodes at which loads given as functions of position are evaluated.
-
-Derivative of the work of a force and a moment that are spread over a surface whose nodes move.
-
-Derivatives of virtual works by the nodes: that of the stresses and that of the loads.
-"""
+"""Derivatives of virtual works by the nodes: of stresses, of loads, fields of position and resultants."""
 
 from __future__ import annotations
 

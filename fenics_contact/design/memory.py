@@ -1,7 +1,4 @@
-"""Evaluated designs, and those that a problem stores: the first, the best and the last.
-
-How accurately the states of a design problem are solved.
-"""
+"""Evaluated designs, those that a problem stores, and how accurately their states are solved."""
 
 from __future__ import annotations
 

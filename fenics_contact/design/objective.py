@@ -1,7 +1,4 @@
-"""What an objective is: a function of the state with the partial derivatives that the adjoint needs.
-
-Sums, multiples and the largest of objectives.
-"""
+"""What an objective is: a function of the state with its partial derivatives; sums and maxima of them."""
 
 from __future__ import annotations
 

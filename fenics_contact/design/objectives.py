@@ -1,15 +1,4 @@
-"""Functions of the contact forces as objectives.
-
-Energies as objectives.
-
-Contact pressures as objectives: the largest, a smooth bound of it, how even they are, on what area.
-
-The work of friction as an objective.
-
-The largest stress of a body as an objective, smoothed.
-
-The displacement of a surface or a node as an objective.
-"""
+"""Objectives: energies, contact forces and pressures, work of friction, stresses and movements."""
 
 from __future__ import annotations
 

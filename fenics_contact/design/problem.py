@@ -1,9 +1,4 @@
-"""A design problem: value and subgradient of an objective as functions of the design variables.
-
-The equilibrium of a design, started from a neighbour and, where that fails, from nothing.
-
-Which scenes and objectives can be designed, and which scenes are load cases of one design.
-"""
+"""A design problem: value and subgradient of an objective as functions of the design variables."""
 
 from __future__ import annotations
 
@@ -79,8 +74,6 @@ def design_state(
 #: How far beside the first design an objective without a gradient is evaluated, by the size of the scene.
 BESIDE = 1e-6
 
-_LOG = logging.getLogger(__name__)
-
 
 def checked_contact(contact: ContactProblem) -> ContactProblem:
     """Return the contact problem of a shape problem."""
@@ -129,7 +122,7 @@ def require_influence(
     way = np.random.default_rng(0).standard_normal(number)
     try:
         if _has_influence(evaluate(point.alpha + BESIDE * size * way), size):
-            safe_log(_LOG.info, "the objective is stationary at the first design, to rounding")
+            safe_log(logger.info, "the objective is stationary at the first design, to rounding")
             return
     except InvalidDesignError:
         return  # not known
@@ -384,15 +377,7 @@ class ShapeProblem(SingleProblem):
 
     @collectively("ShapeProblem.gradient_near", comm_of)
     def gradient_near(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """Return the gradient of the design between two, near α, with the fewest weak points. Collective.
-
-        Args:
-            alpha: Design variables, shape (size,), [length].
-            end: A design nearby in a generic direction, shape (size,), [length].
-
-        Raises:
-            InvalidDesignError: If no design between them has an equilibrium.
-        """
+        """Return the gradient of the design near α with the fewest weak points, see the base. Collective."""
         known = self._memory.of_design(alpha)
         evaluate = self._unrecorded(known.tolerance if known else self._tightest)
         return with_fewest_weak_points(alpha, end, evaluate).gradient

@@ -1,7 +1,4 @@
-"""A design problem whose bodies are meshed anew where a design would spoil their cells.
-
-New meshes of designed bodies in the shape of a design, which know where their surfaces came from.
-"""
+"""A design problem whose bodies are meshed anew where a design would spoil their cells."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""The adjoint of a state and the derivative by its nodes, of small and of large deformations.
-
-Derivative of an objective by the areas over which forces make pressures.
-
-Sensitivity of states of large deformations: the transpose of Newton's last tangent, its right sides.
-"""
+"""The adjoint of a state and the derivative by its nodes, of small and of large deformations."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""One design under several loads: the largest objective of all load cases, or a weighted sum.
-
-One design under load steps that follow one another: the objectives of all steps, with a subgradient.
-"""
+"""One design under several loads: load cases, of which the largest or a sum counts, and load paths."""
 
 from __future__ import annotations
 

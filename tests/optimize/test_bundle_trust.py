@@ -130,7 +130,8 @@ def test_noise_of_the_state_solver_below_the_tolerance_does_no_harm() -> None:
 
 def test_same_input_gives_the_same_bits_in_another_process() -> None:
     script = (
-        "from fenics_contact._optimize import BundleTrust, minimize\n"
+        "from fenics_contact import minimize\n"
+        "from fenics_contact.design import BundleTrust\n"
         "from tests.optimize.cases import BY_NAME\n"
         "case = BY_NAME['Maxquad']\n"
         "print(minimize(case.fun, case.start, BundleTrust(tolerance=1e-6)).x.tobytes().hex())\n"
