@@ -16,7 +16,7 @@ Values of loads: SampledField, read_field, Ufl
 Equilibrium: solve_scene, solve_steps, ContactProblem, LoadSequence, AutomaticSteps, TangentNewton,
     FixedPoint, Tolerance
 
-Results: State, DeformedState, NewtonSteps, Status, contact_area
+Results: State, LinearState, DeformedState, NewtonSteps, Status, contact_area
 
 Shape optimisation: ShapeProblem, SurfaceDesign, minimize
 
@@ -99,6 +99,7 @@ if TYPE_CHECKING:
     from fenics_contact.results.contact import Status as Status
     from fenics_contact.results.deformed_state import DeformedState as DeformedState
     from fenics_contact.results.deformed_state import NewtonSteps as NewtonSteps
+    from fenics_contact.results.linear_state import LinearState as LinearState
     from fenics_contact.results.state import State as State
     from fenics_contact.results.state import Tolerance as Tolerance
 
@@ -140,6 +141,7 @@ _HOMES = {
     "results.area": "contact_area",
     "results.contact": "Status",
     "results.deformed_state": "DeformedState NewtonSteps",
+    "results.linear_state": "LinearState",
     "results.state": "State Tolerance",
 }
 #: Public modules.

@@ -105,7 +105,7 @@ MOST_PRINTED = 25
 #: Protocols, and classes to derive from.
 NO_OBJECTS = {
     "Elasticity", "EnergyModel", "HistoryMaterial", "Hyperelasticity", "Inexact", "Kinked", "Material",
-    "NearlyIncompressible", "Objective", "Pieced", "Resumable", "RigidObstacle", "SurfaceShape",
+    "NearlyIncompressible", "Objective", "Pieced", "Resumable", "RigidObstacle", "State", "SurfaceShape",
     "Thermoelastic", "Transverse", "Weighable",
 }  # fmt: skip
 

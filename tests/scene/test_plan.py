@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -281,3 +282,21 @@ def test_an_approach_may_be_prescribed_or_unknown() -> None:
     assert (unknown.approach, unknown.share) == (None, None)
     assert "of an unknown part of the approach" in str(unknown)
     assert unknown.height > 1.5 * ball("xy").plan().contacts[0].height, "then all facets count"
+
+
+def test_a_scene_is_made_without_what_its_plan_computes(mpirun: Callable[..., str]) -> None:
+    script = """
+    import sys
+    from fenics_contact import Body, ContactPair, RigidPlane, Scene, Support, Surface
+    from fenics_contact.gallery import block
+    from fenics_contact.materials import IsotropicElasticity
+
+    body = Body(block((0, 0, 0), (1, 1, 1), (2, 2, 2)), IsotropicElasticity(1.0, 0.3))
+    pair = ContactPair(Surface("block", "z0"), RigidPlane((0, 0, 0), (0, 0, 1)))
+    scene = Scene({"block": body}, [Support("block", "z1")], contacts=[pair])
+    names = ("plan", "pair_geometry")
+    for make in (lambda: None, scene.plan):
+        make()
+        sys.stdout.write(f"{sum('fenics_contact._scene.' + name in sys.modules for name in names)} ")
+    """
+    assert mpirun(script, 1).split() == ["0", "2"]
