@@ -147,8 +147,8 @@ def _loaded(path: Path) -> Arrays:
     except Exception as error:  # arbitrary bytes can make the libraries raise anything
         reason = str(error) or type(error).__name__
     raise InvalidInputError(
-        f"a whole checkpoint is needed, {str(path)!r} with {len(content)} bytes is none ({reason}): bring "
-        "back a copy of it, or move it away to start anew"
+        f"{str(path)!r} is not a complete checkpoint ({len(content)} bytes; {reason}): restore a copy, or "
+        "move it away to start over"
     )
 
 
@@ -289,7 +289,7 @@ class Interruption:
         name = signal.Signals(number).name
         if not self.requested:
             self.requested = number
-            self._say("%s: the run stops after the step under way, at once if it is told again%s", name)
+            self._say("%s: the run stops after the step under way, at once on a second signal%s", name)
             return
         self._say("%s again: the run stops at once%s", name)
         if self.comm is not None and self.comm.size > 1:

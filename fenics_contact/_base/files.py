@@ -104,7 +104,7 @@ def remove_abandoned(folder: Path) -> None:
         if not _HIDDEN.fullmatch(left.name) or not left.is_dir():
             continue
         with suppress(OSError):  # another writer may remove it at the same time
-            taken, lock = _locked(left)
+            taken, lock = locked(left)
             if taken or (lock is None and time.time() - left.stat().st_mtime > _ABANDONED):
                 shutil.rmtree(left, ignore_errors=True)
             if lock is not None:
@@ -138,7 +138,7 @@ def _made(folder: Path, stem: str) -> tuple[Path, int | None]:
         hidden = folder / f".{stem}.{secrets.token_hex(4)}.partial"
         hidden.mkdir()
         with suppress(FileNotFoundError):
-            taken, lock = _locked(hidden)
+            taken, lock = locked(hidden)
             # Before it was locked another writer may have taken it for abandoned.
             if (taken or lock is None) and hidden.exists():
                 return hidden, lock
@@ -146,8 +146,8 @@ def _made(folder: Path, stem: str) -> tuple[Path, int | None]:
                 os.close(lock)
 
 
-def _locked(path: Path) -> tuple[bool, int | None]:
-    """Try to lock a folder; return the success and the open folder, None where there are no locks."""
+def locked(path: Path) -> tuple[bool, int | None]:
+    """Try to lock a file or folder; return the success and it opened, None where there are no locks."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

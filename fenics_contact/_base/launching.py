@@ -124,8 +124,8 @@ def last_words(command: Sequence[str], output: str, most: int = 2000) -> str:
         return words
     settings = sorted(name for name in clean_environment() if name.startswith(_FAMILIES))
     return (
-        f"it said nothing, as an mpirun that cannot start: try `{shlex.join(command)[:most]}` in a shell, "
-        f"without what the environment says of MPI ({', '.join(settings) or 'nothing'})"
+        f"it printed nothing and probably could not start: run `{shlex.join(command)[:most]}` in a shell "
+        f"with these variables unset: {', '.join(settings) or 'none'}"
     )
 
 

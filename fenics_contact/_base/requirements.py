@@ -30,12 +30,12 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Requirement:
-    """A library, its oldest supported version, and how to install it."""
+    """A library, its oldest supported version, how to install it, and the versions it was tested with."""
 
     module: str
     oldest: str
-    debian: str
-    conda: str
+    debian: str = ""
+    conda: str = ""
     distribution: str = ""
     tested: tuple[str, ...] = ()
 
@@ -50,37 +50,24 @@ class Requirement:
         """Return the error that states what is needed, what was found and how to install it."""
         return MissingRequirementError(
             f"fenics_contact needs {self.module} {self.oldest} or newer, found {found}. "
-            f"Debian: {self.debian}; conda-forge: {self.conda}",
+            f"Debian: {self.debian or f'pip install {self.module}'}; "
+            f"conda-forge: conda install -c conda-forge {self.conda or self.module}",
             name=self.module,
         )
 
 
-_DEBIAN_FENICSX = "apt-get install --no-install-recommends python3-dolfinx-real"
-
-_MPI4PY = Requirement("mpi4py", "3.1", _DEBIAN_FENICSX, "conda install -c conda-forge mpi4py")
-_PETSC4PY = Requirement(
-    "petsc4py", "3.18", _DEBIAN_FENICSX, 'conda install -c conda-forge petsc4py "petsc=*=real*"'
-)
-DOLFINX = Requirement(
-    "dolfinx",
-    "0.5",
-    _DEBIAN_FENICSX,
-    "conda install -c conda-forge fenics-dolfinx",
-    distribution="fenics-dolfinx",
-    tested=("0.5", "0.9"),
-)
+_APT = "apt-get install --no-install-recommends"
+_FENICSX = f"{_APT} python3-dolfinx-real"
+_MPI4PY = Requirement("mpi4py", "3.1", _FENICSX)
+_PETSC4PY = Requirement("petsc4py", "3.18", _FENICSX, 'petsc4py "petsc=*=real*"')
+DOLFINX = Requirement("dolfinx", "0.5", _FENICSX, "fenics-dolfinx", "fenics-dolfinx", ("0.5", "0.9"))
 _NUMERICAL = [
-    Requirement("numpy", "1.24", _DEBIAN_FENICSX, "conda install -c conda-forge numpy"),
-    Requirement("scipy", "1.10", _DEBIAN_FENICSX, "conda install -c conda-forge scipy"),
-    Requirement("clarabel", "0.11", "pip install clarabel", "conda install -c conda-forge clarabel"),
+    Requirement("numpy", "1.24", _FENICSX),
+    Requirement("scipy", "1.10", _FENICSX),
+    Requirement("clarabel", "0.11"),
 ]
-_GMSH = Requirement(
-    "gmsh",
-    "4.8",
-    "apt-get install --no-install-recommends python3-gmsh",
-    "conda install -c conda-forge python-gmsh",
-)
-_PYMETIS = Requirement("pymetis", "2025.2", "pip install pymetis", "conda install -c conda-forge pymetis")
+_GMSH = Requirement("gmsh", "4.8", f"{_APT} python3-gmsh", "python-gmsh")
+_PYMETIS = Requirement("pymetis", "2025.2")
 
 
 def check() -> None:

@@ -118,8 +118,7 @@ def main(comm: MPI.Comm, arguments: Sequence[str] | None = None) -> int:
 def _run(arguments: Sequence[str], comm: MPI.Comm) -> int:
     command = typer.main.get_command(app)
     try:
-        whole = view.with_page_named(arguments)
-        code = command.main(whole, prog_name=PROGRAM, standalone_mode=False, obj=Console(comm))
+        code = command.main(list(arguments), prog_name=PROGRAM, standalone_mode=False, obj=Console(comm))
         write_stdout("")  # what the library has written, as help does, goes out now
     except UsageProblem as problem:
         if comm.rank == 0:

@@ -241,7 +241,7 @@ def report_error(error: BaseException, comm: MPI.Comm) -> ExitCode:
 
 
 def forces_table(forces: Mapping[str, Any], units: Mapping[str, str] | None = None) -> Table:
-    """Return forces and moments as they stand in a result file, one row each."""
+    """Return forces and moments of a result file, one row each."""
     balance, names = forces["balance"], units or {}
     force, length = names.get("force", "force"), names.get("length", "length")
     plane = np.ndim(balance["loads"]["moment"]) == 0
@@ -301,22 +301,22 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
     return {name: words for name, words in rows.items() if not words.startswith("nan")}
 
 
-def step_row(number: int, name: str, state: State) -> tuple[str, ...]:
-    """Return a row of `step_table`."""
+def step_row(number: int, name: str, state: State) -> dict[str, Any]:
+    """Return a row of `step_table`, which result files hold, too."""
     contact, counts = state.contact, state.counts
-    return (
-        str(number),
-        name,
-        str(counts["solver_steps"]),
-        str(counts["f_products"]),
-        *(str(contact.count(status)) for status in Status),
-        f"{contact.normal_force.sum():.6g}",
-        f"{_resultant(state):.6g}",
-        f"{contact.pressure.max(initial=0.0):.5g}",
-    )
+    return {
+        "number": number,
+        "name": name,
+        "iterations": counts["solver_steps"],
+        "products": counts["f_products"],
+        **{status.name.lower(): contact.count(status) for status in Status},
+        "normal_force": float(contact.normal_force.sum()),
+        "friction_force": _resultant(state),
+        "peak_pressure": float(contact.pressure.max(initial=0.0)),
+    }
 
 
-def step_table(rows: Sequence[tuple[str, ...]], file: SceneFile) -> Table:
+def step_table(rows: Sequence[Mapping[str, Any]], file: SceneFile) -> Table:
     """Return one row for every load step."""
     units = file.document.units
     force, _ = force_units(units.force, units.length, file.scene.dim)
@@ -331,7 +331,7 @@ def step_table(rows: Sequence[tuple[str, ...]], file: SceneFile) -> Table:
     ):  # fmt: skip
         table.add_column(name, justify="right")
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*(f"{value:.6g}" if isinstance(value, float) else str(value) for value in row.values()))
     return table
 
 

@@ -146,7 +146,7 @@ def _through_steps(console: Console, file: SceneFile, resume: bool | None) -> di
         Some of the states by name, the last one among them.
     """
     checkpoint = checkpoint_of(file, resume)
-    rows, drawn = list[tuple[str, ...]](), dict[str, State]()
+    rows, drawn = list[dict[str, Any]](), dict[str, State]()
     chosen = set(np.unique(np.linspace(0, len(file.steps) - 1, MAPS).round().astype(int)))
     with resumable(console, checkpoint):
         sequence = file.sequence(checkpoint)
@@ -189,14 +189,7 @@ def _origin(file: SceneFile) -> dict[str, Any]:
     }
 
 
-def _steps(rows: list[tuple[str, ...]], file: SceneFile) -> dict[str, list[Any]]:
-    names = (
-        "number", "name", "iterations", "products", "open", "stick", "slip", "normal_force", "friction_force",
-        "peak_pressure",
-    )  # fmt: skip
-    kinds = (int, str, int, int, int, int, int, float, float, float)
-    columns = {
-        name: [kind(row[column]) for row in rows]
-        for column, (name, kind) in enumerate(zip(names, kinds, strict=True))
-    }
+def _steps(rows: list[dict[str, Any]], file: SceneFile) -> dict[str, list[Any]]:
+    """Return the rows of load steps by columns, with their times."""
+    columns = {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
     return {**columns, "time": [step.time for step in file.steps[: len(rows)]]}

@@ -5,10 +5,10 @@ Pictures of a run, if the libraries for them are installed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from rich.table import Table
@@ -22,9 +22,6 @@ from fenics_contact.output.reading import FIELD_FILES, fields_of_result, read_re
 from fenics_contact.results.linear_state import as_linear
 from fenics_contact.results.state import State
 
-if TYPE_CHECKING:
-    from fenics_contact.pictures.canvas import Units
-
 
 @dataclass
 class Gallery:
@@ -37,7 +34,7 @@ class Gallery:
         """Refuse to end well without a picture that the scene file requests, once everything else is written.
 
         Raises:
-            InvalidInputError: If one is missing; the reason was said where it was drawn.
+            InvalidInputError: If one is missing; the reason was printed where it was drawn.
         """
         if self.missing:
             raise InvalidInputError(
@@ -48,7 +45,7 @@ class Gallery:
 
 
 def can_draw(console: Console, file: SceneFile, gallery: Gallery) -> bool:
-    """Return whether pictures can be drawn; if not, say what is missing for them. Collective."""
+    """Return whether pictures can be drawn; if not, print what is missing for them. Collective."""
     error: Exception | None = None
     try:
         from fenics_contact.pictures.canvas import check_renderer
@@ -67,69 +64,36 @@ def can_draw(console: Console, file: SceneFile, gallery: Gallery) -> bool:
     return True
 
 
-def units_of(file: SceneFile) -> Units:
-    """Return the names of units for pictures."""
-    from fenics_contact.pictures.canvas import Units
-
-    names = file.document.units
-    return Units(length=names.length, force=names.force, stress=names.stress)
-
-
 def draw_state(
     console: Console, file: SceneFile, states: Mapping[str, State], gallery: Gallery, suffix: str = ""
 ) -> None:
     """Draw the pictures that a file requests. Collective."""
-    state = list(states.values())[-1]
+    from fenics_contact import pictures as viz
+
+    state, names = list(states.values())[-1], file.document.units
+    units = viz.Units(length=names.length, force=names.force, stress=names.stress)
+    words: dict[str, Any] = {"title": file.title, "units": units}
     for kind in file.document.output.pictures:
         path = file.folder / f"{kind}{suffix}.png"
         try:
-            _DRAWN[kind](file, states, state, path)
+            match kind:
+                case "stress":
+                    viz.plot_stress(state, path, **words)
+                case "pressure":
+                    viz.plot_contact_pressure(state, path, **words)
+                case "status":
+                    viz.plot_contact_status(states, path, **words)
+                case "decomposition":
+                    viz.plot_decomposition(file.scene, file.partitions, path, comm=file.comm)
+                case "error":
+                    errors = as_linear(state, "errors").estimate_errors(geometry=False)
+                    parts = {body: errors.by_cell(body) for body in state.scene.bodies}
+                    viz.plot_error(state, path, parts, **words)
         except InvalidInputError as error:
             console.say(f"no picture {path.name}: {error}")
             gallery.missing.append(path.name)
         else:
             gallery.drawn.append(path)
-
-
-def _stress(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
-    from fenics_contact.pictures.states import plot_stress
-
-    plot_stress(state, path, title=file.title, units=units_of(file))
-
-
-def _pressure(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
-    from fenics_contact.pictures.states import plot_contact_pressure
-
-    plot_contact_pressure(state, path, title=file.title, units=units_of(file))
-
-
-def _status(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
-    from fenics_contact.pictures.states import plot_contact_status
-
-    plot_contact_status(states, path, title=file.title, units=units_of(file))
-
-
-def _decomposition(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
-    from fenics_contact.pictures.states import plot_decomposition
-
-    plot_decomposition(file.scene, file.partitions, path, comm=file.comm)
-
-
-def _error(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
-    from fenics_contact.pictures.states import plot_error
-
-    errors = as_linear(state, "errors").estimate_errors(geometry=False)
-    parts = {body: errors.by_cell(body) for body in state.scene.bodies}
-    plot_error(state, path, parts, title=file.title, units=units_of(file))
-
-
-_DRAWN: dict[str, Callable[[SceneFile, Mapping[str, State], State, Path], None]] = {
-    "stress": _stress,
-    "pressure": _pressure,
-    "status": _status,
-    "decomposition": _decomposition,
-    "error": _error,
-}
 
 
 #: Entries of a result that are shown, in this order; the others are long.
@@ -157,48 +121,32 @@ def view(
         ),
     ],
     save: Annotated[
-        Path | None, typer.Option("--save", help="PNG file to draw to.", show_default=False)
+        Path | None,
+        typer.Option("--save", help="PNG file to draw to, or HTML file for a web page.", show_default=False),
     ] = None,
     page: Annotated[
-        str | None,
-        typer.Option(
-            "--page",
-            metavar="[FILE.html]",
-            help="Write a web page to turn, cut and read, page.html beside the result unless named.",
-            show_default=False,
-        ),
-    ] = None,
+        bool, typer.Option("--page", help="Write page.html beside the result, to turn, cut and read.")
+    ] = False,
     field: Annotated[
-        str,
-        typer.Option("--field", help="Field shown by the colours, as in the list."),
+        str, typer.Option("--field", help="Field shown by the colours, as in the list.")
     ] = "von_mises",
     scale: Annotated[float, typer.Option("--scale", help="Factor of the displacement.")] = 1.0,
 ) -> None:
-    """Show a result: its numbers and its fields; --save draws a picture, --page makes a web page."""
+    """Show a result: its numbers and its fields, a picture or a web page of them."""
     console = console_of(context)
     with together(console.comm):
         if console.comm.rank == 0:
-            _view(console, result, save, field, scale)
-            if page is not None:
-                _write_page(console, result, page)
+            html = save is not None and save.suffix == ".html"
+            _view(console, result, None if html else save, field, scale)
+            if page:
+                _write_page(console, result, (result if result.is_dir() else result.parent) / "page.html")
+            if html and save is not None:
+                _write_page(console, result, save)
 
 
-def with_page_named(arguments: Sequence[str]) -> list[str]:
-    """Give --page of this command an empty value where no file follows it, as the library wants one."""
-    command = next((word for word in arguments if not word.startswith("-")), "")
-    if command != "view":
-        return list(arguments)
-    named = [*arguments[1:], ""]
-    return [
-        f"{word}=" if word == "--page" and not after.endswith(".html") else word
-        for word, after in zip(arguments, named, strict=True)
-    ]
-
-
-def _write_page(console: Console, result: Path, name: str) -> None:
+def _write_page(console: Console, result: Path, target: Path) -> None:
     from fenics_contact._page.page import result_page
 
-    target = Path(name) if name else (result if result.is_dir() else result.parent) / "page.html"
     result_page(result, target)
     console.say(f"page in {target}, {target.stat().st_size / 1e6:.1f} MB: open it in a browser")
 

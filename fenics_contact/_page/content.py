@@ -209,7 +209,7 @@ Record = Mapping[str, Any]
 
 
 def sections(record: Record, units: Units) -> str:
-    """Return the tables of a result as HTML, each under its heading; nothing for what the record lacks."""
+    """Return the tables of a result as HTML, each under its heading, of the entries in the record."""
     parts = {
         "Summary": _rows(_summary(record, units)),
         "Contact": _contact(record, units),
@@ -325,9 +325,9 @@ def _contact(record: Record, units: Units) -> str:
 
 
 def status_words(pairs: Sequence[Record]) -> tuple[str, str, str]:
-    """Return what open, sticking and slipping points of contact pairs are called, "" what there is none of.
+    """Return the words for points of status OPEN, STICK and SLIP of contact pairs, "" where there are none.
 
-    Without friction closed points count as slipping, which none of them is.
+    Frictionless closed points have status SLIP: they are called closed.
     """
     laws = [pair.get("friction") or {} for pair in pairs]
     rub = [any(value for name, value in law.items() if name != "type") for law in laws]

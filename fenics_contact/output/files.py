@@ -1,6 +1,6 @@
 """Atomic replacement of result files, also of several at once, written by one rank or by all.
 
-JSON files of results; NumPy's types are converted, numbers that JSON lacks are rejected.
+JSON files of results; NumPy's types are converted, numbers that JSON cannot hold are rejected.
 
 One run at a time in a folder: a second one would mistake the files of the first for its own.
 
@@ -30,12 +30,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from fenics_contact._base.display import in_short
 from fenics_contact.errors import InvalidInputError, together
-import fcntl
 import logging
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
+from fenics_contact._base.files import locked
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -290,34 +290,22 @@ def only_run_in(folder: str | Path, comm: MPI.Comm) -> Iterator[None]:
 def _taken(path: Path) -> int | None:
     """Lock a file, created if necessary; None where there are no locks."""
     while True:
-        lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            owner = os.pread(lock, 200, 0).decode("utf-8", "replace").strip()
+        path.touch()
+        with suppress(FileNotFoundError):  # its owner has removed it since
+            taken, lock = locked(path)
+            if lock is None:
+                path.unlink(missing_ok=True)
+                _LOG.warning("%s: no locks there, let no other run write to this folder", path.parent)
+                return None
+            if not taken:
+                os.close(lock)
+                owner = path.read_text(encoding="utf-8", errors="replace").strip()
+                raise InvalidInputError(
+                    f"a folder must have one run at a time, another one ({owner or 'just begun'}) writes to "
+                    f"{str(path.parent)!r}: wait for its end, or give this run another folder"
+                )
+            if path.exists() and os.path.samestat(os.fstat(lock), path.stat()):
+                begun = datetime.now().astimezone().isoformat(" ", "seconds")
+                path.write_text(f"process {os.getpid()} on {socket.gethostname()}, begun {begun}")
+                return lock
             os.close(lock)
-            raise InvalidInputError(
-                f"a folder must have one run at a time, another one ({owner or 'just begun'}) writes to "
-                f"{str(path.parent)!r}: wait for its end, or give this run another folder"
-            ) from None
-        except OSError as error:
-            os.close(lock)
-            path.unlink(missing_ok=True)
-            _LOG.warning(
-                "%s: no locks there (%s), let no other run write to this folder", path.parent, error.strerror
-            )
-            return None
-        if _is_still(path, lock):
-            os.ftruncate(lock, 0)
-            begun = datetime.now().astimezone().isoformat(" ", "seconds")
-            os.pwrite(lock, f"process {os.getpid()} on {socket.gethostname()}, begun {begun}".encode(), 0)
-            return lock
-        os.close(lock)  # its owner has removed it since it was opened
-
-
-def _is_still(path: Path, descriptor: int) -> bool:
-    """Return whether an open file is the one at a path."""
-    try:
-        return os.path.samestat(os.fstat(descriptor), path.stat())
-    except FileNotFoundError:
-        return False

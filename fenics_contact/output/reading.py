@@ -132,7 +132,7 @@ def read_result(path: str | Path) -> dict[str, Any]:
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         kind = data.get("format") if isinstance(data, dict) else None
         raise InvalidInputError(
-            f'a result must say "format": {FORMAT!r}, {str(file)!r} says {kind!r}: give a file that '
+            f'a result must have "format": {FORMAT!r}, {str(file)!r} has {kind!r}: give a file that '
             "write_result or write_optimisation_result wrote"
         )
     version = data.get("format_version")

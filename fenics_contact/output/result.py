@@ -2,7 +2,7 @@
 
 Description of a scene as plain data for JSON.
 
-Forces and moments of a state, and motions of rigid surfaces, as they stand in a result file.
+Forces and moments of a state, and motions of rigid surfaces, as a result file has them.
 
 Provenance of results.
 """
@@ -146,7 +146,7 @@ def listed_forces(forces: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any
 
 
 def scales_of(forces: Mapping[str, Any]) -> dict[str, float]:
-    """Return a force and a moment beside which what is only rounding can be told.
+    """Return a reference force and moment; smaller values are rounding.
 
     Results of before these were stored have the largest entries instead.
     """

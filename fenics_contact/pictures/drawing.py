@@ -199,7 +199,7 @@ class Paints:
         return painted
 
     def add_bar(self, figure: Figure, panels: Iterable[Axes]) -> None:
-        """Add a colour bar beside axes; its ends are pointed where values lie beyond, and say how far."""
+        """Add a colour bar next to axes; its ends are pointed where values lie beyond."""
         low = min(float(np.nanmin(values)) for values in self.values.values())
         high = max(float(np.nanmax(values)) for values in self.values.values())
         key = ScalarMappable(self.norm, self.colours)

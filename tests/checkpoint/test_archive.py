@@ -66,7 +66,7 @@ def test_a_file_cut_anywhere_is_refused(path: Path) -> None:
     content = path.read_bytes()
     for length in np.linspace(0, len(content) - 1, 60).astype(int):
         path.write_bytes(content[:length])
-        with pytest.raises(InvalidInputError, match=r"whole checkpoint is needed.*bring back a copy"):
+        with pytest.raises(InvalidInputError, match=r"is not a complete checkpoint.*restore a copy"):
             read_archive(path, "test", PROBLEM)
 
 
@@ -88,7 +88,7 @@ def test_a_spoilt_byte_is_noticed_wherever_it_matters(path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [(b"", "with 0 bytes is none"), (b"no archive\n", "move it away to start anew")],
+    [(b"", "0 bytes;"), (b"no archive\n", "move it away to start over")],
 )
 def test_a_file_of_another_kind_is_refused(path: Path, content: bytes, message: str) -> None:
     path.write_bytes(content)
@@ -104,7 +104,7 @@ def test_arrays_of_another_program_are_refused(path: Path) -> None:
 
 def test_objects_that_run_code_are_refused(path: Path) -> None:
     np.savez(path, _format=np.array([path], dtype=object))
-    with pytest.raises(InvalidInputError, match="whole checkpoint is needed"):
+    with pytest.raises(InvalidInputError, match="is not a complete checkpoint"):
         read_archive(path, "test", PROBLEM)
 
 

@@ -47,7 +47,7 @@ def test_the_first_signal_waits_for_a_safe_point(number: int, caplog: pytest.Log
     assert stop.value.signal is signal.Signals(number)
     name = signal.Signals(number).name
     assert caplog.messages == [
-        f"{name}: the run stops after the step under way, at once if it is told again; so far 2 of 3 steps "
+        f"{name}: the run stops after the step under way, at once on a second signal; so far 2 of 3 steps "
         "are kept",
         f"stopped by {name}: 2 of 3 steps are kept",
     ]

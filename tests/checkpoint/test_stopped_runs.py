@@ -59,7 +59,7 @@ def test_a_signal_stops_after_the_piece_under_way(kind: str, name: str, tmp_path
     end = launch(1, SCRIPT, kind, path, name)
     assert end.returncode == 128 + getattr(signal, name)
     assert end.stderr.splitlines() == [
-        f"{name}: the run stops after the step under way, at once if it is told again; so far "
+        f"{name}: the run stops after the step under way, at once on a second signal; so far "
         + words(kind, 3, path),
         f"stopped by {name}: " + words(kind, 4, path),
     ]

@@ -124,5 +124,5 @@ def test_a_body_without_contact_is_solved_again(tmp_path: Path) -> None:
 
 def test_an_unreadable_checkpoint_is_refused(interrupted: Path) -> None:
     shutil.copy(Path(__file__), interrupted)
-    with pytest.raises(InvalidInputError, match=r"a whole checkpoint is needed, .* move it away"):
+    with pytest.raises(InvalidInputError, match=r"is not a complete checkpoint .* move it away"):
         sequence(Checkpoint(interrupted), MPI.COMM_SELF)

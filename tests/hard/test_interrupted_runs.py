@@ -161,7 +161,7 @@ def test_a_checkpoint_that_cannot_be_read_is_refused_and_kept(
         }[damage]
     )
     before = path.read_bytes()
-    with pytest.raises(InvalidInputError, match=r"a whole checkpoint is needed, .* bring back") as caught:
+    with pytest.raises(InvalidInputError, match=r"is not a complete checkpoint .* restore") as caught:
         minimize(case.fun, case.start, checkpoint=Checkpoint(path))
     assert path.read_bytes() == before
     reason = str(caught.value).partition("is none (")[2].partition(")")[0]

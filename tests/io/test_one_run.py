@@ -108,7 +108,7 @@ def test_where_there_are_no_locks_a_run_goes_on_and_says_so(
     monkeypatch.setattr(fcntl, "flock", none)
     with caplog.at_level(logging.WARNING), only_run_in(tmp_path, MPI.COMM_SELF):
         assert names(tmp_path) == set()
-    assert "no locks there (No locks available)" in caplog.text
+    assert "no locks there, let no other run write to this folder" in caplog.text
 
 
 @pytest.mark.parametrize("name", ["file", "file/below", "loop", "a" * 300, "zero\0byte"])

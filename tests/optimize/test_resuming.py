@@ -224,7 +224,7 @@ def test_an_unreadable_checkpoint_is_never_replaced_by_a_new_run(tmp_path: Path)
     stopped(case, Checkpoint(path), 4)
     path.write_bytes(path.read_bytes()[:-100])
     half = path.read_bytes()
-    with pytest.raises(InvalidInputError, match=r"a whole checkpoint is needed, .*: bring back a copy of it"):
+    with pytest.raises(InvalidInputError, match=r"is not a complete checkpoint .*: restore a copy"):
         minimised(case, case.fun, Checkpoint(path))
     assert path.read_bytes() == half
 

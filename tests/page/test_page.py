@@ -368,9 +368,9 @@ def test_the_command_writes_a_page_beside_the_result_or_where_told(
     assert "without a display" not in told
     data, _ = content((tmp_path / "page.html").read_text())
     assert data["title"] == tmp_path.name
-    assert cli.main(MPI.COMM_SELF, ["view", str(tmp_path), "--page", str(tmp_path / "b" / "mine.html")]) == 0
+    assert cli.main(MPI.COMM_SELF, ["view", str(tmp_path), "--save", str(tmp_path / "b" / "mine.html")]) == 0
     assert (tmp_path / "b" / "mine.html").exists()
-    assert cli.main(MPI.COMM_SELF, ["view", str(tmp_path), "--page", "mine.jpg"]) == 2
+    assert cli.main(MPI.COMM_SELF, ["view", str(tmp_path), "--save", "mine.jpg"]) == 2
 
 
 RANKS = """

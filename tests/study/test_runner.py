@@ -60,7 +60,7 @@ def test_ranks_of_a_study_start_where_mpi_has_left_its_traces(monkeypatch: pytes
 def test_a_launcher_that_says_nothing_is_told_with_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "launcher", lambda ranks: ["false", str(ranks)])
     message = measure(replace(JOB, ranks=2))["failed"]["message"]
-    assert message.startswith("it ended with exit status 1: it said nothing, as an mpirun that cannot start")
+    assert message.startswith("it ended with exit status 1: it printed nothing and probably could not start")
     assert "`false 2 " in message
 
 

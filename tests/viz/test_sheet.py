@@ -52,21 +52,16 @@ def test_an_image_keeps_its_proportions_and_its_coordinates() -> None:
 
 
 @pytest.mark.parametrize(
-    ("beyond", "words"),
-    [
-        ((0.0, 515.0), "σ; largest 515"),
-        ((-2.0, 515.0), "σ; smallest −2.00, largest 515"),
-        ((0.0, 400.0), "σ"),
-        (None, "σ"),
-    ],
+    ("beyond", "ends"),
+    [((0.0, 515.0), "max"), ((-2.0, 515.0), "both"), ((-2.0, 400.0), "min"), (None, "neither")],
 )
-def test_a_bar_that_ends_before_the_values_says_how_far_they_go(
-    beyond: tuple[float, float] | None, words: str
+def test_a_bar_is_pointed_where_values_lie_beyond_its_colours(
+    beyond: tuple[float, float] | None, ends: str
 ) -> None:
     def draw(figure: Any) -> None:
-        panel = figure.subplots()
-        add_colour_bar(figure, [panel], ScalarMappable(Normalize(0, 400)), "σ", beyond=beyond)
-        assert figure.axes[-1].get_ylabel() == words
+        panel, key = figure.subplots(), ScalarMappable(Normalize(0, 400))
+        add_colour_bar(figure, [panel], key, "σ", beyond=beyond)
+        assert key.colorbar.extend == ends
 
     drawn((640, 400), "", draw)
 
