@@ -574,6 +574,18 @@ def _add_projected(
     nodes = torn.decomposition.tearing.global_nodes(master.body, surface.nodes)
     carrying, gradients = carriers(surface, points.facet[mine], points.local[mine])
     by = replace(_by_point(points, rows, mine, rows.at(nodes[carrying])), gradients=gradients)
+    _add_projection(result, surface, nodes, points, mine, by)
+
+
+def _add_projection(
+    result: np.ndarray,
+    surface: FacetedSurface,
+    nodes: np.ndarray,
+    points: ContactPoints,
+    mine: np.ndarray,
+    by: PointDerivatives,
+) -> None:
+    """Add the derivative by the slave nodes of some points and by the nodes of their master."""
     by_slave, by_master = projection_pulled_back(
         surface, points.facet[mine], points.local[mine], points.distance[mine], by
     )
@@ -660,11 +672,7 @@ def _add_tie(
     by_normal = _by_normal(torn, tie, motions, force, mine)
     tangents = np.zeros_like(points.tangents[mine])
     by = PointDerivatives(np.zeros(len(mine)), by_normal, tangents, weight, points.axes[mine], gradients)
-    by_slave, by_master = projection_pulled_back(
-        surface, points.facet[mine], points.local[mine], points.distance[mine], by
-    )
-    result[points.slave[mine]] += by_slave
-    result[nodes] += by_master
+    _add_projection(result, surface, nodes, points, mine, by)
 
 
 def _add_mortar_tie(

@@ -28,9 +28,16 @@ class JointProblem(DesignProblem[JointPoint]):
 
     Attributes:
         problems: Name of each case or step -> its problem; all are made of the first by `ShapeProblem.case`.
+        objectives: Name of each case, or of each step that has one -> its objective.
     """
 
     problems: dict[str, ShapeProblem]
+    objectives: dict[str, Objective]
+
+    @property
+    def scene(self) -> Scene:
+        """The scene of the last case or step, in its reference shape."""
+        return self._parts[-1].scene
 
     @property
     def _parts(self) -> Sequence[ShapeProblem]:
@@ -39,6 +46,10 @@ class JointProblem(DesignProblem[JointPoint]):
     def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
         """Return the coordinates of the designed bodies, see `DesignGeometry.points_of`. Collective."""
         return self._parts[0].points_of(alpha)
+
+    def scene_of(self, alpha: np.ndarray) -> Scene:
+        """Return `scene` in the shape of a design; raises as `evaluate` does. Collective."""
+        return self._parts[-1].scene_of(alpha)
 
     def fingerprint(self) -> dict[str, str]:
         """Identify the problem, for a checkpoint."""
@@ -85,6 +96,7 @@ class LoadCases(JointProblem):
         if not self.problems:
             raise InvalidInputError("LoadCases needs a problem, got none: give {'name': problem}")
         self._memory = record_of_values(self._at)
+        self.objectives = {name: problem.objective for name, problem in self.problems.items()}
         first = self._parts[0]
         with together(first.comm):
             for name, problem in self.problems.items():
@@ -157,10 +169,6 @@ class LoadCases(JointProblem):
     def remarks(self, alpha: np.ndarray) -> tuple[str, ...]:
         """Return what to know of a design beside its value, see `ShapeProblem.remarks`. Collective."""
         return tuple(words for problem in self.problems.values() for words in problem.remarks(alpha))
-
-    def scene_of(self, alpha: np.ndarray) -> Scene:
-        """Return the scene of the first case in the shape of a design. Collective; raises as `evaluate`."""
-        return self._parts[0].scene_of(alpha)
 
     def may_be_invalid(self, alpha: np.ndarray) -> bool:
         """Return whether the last result, at α, may not be a subgradient. Collective."""
@@ -278,11 +286,6 @@ class LoadPath(JointProblem):
         return {"steps": list(self.problems), "objectives": self.objectives, "work": work}
 
     @property
-    def scene(self) -> Scene:
-        """The scene after the last step, in its reference shape."""
-        return self._parts[-1].scene
-
-    @property
     def forms(self) -> ShapeForms:
         """Compiled derivatives, which objectives take beside a state."""
         return self._parts[0].geometry.forms
@@ -299,10 +302,6 @@ class LoadPath(JointProblem):
         point = self._point_at(alpha)
         self._memory.record(point)
         return point
-
-    def scene_of(self, alpha: np.ndarray) -> Scene:
-        """Return the scene after the last step in the shape of a design. Collective; raises as `evaluate`."""
-        return self._parts[-1].scene_of(alpha)
 
     @collectively("LoadPath.states_of", comm_of)
     def states_of(self, alpha: np.ndarray) -> dict[str, AnyState]:

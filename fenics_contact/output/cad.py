@@ -38,7 +38,7 @@ from fenics_contact.readers.gmsh_session import gmsh_model, silenced
 if TYPE_CHECKING:
     from fenics_contact.design.design import MovedSurface
     from fenics_contact.design.problem import ShapeProblem
-    from fenics_contact.design.several import LoadPath
+    from fenics_contact.design.several import JointProblem
 
 
 DEGREE = 5
@@ -384,7 +384,7 @@ class StepFile:
 
 @collectively("write_step", lambda problem, *_, **__: problem.comm)
 def write_step(
-    problem: ShapeProblem | LoadPath,
+    problem: ShapeProblem | JointProblem,
     alpha: np.ndarray,
     path: str | Path,
     *,

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     import meshio
     from fenics_contact._optimize.result import Record
     from fenics_contact.design.problem import ShapeProblem
-    from fenics_contact.design.several import LoadPath
+    from fenics_contact.design.several import JointProblem
 
 
 @dataclass(frozen=True, order=True)
@@ -466,7 +466,7 @@ class ResultSeries:
                 self._write_index()
         return self.path
 
-    def follow(self, problem: ShapeProblem | LoadPath) -> Callable[[Record, np.ndarray], None]:
+    def follow(self, problem: ShapeProblem | JointProblem) -> Callable[[Record, np.ndarray], None]:
         """Return a callback for `minimize` that adds the first design and every better one.
 
         Their values are the numbers of the evaluations, their labels the objectives.

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from fenics_contact._accuracy.state_errors import StateErrors
     from fenics_contact._optimize.result import Result
     from fenics_contact.design.problem import ShapeProblem
-    from fenics_contact.design.several import LoadPath
+    from fenics_contact.design.several import JointProblem
 
 
 #: Any value as plain data.
@@ -295,7 +295,7 @@ def result_record(
 @collectively("write_optimisation_result", lambda result, problem, *_, **__: problem.comm)
 def write_optimisation_result(
     result: Result,
-    problem: ShapeProblem | LoadPath,
+    problem: ShapeProblem | JointProblem,
     folder: str | Path,
     *,
     name: str = "result",
@@ -461,11 +461,11 @@ def _errors(errors: StateErrors) -> dict[str, Any]:
     }
 
 
-def _objective(problem: ShapeProblem | LoadPath, initial: float, final: float) -> dict[str, Any]:
-    from fenics_contact.design.several import LoadPath
+def _objective(problem: ShapeProblem | JointProblem, initial: float, final: float) -> dict[str, Any]:
+    from fenics_contact.design.several import JointProblem
 
-    kind: object = problem if isinstance(problem, LoadPath) else problem.objective
-    objective = problem.objectives if isinstance(problem, LoadPath) else problem.objective
+    kind: object = problem if isinstance(problem, JointProblem) else problem.objective
+    objective = problem.objectives if isinstance(problem, JointProblem) else problem.objective
     return {
         "type": type(kind).__name__,
         "definition": re.sub(r" at 0x[0-9a-f]+", "", repr(objective)),

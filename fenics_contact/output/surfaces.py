@@ -23,14 +23,14 @@ from fenics_contact.mesh.faces import boundary_faces
 if TYPE_CHECKING:
     from fenics_contact.mesh.body_mesh import BodyMesh
     from fenics_contact.design.problem import ShapeProblem
-    from fenics_contact.design.several import LoadPath
+    from fenics_contact.design.several import JointProblem
 
 
 #: Largest distance of a node from its smooth surface, relative to the extent of the surface.
 OFF = 1e-9
 
 
-def moved_surfaces(problem: ShapeProblem | LoadPath, alpha: np.ndarray) -> tuple[MovedSurface, ...]:
+def moved_surfaces(problem: ShapeProblem | JointProblem, alpha: np.ndarray) -> tuple[MovedSurface, ...]:
     """Return the surface of every design, moved. Collective.
 
     Raises:
@@ -53,7 +53,7 @@ def moved_surfaces(problem: ShapeProblem | LoadPath, alpha: np.ndarray) -> tuple
     return tuple(found)
 
 
-def moved_body(problem: ShapeProblem | LoadPath, alpha: np.ndarray, body: str | None) -> tuple[str, BodyMesh]:
+def moved_body(problem: ShapeProblem | JointProblem, alpha: np.ndarray, body: str | None) -> tuple[str, BodyMesh]:
     """Return the name and the mesh of a designed body in the shape of a design. Collective.
 
     Args:
@@ -75,7 +75,7 @@ def moved_body(problem: ShapeProblem | LoadPath, alpha: np.ndarray, body: str | 
 
 @collectively("write_design_table", lambda problem, *_, **__: problem.comm)
 def write_design_table(
-    problem: ShapeProblem | LoadPath,
+    problem: ShapeProblem | JointProblem,
     alpha: np.ndarray,
     path: str | Path,
     *,
@@ -148,7 +148,7 @@ def _table(surface: MovedSurface, places: np.ndarray, length: str) -> str:
 
 @collectively("write_stl", lambda problem, *_, **__: problem.comm)
 def write_stl(
-    problem: ShapeProblem | LoadPath, alpha: np.ndarray, path: str | Path, *, body: str | None = None
+    problem: ShapeProblem | JointProblem, alpha: np.ndarray, path: str | Path, *, body: str | None = None
 ) -> Path:
     """Write the closed boundary of a designed body as a binary STL file. Collective.
 

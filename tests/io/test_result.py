@@ -26,11 +26,12 @@ from fenics_contact import (
     Tie,
     Tresca,
     Ufl,
+    minimize,
     solve_scene,
     write_result,
 )
 from fenics_contact._optimize.result import StepKind
-from fenics_contact.design import Result
+from fenics_contact.design import BundleTrust, Result
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
@@ -39,6 +40,7 @@ from fenics_contact.output.result import described_scene, readable
 from fenics_contact.results import BalancedTolerance
 from tests.contact.rigid_cases import POINT, SCENES, solved
 from tests.io.states import touching_blocks
+from tests.shape.load_cases_on_ranks import cases_of
 from tests.shape.resumed_cases import minimised, posed
 
 
@@ -203,6 +205,18 @@ def test_an_optimisation_is_told_with_its_history_and_design(tmp_path: Path) -> 
     assert found["counts"]["f_products"] == problem.products > 0
     assert found["seconds"]["adjoint"] > 0.0
     assert found["more"] == {"a": [1]}
+
+
+def test_an_optimisation_of_load_cases_has_the_objective_of_each(tmp_path: Path) -> None:
+    both = cases_of(MPI.COMM_SELF, None)
+    short = BundleTrust(max_evaluations=4, raise_on_failure=False)
+    result = minimize(both, np.zeros(both.size), short, bounds=(-0.004, 0.004))
+    found = read_result(write_optimisation_result(result, both, tmp_path))
+    told = found["optimisation"]
+    assert told["objective"]["type"] == "LoadCases"
+    assert all(name in told["objective"]["definition"] for name in both.problems)
+    assert told["objective"]["final"] == result.value < told["objective"]["initial"]
+    assert found["counts"]["f_products"] == both.products > 0
 
 
 def test_an_optimisation_that_did_not_happen_is_refused(tmp_path: Path) -> None:

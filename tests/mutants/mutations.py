@@ -254,7 +254,7 @@ MUTATIONS = (
     ),
     Mutation(
         "kinematic hardening is too weak by a percent",
-        "scene/materials/j2_plasticity.py",
+        "materials/plastic.py",
         "back = 2 / 3 * self.kinematic_hardening * plastic",
         "back = 0.66 * self.kinematic_hardening * plastic",
         ("tests/scene/test_plasticity.py::test_kinematic_hardening_yields_earlier_in_the_other_direction",),

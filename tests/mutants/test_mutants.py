@@ -31,7 +31,7 @@ def test_every_mutation_finds_its_text_and_changes_it() -> None:
 
 def test_a_text_that_is_gone_is_told() -> None:
     gone = Mutation("no more", "_base/progress.py", "a text that is nowhere", "", ())
-    with pytest.raises(LookupError, match=r"'no more' needs its text once in timing.py, found it 0 times"):
+    with pytest.raises(LookupError, match=r"'no more' needs its text once in _base/progress.py, found it 0"):
         replaced(gone, "some text")
 
 
