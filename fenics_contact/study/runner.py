@@ -282,7 +282,7 @@ def summarised(name: str, records: Sequence[Record]) -> Record:
 SHORT = 10.0
 _PACKAGE = Path(__file__).resolve().parents[1]
 #: Modules of this part that affect the numbers of a run.
-_MEASURING = {"measuring.py", "parameters.py", "solving.py", "true_error.py", "worker.py"}
+_MEASURING = ("measuring.py", "study.py", "worker.py")
 
 
 @dataclass(frozen=True)
@@ -405,7 +405,7 @@ def _arguments(job: Job, parameters: Parameters) -> dict[str, object]:
 
 def _code(scene: str) -> list[Path]:
     """Return the files that a run executes: plotting does not affect its numbers."""
-    rooms = [room for room in _PACKAGE.iterdir() if room.is_dir() and room.name not in ("study", "viz")]
+    rooms = [room for room in _PACKAGE.iterdir() if room.is_dir() and room.name not in ("study", "pictures")]
     executed = [path for room in rooms for path in room.rglob("*.py")]
     executed += [_PACKAGE / "study" / name for name in _MEASURING]
     return [*executed, scene_file(scene) or _PACKAGE / "study" / "scenes" / f"{scene}.py"]

@@ -184,7 +184,7 @@ def test_a_demo_whose_reader_has_gone_ends_without_a_complaint(tmp_path: Path) -
         "version()\nfor k in range(3):\n    print('word', flush=True)\nPath('done').touch()\n"
     )
     code = (
-        "import sys; from pathlib import Path; from fenics_contact import __main__, cli; "
+        "import sys; from pathlib import Path; from fenics_contact import __main__; "
         "from fenics_contact._cli import demos; "
         f"demos.folder_of_demos = lambda: Path({str(tmp_path)!r}); "
         "sys.exit(__main__.main(['demo', 'wordy']))"
