@@ -347,5 +347,5 @@ assert imbalance < 1e-9
 # - `tolerance=design.AdaptiveTolerance()` in `ShapeProblem`: states are solved no more accurately than the
 #   optimiser needs, which saves a third of the products.
 # - A finer net, or `LinkShape(cell="tetrahedron")`.
-# - `result_page(after.state, output / "links.html")` (from `fenics_contact._page`): a page on which the mouse
+# - `result_page(after.state, output / "links.html")` (from `fenics_contact`): a page on which the mouse
 #   turns the links; `after.state.to_pyvista()` for pictures of your own.

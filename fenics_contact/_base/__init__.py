@@ -1,1 +1,1 @@
-"""Checkpoints: long runs store all that they need to continue, in atomically written files."""
+"""What every part of the package may use."""

@@ -1,11 +1,4 @@
-"""Checks of the numbers from which meshes are built, with the argument's name in messages.
-
-Type checks of a class's arguments: values of other types would silently mean something else.
-
-Checks that input files exist.
-
-Vectors given by users: two or three finite numbers.
-"""
+"""Checks of arguments: numbers, vectors, types and files, named in messages."""
 
 from __future__ import annotations
 

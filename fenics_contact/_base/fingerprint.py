@@ -1,7 +1,4 @@
-"""Descriptions of problems that another run of the same script reproduces.
-
-Check that all ranks have the same input, instead of solving a mixture or waiting forever.
-"""
+"""Descriptions of problems that another run of the same script reproduces, the same on all ranks."""
 
 from __future__ import annotations
 

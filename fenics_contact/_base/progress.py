@@ -1,9 +1,4 @@
-"""Progress of long work: events that every part of the package reports, and their display on request.
-
-The context in which progress is shown: bars on a terminal, an output of a notebook, lines in a log.
-
-Seconds spent by phase.
-"""
+"""Progress of long work: events that every part of the package reports, and their display."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""Output and exit codes of commands, the same on every rank.
-
-The table of forces and moments: reactions, contacts, ties, and their balance with the loads.
-
-Tables of results.
-"""
+"""Output and exit codes of commands, the same on every rank, and tables of results."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""`fenics-contact optimize`: the shape optimisation of a scene file.
-
-Files of an optimised surface for other programs, as a scene file asks for them.
-"""
+"""`fenics-contact optimize`: the shape optimisation of a scene file, and the files of the design."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""Options that several commands share.
-
-Preview of what will be built and written.
-
-Interruption and continuation of runs.
-"""
+"""What several commands share: options, the preview of a run, interruption and continuation."""
 
 from __future__ import annotations
 

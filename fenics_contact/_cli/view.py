@@ -1,7 +1,4 @@
-"""`fenics-contact view`: numbers, a picture and a web page of a result.
-
-Pictures of a run, if the libraries for them are installed.
-"""
+"""`fenics-contact view`: numbers, a picture and a web page of a result; pictures of a run."""
 
 from __future__ import annotations
 

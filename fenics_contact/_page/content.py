@@ -1,13 +1,4 @@
-"""Arrays in a page: each once, rounded, compressed together.
-
-What a page draws of a body: its skin, its edges, and the cells to cut through.
-
-Colours of a page: those of the pictures, as lists.
-
-Rigid obstacles of a page as lines, from the record of a result.
-
-The tables of a page, from the record of a result.
-"""
+"""What a page consists of: arrays, bodies, obstacles and tables, from the record of a result."""
 
 from __future__ import annotations
 

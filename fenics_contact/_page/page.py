@@ -1,7 +1,4 @@
-"""A web page of a result, one file that needs no other and no network.
-
-What a page is made of: the fields of one or several states, and the record of the result.
-"""
+"""A web page of a result, one file that needs no other and no network."""
 
 from __future__ import annotations
 

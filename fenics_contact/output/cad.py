@@ -1,10 +1,7 @@
-"""A designed surface as the B-spline that CAD programs know.
+"""Designed surfaces and bodies as STEP files for CAD programs, through gmsh's OpenCASCADE.
 
-The flat sides of a body beside its designed surfaces, with their edges; in the plane the one face.
-
-Rims of designed surfaces and corners of flat sides, put exactly into the planes in which they lie.
-
-Designed surfaces and bodies as STEP files for CAD programs, through gmsh's OpenCASCADE.
+Designed surfaces become B-splines, the other sides of a body flat faces, whose rims and corners are put
+exactly into their planes.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""Atomic replacement of result files, also of several at once, written by one rank or by all.
-
-JSON files of results; NumPy's types are converted, numbers that JSON cannot hold are rejected.
-
-One run at a time in a folder: a second one would mistake the files of the first for its own.
+"""Result files, replaced atomically and written by one run at a time; JSON files.
 
 A run holds a lock on a hidden file in its folder. The system releases the lock of a run that dies for any
 reason; the remaining file blocks no other run.

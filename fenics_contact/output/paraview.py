@@ -1,15 +1,4 @@
-"""PVD files: the files of a series by time, for ParaView.
-
-Names of files made from names of bodies.
-
-VTU files, one per body, gathered from all ranks, with an index that opens them together.
-
-XDMF files of the fields on the bodies' own meshes, written by dolfinx.
-
-VTX files, the parallel format of ADIOS2, if dolfinx was built with it.
-
-Series of states for ParaView: load steps, designs of an optimisation.
-"""
+"""Files for ParaView: VTU with indices, XDMF, VTX, and series of states (PVD)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Reading of result files, with errors that state what is wrong with them.
-
-Files of fields, VTU, VTM and PVD, read back as pyvista's grids by body.
-"""
+"""Reading of results: JSON files, and files of fields as pyvista's grids by body."""
 
 from __future__ import annotations
 

@@ -1,10 +1,6 @@
 """The result of a computation in one JSON file that other programs can read years later.
 
-Description of a scene as plain data for JSON.
-
-Forces and moments of a state, and motions of rigid surfaces, as a result file has them.
-
-Provenance of results.
+It describes the scene as plain data, and holds forces, moments and provenance.
 """
 
 from __future__ import annotations

@@ -1,9 +1,4 @@
-"""The surfaces and bodies that a design moves, for the files that hold them.
-
-A designed surface as a table of points before and after.
-
-The boundary of a designed body as triangles, for printers and other programs.
-"""
+"""Designed surfaces as tables of points, and designed bodies as triangles (STL)."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ from fenics_contact.pictures.states import (
     plot_contact_status,
     plot_decomposition,
     plot_error,
+    plot_field,
     plot_stress,
 )
 
@@ -28,5 +29,6 @@ __all__ = [
     "plot_curves",
     "plot_decomposition",
     "plot_error",
+    "plot_field",
     "plot_stress",
 ]

@@ -1,24 +1,8 @@
-"""Colours that colour-blind readers can distinguish, and their assignment to neighbouring subdomains.
+"""What pictures are drawn on: colours, directions of view, rendering, figures, and the finished picture.
 
 References:
     M. Okabe and K. Ito, Color universal design (2008), for symbols; P. Tol, Colour schemes, SRON technical
-    note SRON/EPS/TN/09-002 (2021), scheme "light", for areas.
-
-A finished picture, for notebooks and files.
-
-Test whether this machine can render, in a separate process, as VTK without OpenGL dies by a signal.
-
-Direction of view and visible part of a picture, in parallel projection.
-
-The sheet: a matplotlib figure with common fonts, with images and scale bars on it.
-
-Rendering of meshes to an image array with pyvista, off screen, on white, in parallel projection.
-
-Symbols for the status of contact points, which differ in shape and colour.
-
-Names of the units of a scene; the numbers themselves have none.
-
-Formatting of numbers and titles.
+    note SRON/EPS/TN/09-002 (2021), scheme "light", for areas; distinguishable with colour deficiencies, too.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Diagram of curves: computed results and reference solutions.
-
-A plane contact surface unrolled: its nodes in order, and the contact quantities on them.
-"""
+"""Diagrams of curves, and the contact quantities along a plane contact surface."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""Picture of the result of an optimisation: contact before and after, and the moved outlines.
-
-Picture of a design surface and its control net, before and after.
-
-Diagram of an optimisation: objective against evaluations.
-"""
+"""Pictures of designs: contact before and after, the control net, the objective by evaluation."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""Rigid obstacles in pictures and pages: outlines of simple shapes; in the plane also shaded areas.
-
-A field on all bodies, ready for drawing: values, colours and labels.
-
-Drawing a field on bodies: all of them, and the contact at a larger scale.
-"""
+"""Drawing of a field on bodies with rigid obstacles, and of the contact at a larger scale."""
 
 from __future__ import annotations
 

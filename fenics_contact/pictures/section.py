@@ -1,9 +1,4 @@
-"""Plane sections through deformed bodies at their contact.
-
-The bodies of a state for drawing, and the fields that they have: names, units, colours and ranges.
-
-Plane bodies drawn by matplotlib: meshes, fields and outlines on their coordinates.
-"""
+"""Bodies as they are drawn: their fields with units and ranges, plane drawings, sections."""
 
 from __future__ import annotations
 

@@ -1,13 +1,4 @@
-"""Picture of the bodies cut into subdomains.
-
-Pictures of a field in the deformed bodies, with sections through the contact.
-
-Picture of the discretisation error of a state.
-
-Maps of the status of contact points, one for each state of a history.
-
-Picture of a contact surface seen face on: pressure and status.
-"""
+"""Pictures of states: stress, error, any field, contact pressure and status; and of subdomains."""
 
 from __future__ import annotations
 

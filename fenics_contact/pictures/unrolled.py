@@ -1,11 +1,4 @@
-"""Surfaces around an axis, unrolled: around it to the right, along it up.
-
-A contact surface projected to a plane, seen from its master, or unrolled.
-
-Axes for views along coordinates, and the bar of the pressure.
-
-Picture of a plane contact surface: pressure, tangential traction and status along it.
-"""
+"""Contact surfaces seen from their master or unrolled, and pictures of plane contact surfaces."""
 
 from __future__ import annotations
 
