@@ -1,9 +1,4 @@
-"""The entry point: from a scene to its equilibrium, and on to the next load, geometry or slip.
-
-Transfer a multiplier to the system of another geometry or load.
-
-Equilibria of scenes with linear materials: from a torn system to its state.
-"""
+"""The entry point: from a scene to its equilibrium, and on to the next load, geometry or slip."""
 
 from __future__ import annotations
 
@@ -110,21 +105,23 @@ class LinearEquilibria:
         scene: Scene,
         kind: SolverKind,
         tolerance: Tolerance,
-        earlier: Mapping[str, State | None],
         *,
-        design: bool = False,
+        start: State | None,
+        before: State | None,
+        known: State | None,
+        design: bool,
     ) -> LinearState:
         """Compute the equilibrium of a scene. Collective.
 
         Args:
-            earlier: States or None: "start" gives the first multipliers, "before" is that from which slip is
-                measured, "known" has parts that may be reused.
+            start: State whose multipliers come first, or None.
+            before: State from which slip is measured, or None.
+            known: State of which parts may be reused, or None.
 
         Raises:
             InfeasibleError: If nothing holds some body.
             ConvergenceError: If the solver does not reach its tolerance.
         """
-        before, known = earlier["before"], earlier["known"]
         with self._timer.phase("assemble"):
             torn = self._torn(scene, known, overlap=design)
             if before is not None:
@@ -135,16 +132,18 @@ class LinearEquilibria:
                 check_held(torn)
         if self._solver is None and kind is SolverKind.DIRECT:
             return self._directly(torn, known)
-        solver = self._solver or default_solver(kind)
+        solver, reused = self._solver or default_solver(kind), known_system(known)
         # Derivatives need the status of every contact point, which a balanced state leaves uncertain.
         if tolerance is None and (self._solver is not None or design):
             tolerance = solver.tolerance
-        system, reused = DualSystem(torn, self._timer, previous=known_system(known)), known_system(known)
-        start = _start_from(earlier["start"], system)
+        system = DualSystem(torn, self._timer, previous=reused)
+        first = _start_from(start, system)
         solve = solve_dual if reused is None else FollowedLoads(reused, self._timer).solve
-        if isinstance(tolerance, float):
-            return self._to_tolerance(system, solve, solver.with_tolerance(tolerance), start)
-        return self._balanced(system, solve, solver, tolerance, start)
+        if not isinstance(tolerance, float):
+            return self._balanced(system, solve, solver, tolerance, first)
+        with self._timer.phase("solve"):
+            solution = solve(system, solver.with_tolerance(tolerance), first)
+        return self._state(system, solution, tolerance=tolerance)
 
     def restored(self, stored: Stored, scene: Scene, known: State | None) -> LinearState:
         """Build a state from what `stored_state` returned, with at most one product. Collective."""
@@ -156,8 +155,24 @@ class LinearEquilibria:
         system = DualSystem(torn, self._timer, previous=known_system(known))
         with self._timer.phase("state"):
             solution = restored_solution(system, stored)
-            displacement = system.displacement(solution.multiplier, solution.alpha)
-        return state_of(system, solution, displacement, self._timer)
+        return self._state(system, solution)
+
+    def _state(
+        self, system: DualSystem, solution: DualSolution, displacement: np.ndarray | None = None, **known: Any
+    ) -> LinearState:
+        """Return the state of a solution; its torn displacement is computed unless given. Collective."""
+        torn = system.torn
+        with self._timer.phase("state"):
+            if displacement is None:
+                displacement = system.displacement(solution.multiplier, solution.alpha)
+            contact = contact_result(torn, row_values(system, solution), displacement)
+            friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))
+            rigid = system.kernel @ solution.alpha
+            energies = compute_energies(torn, displacement, solution.multiplier, friction, rigid)
+        return LinearState(
+            torn=torn, system=system, solution=solution, torn_displacement=displacement, contact=contact,
+            energies=energies, seconds=dict(self._timer.seconds), **known,
+        )  # fmt: skip
 
     def _torn(self, scene: Scene, known: State | None, *, overlap: bool) -> TornSystem:
         previous = None if known is None else known.torn
@@ -176,15 +191,6 @@ class LinearEquilibria:
             energies=compute_energies(torn, solution.displacement, solution.multiplier, 0.0),
         )  # fmt: skip
 
-    def _to_tolerance(
-        self, system: DualSystem, solve: Solve, solver: DualSolver, start: np.ndarray | None
-    ) -> LinearState:
-        with self._timer.phase("solve"):
-            solution = solve(system, solver, start)
-        with self._timer.phase("state"):
-            displacement = system.displacement(solution.multiplier, solution.alpha)
-        return replace(state_of(system, solution, displacement, self._timer), tolerance=solver.tolerance)
-
     def _balanced(
         self,
         system: DualSystem,
@@ -200,8 +206,8 @@ class LinearEquilibria:
 
         wanted = balanced or BalancedTolerance()
         rounds = solve_balanced(system, solve, solver, wanted, start, self._timer)
-        state = state_of(system, rounds.solution, rounds.displacement, self._timer)
-        return replace(state, known_errors=rounds.state_errors(state.energies.norm), tolerance=wanted)
+        state = self._state(system, rounds.solution, rounds.displacement, tolerance=wanted)
+        return replace(state, known_errors=rounds.state_errors(state.energies.norm))
 
 
 def _start_from(state: State | None, system: DualSystem) -> np.ndarray | None:
@@ -216,21 +222,6 @@ def known_system(state: State | None) -> DualSystem | None:
     """Return the dual system of a state, whose unchanged parts the next one reuses."""
     system = state.system if isinstance(state, LinearState) else None
     return system if isinstance(system, DualSystem) else None
-
-
-def state_of(
-    system: DualSystem, solution: DualSolution, displacement: np.ndarray, timer: PhaseTimer
-) -> LinearState:
-    """Return the state of a solution with its torn displacement. Collective."""
-    with timer.phase("state"):
-        contact = contact_result(system.torn, row_values(system, solution), displacement)
-        friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))
-        rigid = system.kernel @ solution.alpha
-        energies = compute_energies(system.torn, displacement, solution.multiplier, friction, rigid)
-    return LinearState(
-        torn=system.torn, system=system, solution=solution, torn_displacement=displacement, contact=contact,
-        energies=energies, seconds=dict(timer.seconds),
-    )  # fmt: skip
 
 
 def default_solver(kind: SolverKind) -> DualSolver:
@@ -428,8 +419,10 @@ class ContactProblem:
         else:
             check_same_input(self.comm, scene, solver=self.solver, tolerance=wanted)
             first = (self.state if start == "last" else start) or before
-            earlier = {"start": first, "before": before, "known": self._alike(scene, first)}
-            state = self._linear(scene).solve(scene, kind, wanted, earlier, design=design)
+            known = self._alike(scene, first)
+            state = self._linear(scene).solve(
+                scene, kind, wanted, start=first, before=before, known=known, design=design
+            )
         self.state = state
         with self.timer.phase("state"):
             self._warnings.warn(state, design=design)

@@ -1,7 +1,4 @@
-"""Check that every body is held: a conic feasibility problem on rigid motions, before any factorisation.
-
-Motions that nothing resists where bodies are at rest: nonlinear scenes with one have no way to begin.
-"""
+"""Whether every body is held, by conic feasibility on rigid motions before any factorisation."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Load steps: a sequence of equilibria with frictional slip measured from step to step.
-
-The checkpoint of a load history: the states after the completed steps.
-"""
+"""Load steps: equilibria with slip measured from step to step, and the checkpoint of such a history."""
 
 from __future__ import annotations
 

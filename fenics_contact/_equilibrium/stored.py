@@ -1,9 +1,4 @@
-"""A state as a few arrays, and back: the content of a checkpoint of an equilibrium.
-
-Arrays of a stored state, and the rows to which they belong.
-
-A state of bodies that deform much as arrays: the content of a checkpoint of a load history.
-"""
+"""A state as a few arrays, and back: the content of checkpoints."""
 
 from __future__ import annotations
 

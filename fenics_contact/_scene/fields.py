@@ -1,9 +1,4 @@
-"""Values of loads and supports: numbers, functions of position, or UFL.
-
-A field known at some points, measured or computed by another program, as a function of position.
-
-Fields from files: tables of points, and values on the nodes or cells of a mesh.
-"""
+"""Values of loads and supports: numbers, functions of position, UFL, fields known at points or in files."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""Between which surfaces the gaps of contact pairs are measured, and the error of flat facets.
-
-How far the bodies of a contact pair may come closer, estimated before anything is computed.
-
-Bodies that nothing keeps from passing through each other, for want of a pair or of a larger surface.
-"""
+"""What a plan says of contact: surfaces and their errors, approach, bodies without a pair."""
 
 from __future__ import annotations
 

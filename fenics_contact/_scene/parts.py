@@ -1,11 +1,4 @@
-"""The parts of a scene, and the checks that they fit together.
-
-Where contact and ties are enforced, by nodes or by mortar: the choice of a scene, with its reason.
-
-Planes of symmetry: flat sides on rollers, beyond which the body continues as its mirror image.
-
-The surfaces of a scene as contact sees them.
-"""
+"""The parts of a scene, checks that they fit together, and surfaces and discretisation of its pairs."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""What will be built for a scene, known before anything is computed.
-
-The physical effects in a scene. Only what these need is built.
-
-Which rigid motions of a body its supports resist.
-"""
+"""What will be built for a scene: its effects, its solver, and which motions its supports resist."""
 
 from __future__ import annotations
 

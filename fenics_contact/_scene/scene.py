@@ -1,9 +1,4 @@
-"""A scene: bodies, supports, loads and contact pairs. Nothing is solved yet.
-
-Bodies of a scene from the meshes of a file, materials by name.
-
-A sequence of loads.
-"""
+"""A scene: bodies, supports, loads and contact pairs, and steps of its loads. Nothing is solved yet."""
 
 from __future__ import annotations
 

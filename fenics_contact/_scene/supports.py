@@ -1,7 +1,4 @@
-"""Supports: displacements prescribed on surfaces.
-
-Surfaces that move as one rigid piece, driven by a point.
-"""
+"""Supports: displacements prescribed on surfaces, and surfaces that move as one rigid piece."""
 
 from __future__ import annotations
 

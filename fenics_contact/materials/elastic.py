@@ -1,15 +1,4 @@
-"""Checks and conversions of engineering constants.
-
-The base of small-strain elastic models: only the stress has to be written.
-
-Isotropic elasticity: the common base of all isotropic models, and the model in space.
-
-Isotropic elasticity of plane bodies: plane strain and plane stress. Forces are per unit of thickness.
-
-What a material model must provide.
-
-Symmetric tensors as vectors (Voigt), their rotation, and stiffness matrices from engineering constants.
-"""
+"""Small-strain elasticity: what a material must provide, isotropic models, Voigt vectors."""
 
 from __future__ import annotations
 

@@ -1,19 +1,4 @@
-"""The base of models that are given by their energy.
-
-The base of models for large deformations that are given by their energy.
-
-The base of hyperelastic models whose energy of volume changes stands apart.
-
-Models whose shape energy is a function of two invariants.
-
-The neo-Hookean model of compressible bodies.
-
-Sums of powers of the principal stretches, by invariants: smooth where stretches are equal, too.
-
-Models of rubber: Mooney-Rivlin and Ogden.
-
-The St. Venant-Kirchhoff model: Hooke's law between the strains of large rotations.
-"""
+"""Models given by their energy: neo-Hookean, Mooney-Rivlin, Ogden, St. Venant-Kirchhoff, and bases."""
 
 from __future__ import annotations
 

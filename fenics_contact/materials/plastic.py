@@ -1,13 +1,4 @@
-"""The base of materials that remember: plasticity, viscoelasticity, damage.
-
-Hardening laws and the radial return of von Mises plasticity, for all points at once.
-
-What von Mises' metals have in common, in small and large deformations.
-
-Von Mises plasticity in small strain.
-
-Von Mises plasticity for large deformations, by logarithmic strains.
-"""
+"""Materials with internal variables: their base, and von Mises plasticity for small and large strains."""
 
 from __future__ import annotations
 

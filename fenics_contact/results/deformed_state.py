@@ -1,7 +1,4 @@
-"""The state of bodies with nonlinear materials.
-
-How Newton's method ended in the load steps of a history.
-"""
+"""The state of bodies with nonlinear materials, and how Newton's method ended in its load steps."""
 
 from __future__ import annotations
 

@@ -1,17 +1,4 @@
-"""Fields of a state on the bodies' own meshes as dolfinx Functions, and back in the order of the bodies.
-
-Stress in the cells of a body: means of the tensor, of its von Mises equivalent, and principal stresses.
-
-The fields of a state as plain arrays in the order of the bodies' meshes, the same on all ranks.
-
-Stresses of materials with a history, which displacements alone do not tell.
-
-Stress at the nodes, averaged around each node within one material.
-
-The displacement gradient is recovered at each node from the displacements of the nodes around it (see
-`accuracy.recovery`), which is more accurate than the means of the cells, above all on surfaces. Where
-materials meet a node has a stress for each of them.
-"""
+"""Displacements, stresses and contact as fields: dolfinx Functions on the bodies' meshes, and arrays."""
 
 from __future__ import annotations
 

@@ -1,13 +1,4 @@
-"""The forces on the nodes of all bodies by what exerts them: loads, supports, contact, ties, beds.
-
-Force and moment of several forces about a point, as one value, and tables of them.
-
-The reactions of supports: what holds each of them, as force and moment.
-
-The balance of all forces on the bodies of a scene.
-
-What contacts and ties transmit: force and moment on the slave of each pair.
-"""
+"""Forces on nodes by what exerts them, and what follows: reactions, resultants, their balance."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from fenics_contact.results.dual_solve import row_values
 from fenics_contact.results.forces import rounding_force
 from fenics_contact.results.geometry_error import geometry_error
 from fenics_contact.results.rigid_motions import UnheldMotion, unheld_motions
-from fenics_contact.results.state import State, comm_of, errors_in_words
+from fenics_contact.results.state import State, comm_of
 
 if TYPE_CHECKING:
     from fenics_contact._accuracy.state_errors import StateErrors
@@ -41,7 +41,9 @@ class LinearState(State):
     system: DualSystem | DirectSystem
 
     def _errors_in_words(self) -> dict[str, str]:
-        return errors_in_words(self.known_errors)
+        if self.known_errors is None:
+            return {"errors": "not estimated yet: call state.estimate_errors()"}
+        return {f"error, {name}": words for name, words in self.known_errors.in_words.items()}
 
     @property
     def dual(self) -> DualSystem:

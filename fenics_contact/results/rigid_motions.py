@@ -1,7 +1,4 @@
-"""Rigid motions that nothing resists, in words: bodies that the load does not move stay where they are.
-
-How the points of rigid surfaces move.
-"""
+"""Rigid motions in words: those that nothing resists, and those of rigid surfaces."""
 
 from __future__ import annotations
 

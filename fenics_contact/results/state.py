@@ -1,11 +1,4 @@
-"""The equilibrium of a scene.
-
-Energies of a state, primal and dual.
-
-What was found in a state and what it cost, in words.
-
-How accurately a state is solved: to a number, or as accurately as its mesh deserves.
-"""
+"""The equilibrium of a scene, its energies, and both in words."""
 
 from __future__ import annotations
 
@@ -124,40 +117,6 @@ def compute_energies(
     return Energies(strain, torn.load_work(displacement), friction, -strain - prescribed)
 
 
-def answer_in_words(
-    contact: ContactResult,
-    solution: Solution | DirectSolution,
-    energies: Energies,
-    counts: Mapping[str, int],
-) -> dict[str, str]:
-    """Return the size of a problem, its answer and the work of its solver, by name."""
-    return {
-        "unknowns": f"{counts['torn_unknowns']} in {counted(counts['subdomains'], 'subdomain')}",
-        "contact": f"{counted(contact.points.count, 'point')}, {contact.counts_in_words}",
-        "largest force": f"{np.linalg.norm(contact.force, axis=1).max(initial=0.0):.6g}",
-        "strain energy": f"{energies.strain:.6g}",
-        "total potential": f"{energies.total_potential:.6g}",
-        "work": f"{counted(counts['solver_steps'], 'step')}, "
-        f"{counted(counts['f_products'], 'product')} with F",
-        "residuals": f"natural {solution.natural_residual:.1e}, gluing {solution.gluing_residual:.1e}",
-    }
-
-
-def errors_in_words(errors: StateErrors | None) -> dict[str, str]:
-    """Return the errors of a state by name, or where to get them."""
-    if errors is None:
-        return {"errors": "not estimated yet: call state.estimate_errors()"}
-    return {f"error, {name}": words for name, words in errors.in_words.items()}
-
-
-def first_pairs(scene: Scene, contact: ContactResult, most: int = 8) -> dict[str, str]:
-    """Return a summary of the first contact pairs, and how many there are beside, by name."""
-    words = pairs_in_words(scene, contact)
-    shown = {f"contact {number}": line for number, line in enumerate(words[:most])}
-    more = len(words) - most
-    return shown | ({"more": f"{more} further contact pairs"} if more > 0 else {})
-
-
 def pairs_in_words(scene: Scene, contact: ContactResult, force: str = "", stress: str = "") -> list[str]:
     """Return a summary of each contact pair: points by status, resultants, largest pressure."""
     rows = []
@@ -266,11 +225,23 @@ class State(ABC):
         return in_lines(self, 25, 200)
 
     def _facts(self) -> dict[str, str]:
+        contact, counts, solution = self.contact, self.counts, self.solution
+        pairs = pairs_in_words(self.scene, contact)
+        shown = {f"contact {number}": line for number, line in enumerate(pairs[:8])}
+        if len(pairs) > 8:
+            shown["more"] = f"{len(pairs) - 8} further contact pairs"
         return {
-            **answer_in_words(self.contact, self.solution, self.energies, self.counts),
+            "unknowns": f"{counts['torn_unknowns']} in {counted(counts['subdomains'], 'subdomain')}",
+            "contact": f"{counted(contact.points.count, 'point')}, {contact.counts_in_words}",
+            "largest force": f"{np.linalg.norm(contact.force, axis=1).max(initial=0.0):.6g}",
+            "strain energy": f"{self.energies.strain:.6g}",
+            "total potential": f"{self.energies.total_potential:.6g}",
+            "work": f"{counted(counts['solver_steps'], 'step')}, "
+            f"{counted(counts['f_products'], 'product')} with F",
+            "residuals": f"natural {solution.natural_residual:.1e}, gluing {solution.gluing_residual:.1e}",
             "seconds": ", ".join(f"{name} {spent:.2f}" for name, spent in self.seconds.items()),
             **self._errors_in_words(),
-            **first_pairs(self.scene, self.contact),
+            **shown,
         }
 
     @abstractmethod
