@@ -22,8 +22,7 @@ from fenics_contact._large_deformations.equations import Equations, ResidualStat
 from fenics_contact._large_deformations.load_steps import AutomaticSteps, Path, PathEndsError, Snap
 from fenics_contact._large_deformations.loading import FollowingPressures, Loading, TurnedSurface
 from fenics_contact._large_deformations.moving_contact import ContactConfiguration, MovingContact
-from fenics_contact._large_deformations.newton import NotHeldError
-from fenics_contact._large_deformations.starts import Effort, NonlinearEquilibrium
+from fenics_contact._large_deformations.newton import Effort, NonlinearEquilibrium, NotHeldError
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.supports import RigidSurface
 from fenics_contact.errors import InfeasibleError, InvalidInputError, LoadStepError, together

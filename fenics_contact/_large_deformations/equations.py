@@ -15,7 +15,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._fem.composition import composition
 from fenics_contact._fem.mechanics import Mechanics, Response
-from fenics_contact._large_deformations.loading import Loading
+from fenics_contact._large_deformations.loading import Loading, RigidStart
 from fenics_contact._large_deformations.moving_contact import (
     NO_ROWS,
     Contact,
@@ -26,7 +26,6 @@ from fenics_contact._large_deformations.moving_contact import (
     unsymmetric_at,
     with_added,
 )
-from fenics_contact._large_deformations.rigid_start import RigidStart
 from fenics_contact._large_deformations.tangent import TangentSystem, linearised
 from fenics_contact._large_deformations.tangent_step import TangentProblem
 from fenics_contact._scene.scene import Scene

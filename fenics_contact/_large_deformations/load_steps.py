@@ -24,8 +24,12 @@ from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._large_deformations.equations import Configuration, Equations, Linearisation
 from fenics_contact._large_deformations.loading import Drag, Loading
 from fenics_contact._large_deformations.moving_contact import ContactConfiguration
-from fenics_contact._large_deformations.newton import NotHeldError, TangentNewton
-from fenics_contact._large_deformations.starts import Effort, NonlinearEquilibrium
+from fenics_contact._large_deformations.newton import (
+    Effort,
+    NonlinearEquilibrium,
+    NotHeldError,
+    TangentNewton,
+)
 from fenics_contact.errors import ConvergenceError, InvalidInputError, safe_log
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.reductions import global_max, global_sum

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from fenics_contact._large_deformations.load_steps import Snap
     from fenics_contact._large_deformations.loading import Loading
     from fenics_contact._large_deformations.moving_contact import ContactConfiguration
-    from fenics_contact._large_deformations.starts import NonlinearEquilibrium
+    from fenics_contact._large_deformations.newton import NonlinearEquilibrium
 
 
 @displayed

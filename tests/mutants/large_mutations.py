@@ -45,7 +45,7 @@ LARGE_MUTATIONS = (
     ),
     Mutation(
         "plastic strain goes on from every part of a load step",
-        "_large_deformations/starts.py",
+        "_large_deformations/newton.py",
         "history=origin.history, time=origin.time",
         "history=self.evaluation.history, time=origin.time",
         (f"{ONE_STEP}[metal]",),

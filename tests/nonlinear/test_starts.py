@@ -21,7 +21,7 @@ from fenics_contact import (
     Surface,
     solve_steps,
 )
-from fenics_contact._large_deformations.rigid_start import RigidStart
+from fenics_contact._large_deformations.loading import RigidStart
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import NeoHooke
 from tests.nonlinear.ironing import die
