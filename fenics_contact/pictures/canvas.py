@@ -470,8 +470,8 @@ def add_colour_bar(
 #: Images are rendered at this multiple of the resolution: matplotlib then smooths edges alike on all
 #: machines.
 SUPERSAMPLING = 2
-#: Side of the corner with the directions of the axes, relative to the smaller side of an image.
-AXES = 0.3
+#: Side of the corner with the directions of the axes, relative to the side of a square as large as the image.
+AXES = 0.2
 
 
 @dataclass(frozen=True)
@@ -516,7 +516,7 @@ def render(
                 middle = np.asarray(layer.mesh.center)
             _aim(plotter, view, frame, middle)
             if axes:
-                side = AXES * min(size) / np.array(size)
+                side = AXES * np.sqrt(size[0] * size[1]) / np.array(size)
                 ink = dict.fromkeys(("x_color", "y_color", "z_color", "color"), INK)
                 names = {"xlabel": "x", "ylabel": "y", "zlabel": "z", "label_size": (0.35, 0.14)}
                 plotter.add_axes(viewport=(0.0, 0.0, *side), line_width=3 * SUPERSAMPLING, **ink, **names)

@@ -315,7 +315,7 @@ def _in_space(
         layers.append(Layer(body.extract_surface(algorithm=None), {**paints.of_surfaces, **_LOOK}))
     frame = frame_around(view, np.concatenate([points, corners]))
     # room for the directions of the axes
-    frame = Frame(frame.low - [AXES / 2 * float(np.min(frame.size)), 0.0], frame.high)
+    frame = Frame(frame.low - [AXES / 2 * float(np.sqrt(np.prod(frame.size))), 0.0], frame.high)
     image = render(layers, view, frame, round(paints.width * WIDE), axes=True)
     parts = [_Part(frame, partial(show_image, image=image, frame=frame))]
     return parts if spot is None else [*parts, *_sections(moved(bodies, 1.0), spot, view, paints)]
@@ -327,7 +327,7 @@ def _sections(bodies: Bodies, spot: Spot, main: View, paints: Paints) -> Iterato
         frame = section_frame(section.view, spot, points_of(bodies), paints.reach)
         layers = section_layers(bodies, section, paints.of_surfaces)
         image = render(layers, section.view, frame, paints.width // 2)
-        title = f"{section.title(frame, paints.units.length)}; displacement × 1"
+        title = f"{section.title(frame, paints.units.length)}\ndisplacement × 1"
         yield _Part(frame, partial(_draw_section, image, frame, title, section.view, paints.units))
 
 

@@ -130,6 +130,6 @@ def test_sections_have_axes_with_coordinates(tmp_path: Path, monkeypatch: pytest
     plot_stress(cut_model("x0 y1"), tmp_path / "stress.png", width=320)
     # Which comes first is rounding: both have the same stress.
     first, second = sorted(drawn)
-    assert first[0] == "section at x = 0 mm; displacement × 1"
+    assert first[0] == "section at x = 0 mm\ndisplacement × 1"
     assert first[1:] == ("y (mm), runs to the left: seen from −x", "z (mm)")
-    assert second == ("section at y = 1 mm; displacement × 1", "x (mm)", "z (mm)")
+    assert second == ("section at y = 1 mm\ndisplacement × 1", "x (mm)", "z (mm)")
