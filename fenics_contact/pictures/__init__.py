@@ -3,6 +3,18 @@
 Three-dimensional parts are rendered by pyvista; matplotlib adds titles, colour bars and diagrams, and draws
 plane bodies. On several ranks the fields are gathered by all and drawn by rank 0. Every ``plot_`` function
 returns a `Picture`, which Jupyter shows and which is written to a file if a path is given.
+
+Arguments that they share:
+
+* ``path``: PNG file to write, None to write none,
+* ``title``: text before the facts in the title,
+* ``units``: names of the units in titles and labels, mm, N and MPa unless given,
+* ``width``: width of the picture in pixels,
+* ``comm``, of functions that take no state: if given, the call is collective, only rank 0 draws, and an error
+  is raised on all ranks.
+
+All raise `InvalidInputError` if an option or the name of the file cannot be used, those that draw in space
+`MissingRequirementError` if this machine cannot render.
 """
 
 from fenics_contact.pictures import _libraries  # noqa: F401

@@ -64,25 +64,15 @@ def plot_curves(
 
     Args:
         series: Name -> abscissas and ordinates, computed or measured. NaN leaves a gap.
-        path: PNG file to write, None to write none.
         xlabel: Label of the abscissas with unit.
         ylabel: Label of the ordinates with unit.
         reference: Name -> abscissas and ordinates of the reference curves.
         connected: Whether to connect the points of a series in their order.
         logarithmic: Whether both axes are logarithmic, for convergence; "y" for the ordinates alone.
-        title: Title.
-        width: Width of the picture in pixels.
-        comm: If given, only rank 0 draws, and an error is raised on all ranks.
-
-    Returns:
-        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If there is nothing to draw, or a curve has different numbers of abscissas and
             ordinates.
-
-    Note:
-        Collective on ``comm`` if given.
 
     Example:
         >>> shear = {"computed": ([0.0, 1.0], [0.0, 2.0])}

@@ -97,17 +97,10 @@ def plot_before_after(
     Args:
         first: State before, or the design point, for instance ``problem.first``.
         best: State after, or the design point, for instance ``problem.best``.
-        path: PNG file to write, None to write none.
         pair: Number of the contact pair in the scene.
         clim: Range of the pressure, [force / length²]; from zero to the largest of both unless given.
         reach: How far pictures reach around the contact's middle, [length]; chosen unless given.
         label: Name of the objective with its unit.
-        title: Text before the facts in the title.
-        units: Names of the units, mm, N and MPa unless given.
-        width: Width of the picture in pixels.
-
-    Returns:
-        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If the two do not belong to the same scene, it has no such pair, nothing touches
@@ -317,23 +310,11 @@ def plot_control_net(
         design: Nodes of the surface, their order and outward normals.
         points: The body's nodes before and after, (n_nodes, 3 | 2) each, [length].
         net: Control points before and after, (n_s, n_t, 3) or in the plane (n_s, 2) each, [length].
-        path: PNG file to write, None to write none.
         clim: Range of the colours, [length]; symmetric about zero unless given.
         magnify: Factor of the movement in the picture of after; chosen and stated unless given.
-        title: Text before the facts in the title.
-        units: Names of the units, mm, N and MPa unless given.
-        width: Width of the picture in pixels.
-        comm: If given, only rank 0 draws, and an error is raised on all ranks.
-
-    Returns:
-        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If arrays are inconsistent or not finite, or an option cannot be used.
-        MissingRequirementError: If this machine cannot render.
-
-    Note:
-        Collective on ``comm`` if given.
     """
     target, dim = png_path(path), design.directions.shape[1]
     points = _checked_net("points", points, ("n_nodes",), dim)
@@ -496,21 +477,11 @@ def plot_convergence(
     Args:
         values: Objective of each trial point in the order of evaluation, (n,); NaN where it was rejected.
         kinds: Outcome of each: "start", "serious", "null", "rejected" or "refined"; needed.
-        path: PNG file to write, None to write none.
         label: Name of the objective, with its unit.
-        title: Text before the facts in the title.
         logarithmic: Draw a positive objective logarithmically, so that a trial far off does not dominate.
-        width: Width of the picture in pixels.
-        comm: If given, only rank 0 draws, and an error is raised on all ranks.
-
-    Returns:
-        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If the arrays are inconsistent or hold no start.
-
-    Note:
-        Collective on ``comm`` if given.
     """
     target = png_path(path)
     objective, kind = _checked(values, kinds)

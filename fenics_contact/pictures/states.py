@@ -96,17 +96,10 @@ def plot_decomposition(
     Args:
         scene: The bodies.
         partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
-        path: PNG file to write, None to write none.
         explode: Shrinkage of each subdomain towards its centre, from 0 (whole bodies) to below 1.
-        width: Width of the picture in pixels.
-        comm: If given, only rank 0 draws, and an error is raised on all ranks; collective then.
-
-    Returns:
-        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If a partition does not fit its body or ``explode`` is out of range.
-        MissingRequirementError: If this machine cannot render.
     """
     target = png_path(path)
     if not 0.0 <= explode < 1.0:
@@ -214,7 +207,6 @@ def plot_stress(
 
     Args:
         state: The state.
-        path: PNG file to write, None to write none.
         clim: Range of the colours, [force / length²]; from zero to the 99.5 % quantile unless given. Give two
             pictures the same range to compare them.
         scale: Factor of the displacement in the upper picture; chosen and stated unless given, 1 where there
@@ -222,16 +214,9 @@ def plot_stress(
         sections: Whether to draw the sections, if a contact carries force.
         reach: How far sections reach up and down from the contact's middle, [length]; chosen unless given.
         smooth: Whether to show nodal means instead of cell values.
-        title: Text before the facts in the title.
-        units: Names of the units, mm, N and MPa unless given.
-        width: Width of the picture in pixels.
-
-    Returns:
-        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If an option or the name of the file cannot be used.
-        MissingRequirementError: If this machine cannot render.
 
     Example:
         >>> plot_stress(state, "output/stress.png", clim=(0, 400), scale=50)  # doctest: +SKIP
@@ -274,18 +259,10 @@ def plot_field(
         bodies: Name -> body with its fields.
         field: Name of the field: that in the file, with the name of a component for stresses, as in
             "stress_xx" and "principal_stress_1", and for vectors, as in "displacement_x".
-        path: PNG file to write, None to write none.
         scale: Factor of the displacement.
-        title: Text before the facts in the title.
-        units: Names of the units, mm, N and MPa unless given.
-        width: Width of the picture in pixels.
-
-    Returns:
-        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If there is no such field, or an option or the name of the file cannot be used.
-        MissingRequirementError: If this machine cannot render.
     """
     target, named = png_path(path), units or Units()
     checked_scale(scale)
@@ -355,24 +332,16 @@ def plot_error(
 
     Args:
         state: The state.
-        path: PNG file to write, None to write none.
         by_cell: Body name -> part of each cell relative to that norm, shape (n_cells,); estimated unless
             given, see `accuracy.discretisation_error`.
         clim: Range of the colours, positive; up to the largest part and down to a ten thousandth of it, or
             the smallest, unless given. Give two pictures the same range to compare them.
         sections: Whether to draw the sections, if a contact carries force.
         reach: How far sections reach up and down from the contact's middle, [length]; chosen unless given.
-        title: Text before the facts in the title.
-        units: Names of the units, mm, N and MPa unless given.
-        width: Width of the picture in pixels.
-
-    Returns:
-        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If the number of parts is not that of the cells, or an option or the name of the
             file cannot be used.
-        MissingRequirementError: If this machine cannot render.
     """
     target = png_path(path)
     checked_reach(reach)
@@ -432,15 +401,8 @@ def plot_contact_status(
 
     Args:
         states: Name -> state of a scene in space, for instance after each load step.
-        path: PNG file to write, None to write none.
         pair: Number of the contact pair in the scenes.
         reach: How far a map reaches around the contact's middle, [length]; chosen unless given.
-        title: Title.
-        units: Names of the units, mm, N and MPa unless given.
-        width: Width of the picture in pixels.
-
-    Returns:
-        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If there is no state, one has no such pair, or one is plane.
@@ -536,17 +498,10 @@ def plot_contact_pressure(
 
     Args:
         state: The state.
-        path: PNG file to write, None to write none.
         pair: Number of the contact pair in the scene.
         clim: Range of the pressure, [force / length²]; from zero to the largest pressure unless given. Give
             two pictures the same range to compare them.
         reach: How far the picture reaches around the contact's middle, [length]; chosen unless given.
-        title: Text before the facts in the title.
-        units: Names of the units, mm, N and MPa unless given.
-        width: Width of the picture in pixels.
-
-    Returns:
-        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If the scene has no such pair, or a range or the name of the file cannot be used.
