@@ -1,7 +1,4 @@
-"""The equilibrium of a torn system with nonlinear materials: its residuals and its linearisation.
-
-How far a configuration is from equilibrium, relative to its forces and displacements.
-"""
+"""The equilibrium of a torn system with nonlinear materials: its relative residuals and its linearisation."""
 
 from __future__ import annotations
 

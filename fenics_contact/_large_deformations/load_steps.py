@@ -1,11 +1,10 @@
-"""Automatic load steps: from one load to the next as fast as Newton's method follows.
+"""Automatic load steps, from one load to the next as fast as Newton's method follows, and snapping.
 
-Snapping: where no equilibrium is near, bodies move on through a viscous medium until they rest again.
-
-With the load as it is, stages u₀, u₁, ... satisfy r(uₖ₊₁) = α D (uₖ₊₁ − uₖ), with the forces out of balance r
-and the diagonal D of the tangents at rest: for a large α the tangent K + α D is stable, for a small one a
-stage is Newton's method. α falls while stages succeed and rises where they fail; where the drag is little,
-Newton's method finds the equilibrium without it.
+Where no equilibrium is near, bodies move on through a viscous medium until they rest again. With the load
+as it is, stages u₀, u₁, ... satisfy r(uₖ₊₁) = α D (uₖ₊₁ − uₖ), with the forces out of balance r and the
+diagonal D of the tangents at rest: for a large α the tangent K + α D is stable, for a small one a stage is
+Newton's method. α falls while stages succeed and rises where they fail; where the drag is little, Newton's
+method finds the equilibrium without it.
 """
 
 from __future__ import annotations

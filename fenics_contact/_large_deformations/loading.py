@@ -1,4 +1,4 @@
-"""What acts on the bodies, at the end of a load step and on the way there."""
+"""What acts on the bodies, at the end of a load step and on the way there, and where supports take them."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Forces that turn with their surfaces: how they change as these do.
-
-Contact points: those of the undeformed bodies, or wherever bodies have moved to.
-"""
+"""Contact points of undeformed or moved bodies, and the change of forces that turn with surfaces."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""Factors of symmetric matrices that may be indefinite.
-
-A subdomain under stress: its tangent may be indefinite, and rigid motions have a stiffness.
-
-The dual of a linearised torn system, in which rigid motions may have a stiffness.
-"""
+"""The dual of a linearised torn system: tangents may be indefinite, and rigid motions have a stiffness."""
 
 from __future__ import annotations
 

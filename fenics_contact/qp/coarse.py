@@ -1,9 +1,4 @@
-"""The equilibrium constraint G lambda = e of the floating subdomains and the projector it defines.
-
-Generalised inverses of symmetric positive semidefinite matrices, dense or sparse.
-
-Inverse of the unsymmetric matrix of a coarse space, dense while small, else sparse on a few ranks.
-"""
+"""The equilibrium constraint G λ = e of floating subdomains, the projector it defines, and its inverses."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The set Λ(Ψ) of admissible multipliers: λ_N ≥ 0 and ‖τ_i‖ ≤ Ψ_i, one disc per frictional contact.
-
-Slip bounds of discs: given (Tresca) or from the normal force (Coulomb).
-"""
+"""Admissible multipliers: λ_N ≥ 0 and discs ‖τ_i‖ ≤ Ψ_i, with bounds by Tresca's or Coulomb's law."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Semismooth Newton on faces: predict the active constraints, solve the linear face, correct them.
-
-Bodies that contact and friction could hold in terms of forces, but do not once they deform.
-"""
+"""Semismooth Newton on faces: its state, steps and stopping rules, and the test whether friction suffices."""
 
 from __future__ import annotations
 

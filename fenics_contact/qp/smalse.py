@@ -1,9 +1,4 @@
-"""SMALSE-M: equilibrium by an augmented Lagrangian, bounds and discs by MPGP inside. Robust but slow.
-
-MPGP: conjugate gradients and gradient projections for a quadratic on half lines and discs.
-
-The augmented Lagrangian of the dual problem, scaled so that its Hessian has norm 1.
-"""
+"""SMALSE-M: equilibrium by an augmented Lagrangian, bounds and discs by MPGP inside. Robust but slow."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The result of a dual solver: the multiplier, its residuals, and the history.
-
-A multiplier with its product and residuals: start, iterates and certified result of a solve.
-"""
+"""A multiplier with its product and residuals: start, iterates, certified solution, history of a solve."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The common entry point for all dual problems and dual solvers.
-
-Whether bounds and friction can balance the load at all: depends on G, e and the cone only, not on F.
-"""
+"""The common entry point for all dual problems and solvers, and whether any force balances the load."""
 
 from __future__ import annotations
 
