@@ -16,14 +16,14 @@ import numpy as np
 import pytest
 
 import fenics_contact
-from fenics_contact import LoadSequence, Scene, ShapeProblem, State
+from fenics_contact import LinearState, LoadSequence, Scene, ShapeProblem
 from fenics_contact.design import Result
 from fenics_contact.output import ResultSeries
 
 #: Classes of what skipped examples take for given, where they ask it for an attribute.
 CLASSES = {
     "scene": Scene,
-    "state": State,
+    "state": LinearState,
     "steps": LoadSequence,
     "series": ResultSeries,
     "problem": ShapeProblem,
@@ -48,6 +48,7 @@ GIVEN = {
     "response",
     "start",
     "steel",
+    "sweep",
     "weight",
     "zinc",
 }
