@@ -72,7 +72,7 @@ def launcher(ranks: int) -> list[str]:
 
 
 @dataclass(frozen=True)
-class Ending:
+class FinishedProcess:
     """How a process ended.
 
     Attributes:
@@ -90,7 +90,7 @@ def finished(
     *,
     environment: Mapping[str, str] | None = None,
     folder: Path | None = None,
-) -> Ending:
+) -> FinishedProcess:
     """Run a command in a session of its own, free of the traces of MPI, and wait for its end."""
     process = subprocess.Popen(
         command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -98,10 +98,10 @@ def finished(
     )  # fmt: skip
     try:
         output, errors = process.communicate(timeout=limit)
-        return Ending(process.returncode, output, errors)
+        return FinishedProcess(process.returncode, output, errors)
     except subprocess.TimeoutExpired:
         _end(process)
-        return Ending(None, *process.communicate())
+        return FinishedProcess(None, *process.communicate())
     except BaseException:  # an interrupt from the keyboard does not reach a session of its own
         _end(process)
         process.communicate()

@@ -166,7 +166,7 @@ def _circle(centre: np.ndarray, axes: tuple[np.ndarray, np.ndarray], radius: flo
 
 
 @dataclass(frozen=True)
-class Paints:
+class ColouredField:
     """The content of a picture of a field, apart from the bodies.
 
     Attributes:
@@ -185,13 +185,13 @@ class Paints:
 
     def on(self, bodies: Mapping[str, pv.UnstructuredGrid]) -> dict[str, pv.UnstructuredGrid]:
         """Return the bodies with the field ``shown``, the values in terms of the colours, 0 to 1."""
-        painted = {}
+        coloured = {}
         for name, body in bodies.items():
             shown = np.ma.filled(self.norm(self.values[name], clip=False), 0.0)
-            painted[name] = body.copy(deep=False)
-            data = painted[name].point_data if len(shown) == body.n_points else painted[name].cell_data
+            coloured[name] = body.copy(deep=False)
+            data = coloured[name].point_data if len(shown) == body.n_points else coloured[name].cell_data
             data["shown"] = shown
-        return painted
+        return coloured
 
     def add_bar(self, figure: Figure, panels: Iterable[Axes]) -> None:
         """Add a colour bar next to axes; its ends are pointed where values lie beyond."""
@@ -228,9 +228,9 @@ class _Part:
     draw: Callable[[Axes], None]
 
 
-def paint(
+def draw_field_on_bodies(
     bodies: Bodies,
-    paints: Paints,
+    field: ColouredField,
     path: Path | None,
     *,
     obstacles: list[SurfaceShape],
@@ -241,94 +241,94 @@ def paint(
 
     Args:
         bodies: Undeformed bodies with linear cells and, if they moved, their ``displacement``.
-        paints: The field.
+        field: The field.
         path: PNG file to write, or None.
         obstacles: Rigid obstacles to draw beside them.
         spot: The contact of which a detail is drawn, in space two sections; None for no detail.
         comm: Communicator, None if this rank draws for itself.
     """
-    painted = paints.on(bodies)
+    coloured = field.on(bodies)
     plane = all(map(is_plane, bodies.values()))
     parts_of = _in_plane if plane else _in_space
     return draw_picture(
-        comm, path, lambda paper: _draw(parts_of(painted, obstacles, spot, paints), paper, paints)
+        comm, path, lambda paper: _draw(parts_of(coloured, obstacles, spot, field), paper, field)
     )
 
 
-def _draw(parts: Sequence[_Part], paper: BinaryIO, paints: Paints) -> None:
+def _draw(parts: Sequence[_Part], paper: BinaryIO, field: ColouredField) -> None:
     """Place details below the main part, or beside it where that is not wide."""
     main, *details = parts
     beside = len(details) == 1 and main.frame.proportion < 2.2
     rows = [[*parts]] if beside or not details else [[main], details]
     wide = [part.frame.proportion for part in rows[-1]]
     high = [min(WIDE / sum(part.frame.proportion for part in row), 0.5) for row in rows]
-    height = round(float(np.clip(sum(high) + 0.09 * len(rows), 0.3, 1.3)) * paints.width)
+    height = round(float(np.clip(sum(high) + 0.09 * len(rows), 0.3, 1.3)) * field.width)
     names = [[str(parts.index(part)) for part in row] for row in rows]
     names[0] *= len(wide) // len(names[0])
-    with sheet(paper, (paints.width, height), paints.headline) as figure:
+    with sheet(paper, (field.width, height), field.headline) as figure:
         panels = figure.subplot_mosaic(names, width_ratios=wide, height_ratios=high)
         for number, part in enumerate(parts):
             part.draw(panels[str(number)])
-        paints.add_bar(figure, panels.values())
+        field.add_bar(figure, panels.values())
 
 
 def _in_plane(
-    bodies: Bodies, obstacles: list[SurfaceShape], spot: Spot | None, paints: Paints
+    bodies: Bodies, obstacles: list[SurfaceShape], spot: Spot | None, field: ColouredField
 ) -> list[_Part]:
     """All bodies, and the contact if it is small."""
-    everything = moved(bodies, paints.scale)
+    everything = moved(bodies, field.scale)
     frame = frame_around(IN_PLANE, points_of(everything), 0.04)
-    parts = [_Part(frame, partial(_draw_plane, everything, obstacles, frame, paints, ""))]
+    parts = [_Part(frame, partial(_draw_plane, everything, obstacles, frame, field, ""))]
     if spot is not None:
-        half = REACH * spot.radius if paints.reach is None else paints.reach
+        half = REACH * spot.radius if field.reach is None else field.reach
         detail = Frame(spot.centre - half, spot.centre + half)
         if 2 * half < LARGEST_DETAIL * float(np.max(frame.size)) / 1.08:
             words, true = "where they touch; displacement × 1", moved(bodies, 1.0)
-            parts.append(_Part(detail, partial(_draw_plane, true, obstacles, detail, paints, words)))
+            parts.append(_Part(detail, partial(_draw_plane, true, obstacles, detail, field, words)))
     return parts
 
 
 def _draw_plane(
-    bodies: Bodies, obstacles: list[SurfaceShape], frame: Frame, paints: Paints, title: str, axes: Axes
+    bodies: Bodies, obstacles: list[SurfaceShape], frame: Frame, field: ColouredField, title: str, axes: Axes
 ) -> None:
     shade_obstacles(axes, obstacles, frame)
-    look = {"cmap": paints.colours, "vmin": 0.0, "vmax": 1.0}
+    look = {"cmap": field.colours, "vmin": 0.0, "vmax": 1.0}
     for body in bodies.values():
         points, cells = np.asarray(body.points)[:, :2], cells_of(body)
         draw_field(axes, points, cells, np.asarray(body["shown"]), look)
         draw_cell_edges(axes, points, cells, frame)
         draw_outline(axes, points, cells)
-    unit = paints.units.length
+    unit = field.units.length
     axes.set(title=title, xlabel=f"x ({unit})", ylabel=f"y ({unit})")
     frame.fit(axes)
 
 
 def _in_space(
-    bodies: Bodies, obstacles: list[SurfaceShape], spot: Spot | None, paints: Paints
+    bodies: Bodies, obstacles: list[SurfaceShape], spot: Spot | None, field: ColouredField
 ) -> list[_Part]:
     """All bodies, and two sections through the contact on axes of their own."""
-    everything = moved(bodies, paints.scale)
+    everything = moved(bodies, field.scale)
     points = points_of(everything)
     view = oblique_view(points)
     layers, corners = obstacle_layers(obstacles, points, view)
     for body in everything.values():
-        layers.append(Layer(body.extract_surface(algorithm=None), {**paints.of_surfaces, **_LOOK}))
+        layers.append(Layer(body.extract_surface(algorithm=None), {**field.of_surfaces, **_LOOK}))
     frame = frame_around(view, np.concatenate([points, corners]))
     # room for the directions of the axes
     frame = Frame(frame.low - [AXES / 2 * float(np.sqrt(np.prod(frame.size))), 0.0], frame.high)
-    image = render(layers, view, frame, round(paints.width * WIDE), axes=True)
+    image = render(layers, view, frame, round(field.width * WIDE), axes=True)
     parts = [_Part(frame, partial(show_image, image=image, frame=frame))]
-    return parts if spot is None else [*parts, *_sections(moved(bodies, 1.0), spot, view, paints)]
+    return parts if spot is None else [*parts, *_sections(moved(bodies, 1.0), spot, view, field)]
 
 
-def _sections(bodies: Bodies, spot: Spot, main: View, paints: Paints) -> Iterator[_Part]:
+def _sections(bodies: Bodies, spot: Spot, main: View, field: ColouredField) -> Iterator[_Part]:
     """Render two sections through a contact, to be shown on axes with coordinates."""
     for section in sections_of(spot, main):
-        frame = section_frame(section.view, spot, points_of(bodies), paints.reach)
-        layers = section_layers(bodies, section, paints.of_surfaces)
-        image = render(layers, section.view, frame, paints.width // 2)
-        title = f"{section.title(frame, paints.units.length)}\ndisplacement × 1"
-        yield _Part(frame, partial(_draw_section, image, frame, title, section.view, paints.units))
+        frame = section_frame(section.view, spot, points_of(bodies), field.reach)
+        layers = section_layers(bodies, section, field.of_surfaces)
+        image = render(layers, section.view, frame, field.width // 2)
+        title = f"{section.title(frame, field.units.length)}\ndisplacement × 1"
+        yield _Part(frame, partial(_draw_section, image, frame, title, section.view, field.units))
 
 
 def _draw_section(image: np.ndarray, frame: Frame, title: str, view: View, units: Units, axes: Axes) -> None:

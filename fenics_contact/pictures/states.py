@@ -47,7 +47,7 @@ from fenics_contact.pictures.canvas import (
     written,
 )
 from fenics_contact.pictures.curves import contact_trace
-from fenics_contact.pictures.drawing import Paints, obstacles_of, paint
+from fenics_contact.pictures.drawing import ColouredField, draw_field_on_bodies, obstacles_of
 from fenics_contact.pictures.section import (
     Bodies,
     Spot,
@@ -238,9 +238,11 @@ def plot_stress(
     norm = Normalize(*(given or (0.0, rounded_up(float(np.quantile(by_cell, QUANTILE))))))
     words = headline(title, f"{facts}; displacement × {factor:g}")
     label = f"von Mises stress ({named.stress})"
-    paints = Paints(values, STRESS_MAP, norm, label, words, factor, reach, named, width)
+    coloured = ColouredField(values, STRESS_MAP, norm, label, words, factor, reach, named, width)
     spot = contact_spot(state, bodies) if sections else None
-    return paint(bodies, paints, target, obstacles=obstacles, spot=spot, comm=state.torn.decomposition.comm)
+    return draw_field_on_bodies(
+        bodies, coloured, target, obstacles=obstacles, spot=spot, comm=state.torn.decomposition.comm
+    )
 
 
 def plot_field(
@@ -279,10 +281,10 @@ def plot_field(
     facts = f"{entry['label']}, {written(ends[0])} to {written(ends[1])} {entry['unit']}".rstrip()
     colours = SIGNED_MAP if entry["colours"] == "signed" else STRESS_MAP
     words = headline(title, f"{facts}; displacement × {scale:g}")
-    paints = Paints(
+    coloured = ColouredField(
         values, colours, Normalize(*entry["range"]), label, words, float(scale), None, named, width
     )
-    return paint(bodies, paints, target, obstacles=[])
+    return draw_field_on_bodies(bodies, coloured, target, obstacles=[])
 
 
 def checked_scale(scale: float) -> None:
@@ -360,10 +362,10 @@ def plot_error(
     bodies, named = drawn_bodies(state), units or Units()
     shown = {name: np.repeat(part, bodies[name].n_cells // len(part)) for name, part in parts.items()}
     words, label = headline(title, facts), "part of a cell, relative"
-    paints = Paints(shown, ERROR_MAP, LogNorm(*ends), label, words, 1.0, reach, named, width)
+    coloured = ColouredField(shown, ERROR_MAP, LogNorm(*ends), label, words, 1.0, reach, named, width)
     spot = contact_spot(state, bodies) if sections else None
     comm = state.torn.decomposition.comm
-    return paint(bodies, paints, target, obstacles=obstacles_of(state), spot=spot, comm=comm)
+    return draw_field_on_bodies(bodies, coloured, target, obstacles=obstacles_of(state), spot=spot, comm=comm)
 
 
 def _checked(name: str, cells: int, by_cell: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -18,7 +18,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, TextIO
 
-from fenics_contact._base.launching import Ending, finished, last_words, launcher
+from fenics_contact._base.launching import FinishedProcess, finished, last_words, launcher
 from fenics_contact._base.progress import Task, duration, show_progress
 from fenics_contact.output.files import write_json
 from fenics_contact.output.result import versions
@@ -117,7 +117,7 @@ def _read(file: Path) -> Any:
         return None
 
 
-def _failure(command: list[str], ending: Ending, limit: float) -> dict[str, str]:
+def _failure(command: list[str], ending: FinishedProcess, limit: float) -> dict[str, str]:
     if ending.status is None:
         return {"kind": "timeout", "message": f"it did not end within {limit:g} s and was ended"}
     words = last_words(command, ending.output + ending.errors)
