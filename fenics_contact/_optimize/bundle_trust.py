@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_contact._base.checkpoint import Checkpoint
 from fenics_contact._optimize.bundle import Bundle, SubproblemError
-from fenics_contact._optimize.constraints import Bounds, Constraints
+from fenics_contact._optimize.constraints import Box, Constraints
 from fenics_contact._optimize.merit import (
     correcting_step,
     first_soft,
@@ -532,7 +532,7 @@ def minimize(
     x0: ArrayLike,
     method: BundleTrust | None = None,
     *,
-    bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
+    bounds: Box | None = None,
     constraints: Constraints | None = None,
     scale: ArrayLike | None = None,
     restore: bool = False,
@@ -550,7 +550,7 @@ def minimize(
             raises `InvalidDesignError`, and a shorter step is tried.
         x0: Feasible starting point, shape (n,).
         method: Parameters; None for the default ones.
-        bounds: Box, or a pair (lower, upper), or None.
+        bounds: Pair (lower, upper), numbers or shape (n,), or SciPy's Bounds; None for no box.
         constraints: `LinearConstraints`, `NonlinearConstraint`, SciPy's of either kind, or a list of them.
             All are met at the stop, linear ones and, after corrections, equalities at every point tried.
         scale: Size of each variable, shape (n,) or a number. None takes the widths of the box where it is

@@ -70,6 +70,8 @@ def _elastic(rows: Array, limits: Array, equal: NDArray[np.bool_], *, rounding: 
     return [int(k) for k in np.flatnonzero(pushes > rounding)]
 
 
+#: A box lower ≤ x ≤ upper: a pair, numbers or shape (n,), ±inf where there is no bound; or SciPy's Bounds.
+Box: TypeAlias = "tuple[ArrayLike, ArrayLike] | scipy.optimize.Bounds"
 #: A constraint, as this package or as SciPy writes it.
 Constraint: TypeAlias = (
     "LinearConstraints | NonlinearConstraint | scipy.optimize.LinearConstraint |"
@@ -91,20 +93,6 @@ def _frozen(values: ArrayLike, name: str, dimensions: int) -> Array:
         raise InvalidInputError(f"{name} must hold numbers, got nan at {np.argwhere(np.isnan(array))[0]}")
     array.setflags(write=False)
     return array
-
-
-@displayed
-@dataclass(frozen=True)
-class Bounds:
-    """The box lower ≤ x ≤ upper; ±inf where there is no bound.
-
-    Attributes:
-        lower: Shape (n,), or a number for all variables.
-        upper: Shape (n,), or a number for all variables.
-    """
-
-    lower: ArrayLike
-    upper: ArrayLike
 
 
 @displayed
@@ -262,7 +250,7 @@ def _residual(matrix: Array, limit: Array, x: Array) -> tuple[Array, Array]:
 
 def feasible_set(
     n: int,
-    bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
+    bounds: Box | None = None,
     constraints: Constraints | None = None,
 ) -> FeasibleSet:
     """Check the caller's constraints and fill in the defaults.
@@ -330,9 +318,10 @@ def _what_to_give(given: Any) -> str:
     )
 
 
-def _box(n: int, bounds: Bounds | tuple[ArrayLike, ArrayLike] | None) -> tuple[Array, Array]:
-    box = Bounds(-np.inf, np.inf) if bounds is None else bounds
-    pair = (box.lower, box.upper) if isinstance(box, Bounds) else box
+def _box(n: int, bounds: Box | None) -> tuple[Array, Array]:
+    pair: Any = (-np.inf, np.inf) if bounds is None else bounds
+    if hasattr(pair, "lb"):  # SciPy's, whose numbers for all variables have shape (1,)
+        pair = tuple(np.squeeze(side) if np.size(side) == 1 else side for side in (pair.lb, pair.ub))
     if len(pair) != 2:
         raise InvalidInputError(f"bounds must be a pair (lower, upper), got {len(pair)} entries")
     for name, side in zip(("lower", "upper"), pair, strict=True):
@@ -365,14 +354,14 @@ def _rows(n: int, matrix: ArrayLike, limit: ArrayLike, name: str, right: str) ->
 
 def nearest_feasible(
     x: ArrayLike,
-    bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
+    bounds: Box | None = None,
     constraints: Constraints | None = None,
 ) -> Array:
     """Return the feasible point nearest to x in the Euclidean norm.
 
     Args:
         x: Any point, shape (n,).
-        bounds: Box, or None.
+        bounds: Pair (lower, upper), SciPy's Bounds, or None.
         constraints: Rows, or None.
 
     Returns:

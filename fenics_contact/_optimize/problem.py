@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_contact._base.display import displayed
-from fenics_contact._optimize.constraints import Bounds, Constraints, FeasibleSet, feasible_set
+from fenics_contact._optimize.constraints import Box, Constraints, FeasibleSet, feasible_set
 from fenics_contact._optimize.nonlinear import (
     NonlinearConstraint,
     Scaled,
@@ -119,7 +119,7 @@ class PosedProblem:
 def pose(
     fun: Fun,
     x0: ArrayLike,
-    bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
+    bounds: Box | None = None,
     constraints: Constraints | None = None,
     scale: ArrayLike | None = None,
     *,

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_contact._base.display import displayed
 from fenics_contact._optimize.bundle import unit_rows
-from fenics_contact._optimize.constraints import Bounds, Constraints
+from fenics_contact._optimize.constraints import Box, Constraints
 from fenics_contact._optimize.nonlinear import NonlinearConstraint, scaled_constraints
 from fenics_contact._optimize.objective import Evaluation, Fun, evaluate, require_finite
 from fenics_contact._optimize.problem import evaluate_constraint, pose
@@ -79,7 +79,7 @@ class ForScipy:
         fun: Fun,
         x0: ArrayLike,
         *,
-        bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
+        bounds: Box | None = None,
         constraints: Constraints | None = None,
         scale: ArrayLike | None = None,
         value: Callable[[Array], float] | None = None,
@@ -90,7 +90,7 @@ class ForScipy:
         Args:
             fun: Returns J(x) and one subgradient; raises `InvalidDesignError` where there is none.
             x0: Feasible starting point, shape (n,).
-            bounds: Box, or a pair (lower, upper), or None.
+            bounds: Pair (lower, upper), numbers or shape (n,), or SciPy's Bounds; None for no box.
             constraints: As for `minimize`; nonlinear ones may be violated at the start and on the way.
             scale: Size of each variable, as for `minimize`.
             value: J(x) alone, where that is cheaper (`ShapeProblem.value_of`), for methods that take no

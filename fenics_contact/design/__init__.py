@@ -3,7 +3,7 @@
 from fenics_contact._base.checkpoint import Checkpoint
 from fenics_contact._base.files import CheckpointError
 from fenics_contact._optimize.bundle_trust import BundleTrust
-from fenics_contact._optimize.constraints import Bounds, LinearConstraints, nearest_feasible
+from fenics_contact._optimize.constraints import LinearConstraints, nearest_feasible
 from fenics_contact._optimize.manufacture import convex, fixed_rim, monotone, smallest_radius, symmetric
 from fenics_contact._optimize.nonlinear import NonlinearConstraint
 from fenics_contact._optimize.objective import Kinked, Pieced
@@ -32,7 +32,6 @@ from fenics_contact.design.several import LoadCases, LoadPath
 __all__ = [
     "AdaptiveTolerance",
     "Adjoint",
-    "Bounds",
     "BundleTrust",
     "Checkpoint",
     "CheckpointError",

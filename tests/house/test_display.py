@@ -53,7 +53,6 @@ from fenics_contact._base.display import COLUMNS, LINES, displayed, in_lines
 from fenics_contact._optimize.problem import pose
 from fenics_contact.design import (
     AdaptiveTolerance,
-    Bounds,
     BundleTrust,
     Checkpoint,
     ContactArea,
@@ -139,7 +138,7 @@ def objects() -> dict[str, Any]:
         *shape.geometry.motions, LoadCases({"one": shape}), path, followed,
         Remeshed(shape), Remeshing(np.zeros(60), 1.0, 1.1),
         RigidMotion(Surface("block", "z1"), np.zeros(3), np.ones(3), np.arange(3.0)),
-        limits, Bounds(np.zeros(60), np.ones(60)), BundleTrust(),
+        limits, BundleTrust(),
         minimize(bowl, np.ones(60), constraints=NonlinearConstraint(bowl, 90.0, name="size")),
         NonlinearConstraint(bowl, 90.0), Checkpoint("run.npz"), search,
         pose(bowl, np.zeros(60), constraints=limits),

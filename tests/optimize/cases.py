@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.design import Bounds, LinearConstraints, nearest_feasible
+from fenics_contact.design import LinearConstraints, nearest_feasible
 from tests.optimize.functions import (
     COLVILLE_A,
     COLVILLE_B,
@@ -58,7 +58,7 @@ class Case:
     start: Array
     minimum: float
     most_evaluations: int
-    bounds: Bounds | None = None
+    bounds: tuple[Array, Array] | None = None
     constraints: LinearConstraints | None = None
 
 
@@ -140,7 +140,7 @@ CONSTRAINED = (
         np.array([0.0, 0, 0, 0, 1]),
         -32.348679,
         30,
-        bounds=Bounds(np.zeros(5), np.full(5, np.inf)),
+        bounds=(np.zeros(5), np.full(5, np.inf)),
         constraints=LinearConstraints(-COLVILLE_A, -COLVILLE_B),
     ),
 )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenics_contact import minimize
-from fenics_contact.design import Bounds, LinearConstraints
+from fenics_contact.design import LinearConstraints
 from fenics_contact.errors import InvalidInputError
 
 
@@ -21,7 +21,7 @@ def bowl(x: np.ndarray) -> tuple[float, np.ndarray]:
     [
         ({"bounds": (0.0, 1.0, 2.0)}, r"pair \(lower, upper\), got 3"),
         ({"bounds": (np.zeros(3), 1.0)}, r"lower bound must have shape \(2,\) like x0, got \(3,\)"),
-        ({"bounds": Bounds(-5.0, [np.nan, 1.0])}, "upper bound must hold numbers, got nan"),
+        ({"bounds": (-5.0, [np.nan, 1.0])}, "upper bound must hold numbers, got nan"),
         ({"bounds": ([0.0, 3.0], 2.0)}, r"lower bounds must not exceed.*3 > 2 for x\[1\]"),
         ({"bounds": (2.0, 9.0)}, r"x\[0\] = 1 is below its lower bound 2.*nearest_feasible"),
         ({"bounds": (-9.0, [9.0, 0.5])}, r"x\[1\] = 1 is above its upper bound 0.5"),

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fenics_contact._optimize.constraints import contradicting, feasible_set
-from fenics_contact.design import Bounds, LinearConstraints, nearest_feasible
+from fenics_contact.design import LinearConstraints, nearest_feasible
 from fenics_contact.errors import InvalidInputError
 
-BOX = Bounds([-1.0, 0.0, -np.inf], [1.0, np.inf, 2.0])
+BOX = ([-1.0, 0.0, -np.inf], [1.0, np.inf, 2.0])
 ROWS = LinearConstraints([[1.0, 1.0, 1.0], [2.0, -1.0, 0.0]], [1.0, 1.5], [[0.0, 1.0, -1.0]], [0.25])
 
 

@@ -10,7 +10,7 @@ import pytest
 import scipy.optimize
 
 from fenics_contact import minimize
-from fenics_contact.design import Bounds, ForScipy, LinearConstraints
+from fenics_contact.design import ForScipy, LinearConstraints
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
 
 #: Sizes of the variables and of the objective like those of a design in millimetres.
@@ -18,7 +18,7 @@ SIZE, UNIT = np.array([0.25, 1e-3, 20.0]), 1e5
 TARGET = np.array([0.2, 0.4, -0.1])
 #: The nearest point to TARGET in y = x / SIZE with y_0 ≤ 0.1, Σ y = 0 and y_1 ≤ 0.2.
 ANSWER = np.array([0.05, 0.2, -0.25])
-BOX = Bounds(-0.5 * SIZE, np.array([0.1, 0.5, 0.5]) * SIZE)
+BOX = (-0.5 * SIZE, np.array([0.1, 0.5, 0.5]) * SIZE)
 ROWS = LinearConstraints([[0.0, 1.0 / SIZE[1], 0.0]], [0.2])
 PLANE = LinearConstraints(ROWS.matrix, ROWS.limit, [1.0 / SIZE], [0.0])
 
@@ -59,7 +59,7 @@ def test_a_method_without_derivative_keeps_bounds_as_rows_and_asks_for_values_al
 
 
 def test_a_method_that_takes_no_equality_is_given_its_row_and_a_fixed_variable_from_both_sides() -> None:
-    fixed = Bounds(BOX.lower * [0.0, 1.0, 1.0], BOX.upper * [0.0, 1.0, 1.0])
+    fixed = (BOX[0] * [0.0, 1.0, 1.0], BOX[1] * [0.0, 1.0, 1.0])
     task = ForScipy(bowl, np.zeros(3), bounds=fixed, constraints=PLANE)
     scipy.optimize.minimize(**task.arguments("COBYLA"), options={"rhobeg": 0.2, "tol": 1e-5, "catol": 1e-5})
     np.testing.assert_allclose(task.best_within(1e-3).x / SIZE, [0.0, 0.2, -0.2], atol=5e-3)
@@ -129,7 +129,7 @@ def test_a_problem_that_was_not_evaluated_has_no_best_design() -> None:
 def test_bounds_and_constraints_are_scipys_own() -> None:
     given = ForScipy(bowl, np.zeros(3), bounds=BOX, constraints=PLANE, scale=SIZE).arguments("trust-constr")
     box, (rows, plane) = given["bounds"], given["constraints"]
-    np.testing.assert_allclose(box.ub * SIZE, BOX.upper)
+    np.testing.assert_allclose(box.ub * SIZE, BOX[1])
     assert np.all(box.keep_feasible)
     assert len(ForScipy(bowl, np.zeros(3), constraints=ROWS).arguments("SLSQP")["constraints"]) == 1
     for y, below, level in (

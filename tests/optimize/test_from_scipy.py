@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from scipy.optimize import LinearConstraint, NonlinearConstraint
+from scipy.optimize import Bounds, LinearConstraint, NonlinearConstraint
 
 from fenics_contact import minimize
 from fenics_contact._optimize.constraints import feasible_set
@@ -27,6 +27,13 @@ def bowl(x: np.ndarray) -> tuple[float, np.ndarray]:
 
 def curve(x: np.ndarray) -> float:
     return float(x @ x)
+
+
+@pytest.mark.parametrize("lower", [0.25, [0.25, -1.0]])
+def test_bounds_of_scipy_are_a_box(lower: Any) -> None:
+    box, far = Bounds(lower, 2.0), [0.0, 3.0]
+    np.testing.assert_array_equal(nearest_feasible(far, box), nearest_feasible(far, (lower, 2.0)))
+    assert nearest_feasible(far, box).tolist() == pytest.approx([0.25, 2.0])
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import pytest
 
 from fenics_contact import minimize
 from fenics_contact._optimize.result import StepKind
-from fenics_contact.design import Bounds, BundleTrust, LinearConstraints, Result
+from fenics_contact.design import BundleTrust, LinearConstraints, Result
 from tests.optimize.cases import BY_NAME, CONSTRAINED, CONVEX, NONCONVEX, Case
 from tests.optimize.functions import cb3, hs86, maxq
 
@@ -111,7 +111,7 @@ def test_every_serious_step_descends_and_every_null_step_leaves_the_best_value(c
 def test_minimum_with_an_active_bound_is_the_analytic_one() -> None:
     # The largest square over x_k ≥ k/10 is the square of the largest bound.
     lower = np.arange(1, 6) / 10
-    result = minimize(maxq, np.full(5, 2.0), BundleTrust(tolerance=1e-8), bounds=Bounds(lower, 3.0))
+    result = minimize(maxq, np.full(5, 2.0), BundleTrust(tolerance=1e-8), bounds=(lower, 3.0))
     assert result.value == pytest.approx(0.25, rel=1e-7)
     assert (result.x >= lower).all()
     assert result.x[4] == pytest.approx(0.5, abs=1e-7)
@@ -149,7 +149,7 @@ def test_variable_whose_bounds_coincide_stays_where_it_is() -> None:
     lower, upper = np.zeros(5), np.full(5, np.inf)
     lower[3] = upper[3] = 0.3
     start = np.array([0.0, 0.0, 0.0, 0.3, 1.0])
-    fixed = minimize(hs86, start, bounds=Bounds(lower, upper), constraints=case.constraints)
+    fixed = minimize(hs86, start, bounds=(lower, upper), constraints=case.constraints)
     assert fixed.x[3] == 0.3
     assert fixed.value > case.minimum + 1e-3
     assert fixed.reason.success
