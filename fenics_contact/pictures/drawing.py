@@ -195,8 +195,8 @@ class ColouredField:
 
     def add_bar(self, figure: Figure, panels: Iterable[Axes]) -> None:
         """Add a colour bar next to axes; its ends are pointed where values lie beyond."""
-        low = min(float(np.nanmin(values)) for values in self.values.values())
-        high = max(float(np.nanmax(values)) for values in self.values.values())
+        every = np.concatenate([np.ravel(values) for values in self.values.values()])
+        low, high = float(np.nanmin(every)), float(np.nanmax(every))
         key = ScalarMappable(self.norm, self.colours)
         add_colour_bar(figure, panels, key, self.label, beyond=(low, high))
 

@@ -276,13 +276,22 @@ def plot_field(
         )
     entry = entries[field]
     values = {name: component(body, entry) for name, body in bodies.items()}
-    ends = entry["extremes"][0] or (-1.0, 2.0)
+    is_status = entry["colours"] == "status"
+    ends = (-1.0, 2.0) if is_status else entry["extremes"][0] or (0.0, 0.0)
     label = f"{entry['label']} ({entry['unit']})" if entry["unit"] else entry["label"]
     facts = f"{entry['label']}, {written(ends[0])} to {written(ends[1])} {entry['unit']}".rstrip()
     colours = SIGNED_MAP if entry["colours"] == "signed" else STRESS_MAP
     words = headline(title, f"{facts}; displacement × {scale:g}")
     coloured = ColouredField(
-        values, colours, Normalize(*entry["range"]), label, words, float(scale), None, named, width
+        values,
+        colours,
+        Normalize(*(ends if is_status else entry["range"])),
+        label,
+        words,
+        float(scale),
+        None,
+        named,
+        width,
     )
     return draw_field_on_bodies(bodies, coloured, target, obstacles=[])
 
