@@ -24,7 +24,7 @@ Functions for other tools: SceneResponse, DesignResponse, served
 
 Files: read_mesh, read_cad, read_scene_file, write_result, write_vtu, result_page
 
-Long runs: show_progress, Checkpoint, interruptible, Interrupted, PhaseTimer, clean_environment
+Long runs: show_progress, Checkpoint, CheckpointError, interruptible, Interrupted, PhaseTimer, clean_environment
 
 Tests of material models: check_hyperelastic, check_history_material
 
@@ -42,8 +42,10 @@ from typing import TYPE_CHECKING, Any
 from fenics_contact._base import requirements
 
 if TYPE_CHECKING:
+    from fenics_contact._base.checkpoint import Checkpoint as Checkpoint
     from fenics_contact._base.checkpoint import Interrupted as Interrupted
     from fenics_contact._base.checkpoint import interruptible as interruptible
+    from fenics_contact._base.files import CheckpointError as CheckpointError
     from fenics_contact._base.launching import clean_environment as clean_environment
     from fenics_contact._base.progress import PhaseTimer as PhaseTimer
     from fenics_contact._base.progress import show_progress as show_progress
@@ -57,6 +59,9 @@ if TYPE_CHECKING:
     from fenics_contact._large_deformations.newton import TangentNewton as TangentNewton
     from fenics_contact._optimize.bundle_trust import minimize as minimize
     from fenics_contact._page.page import result_page as result_page
+    from fenics_contact._responses import DesignResponse as DesignResponse
+    from fenics_contact._responses import SceneResponse as SceneResponse
+    from fenics_contact._responses import served as served
     from fenics_contact._scene.automatic import AutomaticContact as AutomaticContact
     from fenics_contact._scene.body import Body as Body
     from fenics_contact._scene.fields import SampledField as SampledField
@@ -92,9 +97,6 @@ if TYPE_CHECKING:
     from fenics_contact.qp.fixed_point import FixedPoint as FixedPoint
     from fenics_contact.readers.cad import read_cad as read_cad
     from fenics_contact.readers.meshio import read_mesh as read_mesh
-    from fenics_contact.responses import DesignResponse as DesignResponse
-    from fenics_contact.responses import SceneResponse as SceneResponse
-    from fenics_contact.responses import served as served
     from fenics_contact.results.area import contact_area as contact_area
     from fenics_contact.results.contact import Status as Status
     from fenics_contact.results.deformed_state import DeformedState as DeformedState
@@ -109,7 +111,8 @@ __version__ = "0.2.0.dev0"
 
 #: Where the public names are defined.
 _HOMES = {
-    "_base.checkpoint": "Interrupted interruptible",
+    "_base.checkpoint": "Checkpoint Interrupted interruptible",
+    "_base.files": "CheckpointError",
     "_base.launching": "clean_environment",
     "_base.progress": "PhaseTimer show_progress",
     "_equilibrium.problem": "ContactProblem solve_scene",
@@ -137,7 +140,7 @@ _HOMES = {
     "qp.fixed_point": "FixedPoint",
     "readers.cad": "read_cad",
     "readers.meshio": "read_mesh",
-    "responses": "DesignResponse SceneResponse served",
+    "_responses": "DesignResponse SceneResponse served",
     "results.area": "contact_area",
     "results.contact": "Status",
     "results.deformed_state": "DeformedState NewtonSteps",

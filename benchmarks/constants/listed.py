@@ -20,19 +20,20 @@ Value: TypeAlias = float | tuple[float, ...] | dict[Any, float]
 #: Rooms whose constants are not run, as no answer is computed there, and what they are about.
 NOT_RUN = {
     "__main__": "command line",
+    "_base.checkpoint": "format",
+    "_base.display": "lines and columns on a screen",
+    "_base.files": "format",
+    "_base.fingerprint": "words of messages",
+    "_base.progress": "progress",
+    "_cli": "command line",
     "_dolfinx": "cell types",
-    "checkpoint": "format",
-    "cli": "command line",
-    "display": "lines and columns on a screen",
+    "_scene_file": "format",
     "errors": "ranks that wait for each other",
-    "fingerprint": "words of messages",
     "gallery": "meshes of examples",
-    "io": "format",
-    "progress": "progress",
-    "scene_file": "format",
+    "output": "format",
+    "pictures": "layout",
     "study": "scenes and tables of studies",
     "theory": "exact solutions",
-    "viz": "layout",
 }
 
 
@@ -59,8 +60,9 @@ class Constant:
 
     @property
     def room(self) -> str:
-        """The part of the package that it belongs to."""
-        return self.module.split(".")[0]
+        """The part of the package that it belongs to; of the ground each module is one."""
+        first, _, _ = self.module.partition(".")
+        return self.module if first == "_base" else first
 
 
 @cache

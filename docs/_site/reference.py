@@ -25,10 +25,10 @@ import fenics_contact
 from _site import docstrings, signatures
 
 PACKAGE = fenics_contact.__name__
-#: As a user meets them; rooms that are not named here come last.
+#: The front and the public modules, as a user meets them.
 ORDER = (
-    "gallery mesh mesh_io partition surface_shapes scene contact accuracy shape optimize viz io page theory "
-    "progress study scene_file cli outer surfaces pairing fem qp feti checkpoint linalg display timing errors"
+    "fenics_contact materials gallery readers mesh shapes results design pictures output study theory "
+    "errors qp feti"
 ).split()
 #: Names that the reference uses and does not describe: other libraries', and the standard library's.
 OUTSIDE = [
@@ -47,24 +47,21 @@ OUTSIDE = [
 
 @cache
 def rooms() -> list[str]:
-    """Return the public modules just below the package that say what they offer, in `ORDER`."""
-    found = [
-        info.name
-        for info in pkgutil.iter_modules(fenics_contact.__path__)
-        if not info.name.startswith("_") and public_names(module_of(info.name))
-    ]
-    return sorted(found, key=lambda room: (ORDER.index(room) if room in ORDER else len(ORDER), room))
+    """Return the package itself, the front, and its public modules, in `ORDER`."""
+    names = (name for name in fenics_contact.__all__ if inspect.ismodule(getattr(fenics_contact, name)))
+    return sorted([PACKAGE, *names], key=ORDER.index)
 
 
 def module_of(room: str) -> ModuleType:
     """Import a room."""
-    return importlib.import_module(f"{PACKAGE}.{room}")
+    return fenics_contact if room == PACKAGE else importlib.import_module(f"{PACKAGE}.{room}")
 
 
 def public_names(module: ModuleType) -> list[str]:
     """Return the names of ``__all__``; of a module without one, what it defines itself."""
     if hasattr(module, "__all__"):
-        return sorted(module.__all__)
+        names = (name for name in module.__all__ if name[0] != "_")
+        return sorted(name for name in names if not inspect.ismodule(getattr(module, name)))
     own = [
         name for name, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__
     ]
@@ -92,8 +89,7 @@ HEADINGS = {"class": "Classes", "function": "Functions", "data": "Constants and 
 def page(room: str) -> str:
     """Write the page of a room: what it is, its names at a glance, then each in full."""
     module = module_of(room)
-    borrowed = {name: place for name, place in homes(room).items() if place != f"{module.__name__}.{name}"}
-    names = [name for name in public_names(module) if name not in borrowed]
+    names = public_names(module)
     blocks = [
         f"---\ntocdepth: 3\n---\n\n# {module.__name__}\n",
         eval_rst(f".. automodule:: {module.__name__}\n   :no-members:\n"),
@@ -107,9 +103,6 @@ def page(room: str) -> str:
         if chosen:
             lines = "".join(described(module, name, kind) for name in chosen)
             blocks.append(f"## {heading}\n\n" + eval_rst(lines))
-    if borrowed:
-        links = ", ".join(f"{{py:obj}}`{name} <{place}>`" for name, place in borrowed.items())
-        blocks.append(f"From other rooms, offered here too: {links}.\n")
     return "\n".join(blocks)
 
 
@@ -119,16 +112,9 @@ def first_line(module: ModuleType, name: str) -> str:
 
 
 def homes(room: str) -> dict[str, str]:
-    """Map the public names of a room to the full name under which each is described."""
+    """Map the public names of a room to the full name under which each is described: each has one place."""
     module = module_of(room)
-    return {name: home(room, name, getattr(module, name)) for name in public_names(module)}
-
-
-def home(room: str, name: str, value: Any) -> str:
-    """Return the full name under which a public name of a room is described: by the room that defines it."""
-    definer = str(getattr(value, "__module__", "")).removeprefix(f"{PACKAGE}.").partition(".")[0]
-    elsewhere = definer != room and definer in rooms() and name in public_names(module_of(definer))
-    return f"{PACKAGE}.{definer if elsewhere else room}.{name}"
+    return {name: f"{module.__name__}.{name}" for name in public_names(module)}
 
 
 def described(module: ModuleType, name: str, kind: str) -> str:

@@ -1,7 +1,5 @@
 """Contact shape optimisation: designs, problems, objectives, constraints and optimisers."""
 
-from fenics_contact._base.checkpoint import Checkpoint
-from fenics_contact._base.files import CheckpointError
 from fenics_contact._optimize.bundle_trust import BundleTrust
 from fenics_contact._optimize.constraints import LinearConstraints, nearest_feasible
 from fenics_contact._optimize.manufacture import convex, fixed_rim, monotone, smallest_radius, symmetric
@@ -33,8 +31,6 @@ __all__ = [
     "AdaptiveTolerance",
     "Adjoint",
     "BundleTrust",
-    "Checkpoint",
-    "CheckpointError",
     "ContactArea",
     "ContactForces",
     "DesignPoint",

@@ -4,7 +4,6 @@
 of your own is a Python file that defines ``study``, a `StudyScene`.
 """
 
-from fenics_contact.study.figures import plot_accuracy, plot_convergence, plot_parts, plot_phases
 from fenics_contact.study.report import accuracy_table, cost_table, write_report
 from fenics_contact.study.results import Errors, Results, Run, read_study
 from fenics_contact.study.runner import Settings, run_study
@@ -23,10 +22,6 @@ __all__ = [
     "Sweep",
     "accuracy_table",
     "cost_table",
-    "plot_accuracy",
-    "plot_convergence",
-    "plot_parts",
-    "plot_phases",
     "read_study",
     "run_study",
     "write_report",

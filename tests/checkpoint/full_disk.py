@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fenics_contact.design import Checkpoint, CheckpointError
+from fenics_contact import Checkpoint, CheckpointError
 
 KIND, PROBLEM = "test", {"problem": "growing"}
 

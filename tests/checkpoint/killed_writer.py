@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fenics_contact.design import Checkpoint
+from fenics_contact import Checkpoint
 
 KIND, PROBLEM = "test", {"problem": "counting"}
 

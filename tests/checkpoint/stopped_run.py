@@ -19,9 +19,8 @@ from typing import Any
 
 from mpi4py import MPI
 
-from fenics_contact import ContactProblem, box_partition, interruptible, solve_steps
+from fenics_contact import Checkpoint, ContactProblem, box_partition, interruptible, solve_steps
 from fenics_contact._base.progress import LOGGER_NAME, Event
-from fenics_contact.design import Checkpoint
 from fenics_contact.qp import FaceNewton
 from tests.contact.step_cases import sheared_block, shears
 from tests.shape.resumed_cases import minimised, posed

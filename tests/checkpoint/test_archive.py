@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact import Checkpoint
 from fenics_contact._base import checkpoint as archive
 from fenics_contact._base.checkpoint import read_archive, write_archive
-from fenics_contact.design import Checkpoint
 from fenics_contact.errors import InvalidInputError
 from tests.contact.step_cases import sequence, shears
 
@@ -146,7 +146,7 @@ def test_all_ranks_hear_of_what_rank_0_found(mpirun, tmp_path: Path) -> None:
         from pathlib import Path
         import numpy as np
         from mpi4py import MPI
-        from fenics_contact.design import Checkpoint, CheckpointError
+        from fenics_contact import Checkpoint, CheckpointError
         from fenics_contact.errors import InvalidInputError
         comm = MPI.COMM_WORLD
         checkpoint = Checkpoint(Path({str(tmp_path)!r}) / "run.npz")

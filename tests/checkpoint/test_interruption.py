@@ -10,9 +10,8 @@ from typing import Any
 
 import pytest
 
-from fenics_contact import Interrupted, interruptible
+from fenics_contact import Checkpoint, Interrupted, interruptible
 from fenics_contact._base.checkpoint import SIGNALS, safe_point, without_checkpoint
-from fenics_contact.design import Checkpoint
 from fenics_contact.errors import InvalidInputError
 
 

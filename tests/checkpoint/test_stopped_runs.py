@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenics_contact.design import Checkpoint
+from fenics_contact import Checkpoint
 from tests.checkpoint.stopped_run import RUNS
 from tests.conftest import LAUNCH, launch, run_on_ranks
 

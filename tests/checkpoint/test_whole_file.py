@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fenics_contact import Checkpoint, CheckpointError
 from fenics_contact._base.files import write_whole
-from fenics_contact.design import Checkpoint, CheckpointError
 from tests.conftest import run_on_ranks
 
 HERE = Path(__file__).parent

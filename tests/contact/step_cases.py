@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from fenics_contact import (
     Body,
+    Checkpoint,
     ContactPair,
     ContactProblem,
     Coulomb,
@@ -24,7 +25,6 @@ from fenics_contact import (
     Surface,
     box_partition,
 )
-from fenics_contact.design import Checkpoint
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.qp import FaceNewton

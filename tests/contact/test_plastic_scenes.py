@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 from fenics_contact import (
     Body,
+    Checkpoint,
     ContactPair,
     ContactProblem,
     Coulomb,
@@ -27,7 +28,6 @@ from fenics_contact import (
     solve_scene,
     solve_steps,
 )
-from fenics_contact.design import Checkpoint
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import (

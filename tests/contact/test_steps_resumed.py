@@ -15,6 +15,7 @@ from mpi4py import MPI
 
 from fenics_contact import (
     Body,
+    Checkpoint,
     ContactProblem,
     LoadSequence,
     LoadStep,
@@ -24,7 +25,6 @@ from fenics_contact import (
     Traction,
     solve_steps,
 )
-from fenics_contact.design import Checkpoint
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity

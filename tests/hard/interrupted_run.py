@@ -9,7 +9,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from fenics_contact.design import Checkpoint
+from fenics_contact import Checkpoint
 from tests.contact.step_cases import sequence, shears
 from tests.shape.resumed_cases import minimised, posed
 

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenics_contact import minimize
-from fenics_contact.design import BundleTrust, Checkpoint, CheckpointError
+from fenics_contact import Checkpoint, CheckpointError, minimize
+from fenics_contact.design import BundleTrust
 from fenics_contact.errors import InvalidInputError
 from tests.conftest import LAUNCH, ROOT, run_on_ranks
 from tests.hard.conftest import Record

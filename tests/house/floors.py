@@ -16,7 +16,7 @@ FLOORS = [
     {"results"},
     {"_equilibrium"},
     {"design"},
-    {"_scene_file", "output", "pictures", "responses"},
+    {"_scene_file", "output", "pictures", "_responses"},
     {"_page", "study"},
     {"_cli"},
     {"__main__"},

@@ -20,6 +20,7 @@ from fenics_contact import (
     AutomaticContact,
     BodyForce,
     BodyMesh,
+    Checkpoint,
     ContactProblem,
     Coulomb,
     DistanceObstacle,
@@ -54,7 +55,6 @@ from fenics_contact._optimize.problem import pose
 from fenics_contact.design import (
     AdaptiveTolerance,
     BundleTrust,
-    Checkpoint,
     ContactArea,
     ContactForces,
     ForScipy,

@@ -12,7 +12,7 @@ from tests.house.floors import FLOORS
 from tests.house.source import PACKAGE, Module, modules, room_of
 
 FLOOR = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
-ROOMS = {f"{PACKAGE}.{room}" for room in FLOOR if room not in {"theory", "responses"}}
+ROOMS = {f"{PACKAGE}.{room}" for room in FLOOR if room not in {"theory", "_responses"}}
 #: Rooms that are tested with small dense matrices, and what they never meet.
 WITHOUT_FENICS = {
     "qp": {"dolfinx", "ufl", "basix", "ffcx", "gmsh"},
@@ -222,7 +222,7 @@ def test_equilibrium_alone_loads_neither_sensitivity_nor_pictures() -> None:
     assert answer.returncode == 0, answer.stderr
     loaded = set(answer.stdout.split())
     assert f"{PACKAGE}._equilibrium" in loaded
-    rooms = {f"{PACKAGE}.{room}" for room in ("design", "pictures", "_optimize", "responses", "study")}
+    rooms = {f"{PACKAGE}.{room}" for room in ("design", "pictures", "_optimize", "_responses", "study")}
     assert loaded & (rooms | {"pyvista", "matplotlib", f"{PACKAGE}._large_deformations.newton"}) == set()
 
 

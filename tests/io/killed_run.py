@@ -17,9 +17,8 @@ from typing import Any
 import meshio
 from mpi4py import MPI
 
-from fenics_contact import write_result
+from fenics_contact import Checkpoint, write_result
 from fenics_contact._dolfinx.loading import dolfinx
-from fenics_contact.design import Checkpoint
 from fenics_contact.output import ResultSeries, write_optimisation_result
 from fenics_contact.qp.problem import CountedOperator
 from tests.contact.step_cases import sequence, shears

@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenics_contact import LoadSequence, LoadStep, Scene
+from fenics_contact import Checkpoint, LoadSequence, LoadStep, Scene
 from fenics_contact._equilibrium.stored import stored_state
-from fenics_contact.design import Checkpoint
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import PlaneStrain
@@ -66,7 +65,7 @@ def test_the_rest_of_a_history_is_the_same(
 ON_RANKS = """
     import json, sys
     from mpi4py import MPI
-    from fenics_contact.design import Checkpoint
+    from fenics_contact import Checkpoint
     from fenics_contact import LoadSequence
     from tests.nonlinear import resumed_histories as known
 

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from fenics_contact import (
     AutomaticSteps,
     Body,
+    Checkpoint,
     ContactPair,
     ContactProblem,
     DeformedState,
@@ -30,7 +31,6 @@ from fenics_contact import (
     box_partition,
     solve_steps,
 )
-from fenics_contact.design import Checkpoint
 from fenics_contact.errors import LoadStepError
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import NeoHooke

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenics_contact import minimize
+from fenics_contact import Checkpoint, minimize
 from fenics_contact._optimize.result import StepKind
-from fenics_contact.design import BundleTrust, Checkpoint, Result
+from fenics_contact.design import BundleTrust, Result
 from fenics_contact.errors import InvalidInputError
 from tests.optimize.cases import BY_NAME, Case
 from tests.optimize.functions import Array

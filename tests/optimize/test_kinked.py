@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenics_contact import minimize
+from fenics_contact import Checkpoint, minimize
 from fenics_contact._optimize.merit import neighbour
 from fenics_contact._optimize.problem import pose
 from fenics_contact._optimize.result import Reason, StepKind
-from fenics_contact.design import BundleTrust, Checkpoint, Kinked, LinearConstraints
+from fenics_contact.design import BundleTrust, Kinked, LinearConstraints
 from fenics_contact.errors import InvalidDesignError
 
 Array = np.ndarray

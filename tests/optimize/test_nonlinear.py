@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from fenics_contact import minimize
+from fenics_contact import Checkpoint, minimize
 from fenics_contact._optimize.nonlinear import scaled_constraints
 from fenics_contact._optimize.result import Reason, StepKind
 from fenics_contact.design import (
     BundleTrust,
-    Checkpoint,
     ForScipy,
     LinearConstraints,
     NonlinearConstraint,

@@ -11,16 +11,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import minimize
+from fenics_contact import Checkpoint, CheckpointError, minimize
 from fenics_contact._optimize.result import Reason, Record, StepKind
-from fenics_contact.design import (
-    BundleTrust,
-    Checkpoint,
-    CheckpointError,
-    LinearConstraints,
-    NotConvergedError,
-    Result,
-)
+from fenics_contact.design import BundleTrust, LinearConstraints, NotConvergedError, Result
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import InvalidDesignError
 from tests.optimize.cases import BY_NAME, Case

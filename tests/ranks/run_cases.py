@@ -14,6 +14,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact import (
+    Checkpoint,
     ContactProblem,
     LoadStep,
     Scene,
@@ -24,7 +25,6 @@ from fenics_contact import (
     solve_steps,
     write_vtu,
 )
-from fenics_contact.design import Checkpoint
 from tests.ranks.given import CUT, case, fails_on_last, is_last, scene
 
 

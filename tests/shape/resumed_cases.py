@@ -12,11 +12,10 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact import ContactProblem, Coulomb, ShapeProblem, box_partition, minimize
+from fenics_contact import Checkpoint, ContactProblem, Coulomb, ShapeProblem, box_partition, minimize
 from fenics_contact.design import (
     AdaptiveTolerance,
     BundleTrust,
-    Checkpoint,
     ContactForces,
     LinearConstraints,
     Result,

@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from fenics_contact import (
     Body,
+    Checkpoint,
     ContactPair,
     ContactProblem,
     Scene,
@@ -19,7 +20,7 @@ from fenics_contact import (
     SurfaceDesign,
     minimize,
 )
-from fenics_contact.design import BundleTrust, Checkpoint, ContactForces, Result
+from fenics_contact.design import BundleTrust, ContactForces, Result
 from fenics_contact.gallery import DesignSurface, block
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.results import ContactResult

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenics_contact import ShapeProblem, minimize
+from fenics_contact import Checkpoint, ShapeProblem, minimize
 from fenics_contact.design import (
     AdaptiveTolerance,
-    Checkpoint,
     ContactForces,
     NonlinearConstraint,
     Result,

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import ShapeProblem
-from fenics_contact.design import Checkpoint, Result
+from fenics_contact import Checkpoint, ShapeProblem
+from fenics_contact.design import Result
 from fenics_contact.errors import InvalidInputError
 from tests.conftest import run_on_ranks
 from tests.shape.resumed_cases import BOUND, gone_on, minimised, posed

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import Coulomb, ShapeProblem
+from fenics_contact import Checkpoint, Coulomb, ShapeProblem
 from fenics_contact._optimize.result import Reason, StepKind
-from fenics_contact.design import AdaptiveTolerance, Checkpoint, Kinked, WeakChoice
+from fenics_contact.design import AdaptiveTolerance, Kinked, WeakChoice
 from tests.conftest import run_on_ranks
 from tests.contact.gallery import Friction
 from tests.shape.several_weak import BOUND, collect, minimised, posed
