@@ -24,7 +24,8 @@ Functions for other tools: SceneResponse, DesignResponse, served
 
 Files: read_mesh, read_cad, read_scene_file, write_result, write_vtu, result_page
 
-Long runs: show_progress, Checkpoint, CheckpointError, interruptible, Interrupted, PhaseTimer, clean_environment
+Long runs: show_progress, Checkpoint, CheckpointError, interruptible, Interrupted, PhaseTimer,
+    clean_environment
 
 Tests of material models: check_hyperelastic, check_history_material
 

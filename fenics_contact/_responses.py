@@ -33,8 +33,8 @@ from fenics_contact.errors import (
     collective,
     collectively,
     together,
-    user_code,
 )
+from fenics_contact.errors.kinds import user_code
 from fenics_contact.qp.solve import DualSolver
 from fenics_contact.results.state import State
 

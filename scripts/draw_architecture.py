@@ -1,6 +1,6 @@
 """Draw the house: `python scripts/draw_architecture.py` writes docs/pictures/architecture.svg.
 
-The rooms of the package stand on the floors of tests/house/test_imports.py; tests compare both.
+The rooms of the package stand on the floors of tests/house/floors.py; tests compare both.
 """
 
 from __future__ import annotations
@@ -26,58 +26,50 @@ class Room:
 FLOORS = [
     [Room("errors", "what is needed, given, to do; on all ranks", "ground")],
     [
-        Room("progress", "how far work is", "ground"),
-        Room("fingerprint", "what was given", "ground"),
-        Room("checks", "types of arguments", "ground"),
-        Room("display", "objects on a screen", "ground"),
-    ],
-    [
-        Room("_requirements", "libraries", "ground"),
-        Room("launching", "processes on ranks", "ground"),
-        Room("timing", "seconds by phase", "ground"),
-        Room("checkpoint", "files to go on", "ground"),
-    ],
-    [Room("_libraries", "MPI and PETSc, loaded when they are used", "ground")],
-    [Room("_dolfinx", "the one room that knows the version of dolfinx", "ground")],
-    [
-        Room("surface_shapes", "spheres, tori, profiles", "model"),
-        Room("linalg", "shared factors, cost model", "numbers"),
+        Room("_base", "progress, files, arguments", "ground"),
         Room("theory", "contacts known by formula", "numbers"),
     ],
-    [Room("mesh", "meshes of bodies: cells, faces, names, quality", "model")],
     [
-        Room("mesh_io", "gmsh, CAD, dolfinx, files", "model"),
-        Room("partition", "cuts into subdomains", "model"),
-        Room("surfaces", "heights, projection", "model"),
+        Room("_dolfinx", "versions of dolfinx", "ground"),
+        Room("_optimize", "bundle method", "numbers", "6"),
+        Room("qp", "dual solvers", "numbers", "3"),
+        Room("shapes", "spheres, tori", "model"),
     ],
-    [Room("gallery", "blocks, links, rings, Hertz bodies", "model")],
     [
-        Room("scene", "bodies, materials, loads, pairs", "model", "1"),
-        Room("qp", "dual solvers: NumPy and MPI alone", "numbers", "3"),
+        Room("materials", "elastic, rubber, metal", "model"),
+        Room("mesh", "cells, faces, subdomains", "model"),
     ],
-    [Room("fem", "forms of elasticity and loads on templates", "model")],
-    [Room("pairing", "which slave node meets the master where", "model")],
+    [
+        Room("_surfaces", "facets, true surfaces", "model"),
+        Room("readers", "gmsh, CAD, dolfinx, meshio", "model"),
+    ],
+    [
+        Room("_scene", "bodies, supports, loads, pairs", "model", "1"),
+        Room("gallery", "blocks, links, Hertz bodies", "model"),
+    ],
+    [
+        Room("_fem", "forms of elasticity and loads", "model"),
+        Room("_pairing", "which node touches what and where", "model"),
+    ],
     [Room("feti", "subdomains, gluing, contact rows, coarse space, dual operator", "model", "2")],
     [
-        Room("accuracy", "error estimates and certificates", "model"),
-        Room("nonlinear", "Newton on deformed bodies", "model"),
+        Room("_accuracy", "estimates and certificates", "model"),
+        Room("_large_deformations", "Newton, load steps", "model"),
     ],
-    [Room("contact", "scene → state: friction laws, load steps", "model", "4")],
-    [Room("shape", "design → mesh → adjoint → subgradient", "model", "5")],
+    [Room("results", "states, forces, stresses, energies", "model", "4")],
+    [Room("_equilibrium", "scene → state: solution, load steps, warnings", "model")],
+    [Room("design", "design → mesh → adjoint → subgradient", "model", "5")],
     [
-        Room("optimize", "bundle trust method: NumPy alone", "numbers", "6"),
-        Room("outer", "plain functions for other tools", "model"),
+        Room("_responses", "functions", "beside"),
+        Room("_scene_file", "TOML", "beside"),
+        Room("output", "files", "beside"),
+        Room("pictures", "PNG", "beside"),
     ],
-]
-BESIDE = [
-    Room("viz", "pictures", "beside"),
-    Room("io", "files", "beside"),
-    Room("scene_file", "TOML → scene", "beside"),
-]
-TOP = [
-    Room("cli", "the command fenics-contact", "top"),
-    Room("study", "what accuracy costs in time", "top"),
-    Room("page", "web pages of results", "top"),
+    [
+        Room("_page", "web pages of results", "top"),
+        Room("study", "what accuracy costs in time", "top"),
+    ],
+    [Room("_cli", "the command fenics-contact", "top")],
 ]
 FLOW = [
     ("1", "Scene", "what there is; nothing numerical"),
@@ -99,8 +91,8 @@ LEGEND = [
     ("model", "models and discretisation"),
     ("numbers", "no finite elements at all"),
     ("ground", "ground: everybody stands on it"),
-    ("beside", "beside: nobody below imports them"),
-    ("top", "on top of everything"),
+    ("beside", "scenes, files and pictures for users"),
+    ("top", "programs for users"),
 ]
 FONT = "'DejaVu Sans', Verdana, Arial, sans-serif"
 LEFT, WIDTH, HEIGHT, STEP, GAP = 40, 560, 44, 54, 12
@@ -143,8 +135,7 @@ def row(rooms: list[Room], x: float, y: float, width: float) -> list[str]:
 
 def picture() -> str:
     """Return the SVG."""
-    top_row = TOP_EDGE
-    first = TOP_EDGE + STEP * len(TOP) + 16
+    first = TOP_EDGE
     bottom = first + STEP * (len(FLOORS) - 1)
     total, height = ASIDE + ASIDE_WIDTH + LEFT, bottom + HEIGHT + 36
     parts = [
@@ -155,19 +146,20 @@ def picture() -> str:
         'orient="auto-start-reverse"><path d="M0 0 10 5 0 10z" fill="#78909c"/></marker></defs>',
         text(LEFT, 32, "fenics_contact", 20, font_weight="bold", fill="#1c262b"),
         text(
-            LEFT, 52, "Imports point down. Rooms on one floor do not know each other.", 12.5, fill="#455a64"
+            LEFT,
+            52,
+            "Imports point down. Rooms without an underscore are public.",
+            12.5,
+            fill="#455a64",
         ),
-        *(box(room, LEFT, top_row + index * STEP, WIDTH) for index, room in enumerate(TOP)),
     ]
     for level, rooms in enumerate(reversed(FLOORS)):
         parts += row(rooms, LEFT, first + level * STEP, WIDTH)
     parts.append(
-        f'<line x1="{LEFT - 16}" y1="{top_row + 4}" x2="{LEFT - 16}" y2="{bottom + HEIGHT - 4}" '
+        f'<line x1="{LEFT - 16}" y1="{first + 4}" x2="{LEFT - 16}" y2="{bottom + HEIGHT - 4}" '
         'stroke="#78909c" stroke-width="1.6" marker-end="url(#tip)"/>'
     )
-    for index, room in enumerate(BESIDE):
-        parts.append(box(room, ASIDE, first + index * STEP, ASIDE_WIDTH))
-    parts += flow(first + 3 * STEP + 36)
+    parts += flow(first + STEP)
     parts += legend(bottom + HEIGHT - 18 * len(LEGEND) + 6)
     return "\n".join([*parts, "</svg>", ""])
 

@@ -20,7 +20,7 @@ ROUNDING = 1e-9
 #: What constants do, the strongest last.
 CLASSES = ("not reached", "no effect", "work only", "within tolerance", "changes the answer")
 #: A room and scenes of the quick study.
-QUICK_ROOM, QUICK_SCENES = "partition", ("mortar blocks",)
+QUICK_ROOM, QUICK_SCENES = "mesh", ("mortar blocks",)
 
 #: Key of a constant -> its value, meaning and what factors on it do.
 Found = Mapping[str, Mapping[str, Any]]

@@ -49,7 +49,8 @@ from numpy.typing import NDArray
 
 from fenics_contact._base.files import write_whole
 from fenics_contact._base.fingerprint import differences
-from fenics_contact.errors import InvalidInputError, safe_log, together
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors.kinds import safe_log
 
 if TYPE_CHECKING:
     from mpi4py import MPI

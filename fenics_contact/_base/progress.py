@@ -19,7 +19,7 @@ from time import perf_counter
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TextIO
 
-from fenics_contact.errors import safe_log
+from fenics_contact.errors.kinds import safe_log
 
 if TYPE_CHECKING:
     from mpi4py import MPI

@@ -32,7 +32,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from fenics_contact._base.libraries import MPI, PETSc, check_not_forked, start
-from fenics_contact.errors import safe_log
+from fenics_contact.errors.kinds import safe_log
 
 #: Products that a factored subdomain is expected to serve: a state with friction, and its adjoint.
 PRODUCTS = 100

@@ -19,7 +19,8 @@ from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import FacetedSurface, outside, share_areas
 from fenics_contact._surfaces.projection import node_weights, project
-from fenics_contact.errors import InvalidInputError, safe_log, together
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import computed_rounding, vector_areas

@@ -11,7 +11,7 @@ from ufl.core.expr import Expr
 
 from fenics_contact._fem.templates import Constants, scalar_constants
 from fenics_contact._scene.body import Body
-from fenics_contact.errors import user_code
+from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material
 
 #: Builds an integrand (UFL) from a material and its constants, None for materials that are left out.

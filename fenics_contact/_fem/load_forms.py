@@ -14,7 +14,8 @@ from fenics_contact._fem.composition import Composition, integrate
 from fenics_contact._fem.templates import Constants, scalar_constants, surface_measure, volume_measure
 from fenics_contact._scene.fields import Ufl, evaluate
 from fenics_contact._scene.loads import BodyForce, Load, Pressure, ThermalStrain
-from fenics_contact.errors import InvalidInputError, user_code
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material, strain
 
 #: First number of the coefficients of loads, after those of displacement fields.

@@ -17,7 +17,8 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._fem.composition import Composition
 from fenics_contact._fem.mechanics import Mechanics, Response
 from fenics_contact._fem.templates import Templates
-from fenics_contact.errors import InvalidInputError, user_code
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material
 from fenics_contact.materials.hyperelastic import Hyperelasticity
 from fenics_contact.materials.plastic import HistoryMaterial, MaterialResponse

@@ -29,7 +29,8 @@ from fenics_contact._large_deformations.newton import (
     NotHeldError,
     TangentNewton,
 )
-from fenics_contact.errors import ConvergenceError, InvalidInputError, safe_log
+from fenics_contact.errors import ConvergenceError, InvalidInputError
+from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.reductions import global_max, global_sum
 from fenics_contact.qp.solution import SolverStep

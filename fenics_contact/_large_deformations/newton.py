@@ -19,7 +19,8 @@ from fenics_contact._large_deformations.equations import (
 )
 from fenics_contact._large_deformations.loading import Loading
 from fenics_contact._large_deformations.tangent_step import TangentStep, tangent_step, whole_step
-from fenics_contact.errors import ConvergenceError, FoldedFacetsError, InfeasibleError, InvalidInputError
+from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
+from fenics_contact.errors.kinds import FoldedFacetsError
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.face_newton import FaceNewton
 from fenics_contact.qp.krylov import Stop

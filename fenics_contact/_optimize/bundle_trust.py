@@ -41,7 +41,8 @@ from fenics_contact._optimize.problem import (
 from fenics_contact._optimize.progress import Callback, Progress
 from fenics_contact._optimize.result import MethodState, NotConvergedError, Reason, Record, Result, StepKind
 from fenics_contact._optimize.subproblem import Step, Trial, Trust, solve_step
-from fenics_contact.errors import InvalidDesignError, InvalidInputError, safe_log
+from fenics_contact.errors import InvalidDesignError, InvalidInputError
+from fenics_contact.errors.kinds import safe_log
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,8 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fenics_contact.errors import InvalidDesignError, InvalidInputError, safe_log
+from fenics_contact.errors import InvalidDesignError, InvalidInputError
+from fenics_contact.errors.kinds import safe_log
 
 Array = NDArray[np.float64]
 Fun = Callable[[Array], tuple[float, ArrayLike]]

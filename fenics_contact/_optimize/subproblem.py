@@ -18,7 +18,8 @@ from fenics_contact._optimize.bundle import (
 )
 from fenics_contact._optimize.constraints import Surroundings
 from fenics_contact._optimize.nonlinear import SoftConstraint
-from fenics_contact.errors import InvalidInputError, safe_log
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import safe_log
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,8 @@ from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
 from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tie, Tresca
 from fenics_contact._scene.scene import Scene
-from fenics_contact.errors import safe_log, together
+from fenics_contact.errors import together
+from fenics_contact.errors.kinds import safe_log
 
 #: Weights of nodes below this fraction of all are rounding, which must not keep a supported point free.
 HELD = 1e-6

@@ -34,7 +34,8 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import FacetedSurface, bearing_areas, nodal_areas, shape_functions
 from fenics_contact._surfaces.projection import Projection, join, node_weights, project
 from fenics_contact._surfaces.true_surface import Geometry
-from fenics_contact.errors import safe_log, together
+from fenics_contact.errors import together
+from fenics_contact.errors.kinds import safe_log
 
 
 def shared_projection(

@@ -48,7 +48,8 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import Projection, node_weights
 from fenics_contact._surfaces.true_surface import Geometry
-from fenics_contact.errors import InvalidDesignError, InvalidInputError, safe_log, together
+from fenics_contact.errors import InvalidDesignError, InvalidInputError, together
+from fenics_contact.errors.kinds import safe_log
 from fenics_contact.mesh.faces import computed_rounding, coordinate_rounding
 from fenics_contact.shapes.simple import evaluate_shape
 

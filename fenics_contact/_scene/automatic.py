@@ -15,7 +15,8 @@ from fenics_contact._base.display import displayed
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.pairs import AnyDiscretisation, ContactPair, Friction, Surface
 from fenics_contact._surfaces.true_surface import Geometry
-from fenics_contact.errors import InvalidInputError, safe_log
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import safe_log
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import boundary_faces, corners_of
 from fenics_contact.mesh.near_surfaces import near_surfaces

@@ -9,7 +9,8 @@ import numpy as np
 
 from fenics_contact._base.checks import brief, checked
 from fenics_contact._base.display import displayed
-from fenics_contact.errors import InvalidInputError, user_code
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material
 from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_finite_strain
 from fenics_contact.materials.plastic import HistoryMaterial

@@ -16,7 +16,8 @@ from ufl.core.expr import Expr
 
 from fenics_contact._base.checks import checked, require_file
 from fenics_contact._base.display import displayed
-from fenics_contact.errors import InvalidInputError, together, user_code
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors.kinds import user_code
 from fenics_contact.readers.meshio import read_with_meshio
 
 if TYPE_CHECKING:

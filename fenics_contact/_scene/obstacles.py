@@ -10,7 +10,8 @@ import numpy as np
 
 from fenics_contact._base.checks import checked
 from fenics_contact._base.display import displayed
-from fenics_contact.errors import InvalidInputError, user_code
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import user_code
 from fenics_contact.shapes.combined import placed
 from fenics_contact.shapes.simple import Cylinder, Plane, SignedDistance, Sphere, SurfaceShape, evaluate_shape
 

@@ -16,7 +16,8 @@ from fenics_contact._scene.body import Body
 from fenics_contact._scene.loads import Load
 from fenics_contact._scene.parts import SceneParts, with_discretisation
 from fenics_contact._scene.supports import AnySupport
-from fenics_contact.errors import InvalidInputError, user_code
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.bisection import default_partition

@@ -34,7 +34,8 @@ from fenics_contact._scene_file.values import (
     one_of,
     with_message,
 )
-from fenics_contact.errors import InvalidInputError, scene_file_code
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import scene_file_code
 from fenics_contact.gallery import blocks, bolted, hertz
 from fenics_contact.gallery import links as links_module
 from fenics_contact.gallery.links import DesignSurface, Link

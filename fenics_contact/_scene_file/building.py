@@ -53,7 +53,8 @@ from fenics_contact.design.memory import AdaptiveTolerance
 from fenics_contact.design.objective import Objective
 from fenics_contact.design.problem import ShapeProblem
 from fenics_contact.design.several import LoadPath
-from fenics_contact.errors import InvalidInputError, scene_file_code, together
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors.kinds import scene_file_code
 from fenics_contact.materials.elastic import Material
 
 if TYPE_CHECKING:

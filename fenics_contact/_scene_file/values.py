@@ -36,7 +36,8 @@ from pydantic_core import PydanticCustomError, ValidationError
 from fenics_contact._base.checks import MOST, require_file
 from fenics_contact._scene.fields import OfPosition
 from fenics_contact._scene_file.source import shortened
-from fenics_contact.errors import InvalidInputError, scene_file_code
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import scene_file_code
 
 #: Coordinates by name, in the order of the columns of points.
 COORDINATES = ("x", "y", "z")

@@ -24,7 +24,7 @@ from fenics_contact._fem.templates import (
     volume_measure,
 )
 from fenics_contact._scene.loads import Load
-from fenics_contact.errors import user_code
+from fenics_contact.errors.kinds import user_code
 from fenics_contact.feti.subdomain import Subdomain
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.elastic import Material

@@ -24,7 +24,8 @@ from fenics_contact.design.load_derivatives import strain_work_by_shape, work_by
 from fenics_contact.design.motion import BodyIntegral, require_body
 from fenics_contact.design.objective import Partials, Weighable, require_linear
 from fenics_contact.design.sensitivity import by_true_areas
-from fenics_contact.errors import InvalidDesignError, InvalidInputError, together, user_code
+from fenics_contact.errors import InvalidDesignError, InvalidInputError, together
+from fenics_contact.errors.kinds import user_code
 from fenics_contact.feti.averages import nodal_mean_at, nodal_mean_transposed
 from fenics_contact.results.contact import ContactResult
 from fenics_contact.results.state import State

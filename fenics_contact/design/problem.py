@@ -28,8 +28,8 @@ from fenics_contact.errors import (
     InvalidDesignError,
     InvalidInputError,
     collectively,
-    safe_log,
 )
+from fenics_contact.errors.kinds import safe_log
 from fenics_contact.materials.hyperelastic import has_mean_dilatation
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.results.deformed_state import AnyState

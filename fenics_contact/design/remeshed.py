@@ -22,7 +22,8 @@ from fenics_contact.design.base import SingleProblem, with_objective
 from fenics_contact.design.design import SurfaceDesign, checked_variables
 from fenics_contact.design.memory import DesignPoint, record_of_values
 from fenics_contact.design.problem import ShapeProblem
-from fenics_contact.errors import InvalidDesignError, InvalidInputError, safe_log, together, user_code
+from fenics_contact.errors import InvalidDesignError, InvalidInputError, together
+from fenics_contact.errors.kinds import safe_log, user_code
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.quality import jacobians
 from fenics_contact.results.deformed_state import AnyState

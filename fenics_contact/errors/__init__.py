@@ -3,7 +3,6 @@
 from fenics_contact.errors.kinds import (
     ConvergenceError,
     FenicsContactError,
-    FoldedFacetsError,
     ForkedProcessError,
     InfeasibleError,
     InvalidDesignError,
@@ -12,16 +11,12 @@ from fenics_contact.errors.kinds import (
     MissingRequirementError,
     RemoteError,
     UserCodeError,
-    safe_log,
-    scene_file_code,
-    user_code,
 )
 from fenics_contact.errors.ranks import agree, collective, collectively, together
 
 __all__ = [
     "ConvergenceError",
     "FenicsContactError",
-    "FoldedFacetsError",
     "ForkedProcessError",
     "InfeasibleError",
     "InvalidDesignError",
@@ -33,10 +28,7 @@ __all__ = [
     "agree",
     "collective",
     "collectively",
-    "safe_log",
-    "scene_file_code",
     "together",
-    "user_code",
 ]
 
 for _kind in [value for value in globals().values() if isinstance(value, type)]:

@@ -13,7 +13,8 @@ from fenics_contact._scene.fields import Ufl, evaluate
 from fenics_contact._scene.loads import SurfaceLoad
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import Support
-from fenics_contact.errors import together, user_code
+from fenics_contact.errors import together
+from fenics_contact.errors.kinds import user_code
 
 #: Number of nodes at which functions are compared: different functions differ nearly everywhere.
 COMPARED = 8

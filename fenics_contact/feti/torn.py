@@ -26,7 +26,8 @@ from fenics_contact._pairing.points import (
 )
 from fenics_contact._pairing.search import find_contact_points, find_tied_points
 from fenics_contact._scene.scene import Scene
-from fenics_contact.errors import InvalidInputError, safe_log, together
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.contact_rows import Relations, normal_relations, tangential_relations, tied_relations
 from fenics_contact.feti.decomposition import (

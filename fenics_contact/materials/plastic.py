@@ -13,7 +13,8 @@ from ufl.core.expr import Expr
 
 from fenics_contact._base.checks import checked
 from fenics_contact._base.display import displayed
-from fenics_contact.errors import InvalidInputError, user_code
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import (
     Elasticity,
     as_tensor,

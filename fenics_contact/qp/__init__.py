@@ -5,7 +5,7 @@ The problem (`DualProblem`) is an operator, a coarse space and a layout; a solve
 distributed over the ranks of the problem's communicator.
 """
 
-from fenics_contact.qp.cones import CoulombLaw, FeasibleSet, SlipLaw, TrescaLaw
+from fenics_contact.qp.cones import FeasibleSet, SlipLaw
 from fenics_contact.qp.face import Face
 from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG, SlidingError
 from fenics_contact.qp.krylov import Stop
@@ -15,7 +15,6 @@ from fenics_contact.qp.solution import DualSolution, Residuals, Start, measure
 from fenics_contact.qp.solve import DualSolver, Equilibrium, solve
 
 __all__ = [
-    "CoulombLaw",
     "DualProblem",
     "DualSolution",
     "DualSolver",
@@ -31,7 +30,6 @@ __all__ = [
     "Smalse",
     "Start",
     "Stop",
-    "TrescaLaw",
     "measure",
     "solve",
 ]

@@ -1,6 +1,5 @@
 """What states consist of: forces, energies, errors, rigid motions."""
 
-from fenics_contact._accuracy.certificate import Certificate
 from fenics_contact._accuracy.discretisation import DiscretisationError
 from fenics_contact._accuracy.state_errors import BalancedTolerance, SolverErrors, StateErrors
 from fenics_contact.qp.fixed_point import Damping
@@ -13,7 +12,6 @@ from fenics_contact.results.state import Energies
 __all__ = [
     "Balance",
     "BalancedTolerance",
-    "Certificate",
     "ContactResult",
     "Damping",
     "DiscretisationError",

@@ -1,6 +1,5 @@
 """True shapes of surfaces: signed distances with their normals and curvatures."""
 
-from fenics_contact.shapes.combined import Joined, Placed
 from fenics_contact.shapes.parametric import Parametric, SplinePatch
 from fenics_contact.shapes.profile import Profile
 from fenics_contact.shapes.simple import (
@@ -19,9 +18,7 @@ __all__ = [
     "Circle",
     "Cylinder",
     "Extruded",
-    "Joined",
     "Parametric",
-    "Placed",
     "Plane",
     "Profile",
     "Revolved",

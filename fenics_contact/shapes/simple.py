@@ -30,7 +30,8 @@ import numpy as np
 
 from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
 from fenics_contact._base.display import displayed
-from fenics_contact.errors import InvalidInputError, user_code
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import user_code
 
 
 @runtime_checkable

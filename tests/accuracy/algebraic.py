@@ -24,13 +24,12 @@ from fenics_contact import (
     box_partition,
     solve_scene,
 )
-from fenics_contact._accuracy.certificate import certify
+from fenics_contact._accuracy.certificate import Certificate, certify
 from fenics_contact._accuracy.state_errors import friction_error
 from fenics_contact.gallery import block, hemisphere, rectangle
 from fenics_contact.materials import PlaneStress
 from fenics_contact.mesh import bisection_partition, graph_partition, quadratic
 from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG, solve
-from fenics_contact.results import Certificate
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.results.dual_solve import solve_dual
 from tests.contact import effect_cases, gallery

@@ -30,13 +30,12 @@ from fenics_contact import (
     solve_scene,
 )
 from fenics_contact._accuracy import certificate
-from fenics_contact._accuracy.certificate import certify
+from fenics_contact._accuracy.certificate import Certificate, certify
 from fenics_contact._accuracy.discretisation import discretisation_error
 from fenics_contact._accuracy.state_errors import friction_error, solver_errors, state_errors
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import PlaneStrain
 from fenics_contact.qp import DualSolution, FaceNewton, Smalse
-from fenics_contact.results import Certificate
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.results.dual_solve import solve_dual
 from tests.accuracy.algebraic import energy_norm, measured

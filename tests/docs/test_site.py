@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import pkgutil
 import sys
 from pathlib import Path
 
 import pytest
 from sphinx.util.inventory import InventoryFile
 
+import fenics_contact
 from tests.docs.pages import DOCS, ROOT, snippets_of
 from tests.docs.site import Page, Site, broken_links, build
 

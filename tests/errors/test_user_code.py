@@ -13,10 +13,9 @@ from fenics_contact.errors import (
     UserCodeError,
     collective,
     collectively,
-    safe_log,
     together,
-    user_code,
 )
+from fenics_contact.errors.kinds import safe_log, user_code
 
 
 def failing(error: BaseException) -> None:

@@ -10,7 +10,8 @@ import pytest
 from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.shapes import Circle, Joined, Plane, SurfaceShape
+from fenics_contact.shapes import Circle, Plane, SurfaceShape
+from fenics_contact.shapes.combined import Joined
 
 
 def ring() -> BodyMesh:

@@ -11,12 +11,8 @@ DESIGN_MUTATIONS = (
     Mutation(
         "gradients take a given gap for the distance of the surfaces",
         "design/contact_derivatives.py",
-        "rows.at(nodes[carrying])), gradients=gradients)\n"
-        "    by_slave, by_master = projection_pulled_back(\n"
-        "        surface, points.facet[mine], points.local[mine], points.distance[mine], by",
-        "rows.at(nodes[carrying])), gradients=gradients)\n"
-        "    by_slave, by_master = projection_pulled_back(\n"
-        "        surface, points.facet[mine], points.local[mine], points.gap[mine], by",
+        "points.distance[mine], by",
+        "points.gap[mine], by",
         (f"{GIVEN}::test_the_adjoint_agrees_with_central_differences",),
     ),
     Mutation(

@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import Status
-from fenics_contact.errors import FoldedFacetsError
+from fenics_contact.errors.kinds import FoldedFacetsError
 from tests.conftest import run_on_ranks
 from tests.nonlinear.ironing import WAY, ironing
 from tests.nonlinear.mortar_scenes import by_mortar, followed, pressed_and_pushed, stacked

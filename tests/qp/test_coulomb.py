@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError
-from fenics_contact.qp import CoulombLaw, FaceNewton, Smalse, TrescaLaw, solve
+from fenics_contact.qp import FaceNewton, Smalse, solve
+from fenics_contact.qp.cones import CoulombLaw, TrescaLaw
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.solve import find_equilibrium
 from tests.qp.random_problems import random_problem

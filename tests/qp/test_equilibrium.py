@@ -10,8 +10,9 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from fenics_contact.errors import InfeasibleError
-from fenics_contact.qp import CoulombLaw, DualProblem, FaceNewton, Smalse, TrescaLaw, solve
+from fenics_contact.qp import DualProblem, FaceNewton, Smalse, solve
 from fenics_contact.qp.coarse import CoarseSpace
+from fenics_contact.qp.cones import CoulombLaw, TrescaLaw
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.solve import find_equilibrium
 from tests.qp.random_problems import random_problem

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fenics_contact.qp import DualProblem, FaceNewton, TrescaLaw, solve
+from fenics_contact.qp import DualProblem, FaceNewton, solve
+from fenics_contact.qp.cones import TrescaLaw
 from fenics_contact.qp.newton_steps import shorten
 from fenics_contact.qp.problem import CountedOperator
 from fenics_contact.qp.rescue import ProximalPoint, descend

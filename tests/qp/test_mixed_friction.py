@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fenics_contact.qp import CoulombLaw, FaceNewton, Smalse, TrescaLaw, solve
+from fenics_contact.qp import FaceNewton, Smalse, solve
+from fenics_contact.qp.cones import CoulombLaw, TrescaLaw
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.problem import Scaling
 from tests.qp.random_problems import random_problem

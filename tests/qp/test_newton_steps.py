@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.qp import CoulombLaw, DualProblem, Face
+from fenics_contact.qp import DualProblem, Face
+from fenics_contact.qp.cones import CoulombLaw
 from fenics_contact.qp.face import classify
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.newton_steps import FaceState, FaceSteps, Forcing

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import ConvergenceError
-from fenics_contact.qp import CoulombLaw, FaceNewton, Residuals, Smalse, Start, TrescaLaw, measure, solve
+from fenics_contact.qp import FaceNewton, Residuals, Smalse, Start, measure, solve
+from fenics_contact.qp.cones import CoulombLaw, TrescaLaw
 from fenics_contact.qp.face_newton import slides
 from fenics_contact.qp.newton_steps import Forcing
 from fenics_contact.qp.problem import CountedOperator

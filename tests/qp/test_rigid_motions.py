@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fenics_contact.qp import CoulombLaw, DualProblem, FaceNewton, Smalse, TrescaLaw, solve
+from fenics_contact.qp import DualProblem, FaceNewton, Smalse, solve
+from fenics_contact.qp.cones import CoulombLaw, TrescaLaw
 from fenics_contact.qp.rigid_motions import RigidMotionCorrection, _Springs
 from fenics_contact.qp.solution import contact_step
 from tests.qp.torn_bricks import Bricks, torn_problem

@@ -8,16 +8,8 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError
-from fenics_contact.qp import (
-    FaceNewton,
-    FeasibleSet,
-    ProjectedCG,
-    Residuals,
-    Smalse,
-    TrescaLaw,
-    measure,
-    solve,
-)
+from fenics_contact.qp import FaceNewton, FeasibleSet, ProjectedCG, Residuals, Smalse, measure, solve
+from fenics_contact.qp.cones import TrescaLaw
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.solution import contact_step
 from tests.qp.random_problems import random_problem

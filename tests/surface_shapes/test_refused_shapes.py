@@ -10,7 +10,6 @@ import pytest
 from fenics_contact.errors import InvalidInputError, UserCodeError
 from fenics_contact.shapes import (
     Extruded,
-    Joined,
     Parametric,
     Plane,
     Profile,
@@ -19,7 +18,7 @@ from fenics_contact.shapes import (
     Sphere,
     Torus,
 )
-from fenics_contact.shapes.combined import placed
+from fenics_contact.shapes.combined import Joined, placed
 from fenics_contact.shapes.simple import evaluate_shape
 
 AXIS = (1.0, 2.0, -1.0)

@@ -12,9 +12,7 @@ from scipy.spatial import cKDTree
 from fenics_contact.shapes import (
     Cylinder,
     Extruded,
-    Joined,
     Parametric,
-    Placed,
     Plane,
     Profile,
     Revolved,
@@ -23,7 +21,7 @@ from fenics_contact.shapes import (
     SurfaceShape,
     Torus,
 )
-from fenics_contact.shapes.combined import placed, simplified
+from fenics_contact.shapes.combined import Joined, Placed, placed, simplified
 from fenics_contact.shapes.parametric import tensor_grid
 from fenics_contact.shapes.simple import closest_points, evaluate_shape, principal_curvatures
 

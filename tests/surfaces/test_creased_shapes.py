@@ -14,8 +14,8 @@ from fenics_contact._surfaces.facets import (
 )
 from fenics_contact._surfaces.projection import interpolated_normal
 from fenics_contact._surfaces.true_surface import by_shape, height_over, reconstructed
-from fenics_contact.shapes import Cylinder, Joined, Plane, SurfaceShape
-from fenics_contact.shapes.combined import placed
+from fenics_contact.shapes import Cylinder, Plane, SurfaceShape
+from fenics_contact.shapes.combined import Joined, placed
 from tests.pairing.mortar_surfaces import lattice
 
 CAN = (Cylinder((0, 0, 0), (0, 0, 1), 2.0), Plane((0, 0, 0), (0, 0, 1)))

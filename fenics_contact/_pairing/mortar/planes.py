@@ -11,7 +11,7 @@ import numpy as np
 
 from fenics_contact._pairing.mortar.sums import SumsBy
 from fenics_contact._surfaces.facets import FacetedSurface, corner_products, shape_functions
-from fenics_contact.errors import FoldedFacetsError
+from fenics_contact.errors.kinds import FoldedFacetsError
 from fenics_contact.mesh.cell_types import CELL_TYPES, FACET_TYPES, quadrature
 
 

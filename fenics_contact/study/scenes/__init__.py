@@ -8,7 +8,8 @@ import sys
 from pathlib import Path
 
 from fenics_contact._base.checks import require_file
-from fenics_contact.errors import InvalidInputError, scene_file_code
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import scene_file_code
 from fenics_contact.study.study import StudyScene
 
 #: Names of the built-in studies.
