@@ -19,7 +19,6 @@ import fenics_contact
 from fenics_contact import LinearState, LoadSequence, Scene, ShapeProblem
 from fenics_contact.design import Result
 from fenics_contact.output import ResultSeries
-from fenics_contact.results.linear_state import LinearState
 
 #: Classes of what skipped examples take for given, where they ask it for an attribute.
 CLASSES = {

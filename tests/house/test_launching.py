@@ -88,5 +88,5 @@ def test_a_process_without_a_word_gets_some(monkeypatch: pytest.MonkeyPatch) -> 
     assert last_words(["mpirun", "x"], "a" * 50, most=3) == "aaa"
     monkeypatch.setenv("OMPI_MCA_plm", "slurm")
     words = last_words(["mpirun", "-n", "2", "my script"], "\n")
-    assert "nothing, as an mpirun that cannot start: try `mpirun -n 2 'my script'` in a shell" in words
+    assert "nothing and probably could not start: run `mpirun -n 2 'my script'` in a shell" in words
     assert "OMPI_MCA_plm" in words

@@ -44,7 +44,7 @@ def public() -> dict[str, Any]:
     return found
 
 
-def annotations(value: Any) -> str:
+def hints_of(value: Any) -> str:
     """Return the annotations of a public thing, of its fields and of its members, and their docstrings."""
     parts = [value, *vars(value).values()] if inspect.isclass(value) else [value]
     words = [str(vars(value).get("__annotations__", ""))] if inspect.isclass(value) else []
@@ -58,7 +58,7 @@ def annotations(value: Any) -> str:
 
 def unmet(names: dict[str, Any], read: str) -> list[str]:
     """List names in no text for users that no other public thing takes, holds, returns or raises."""
-    words = {name: set(re.findall(r"\w+", annotations(value))) for name, value in names.items()}
+    words = {name: set(re.findall(r"\w+", hints_of(value))) for name, value in names.items()}
     read_words = set(re.findall(r"\w+", read))
     lost = []
     for name in names:
