@@ -43,12 +43,16 @@ _LOG = logging.getLogger(__name__)
 
 #: First α.
 FIRST = 0.01
-#: Factors on α after a stage that failed, after each of the first ones that did not, and after later ones.
-MORE, LESS, MUCH_LESS = 4.0, 0.8, 0.5
+#: Factor on α after a stage that failed.
+MORE = 4.0
+#: Factors on α after the first stages in a row that did not, and after later ones.
+LESS, MUCH_LESS = 0.8, 0.5
 #: Number of those first ones.
 CAREFUL = 3
-#: Tolerance of stages, which need not be exact, and Newton steps after which one counts as failed.
-LOOSE, MANY = 1e-4, 12
+#: Tolerance of stages, which need not be exact.
+LOOSE = 1e-4
+#: Newton steps after which a stage counts as failed.
+MANY = 12
 #: Drag, relative to all forces, below which an equilibrium is tried.
 LITTLE = 3e-3
 #: Factor on the tolerance where bodies do not move at it, and on the drag before the next trial.

@@ -204,12 +204,16 @@ UNBALANCED = 1e-6
 HARDLY = 1e-2
 #: Consecutive steps in which nothing sticks: a single one occurs on the way to states that stick.
 SLIDING = 5
-#: Number of the rescue before which it is tested whether friction can suffice, and the tolerance of the test.
-DOUBT, ROUGH = 4, 1e-3
+#: Number of the rescue before which it is tested whether friction can suffice.
+DOUBT = 4
+#: Tolerance of that test.
+ROUGH = 1e-3
 #: Steps without progress after which faces are solved more accurately.
 CARELESS = 2
-#: Number of consecutive rescues to the same iterate after which to stop, and agreement of their residuals.
-VAIN, SAME = 7, 1e-6
+#: Number of consecutive rescues to the same iterate after which to stop.
+VAIN = 7
+#: Relative difference of residuals below which two iterates are the same.
+SAME = 1e-6
 
 
 @dataclass(frozen=True)
