@@ -164,7 +164,8 @@ def objects() -> dict[str, Any]:
         TotalPotential() + 2.0 * VolumeIntegral("motion", lambda u, x, stress: u[0], "block"),
         StrainEnergy(), PressureNorm(), PressureUnevenness(), ContactArea(), FrictionWork(),
         LargestStress("block"), Movement("block", "z1", (1, 0, 0)), Maximum((LargestPressure(),)),
-        NewtonSteps(((0.1, 1e-3, 1e-7),)),
+        NewtonSteps(((0.1, 1e-3, 1e-7),)), TangentNewton(), AutomaticSteps(), DesignResponse(shape),
+        SceneResponse(lambda load: scene, {"load": 1.0}, {"energy": lambda state: 0.0}, MPI.COMM_SELF),
         MovedSurface(shape.designs[0], scene.bodies["block"].mesh, np.zeros(shape.size)),
     ]  # fmt: skip
     roots.append(solve_scene(pressed(rounded(2), 0.1), MPI.COMM_SELF))
