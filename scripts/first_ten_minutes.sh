@@ -59,22 +59,21 @@ run 2 ".venv/bin/fenics-contact run $mine/my_blocks.toml"
 say '## A scene of your own in Python' 'The fifteen lines of the front page as `first.py`, with numbers printed at the end:'
 file first.py python <<'PYTHON'
 from mpi4py import MPI
-from fenics_contact import Status, solve_scene
-from fenics_contact.gallery import block
-from fenics_contact import Body, ContactPair, Coulomb, RigidPlane, Scene, Support, Surface, Traction
-from fenics_contact.materials import IsotropicElasticity
-from fenics_contact.pictures import plot_contact_pressure
+from fenics_contact import (
+    Body, ContactPair, Coulomb, RigidPlane, Scene, Status, Support, Surface, Traction, gallery,
+    materials, pictures, solve_scene,
+)
 
-mesh = block((0, 0, 0), (2, 1, 1), (32, 16, 16))                    # mm
+mesh = gallery.block((0, 0, 0), (2, 1, 1), (32, 16, 16))                    # mm
 scene = Scene(
-    bodies={"block": Body(mesh, IsotropicElasticity(2.1e5, 0.3))},  # N/mm²
+    bodies={"block": Body(mesh, materials.IsotropicElasticity(2.1e5, 0.3))},  # N/mm²
     supports=[Support("block", "x0")],
     loads=[Traction("block", "z1", (200.0, 0.0, -500.0))],          # N/mm²
     contacts=[ContactPair(Surface("block", "z0"), RigidPlane((0, 0, 0), (0, 0, 1)), Coulomb(0.3))],
 )
 state = solve_scene(scene, MPI.COMM_WORLD)
-plot_contact_pressure(state, "output/first.png")
-errors = state.errors  # all ranks together
+pictures.plot_contact_pressure(state, "output/first.png")
+errors = state.estimate_errors()  # all ranks together
 
 if MPI.COMM_WORLD.rank == 0:
     print(f"normal force {state.contact.normal_force.sum():.1f} N")
