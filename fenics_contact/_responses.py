@@ -1,4 +1,6 @@
-"""The result of a response.
+"""Scenes and designs as functions of parameters, for programs that call plain functions.
+
+The result of a response.
 
 From parameters to quantities of interest, by states of a scene or designs.
 

@@ -1,4 +1,6 @@
-"""Checks of the arguments of formulas.
+"""Contacts known by formula: Hertz's point and line, a pin in a hole, the relief of a roller.
+
+Checks of the arguments of formulas.
 
 Hertz's theory of the contact of two smooth bodies, at a point and along a line.
 

@@ -1,4 +1,6 @@
-"""An upper bound of the algebraic error from duality: an admissible multiplier and displacement.
+"""An upper bound of the algebraic error by duality, from an admissible multiplier and displacement.
+
+An upper bound of the algebraic error from duality: an admissible multiplier and displacement.
 
 The nearest multiplier within its cone and in equilibrium: the projection on the intersection.
 

@@ -1,4 +1,6 @@
-"""The checkpoint of a run, and the treatment of an existing one.
+"""Checkpoints of runs: files of arrays by name, and the point at which a signal stops a run.
+
+The checkpoint of a run, and the treatment of an existing one.
 
 Arrays by name in a file of NumPy's .npz format, with their kind and the fingerprint of the problem.
 

@@ -1,4 +1,6 @@
-"""Cost model for sparse factors and dense matrices of a subdomain, from measured rates.
+"""Sparse matrices: what they cost, factors that several ranks use, rounding, threads.
+
+Cost model for sparse factors and dense matrices of a subdomain, from measured rates.
 
 The choice depends only on sizes, not on timings, so that a run is reproducible. `python -m benchmarks.prices`
 repeats the measurements and compares them with the predictions.

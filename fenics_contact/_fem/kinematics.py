@@ -1,4 +1,6 @@
-"""Changes of volume: the determinant of the deformation gradient in the cells of a mesh.
+"""Deformation at Gauss points, and volume changes in the mean of cells, against locking.
+
+Changes of volume: the determinant of the deformation gradient in the cells of a mesh.
 
 Changes of volume in the mean of each cell, against locking where plastic flow keeps the volume.
 

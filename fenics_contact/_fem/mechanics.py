@@ -1,4 +1,6 @@
-"""What every mesh with materials of nonlinear stress offers: internal forces and tangent.
+"""Internal forces and tangents of linear, hyperelastic and history-dependent materials.
+
+What every mesh with materials of nonlinear stress offers: internal forces and tangent.
 
 What the materials of a scene remember, at the Gauss points of its bodies.
 

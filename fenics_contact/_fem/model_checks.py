@@ -1,4 +1,6 @@
-"""Consistency checks of a material on one small cell, before it is used.
+"""Checks of material models on one small cell.
+
+Consistency checks of a material on one small cell, before it is used.
 
 Checks on demand of a material with a history: whether it is what the solver takes it for.
 

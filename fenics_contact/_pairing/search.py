@@ -1,4 +1,6 @@
-"""Gaps between true surfaces that linear displacements can close, at the points of a mortar coupling.
+"""Contact points of a scene, by nodes and by mortar, with the gaps that pairs give.
+
+Gaps between true surfaces that linear displacements can close, at the points of a mortar coupling.
 
 Where the gap g closes, the slave moves by (1 − s) g and the master by s g, s its share of the compliance, up
 to rigid motions. The constraint contains linear interpolants of that, I g on the slave and J g on the master:

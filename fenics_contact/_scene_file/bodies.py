@@ -1,4 +1,6 @@
-"""What a scene file chooses for surfaces: groups of a mesh file, or faces of a CAD file by where they lie.
+"""Bodies of a scene file: meshes, their placement, surfaces, materials.
+
+What a scene file chooses for surfaces: groups of a mesh file, or faces of a CAD file by where they lie.
 
 Materials of bodies: those of the package by their constants, and user-defined classes.
 

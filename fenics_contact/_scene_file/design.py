@@ -1,4 +1,6 @@
-"""Shape optimisation: moving surfaces, what is minimised, and how.
+"""The shape optimisation of a scene file: surfaces, objectives, constraints, optimiser.
+
+Shape optimisation: moving surfaces, what is minimised, and how.
 
 What a shape optimisation minimises: an objective by its name, a table with its arguments, or a sum.
 

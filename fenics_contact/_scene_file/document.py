@@ -1,4 +1,6 @@
-"""A whole scene file.
+"""A whole scene file, with its load steps and solvers.
+
+A whole scene file.
 
 How Newton's method follows the load of nonlinear materials.
 

@@ -1,4 +1,6 @@
-"""Obstacles of scene files that move: their path as numbers and formulas in t.
+"""Pairs, obstacles, loads and supports of a scene file.
+
+Obstacles of scene files that move: their path as numbers and formulas in t.
 
 Pairs of surfaces that may touch or stay together, and rigid obstacles.
 

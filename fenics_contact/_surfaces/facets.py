@@ -1,4 +1,6 @@
-"""Faceted surfaces with a continuous normal field: shape functions, averaged nodal normals, nodal areas.
+"""Faceted surfaces: areas, moments, averaged normals, heights of a true surface over them.
+
+Faceted surfaces with a continuous normal field: shape functions, averaged nodal normals, nodal areas.
 
 Areas of facets, linear and quadratic, and moments of area, with the quadrature of the load forms.
 

@@ -1,4 +1,6 @@
-"""The exchange by which ranks meet: each reports where it is, and learns where the others are.
+"""An error of one rank becomes an error of all.
+
+The exchange by which ranks meet: each reports where it is, and learns where the others are.
 
 It takes place on a communicator of this package's own, a duplicate of the user's. Ranks poll for the others
 instead of waiting inside MPI, so that they can report what they wait for, receive an interrupt, and give up.

@@ -1,4 +1,6 @@
-"""The part of a torn scene that does not depend on its geometry: meshes, numbering, compiled forms.
+"""The part of a torn scene that does not depend on its geometry: meshes, numbering, gluing rows.
+
+The part of a torn scene that does not depend on its geometry: meshes, numbering, compiled forms.
 
 Copies of nodes: the torn system has one copy of each node for every subdomain around it.
 

@@ -1,4 +1,6 @@
-"""Meshes that do not fit into memory are rejected before they are built.
+"""Blocks and rectangles of structured cells, swept solids, graded ticks.
+
+Meshes that do not fit into memory are rejected before they are built.
 
 Structured hexahedra and quadrilaterals, possibly closed into a ring, and their split into simplices.
 

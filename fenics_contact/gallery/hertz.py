@@ -1,4 +1,6 @@
-"""The bodies of Hertz: half balls and half cylinders on the plane z = 0, graded towards the origin.
+"""The bodies of Hertz, graded towards the contact.
+
+The bodies of Hertz: half balls and half cylinders on the plane z = 0, graded towards the origin.
 
 A box of cells in the middle (the core) is surrounded on its round sides by a shell whose layers end on the
 true sphere or cylinder. Cells are well shaped everywhere, also on the rim, unlike in a single box mapped to a

@@ -1,4 +1,6 @@
-"""One chain link: a stadium-shaped ring of structured hexahedra or tetrahedra with a named crown.
+"""Chain links that just touch, and chains of them.
+
+One chain link: a stadium-shaped ring of structured hexahedra or tetrahedra with a named crown.
 
 Two interlocked links, placed so that the smooth surfaces of their crowns just touch.
 

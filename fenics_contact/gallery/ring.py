@@ -1,4 +1,6 @@
-"""Proportions of a chain link and the lattice that its section sweeps along the stadium-shaped ring.
+"""The ring of a chain link: proportions, section, spacing, and its mesh by gmsh.
+
+Proportions of a chain link and the lattice that its section sweeps along the stadium-shaped ring.
 
 The ring lies in the x-z plane. Its contact crown is the half circle on the +x side, with the middle of the
 inner surface (the pole) at the origin; the far crown lies on the -x side. Lattice directions: around the ring

@@ -1,4 +1,6 @@
-"""METIS of pymetis, and not of another library in the process.
+"""Partition of any mesh by METIS.
+
+METIS of pymetis, and not of another library in the process.
 
 pymetis carries METIS inside its extension and exports its functions. The dynamic linker prefers functions of
 the same name in libraries opened with RTLD_GLOBAL, as dolfinx 0.5 opens the METIS of the system, whose

@@ -1,4 +1,6 @@
-"""The faces of a CAD model: their kinds, sizes and places.
+"""Bodies from CAD files: which faces are which surfaces, meshes by gmsh, true shapes.
+
+The faces of a CAD model: their kinds, sizes and places.
 
 Which faces of a CAD model are which surfaces: by name, by number, or by where they lie.
 

@@ -1,4 +1,6 @@
-"""Bodies of a dolfinx mesh, with the way back: fields of the bodies as Functions on that mesh.
+"""Bodies from dolfinx meshes in memory and from XDMF files, by numeric tags, and the way back.
+
+Bodies of a dolfinx mesh, with the way back: fields of the bodies as Functions on that mesh.
 
 Metadata of the grids of an XDMF file, without reading the data.
 

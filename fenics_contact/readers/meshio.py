@@ -1,4 +1,6 @@
-"""Element sets that an Abaqus file names with its elements: meshio may assign them wrongly.
+"""Bodies from every mesh file that meshio reads.
+
+Element sets that an Abaqus file names with its elements: meshio may assign them wrongly.
 
 The cells of a meshio mesh that bodies can have, in the order of VTK and right-handed.
 

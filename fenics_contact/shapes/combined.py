@@ -1,4 +1,6 @@
-"""Surfaces of several shapes: flat and round faces, fillets between them.
+"""Shapes made of others: joined, placed, or recognised from points and normals.
+
+Surfaces of several shapes: flat and round faces, fillets between them.
 
 Shapes that are rotated, scaled and moved.
 

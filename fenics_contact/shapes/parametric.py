@@ -1,4 +1,6 @@
-"""Surfaces from a user's parametrisation.
+"""Surfaces that are images of a rectangle: a user's parametrisation, and splines through points.
+
+Surfaces from a user's parametrisation.
 
 Feet of perpendiculars on a parametrised surface, and the derivatives of the distance there.
 

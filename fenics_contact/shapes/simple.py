@@ -1,4 +1,6 @@
-"""The protocol of a surface's true shape, and its checked evaluation.
+"""Planes, spheres, cylinders, tori, prisms and surfaces of revolution by their signed distances.
+
+The protocol of a surface's true shape, and its checked evaluation.
 
 Closest points and principal curvatures from a signed distance.
 

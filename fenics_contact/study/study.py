@@ -1,4 +1,6 @@
-"""The settings of one run, and the runs of a study.
+"""Settings of runs, and what a scene of a study provides.
+
+The settings of one run, and the runs of a study.
 
 What a scene must provide for a study: construction, measured quantities, and theoretical values.
 """

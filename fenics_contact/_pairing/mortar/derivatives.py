@@ -1,4 +1,6 @@
-"""Reverse mode through the dual functions of partly covered facets and the integrals with them.
+"""Derivatives of the mortar coupling, and their reverse mode.
+
+Reverse mode through the dual functions of partly covered facets and the integrals with them.
 
 Reverse mode through the heights of true surfaces at the quadrature points of a mortar coupling.
 

@@ -1,4 +1,6 @@
-"""Closest points on smooth patches by Newton's method.
+"""Closest points on the smooth surfaces of moved bodies.
+
+Closest points on smooth patches by Newton's method.
 
 Surfaces of bodies where they lie now, with their averaged normals and the derivatives of these.
 
