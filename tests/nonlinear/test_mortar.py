@@ -60,7 +60,7 @@ def test_a_newton_step_that_folds_facets_cuts_the_load_step(monkeypatch: pytest.
         if calls == 3:
             raise FoldedFacetsError("1 are folded")
 
-    monkeypatch.setattr("fenics_contact._pairing.mortar.planes.check_convex", folded_once)
+    monkeypatch.setattr("fenics_contact._pairing.mortar.coupling.check_convex", folded_once)
     (state,) = followed([stacked("hexahedron", 0.3, held=True, friction=0.0)], MPI.COMM_SELF)
     assert calls > 3
     assert state.fractions == (0.5, 1.0)
