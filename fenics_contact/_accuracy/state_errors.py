@@ -67,9 +67,9 @@ class StateErrors:
         friction: Estimate, not a bound, of the distance from there to the solution of Coulomb's law, see
             `friction_error`; zero without it.
         discretisation: Estimate, not a bound, of the error of the mesh, see `discretisation_error`.
-        geometry: Estimate, not a bound, of the error by the geometry of contact surfaces, see
-            `geometry_error`: the distance to the state of the true surfaces on the same mesh; NaN if not
-            estimated.
+        geometry: Estimate, not a bound, of the error by the geometry of contact surfaces:
+            the distance to the state of the true surfaces on the same mesh; NaN if not estimated, see
+            `LinearState.estimate_errors`.
         peak_by_geometry: Its effect on the largest contact pressure, relative to it, or NaN.
         norm: ‖u‖, [√(force · length)].
         by_body: Body name -> its part of `discretisation`; the sum of squares is its square.

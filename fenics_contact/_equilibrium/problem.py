@@ -31,7 +31,6 @@ from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG
 from fenics_contact.qp.solution import DualSolution
 from fenics_contact.qp.solve import DualSolver
 from fenics_contact.results.contact import no_contact
-from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.results.dual_solve import contact_result, row_values, solve_dual
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State, Tolerance, checked_tolerance, compute_energies
@@ -41,6 +40,7 @@ if TYPE_CHECKING:
     from fenics_contact._equilibrium.balancing import Solve
     from fenics_contact._equilibrium.deformed import DeformedEquilibria
     from fenics_contact._large_deformations.load_steps import AutomaticSteps
+    from fenics_contact.results.deformed_state import AnyState
 
 
 def carried_over(old: DualSystem, solution: DualSolution, new: DualSystem) -> np.ndarray:

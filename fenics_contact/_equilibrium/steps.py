@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -22,12 +22,41 @@ from fenics_contact._base.files import CheckpointError
 from fenics_contact._base.fingerprint import described, differences, require_alike
 from fenics_contact._base.progress import Task
 from fenics_contact._equilibrium.problem import ContactProblem
-from fenics_contact._equilibrium.stored import stored_state
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact.errors import InvalidInputError, collectively, together
-from fenics_contact.results.deformed_state import AnyState
+from fenics_contact.feti.direct import DirectSolution
+from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.state import State
+
+if TYPE_CHECKING:
+    from fenics_contact.results.deformed_state import AnyState, DeformedState
 
 KIND = "load history"
+
+
+def stored_state(state: State) -> dict[str, np.ndarray]:
+    """Return the arrays from which a state can be rebuilt, on any number of ranks. Collective.
+
+    Returns:
+        ``multiplier`` λ and ``origin``, from which slip is measured, of all rows in their order, shape
+        (n_rows,), ``slid``, the same for points without friction, and ``motion``, the coefficients α of the
+        rigid motions; all replicated. Empty for a state that was computed without multipliers. Of bodies with
+        nonlinear materials what `stored_deformed` returns.
+    """
+    if isinstance(state.solution, DirectSolution):
+        return {}
+    if not isinstance(state, LinearState):
+        from fenics_contact._equilibrium.deformed import stored_deformed
+
+        return stored_deformed(cast("DeformedState", state))
+    torn, solution = state.torn, state.dual_solution
+    rows = np.arange(torn.numbering.total)
+    return {
+        "multiplier": torn.numbering.gather(solution.multiplier, rows),
+        "origin": torn.numbering.gather(torn.right + torn.supported, rows),
+        "slid": torn.slid,
+        "motion": np.asarray(solution.alpha),
+    }
 
 
 class StepCheckpoint:

@@ -29,7 +29,6 @@ from fenics_contact._fem.load_forms import (
     load_work,
 )
 from fenics_contact._fem.loads import as_tractions
-from fenics_contact._fem.mechanics import Mechanics
 from fenics_contact._fem.model_checks import check_model, unit_cell_stiffness
 from fenics_contact._fem.templates import (
     Constants,
@@ -48,6 +47,7 @@ from fenics_contact.materials.plastic import HistoryMaterial
 
 if TYPE_CHECKING:
     from fenics_contact._fem.loads import FollowingPressure
+    from fenics_contact._fem.mechanics import Mechanics
 
 
 class FormLibrary:

@@ -18,7 +18,6 @@ from ufl.core.expr import Expr
 from fenics_contact import _dolfinx
 from fenics_contact._base.checks import GivenVector, floats
 from fenics_contact._base.sparse import ROUNDING
-from fenics_contact._fem.kinematics import assembled
 from fenics_contact._fem.load_forms import Symbol, load_fields, load_key, load_name, numbers_of
 from fenics_contact._fem.templates import Templates, Written, surface_measure
 from fenics_contact._scene.fields import Ufl
@@ -102,6 +101,8 @@ class FollowingPressure:
             Force, shape (dim n,), [force]; less its growth with the displacement, shape (dim n, dim n),
             [force / length].
         """
+        from fenics_contact._fem.kinematics import assembled
+
         _dolfinx.update_coordinates(self._mesh, self._points)
         self._displacement.x.array[:] = displacement
         return (

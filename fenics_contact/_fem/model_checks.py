@@ -1,15 +1,9 @@
-"""Checks of material models on one small cell.
-
-Consistency checks of a material on one small cell, before it is used.
-
-Checks on demand of a material with a history: whether it is what the solver takes it for.
-
-Consistency checks of hyperelastic models on one cell.
-"""
+"""Consistency checks of materials on one small cell: of all before use, others on demand."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,7 +11,6 @@ import scipy.sparse as sp
 from fenics_contact import _dolfinx
 from fenics_contact._base.libraries import MPI
 from fenics_contact._fem.composition import Composition
-from fenics_contact._fem.mechanics import Mechanics, Response
 from fenics_contact._fem.templates import Templates
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
@@ -25,6 +18,9 @@ from fenics_contact.materials.elastic import Material
 from fenics_contact.materials.hyperelastic import Hyperelasticity
 from fenics_contact.materials.plastic import HistoryMaterial, MaterialResponse
 from fenics_contact.mesh.cell_types import CELL_TYPES
+
+if TYPE_CHECKING:
+    from fenics_contact._fem.mechanics import Mechanics, Response
 
 #: A quarter turn about each axis in succession.
 _TURN = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
@@ -57,46 +57,30 @@ class Effect:
 
 def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
     """List the effects in a scene, in the order of `EffectName`."""
-    return tuple(_effects_in(scene))
-
-
-def _effects_in(scene: SceneParts) -> Iterator[Effect]:
-    names = EffectName
-    yield Effect(names.ELASTICITY, counted(len(scene.bodies), "elastic body", "elastic bodies"))
+    names, loads = EffectName, scene.loads
     nonlinear = sum(any(map(is_nonlinear, body.materials)) for body in scene.bodies.values())
-    if nonlinear:
-        yield Effect(names.NONLINEAR_MATERIAL, counted(nonlinear, "body deforms much or yields", "bodies do"))
     rigid = sum(isinstance(support, RigidSurface) for support in scene.supports)
-    if len(scene.supports) > rigid:
-        yield Effect(
-            names.PRESCRIBED_DISPLACEMENT, counted(len(scene.supports) - rigid, "support", "supports")
-        )
-    if rigid:
-        yield Effect(names.RIGID_SURFACE, counted(rigid, "surface stays rigid", "surfaces stay rigid"))
-    volume = [load for load in scene.loads if isinstance(load, BodyForce)]
-    thermal = [load for load in scene.loads if isinstance(load, ThermalStrain)]
-    surface = len(scene.loads) - len(volume) - len(thermal)
-    if volume:
-        yield Effect(names.BODY_FORCE, counted(len(volume), "load on a volume", "loads on volumes"))
-    if surface:
-        yield Effect(names.SURFACE_LOAD, counted(surface, "load on a surface", "loads on surfaces"))
-    following = len(scene.following_pressures)
-    if following:
-        words = counted(following, "pressure follows its surface", "pressures follow their surfaces")
-        yield Effect(names.FOLLOWING_PRESSURE, words)
-    if thermal:
-        yield Effect(names.THERMAL_STRAIN, counted(len(thermal), "change of temperature", "temperatures"))
-    if scene.ties:
-        yield Effect(names.TIE, counted(len(scene.ties), "pair stays together", "pairs stay together"))
-    if scene.contacts:
-        yield Effect(names.CONTACT, counted(len(scene.contacts), "pair may touch", "pairs may touch"))
-    for name, law, what in (
-        (names.TRESCA, Tresca, "a fixed slip bound"),
-        (names.COULOMB, Coulomb, "a friction coefficient above zero"),
-    ):
-        count = sum(pair.has_friction and isinstance(pair.friction, law) for pair in scene.contacts)
-        if count:
-            yield Effect(name, counted(count, f"pair has {what}", f"pairs have {what}"))
+    volume = sum(isinstance(load, BodyForce) for load in loads)
+    thermal = sum(isinstance(load, ThermalStrain) for load in loads)
+    rubbing = [pair.friction for pair in scene.contacts if pair.has_friction]
+    tresca, coulomb = (sum(isinstance(law, kind) for law in rubbing) for kind in (Tresca, Coulomb))
+    fixed, rough = "has a fixed slip bound", "has a friction coefficient above zero"
+    found = (
+        (names.ELASTICITY, len(scene.bodies), "elastic body", "elastic bodies"),
+        (names.NONLINEAR_MATERIAL, nonlinear, "body deforms much or yields", "bodies do"),
+        (names.PRESCRIBED_DISPLACEMENT, len(scene.supports) - rigid, "support", "supports"),
+        (names.RIGID_SURFACE, rigid, "surface stays rigid", "surfaces stay rigid"),
+        (names.BODY_FORCE, volume, "load on a volume", "loads on volumes"),
+        (names.SURFACE_LOAD, len(loads) - volume - thermal, "load on a surface", "loads on surfaces"),
+        (names.FOLLOWING_PRESSURE, len(scene.following_pressures), "pressure follows its surface",
+         "pressures follow their surfaces"),
+        (names.THERMAL_STRAIN, thermal, "change of temperature", "temperatures"),
+        (names.TIE, len(scene.ties), "pair stays together", "pairs stay together"),
+        (names.CONTACT, len(scene.contacts), "pair may touch", "pairs may touch"),
+        (names.TRESCA, tresca, f"pair {fixed}", f"pairs {fixed.replace('has', 'have')}"),
+        (names.COULOMB, coulomb, f"pair {rough}", f"pairs {rough.replace('has', 'have')}"),
+    )  # fmt: skip
+    return tuple(Effect(name, counted(count, *words)) for name, count, *words in found if count)
 
 
 #: A motion counts as unresisted if it moves supported nodes by less than this fraction of the other motions.

@@ -10,7 +10,7 @@ import numpy as np
 
 from fenics_contact._base.display import displayed
 from fenics_contact._equilibrium.problem import ContactProblem
-from fenics_contact._equilibrium.stored import stored_state
+from fenics_contact._equilibrium.steps import stored_state
 from fenics_contact.design.adjoint import WeakChoice, WeakPoints
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.results.deformed_state import AnyState

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from fenics_contact._base.display import displayed
-from fenics_contact._fem.mechanics import History
 from fenics_contact.errors import collectively
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.qp.solution import Solution, contact_step
@@ -23,6 +22,7 @@ from fenics_contact.results.state import State, comm_of
 if TYPE_CHECKING:
     import dolfinx
 
+    from fenics_contact._fem.mechanics import History
     from fenics_contact._large_deformations.load_steps import Snap
     from fenics_contact._large_deformations.loading import Loading
     from fenics_contact._large_deformations.moving_contact import ContactConfiguration
@@ -99,6 +99,8 @@ class DeformedState(State):
     @cached_property
     def history(self) -> History:
         """Internal variables of the bodies' materials, on every rank. Collective on first use."""
+        from fenics_contact._fem.mechanics import History
+
         decomposition, found = self.torn.decomposition, self.equilibrium.configuration.history
         pairs = zip(decomposition.meshes, found, strict=True)
         parts = [(mesh.body, mesh.cells, values) for mesh, values in pairs if values is not None]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,12 +13,10 @@ import ufl
 from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
-from fenics_contact._accuracy.recovery import Sites, find_sites, recovered_gradients
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
 from fenics_contact._fem.composition import Composition, integrate
 from fenics_contact._fem.forms import Temperature, stress_in_space, temperature_of
-from fenics_contact._fem.mechanics import Response
 from fenics_contact._fem.templates import (
     Constants,
     Template,
@@ -39,6 +38,10 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature
 from fenics_contact.mesh.quality import jacobians
 from fenics_contact.results.contact import ContactResult
+
+if TYPE_CHECKING:
+    from fenics_contact._accuracy.recovery import Sites
+    from fenics_contact._fem.mechanics import Response
 
 
 def body_mesh(decomposition: Decomposition, name: str, body: Body) -> _dolfinx.mesh.Mesh:
@@ -401,6 +404,9 @@ def nodal_stress(
         For each body, shape (n_materials, n_nodes, 3, 3), NaN where a node has no cell of the material,
         replicated, [force / length²].
     """
+    # Recovery is part of estimates, which a state with a fixed tolerance need not import.
+    from fenics_contact._accuracy.recovery import find_sites, recovered_gradients
+
     found = {}
     for order in sorted({body.mesh.order for body in torn.scene.bodies.values()}):
         sites = find_sites(torn, order)

@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import ContactProblem, Coulomb, Support, Traction, solve_scene
-from fenics_contact._equilibrium.stored import stored_state
+from fenics_contact._equilibrium.steps import stored_state
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.qp import FaceNewton
 from tests.contact.gallery import block_on_plane, partitions

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fenics_contact import Checkpoint, LoadSequence, LoadStep, Scene
-from fenics_contact._equilibrium.stored import stored_state
+from fenics_contact._equilibrium.steps import stored_state
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import PlaneStrain
