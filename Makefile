@@ -48,7 +48,7 @@ notebooks: $(prepare) ## Run the notebooks and store what they show, or NOTEBOOK
 	$(launch) 1 $(python) notebooks/execute.py $(NOTEBOOKS)
 
 test: lint ## Check style and types, run the quick tests and the quick benchmark, of which counts are judged
-	$(launch) 1 $(python) -m pytest -n $(JOBS) --dist loadfile -m "not slow and not hard"
+	$(launch) 1 $(python) -m pytest -n $(JOBS) --dist loadfile -m "not slow and not hard and not claim"
 	$(python) -m benchmarks --quick
 
 test-slow: $(prepare) ## Run the tests that take long
