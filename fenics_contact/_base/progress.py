@@ -24,9 +24,6 @@ from fenics_contact.errors.kinds import safe_log
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-    pass
-
-
 #: Logger of all reports.
 LOGGER_NAME = "fenics_contact.progress"
 #: Other listeners of events: `show_progress` while it draws.
@@ -410,7 +407,7 @@ class Log:
 
     def leave(self, line: str) -> None:
         """Log the outcome."""
-        safe_log(logging.getLogger(LOGGER_NAME).info, "%s", line)
+        safe_log(_LOGGER.info, "%s", line)
 
     def stop(self) -> None:
         """Do nothing."""
