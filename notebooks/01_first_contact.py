@@ -19,7 +19,7 @@
 # holds it but contact and friction: it could lift off, slide, or stay. What does it do, and with which
 # pressure do the blocks meet?
 #
-# This notebook solves that problem with fifteen lines of code, looks at the answer, and checks it against
+# This notebook solves that problem with a few lines of code, looks at the answer, and checks it against
 # what a sheet of paper says. No knowledge of contact mechanics is needed.
 
 # %% [markdown]
@@ -47,7 +47,7 @@
 # The package knows no units; it needs consistent ones. Here everything is in mm and N. Stresses and Young's
 # modulus are then in N/mm² = MPa, energies in N mm = mJ.
 #
-# ## Fifteen lines
+# ## The scene in a few lines
 #
 # The names that we need:
 

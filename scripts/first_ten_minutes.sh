@@ -56,7 +56,7 @@ run 0 'scripts/launch.sh 2 .venv/bin/python -m fenics_contact run demos/scenes/t
 say '## A mistake' 'In a copy of the file, the name of a surface is misspelt:'
 run 0 "sed 's/surface = \"z1\" }/surface = \"top\" }/' demos/scenes/two_blocks.toml > $mine/my_blocks.toml"
 run 2 ".venv/bin/fenics-contact run $mine/my_blocks.toml"
-say '## A scene of your own in Python' 'The fifteen lines of the front page as `first.py`, with numbers printed at the end:'
+say '## A scene of your own in Python' 'The first scene of the front page as `first.py`, with numbers printed at the end:'
 file first.py python <<'PYTHON'
 from mpi4py import MPI
 from fenics_contact import (

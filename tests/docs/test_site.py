@@ -111,7 +111,7 @@ def test_equations_are_drawn_without_the_network_where_debian_has_mathjax(site: 
         assert not scripts_of_equations[0].startswith("http")
 
 
-def test_the_fifteen_lines_of_the_first_page_run(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_first_scene_of_the_first_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
     (snippet,) = (snippet for snippet in snippets_of((DOCS / "index.md").read_text()) if snippet.is_run)
     exec(compile(snippet.code, "docs/index.md", "exec"), {"__name__": "__main__"})
     assert "algebraic" in capsys.readouterr().out
