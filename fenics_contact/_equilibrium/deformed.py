@@ -54,7 +54,7 @@ class DeformedEquilibria:
         decomposition: Decomposition,
         steps: AutomaticSteps | None,
         timer: PhaseTimer,
-        beside: DeformedEquilibria | None = None,
+        known: DeformedEquilibria | None = None,
     ) -> None:
         """Prepare the forms of all materials. Collective.
 
@@ -65,7 +65,7 @@ class DeformedEquilibria:
         self.scene, self._steps = scene, steps or AutomaticSteps()
         self._decomposition, self._timer = decomposition, timer
         self._equations = Equations(scene, decomposition)
-        self._assembled: TornSystem | None = None if beside is None else beside._assembled
+        self._assembled: TornSystem | None = None if known is None else known._assembled
         self._unresisted: tuple[UnheldMotion, ...] | None = None
 
     def solve(
@@ -274,7 +274,7 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
         ``displacement`` of all copies of the nodes, shape (n_copies, dim), ``multiplier`` λ of all rows, the
         ``history`` of materials of each body, with the time and the largest displacement, before the step of
         histories, the work of friction before it (``rubbed``), and the ``parts`` and ``snaps``; of moved
-        bodies the facets on which nodes stand, where they stood, and the slip; else ``origin`` and ``slid``,
+        bodies the facets that nodes touch, where, and the slip; else ``origin`` and ``slid``,
         from which slip is measured. All replicated.
     """
     decomposition, evaluation = state.torn.decomposition, state.equilibrium.evaluation

@@ -329,7 +329,7 @@ class ContactProblem:
         return problem
 
     def on(self, scene: Scene, partitions: Mapping[str, np.ndarray] | None = None) -> ContactProblem:
-        """Return the problem of a scene on other meshes, solved alike; what was told is not told again."""
+        """Return the problem of a scene on other meshes, solved alike; warnings given are not repeated."""
         other = ContactProblem(
             scene, self.comm,
             partitions=partitions, solver=self.solver, tolerance=self.tolerance, steps=self.steps,
@@ -451,7 +451,7 @@ class ContactProblem:
         equilibria = self._deformed_equilibria
         if equilibria is None or not scene.has_meshes_of(equilibria.scene):
             equilibria = DeformedEquilibria(
-                scene, self._decomposed(scene), self.steps, self.timer, beside=equilibria
+                scene, self._decomposed(scene), self.steps, self.timer, known=equilibria
             )
             self._deformed_equilibria = equilibria
         return equilibria

@@ -313,7 +313,7 @@ def _is_curved(scene: Scene, side: Surface, pair: ContactPair) -> bool:
 
 
 def _coarse_peak(state: State, number: int, pressed_in: np.ndarray) -> list[tuple[int, str, str]]:
-    """Return the doubt about a pair whose largest pressure lies beside its edge, where there is one.
+    """Return the doubt about a pair whose largest pressure lies next to its edge, if there is one.
 
     So it is of round bodies. Contact that ends where a surface ends, or between planes that lift off each
     other, has no peak that more points would resolve.
@@ -331,13 +331,13 @@ def _coarse_peak(state: State, number: int, pressed_in: np.ndarray) -> list[tupl
         slave.nodes, contact.points.slave[mine] - NodeNumbers.of(scene).first_of(pair.slave.body)
     )
     top = np.argmax(contact.pressure[mine])
-    beside, rim = _beside(slave)
+    joined, rim = _joined(slave)
     if rim[node[top]] and not slave.mirrored[node[top]].any():
         return []
     gap = np.full(len(slave.nodes), np.nan)
     gap[node[~pressing]] = contact.points.gap[mine[~pressing]]
-    near = beside[node[top]].indices
-    for steps, reached in ((1, near), (2, beside[near].indices)):
+    near = joined[node[top]].indices
+    for steps, reached in ((1, near), (2, joined[near].indices)):
         opened = gap[reached][~np.isnan(gap[reached])]
         if len(opened):
             grown = opened.min() - contact.points.gap[mine[top]]
@@ -348,13 +348,13 @@ def _coarse_peak(state: State, number: int, pressed_in: np.ndarray) -> list[tupl
     return []
 
 
-def _beside(surface: FacetedSurface) -> tuple[sp.csr_matrix, np.ndarray]:
+def _joined(surface: FacetedSurface) -> tuple[sp.csr_matrix, np.ndarray]:
     """Return which nodes an edge of a facet joins, (n, n), and which lie on the rim, (n,)."""
     ends = surface.facets.ravel(), np.roll(surface.facets, -1, axis=1).ravel()
     one, other = np.concatenate(ends), np.concatenate(ends[::-1])
     count = np.bincount(surface.facets.ravel())
-    beside = sp.csr_matrix((np.ones(len(one)), (one, other)), shape=(len(count), len(count)))
-    return beside, (beside.getnnz(axis=1) != count) | (count == 1)
+    joined = sp.csr_matrix((np.ones(len(one)), (one, other)), shape=(len(count), len(count)))
+    return joined, (joined.getnnz(axis=1) != count) | (count == 1)
 
 
 def _words_of_peak(pair: ContactPair, count: int, steps: int) -> str:
@@ -462,7 +462,7 @@ def _on_contact(scene: Scene) -> str:
 
 
 def _on_symmetry(scene: Scene) -> str:
-    """Return words on flat sides beside contact on which nothing acts, as on a forgotten plane of symmetry.
+    """Return words on flat sides next to contact on which nothing acts, as on a forgotten plane of symmetry.
 
     A side with another one parallel to it is more likely to be free.
     """
@@ -478,8 +478,8 @@ def _on_symmetry(scene: Scene) -> str:
         flat = {side: normal for side in mesh.surfaces if (normal := _normal(scene, name, side)) is not None}
         for side, normal in flat.items():
             alone = sum(abs(normal @ other) > 1.0 - FLAT for other in flat.values()) == 1
-            beside = touching and np.isin(mesh.surfaces[side], np.concatenate(touching)).any()
-            if alone and beside and (name, side) not in used:
+            adjacent = touching and np.isin(mesh.surfaces[side], np.concatenate(touching)).any()
+            if alone and adjacent and (name, side) not in used:
                 found.append(f"surface {side!r} of body {name!r}")
     if not found:
         return ""

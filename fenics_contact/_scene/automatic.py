@@ -75,7 +75,7 @@ class AutomaticContact(Sequence[ContactPair]):
     self_contact: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Reject a distance that is none."""
+        """Raise unless the distance is positive and finite."""
         if self.distance is not None and not 0.0 < self.distance < np.inf:
             raise InvalidInputError(
                 f"AutomaticContact.distance must be positive and finite, got {self.distance!r}: give the "

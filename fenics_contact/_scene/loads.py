@@ -58,7 +58,7 @@ class TotalForce:
         body: Name of the body.
         surface: Name of its surface.
         value: Resultant, [force] (in the plane: per unit of thickness).
-        moment: Moment beside that of the force, three numbers in space, in the plane one, positive from x to
+        moment: Moment besides that of the force, three numbers in space, in the plane one, positive from x to
             y, [force·length]; none by default.
         at: Point at which the force acts, [length]; by default the centroid of the surface.
 

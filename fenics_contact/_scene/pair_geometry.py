@@ -346,7 +346,7 @@ class Unpaired:
         )
         if not count:
             return ""
-        where, mend = (
+        where, remedy = (
             ("outside the surfaces of their pairs and ties", "name more of their facets in these")
             if self.paired
             else (
@@ -355,7 +355,7 @@ class Unpaired:
             )
         )
         one, other = self.bodies
-        return f"bodies {one!r} and {other!r} {what} at {counted(count, 'facet')}, {where}: {mend}"
+        return f"bodies {one!r} and {other!r} {what} at {counted(count, 'facet')}, {where}: {remedy}"
 
 
 def outline_of(mesh: BodyMesh) -> Outline:
@@ -377,8 +377,8 @@ def unpaired_bodies(scene: SceneParts) -> tuple[str, ...]:
     outlines = {name: outline_of(scene.bodies[name].mesh) for name in names}
     found = (unpaired(scene, both, outlines, moved, reach) for both in near)
     entering = "pass into each other as their supports move them"
-    told = (replace(each, counts=(*each.counts[:2], 0)) if each.paired else each for each in found)
-    return tuple(words for each in told if (words := each.in_words(entering)))
+    named = (replace(each, counts=(*each.counts[:2], 0)) if each.paired else each for each in found)
+    return tuple(words for each in named if (words := each.in_words(entering)))
 
 
 def bodies_near(scene: SceneParts, reach: float) -> list[tuple[str, str]]:
@@ -490,7 +490,7 @@ class _Facets:
     ) -> np.ndarray:
         """Return which of the chosen facets are behind leading ones that go as deep into a body as they do.
 
-        Those beside them, in one surface with them, lead themselves.
+        Their neighbours in the same surface lead themselves.
         """
         found = np.zeros(len(chosen), dtype=bool)
         at = np.flatnonzero(chosen)

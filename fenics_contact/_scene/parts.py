@@ -85,7 +85,7 @@ class SceneParts:
         )
 
     def _require_one_dimension(self) -> None:
-        """Reject plane bodies beside solid ones."""
+        """Raise if some bodies are plane and others solid."""
         plane = [name for name, body in self.bodies.items() if body.mesh.dim == 2]
         solid = [name for name in self.bodies if name not in plane]
         if plane and solid:

@@ -224,7 +224,7 @@ class LoadStep:
     time: float | None = None
 
     def __post_init__(self) -> None:
-        """Reject functions of time without a time, and a time that is none."""
+        """Raise if loads are functions of time and no finite time is given."""
         if self.time is not None and not np.isfinite(self.time):
             raise InvalidInputError(
                 f"time of LoadStep {self.name!r} must be a finite number or None, got {self.time!r}: give "

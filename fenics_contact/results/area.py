@@ -37,7 +37,7 @@ def contact_area(state: State, pair: int = 0) -> float:
     surface = surface_of(scene, slave, "faceted")
     nodes = state.torn.decomposition.tearing.global_nodes(slave.body, surface.nodes)
     place = np.searchsorted(nodes, points.slave[mine])
-    # Nodes without a contact point are open without a gap: contact beside them reaches up to them.
+    # Nodes without a contact point are open without a gap: neighbouring contact reaches up to them.
     pressure, spread = np.zeros(len(nodes)), np.zeros(len(nodes))
     pressure[place] = contact.pressure[mine] * (contact.status[mine] > 0)
     spread[place] = _modulus(state, pair) * np.maximum(contact.gap[mine], 0.0)

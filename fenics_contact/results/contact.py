@@ -55,7 +55,7 @@ class ContactResult:
     Attributes:
         points: Positions and frames of the contact points.
         normal_force: λ_N ≥ 0, zero at open points, shape (n,), [force]. What a solver that ends at its
-            tolerance leaves beside that is in balance, reactions and resultants alone.
+            tolerance leaves besides is in balance, reactions and resultants alone.
         friction_force: τ in the points' tangents, zero without friction, shape (n, dim - 1), [force]. It
             acts on the master; the slave feels the opposite.
         slip_bound: Largest friction force, shape (n,), [force].
@@ -101,7 +101,7 @@ class ContactResult:
     def pressure(self) -> np.ndarray:
         """True pressure, normal force over `area`, shape (n,), [force / length²].
 
-        It is what the Cauchy stress beside it presses with. Where bodies deform little it is the nominal one.
+        It is the normal part of the Cauchy stress there. Where bodies deform little it is the nominal one.
         """
         return self.normal_force / self.area
 

@@ -153,7 +153,7 @@ class DeformedState(State):
     def _moment_arms(self) -> np.ndarray:
         """Where forces act on the nodes of all bodies, on every rank, shape (n_nodes, dim), [length].
 
-        Stress keeps a body of small strain in balance about its undeformed places, whatever lies beside it.
+        Stress keeps a body of small strain in balance about its undeformed places, whatever others do.
         """
         return np.concatenate(
             [
@@ -170,11 +170,11 @@ AnyState: TypeAlias = LinearState | DeformedState
 def row_values_at(end: NonlinearEquilibrium) -> RowValues:
     """Return what the laws of rows depend on at an equilibrium."""
     evaluation, at = end.evaluation, end.evaluation.at
-    torn, lacking, diagonal = evaluation.torn, evaluation.constraint_residual, at.diagonal
+    torn, residual, diagonal = evaluation.torn, evaluation.constraint_residual, at.diagonal
     assert diagonal is not None
     bound, step = torn.law.bound(at.multiplier), contact_step(torn.layout, diagonal)
     free = np.zeros(len(at.multiplier), dtype=bool)
-    return RowValues(at.multiplier, lacking, bound, step, -lacking, free, evaluation.residuals)
+    return RowValues(at.multiplier, residual, bound, step, -residual, free, evaluation.residuals)
 
 
 #: Near the end residuals may be what rounding and inexact systems leave: the best of this many steps counts.

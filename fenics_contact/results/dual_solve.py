@@ -24,7 +24,7 @@ def solve_dual(
         start: Earlier solution, or multiplier to start from, owned, or None.
 
     Raises:
-        SlidingError: The load is more than friction bears; names the bodies and how they move.
+        SlidingError: The load exceeds what friction can hold; names the bodies and how they move.
         InfeasibleError: Otherwise no equilibrium exists.
         ConvergenceError: The tolerance was not met.
     """

@@ -217,7 +217,7 @@ def table(
     """Return forces and moments of several resultants, one per line behind its names, with their units.
 
     Args:
-        scales: A force and a moment beside which what is only rounding is shown as zero; by default the
+        scales: Reference force and moment; what is rounding of these is shown as zero; by default the
             largest components.
     """
     if not resultants:

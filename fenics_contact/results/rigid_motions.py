@@ -101,7 +101,7 @@ class RigidMotion:
     rotation: np.ndarray | float
 
     def __str__(self) -> str:
-        """Return it in words; what is only rounding beside other components is zero."""
+        """Return it in words; rounding of other components is zero."""
         words = []
         for values in map(np.atleast_1d, (self.displacement, self.rotation, self.about)):
             known = np.where(np.abs(values) > MOTION_ROUNDING * np.abs(values).max(), values, 0.0)
