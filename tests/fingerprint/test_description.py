@@ -86,8 +86,8 @@ def test_no_address_of_an_object_is_told() -> None:
 
 def test_another_process_finds_the_same_words() -> None:
     script = (
-        "import json, numpy as np\nfrom fenics_contact._base import described\n"
-        "from fenics_contact._scene import Coulomb\n"
+        "import json, numpy as np\nfrom fenics_contact._base.fingerprint import described\n"
+        "from fenics_contact import Coulomb\n"
         "print(json.dumps(described([Coulomb(0.3), {'a': np.arange(3.0)}, np.sin], 'it')))"
     )
     root = Path(__file__).resolve().parents[2]

@@ -226,7 +226,7 @@ def test_all_ranks_report_the_same_mistake(mpirun: Callable[..., str]) -> None:
         data = {"meshes": {"m": mesh}, "materials": {"s": {"model": f"{folder}/{comm.rank}.py:A"}}}
         file = read_scene_file({**data, "bodies": {"a": {"mesh": "m", "material": "s"}}}, comm)
         if comm.rank == 0:
-            code = "from fenics_contact._scene import IsotropicElasticity as E; A = lambda: E(1.0, 0.0)"
+            code = "from fenics_contact.materials import IsotropicElasticity as E; A = lambda: E(1.0, 0.0)"
             (folder / "0.py").write_text(code)
         try:
             file.scene
