@@ -61,9 +61,6 @@ def nearest(problem: DualProblem, feasible: FeasibleSet, start: Vector, enough: 
     Norms are those of the scaled multipliers.
 
     Args:
-        problem: The dual problem.
-        feasible: The cone.
-        start: λ₀, owned.
         enough: Norm of G λ − e, measured in multipliers, at which to stop.
 
     Returns:
@@ -225,11 +222,9 @@ def admissible(
     slip are not small. Elsewhere λ is projected on the cone.
 
     Args:
-        problem: The dual problem.
         slip_bound: Ψ, shape (n_friction,), owned.
         follows: Discs whose slip bound follows the normal force, shape (n_friction,), owned. That of the
             others is given and not raised.
-        multiplier: λ, owned.
         residual: r = F λ − d − Gᵀα, owned.
     """
     layout = problem.layout
@@ -292,7 +287,6 @@ def basis(
     """Return Z of a face, see `fenics_contact.qp.face.face_basis`, by the directions of friction forces.
 
     Args:
-        layout: Positions of the multipliers.
         closed: Contacts whose normal row is in it, shape (n_contact,).
         stick: Discs of which both rows are in it, shape (n_friction,).
         turning: Discs of which the direction across the friction force is in it, shape (n_friction,).
@@ -349,7 +343,6 @@ def lift(system: DualSystem, known: Admissible, residual: Vector, cancelled: flo
     of that small block alone; S is applied once, for half an F-product.
 
     Args:
-        system: The dual system.
         known: An admissible multiplier with its statuses.
         residual: Its r = F λ − d − Gᵀα, owned, [length].
         cancelled: Norm of the displacements that cancel in r, [length].
@@ -487,7 +480,6 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
     initial violation count as closed, and a load that is balanced to 1e-9 as balanced.
 
     Args:
-        system: The dual system.
         solution: A solution of its problem, of any accuracy.
 
     References:

@@ -45,7 +45,6 @@ def moduli(forms: FormLibrary, material: Material, cell_type: str) -> np.ndarray
     Args:
         forms: Compiled forms, including those of the material.
         material: A material whose moduli are the same everywhere.
-        cell_type: Type of the cell.
 
     Returns:
         Shape (dim², dim²), g_kj at index dim k + j, [force / length²].
@@ -71,7 +70,6 @@ def energy_of_difference(
 
     Args:
         moduli: C from `moduli`, shape (dim², dim²), [force / length²].
-        cell_type: Type of the cells.
         points: Coordinates of the nodes, shape (n, nodes of a cell, dim), [length].
         displacement: u at the nodes, shape (n, nodes of a cell, dim), [length].
         gradient: g at the nodes, (k, j) for ∂u_k/∂x_j, shape (n, nodes of a cell, dim, dim).
@@ -186,8 +184,6 @@ def energy_on_subdomain(
 
     Args:
         form: The compiled form of the material.
-        material: The material.
-        subdomain: The subdomain.
         blocks: Block of each node of some cells, shape (n, nodes of a cell); elsewhere the result is
             undefined.
         displacement: u at these nodes, shape (n, nodes of a cell, dim), [length].
@@ -257,7 +253,6 @@ def discretisation_error(torn: TornSystem, displacement: np.ndarray) -> Discreti
     does not follow. The geometry error of facets on a curved surface is not included.
 
     Args:
-        torn: The torn system.
         displacement: This rank's torn displacement, shape (torn_size,), [length]: that of a state is
             `State.conforming_displacement`. Where copies of a node differ, their mean is used.
 

@@ -301,12 +301,7 @@ def find_patches(sites: Sites) -> Patches:
 
 
 def padded(sites: Sites, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return neighbours and their weights as tables, padded with neighbours of weight zero.
-
-    Args:
-        sites: The sites.
-        rows: Some of them.
-    """
+    """Return neighbours and their weights as tables, padded with neighbours of weight zero."""
     table = sites.neighbours
     start, end = table.indptr[rows], table.indptr[rows + 1]
     place = start[:, None] + np.arange(int((end - start).max(initial=0)))
@@ -333,7 +328,6 @@ def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
     """Return the recovered displacement gradient at every site. Collective.
 
     Args:
-        sites: The sites.
         displacement: Displacement of each site, shape (n_sites, dim), [length].
 
     Returns:
@@ -360,7 +354,6 @@ def _ask_neighbours(patches: Patches, open_: Moments, doubt: np.ndarray, coeffic
     """Refit undetermined sites with the highest derivatives of neighbours, layer by layer. Collective.
 
     Args:
-        patches: The patches.
         open_: Normal equations of the n undetermined sites.
         doubt: Measure of how poorly each is determined, shape (n,).
         coefficients: Coefficients of all sites, which are overwritten, shape (n_sites, m, dim), [length].
@@ -383,7 +376,6 @@ def _fitted(patches: Patches, moments: Moments, derivatives: np.ndarray) -> np.n
     """Refit with given highest derivatives where a patch leaves them undetermined.
 
     Args:
-        patches: The patches.
         moments: Normal equations of the sites, n of them.
         derivatives: ∂u_k/∂x_i...∂x_j as entry (i, ..., j, k), shape (n, dim, ..., dim, dim).
 
@@ -404,10 +396,8 @@ def _mean_of_neighbours(
     Collective.
 
     Args:
-        patches: The patches.
         rows: The sites, shape (n,).
         known: Which sites are known, shape (n_sites,).
-        coefficients: Coefficients of all sites.
 
     Returns:
         Shapes (n,) and (n, dim, ..., dim, dim): ∂u_k/∂x_i...∂x_j as entry (i, ..., j, k).

@@ -36,9 +36,7 @@ def friction_error(system: DualSystem, solution: DualSolution, certificate: Cert
     and where slip bounds do not follow the normal forces.
 
     Args:
-        system: The dual system.
         solution: A solution of its problem.
-        certificate: Its certificate.
 
     Returns:
         Energy norm of the change, [√(force · length)].
@@ -165,8 +163,6 @@ def state_errors(solver: SolverErrors, estimate: DiscretisationError, norm: floa
     """Combine the errors of a state.
 
     Args:
-        solver: Errors of the solver.
-        estimate: Discretisation error.
         norm: Energy norm of the displacement, [√(force · length)].
     """
     by_body = {name: _ratio(value, norm) for name, value in estimate.by_body.items()}

@@ -68,8 +68,6 @@ def write_archive(path: Path, kind: str, fingerprint: Mapping[str, str], arrays:
     """Write arrays with their kind and the problem's fingerprint, atomically.
 
     Args:
-        path: File to replace.
-        kind: Kind of the arrays.
         fingerprint: Identifies the problem, see `described`.
         arrays: Numbers and text by name; names must not start with an underscore.
 

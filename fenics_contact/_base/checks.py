@@ -230,7 +230,6 @@ def meaning(owner: Any, name: str) -> str:
     """Return the documentation of a field or an argument of a class or function, "" if there is none.
 
     Args:
-        owner: The class or function.
         name: Name of the field or argument.
     """
     for known in getattr(owner, "__mro__", (owner,)):
@@ -246,7 +245,6 @@ def require_file(path: Path, what: str = "a file") -> None:
     """Reject a path that is not a readable file, also if its name is too long or its folder closed.
 
     Args:
-        path: The path.
         what: Description of the expected file, with its article.
 
     Raises:

@@ -34,7 +34,6 @@ def write_whole(path: Path, content: bytes) -> None:
 
     Args:
         path: The file; its folder is created.
-        content: Its content.
 
     Raises:
         CheckpointError: If the disk is full or the folder cannot be written to; the target is then unchanged.
@@ -55,7 +54,6 @@ def write_atomically(path: Path, content: bytes) -> None:
 
     Args:
         path: The file; its folder is created.
-        content: Its content.
 
     Raises:
         OSError: If the disk is full, the folder cannot be written to, or another writer has replaced the file
@@ -81,12 +79,7 @@ def _version(path: Path) -> tuple[int, int] | None:
 
 @contextmanager
 def hidden_folder(folder: Path, stem: str) -> Iterator[Path]:
-    """Create a hidden folder to write in, and remove it at the end; first remove those of dead writers.
-
-    Args:
-        folder: Its parent folder; created.
-        stem: Beginning of its name.
-    """
+    """Create a hidden folder to write in, and remove it at the end; first remove those of dead writers."""
     folder.mkdir(parents=True, exist_ok=True)
     remove_abandoned(folder)
     hidden, lock = _made(folder, stem)

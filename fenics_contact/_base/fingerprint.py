@@ -31,8 +31,6 @@ def described(value: Any, name: str, *, carried: bool = True) -> dict[str, str]:
     any other object only by its class.
 
     Args:
-        value: The value.
-        name: Its name.
         carried: Whether to describe closures and defaults of functions.
 
     Example:
@@ -45,12 +43,7 @@ def described(value: Any, name: str, *, carried: bool = True) -> dict[str, str]:
 
 
 def differences(there: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
-    """Name the differences between two descriptions, the first few in full.
-
-    Args:
-        there: The stored one.
-        here: The present one.
-    """
+    """Name the differences between two descriptions, the first few in full."""
     unlike = [name for name in {**there, **here} if there.get(name) != here.get(name)]
     named = [
         f"{name} ({there.get(name, 'absent')}, {here.get(name, 'absent')})" for name in unlike[:MOST_NAMED]

@@ -104,10 +104,7 @@ def prefers_explicit(size: int, interface: int, *, products: int = PRODUCTS, rat
     """Return whether dense interface matrices are expected to be faster than sparse factors.
 
     Args:
-        size: Dofs of the subdomain.
-        interface: Dofs that B touches.
         products: Expected number of products with the dual operator, and with the preconditioner.
-        rates: Rates of the machine.
 
     Example:
         >>> prefers_explicit(2079, 729), prefers_explicit(10125, 3534)
@@ -341,9 +338,6 @@ def warn_of_threads(ranks: int) -> None:
     """Warn, once, if several ranks run and the number of their threads is unset.
 
     The number itself is the user's choice: a library that changed it would affect the whole process.
-
-    Args:
-        ranks: Number of ranks.
     """
     if ranks > 1 and not any(os.environ.get(name) for name in SETTINGS):
         safe_log(

@@ -46,10 +46,8 @@ class CompiledForm:
         Integrals without a tag cover the whole mesh, those with a tag only the entities given for it.
 
         Args:
-            mesh: The mesh.
             spaces: dolfinx function spaces of the form's arguments, in their order.
             coefficients: Template coefficient -> dolfinx Function on ``mesh``.
-            constants: Template constant -> dolfinx Constant.
             facets: Tag of a surface integral -> (cells, local facets) from `match_facets`.
             cells: Tag of a volume integral -> cells of ``mesh``; no cell has two tags.
         """

@@ -27,7 +27,6 @@ def local_mesh(points: np.ndarray, cells: np.ndarray, cell_type: str) -> dolfinx
     Args:
         points: Coordinates, shape (n, dim), [length].
         cells: Rows of node numbers in VTK order, shape (m, n_vertices).
-        cell_type: One of `CELL_TYPES`.
     """
     return _create_mesh(MPI.COMM_SELF, points, cells, cell_type, np.zeros((len(cells), 1), dtype=np.int32))
 
@@ -38,11 +37,9 @@ def rank_mesh(
     """Build a distributed mesh with cells on given ranks; a rank may have none. Collective on ``comm``.
 
     Args:
-        comm: Communicator of the mesh.
         points: All coordinates, shape (n_nodes, dim), replicated, [length].
         cells: All cells, rows of node numbers in VTK order, replicated.
         rank: Owner of each cell, shape (n_cells,), replicated.
-        cell_type: One of `CELL_TYPES`.
     """
     bounds = np.linspace(0, len(points), comm.size + 1).astype(int)
     mine = np.flatnonzero(rank == comm.rank)

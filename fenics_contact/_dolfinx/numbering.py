@@ -60,7 +60,6 @@ def cell_field(mesh: dolfinx.mesh.Mesh, name: str, values: np.ndarray) -> dolfin
     """Return a field on ``mesh`` that is constant on each cell, by the values on this rank's own cells.
 
     Args:
-        mesh: The mesh.
         name: Name of the field (a C identifier).
         values: Shape (n_owned, ...): numbers, vectors or tensors.
     """

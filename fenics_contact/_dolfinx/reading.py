@@ -86,10 +86,6 @@ def read_tags(
     """Read the first attribute of a grid of an XDMF file as tags on ``mesh``.
 
     Args:
-        path: As in `read_mesh`.
-        mesh: The mesh.
-        name: As in `read_mesh`.
-        inline: As in `read_mesh`.
         own_points: Whether the grid has its own points, which must then be those of the mesh.
 
     Raises:

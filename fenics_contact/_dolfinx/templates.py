@@ -26,12 +26,7 @@ def _element(cell_type: str, shape: tuple[int, ...]) -> ufl.finiteelement.Abstra
 
 
 def vector_element(cell_type: str, size: int = 0) -> ufl.finiteelement.AbstractFiniteElement:
-    """Return the element of coordinates and displacements, of the cells' degree, one value per direction.
-
-    Args:
-        cell_type: Type of the cells.
-        size: Another number of values.
-    """
+    """Return the element of coordinates and displacements, of the cells' degree, one value per direction."""
     return _element(cell_type, (size or dimension(cell_type),))
 
 

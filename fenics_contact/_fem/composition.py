@@ -46,7 +46,6 @@ def composition(body: Body, cells: np.ndarray) -> Composition:
     """Return the materials of some cells of a body.
 
     Args:
-        body: The body.
         cells: Cells of the body in the order of the mesh on which forms are to be bound.
     """
     materials = body.materials
@@ -71,10 +70,7 @@ def integrate(
     """Return ∫ integrand over all materials (a form) and its constants.
 
     Args:
-        materials: As in `Composition`.
-        cell_type: Of the template.
         integrand: Takes each material with its constants.
-        measure: dx on the template.
     """
     all_constants: list[ufl.Constant] = []
     form = None

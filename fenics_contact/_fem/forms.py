@@ -110,9 +110,6 @@ class FormLibrary:
 
         Args:
             load: The load; a resultant must have been spread.
-            parts: Materials of the mesh.
-            cell_type: Of the mesh.
-            space: Displacements on the mesh.
             points: Coordinates by input node of the mesh, shape (n, dim), [length].
             facets: (cells, local facets) on which a surface load acts.
             acted: Marks of the nodes of its surface by input node, shape (n,).
@@ -151,9 +148,6 @@ class FormLibrary:
         """Return forces and tangent of the materials ``parts`` on one mesh of a scene with nonlinear ones.
 
         Args:
-            parts: Materials of the mesh.
-            cell_type: Of the mesh.
-            space: Displacements on the mesh.
             points: Coordinates by input node, shape (n, dim), [length].
         """
         from fenics_contact._fem.mechanics import HyperelasticMechanics, LinearMechanics
@@ -236,10 +230,6 @@ def cell_stiffness(scene: Scene, forms: FormLibrary) -> dict[str, np.ndarray]:
 
     It is a material's stiffness on a unit cell, times the mean cell size of the body: within a body of one
     material it is the same everywhere.
-
-    Args:
-        scene: The scene.
-        forms: Its prepared forms.
     """
     stiffness = {}
     for name, body in scene.bodies.items():
@@ -283,7 +273,6 @@ class Temperature:
         """Return the Functions for the coefficients.
 
         Args:
-            mesh: The mesh.
             points: Coordinates by input node, shape (n, dim), [length].
         """
         if not self.of_position:
@@ -315,14 +304,7 @@ def temperature_of(loads: Iterable[Load], body: str) -> Temperature:
 
 
 def stress_left(material: Any, u: Expr, constants: Constants, temperature: Expr | None) -> Expr:
-    """Return the stress (dim x dim, UFL) of a displacement at a temperature change.
-
-    Args:
-        material: The material.
-        u: The displacement (UFL).
-        constants: The material's constants.
-        temperature: ΔT (UFL) or None.
-    """
+    """Return the stress (dim x dim, UFL) of a displacement at a temperature change."""
     stress = material.stress(u, constants)
     return stress if temperature is None else stress - temperature * material.thermal_stress(constants)
 

@@ -38,8 +38,6 @@ class Dilatation:
         """Evaluate the Jacobians of the undeformed cells.
 
         Args:
-            space: Displacements on the mesh.
-            cell_type: Of the mesh.
             points: Coordinates by block, shape (n, dim), [length].
         """
         self._positions, _ = quadrature(CELL_TYPES[cell_type], quadrature_degree(cell_type))
@@ -98,8 +96,6 @@ class MeanStrain:
 
         Args:
             gradients: Of the shape functions, shape (n_cells, n_gauss, nodes, dim), [1 / length].
-            polynomials: Of the same cells.
-            share: The share s.
         """
         self._gradients, self._polynomials, self._part = gradients, polynomials, 1.0 - share
 
@@ -142,8 +138,6 @@ class GaussPoints:
         """Evaluate the gradients of the shape functions.
 
         Args:
-            space: Displacements on the mesh.
-            cell_type: Of the mesh.
             points: Coordinates by block, shape (n, dim), [length].
         """
         cell = CELL_TYPES[cell_type]
@@ -177,7 +171,6 @@ class GaussPoints:
 
         Args:
             stress: P at their points, shape (n_cells, n_gauss, 3, 3), [force / length²].
-            cells: Numbers of the cells.
         """
         dim = self._shape[1]
         weighted = self._weights[cells][..., None, None] * stress[..., :dim, :dim]
@@ -188,7 +181,6 @@ class GaussPoints:
         """Return the means of changes of volume in some cells.
 
         Args:
-            cells: Numbers of the cells.
             moduli: Of the material at rest, by Voigt components, shape (6, 6), [force / length²].
         """
         share = held_share(moduli) if self._cell_type in UNSEEN else 0.0
@@ -201,7 +193,6 @@ class GaussPoints:
 
         Args:
             tangent: A at their points, shape (n_cells, n_gauss, 3, 3, 3, 3), [force / length²].
-            cells: Numbers of the cells.
             means: Means of changes of volume in these cells, where A is the tangent by them.
         """
         dim, (_, m) = self._shape[1], self.shape
@@ -221,7 +212,6 @@ class GaussPoints:
         """Return the matrix with entries from `stiffness`; its pattern is the same whatever is zero in it.
 
         Args:
-            entries: Sums of `stiffness`.
             others: A matrix of the same mesh that is added.
         """
         indptr, indices, _ = self._pattern
@@ -299,9 +289,6 @@ class MeanDilatation:
         """Bind the forms.
 
         Args:
-            templates: With the prepared forms.
-            parts: Materials of the mesh.
-            cell_type: Of the mesh.
             fields: Displacement, and the `mean_fields`, which `follow` sets.
             dilatation: Changes of volume on the mesh.
         """
@@ -333,7 +320,6 @@ class MeanDilatation:
 
         Args:
             origin: Displacement at the start of the step, that of the fields.
-            displacement: That at its end.
         """
         shape = self._polynomials.centres.shape[0], -1
         change = (self._inverse @ (self._volume_changes() @ (displacement - origin))).reshape(shape)

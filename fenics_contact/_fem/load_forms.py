@@ -87,7 +87,6 @@ def load_fields(
     """Return the Functions for a symbol's coefficients.
 
     Args:
-        load: The load.
         space: Space of displacements on the mesh.
         points: Coordinates by input node of that mesh, shape (n, dim), [length].
         acted: Marks of the nodes on the load's surface, shape (n,); the value is asked for only there.
@@ -115,7 +114,6 @@ def load_work(
     Args:
         load: A load; a resultant must have been spread.
         materials: Materials of the cells on which it acts.
-        cell_type: Of the template.
         value: Value of the load (UFL), see `Symbol`.
         v: Test function or another field.
     """

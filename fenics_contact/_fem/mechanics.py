@@ -188,9 +188,6 @@ class HistoryMechanics:
         """Evaluate shape functions.
 
         Args:
-            parts: Materials of the mesh.
-            cell_type: Of the mesh.
-            space: Displacements on the mesh.
             points: Coordinates by input node, shape (n, dim), [length].
             others: The mechanics of the materials without history, None where there are none.
         """
@@ -361,7 +358,6 @@ class LinearMechanics:
 
         Args:
             stiffness: The bilinear form, bound to the mesh.
-            mesh: The mesh.
             points: Coordinates by input node, shape (n, dim), [length].
         """
         _dolfinx.update_coordinates(mesh, points)

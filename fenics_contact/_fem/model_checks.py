@@ -170,11 +170,6 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
     A kernel with a missing mode makes the generalised inverse blow up, one with an extra mode removes real
     stiffness; both could be taken for a solution.
 
-    Args:
-        material: The material.
-        cell_type: Type of the cell.
-        bind: Binds its stiffness form.
-
     Raises:
         InvalidInputError: If the stiffness is zero, not finite, not symmetric or has a negative energy, the
             kernel has the wrong shape, dependent modes or modes with energy, or a mode without energy is
@@ -280,7 +275,6 @@ def stiffness_of_cell(vertices: np.ndarray, cell_type: str, bind: Bind) -> tuple
 
     Args:
         vertices: Coordinates in VTK order, shape (n, dim), [length].
-        cell_type: Type of the cell.
         bind: Binds the stiffness form of a material.
     """
     mesh = _dolfinx.local_mesh(vertices, np.arange(len(vertices))[None], cell_type)

@@ -65,9 +65,6 @@ class Template:
         """Return the form on one mesh, with values for its constants and Functions for its coefficients.
 
         Args:
-            spaces: Spaces of its arguments.
-            values: Values of its constants.
-            functions: Functions for its coefficients.
             facets: (cells, local facets) of its surface integral.
             mesh: The mesh, where there are no arguments.
             cells: Cells of its tagged volume integrals by tag.
@@ -113,7 +110,6 @@ class Templates:
 
         Args:
             key: Everything on which the form depends.
-            name: Its name among `names`.
             write: Returns form, constants and coefficients.
 
         Raises:
@@ -231,7 +227,6 @@ class CellPolynomials:
         Args:
             points: Coordinates, shape (n, dim), [length].
             cells: Nodes of the cells in VTK order, shape (n_cells, nodes of a cell).
-            cell_type: Of the cells.
         """
         cell = CELL_TYPES[cell_type]
         positions, weights = quadrature(cell, quadrature_degree(cell_type))
@@ -276,8 +271,6 @@ def polynomial(coefficients: Expr, centre: Expr, cell_type: str) -> Expr:
 
     Args:
         coefficients: Constant in each cell: a scalar, or a vector of `polynomial_size`.
-        centre: X_c of each cell.
-        cell_type: Of the template.
     """
     if cell_type not in LINEAR:
         return coefficients

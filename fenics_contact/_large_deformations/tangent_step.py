@@ -109,11 +109,9 @@ def tangent_step(
     """Solve the face that the natural map selects; None where it does not hold every body. Collective.
 
     Args:
-        tangent: The linearised problem.
         step: ρ of the natural map, owned; zero on equality rows.
         forcing: Residual of the linear system relative to that of its start.
         floor: A residual that is small enough, [length].
-        max_products: Largest number of products.
         margin: Discs inside their slip bound by less than this part of it count as slipping.
     """
     factor = None if tangent.problem.scaling is None else tangent.problem.scaling.factor
@@ -166,13 +164,9 @@ def tangent_adjoint(
     It is (Zᵀ F W + κ) z − (G Z)ᵀβ = Zᵀ d under G W z + S β = e, with the bases of `tangent_step` swapped.
 
     Args:
-        tangent: The linearised problem.
-        face: Its face.
         coupling: Growth of slipping forces with their normal forces, shape (n_owned, n_face).
-        right: d, owned.
         load: e, shape (m,), replicated.
         tolerance: Residual of the linear system relative to that of its start.
-        max_products: Largest number of products.
 
     Returns:
         W z as multiplier, β as motions.

@@ -73,7 +73,6 @@ def rounded(values: np.ndarray, dropped: int = 10) -> np.ndarray:
     """Round numbers of single precision to four digits, which compress better.
 
     Args:
-        values: The numbers, float32.
         dropped: How many of their 23 binary digits after the first are zero then.
     """
     bits = np.where(np.isfinite(values), values, np.float32(np.nan)).astype("<f4").view("<u4")

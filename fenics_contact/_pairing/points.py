@@ -88,7 +88,6 @@ class ContactPoints:
         """Return slave nodes of a pair whose areas belong to points, ascending, with values of these points.
 
         Args:
-            pair: Number of the pair.
             values: A value for each point, shape (n,).
         """
         mine = np.flatnonzero(self.pair == pair)
@@ -145,7 +144,6 @@ def movable(points: ContactPoints, fixed: np.ndarray) -> np.ndarray:
     """Return the components of the relative displacement that supports leave free, shape (n_points, dim).
 
     Args:
-        points: The points.
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
     """
     jump = points.jump
@@ -268,9 +266,6 @@ def without_tied(
     forces would be split at will, and friction would follow. The tie alone has them: it keeps closed.
 
     Args:
-        points: The contact points.
-        ties: Points of the ties.
-        scene: Their scene.
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         told: Whether nothing is to be logged.
     """
@@ -310,8 +305,6 @@ def shared_once(points: ContactPoints, scene: Scene, *, told: bool) -> ContactPo
     one named first, with its friction and the area of the surfaces of both.
 
     Args:
-        points: The contact points.
-        scene: Their scene.
         told: Whether nothing is to be logged.
     """
     kept, lost = _shared(points, scene)
@@ -329,9 +322,7 @@ def areas_taken(
     """Return the areas that points take over from others, and whose they are, see `ContactPoints.taken`.
 
     Args:
-        points: All points.
         couples: Numbers of points and of those that they stand for, shape (n,) each.
-        scene: Their scene.
     """
     kept, lost = couples
     beside = np.zeros(len(kept), dtype=bool)

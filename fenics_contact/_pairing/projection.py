@@ -44,7 +44,6 @@ def shared_projection(
     """Project nodes of the slave, distributed round-robin over the ranks. Collective.
 
     Args:
-        slave: Surface of the nodes.
         chosen: Positions in its nodes; the projection numbers these, shape (n,).
         master: The surface to project on.
         comm: Communicator of the ranks; all receive all projections.
@@ -70,11 +69,8 @@ def warn_of_surface(
     """Warn of nodes off their shape, and of reconstructed facets that stay flat.
 
     Args:
-        scene: The scene.
         surface: Slave or master of a pair.
         geometry: Its representation in the pair.
-        faceted: The resulting surface.
-        comm: Communicator; rank 0 logs.
     """
     mesh = scene.bodies[surface.body].mesh.origin
     away = mesh.off_shapes.get(surface.name) if geometry == "best" else None
@@ -111,10 +107,7 @@ def warn_of_edge(
     them between these nodes and its edge is missing.
 
     Args:
-        tie: A tie by nodes.
-        slave: Its slave.
         held: Which nodes of the slave are tied or held by supports, shape (n_nodes,).
-        master: Its master.
         comm: Communicator of the ranks that share the work; rank 0 logs.
     """
     whole, some = (each(held[slave.facets], axis=1) for each in (np.all, np.any))
@@ -149,10 +142,7 @@ def warn_of_uneven_pressure(
     Only of quadratic cells: linear ones have mortar. Collective.
 
     Args:
-        scene: The scene.
         pair: A pair by nodes, or a tie.
-        slave: Its slave.
-        master: Its master.
         comm: Communicator of the ranks that share the work; rank 0 logs.
     """
     if slave.whole is None and master.whole is None:
@@ -183,9 +173,7 @@ def unevenness(
     Facets near the end of the other surface are left out. Pressures do not fall below zero.
 
     Args:
-        slave: The slave.
         there: Projections of its nodes on the master.
-        master: The master.
         back: Projections of the master's nodes on the slave.
         share: The master's share of the compliance of both.
     """
@@ -213,7 +201,6 @@ def _areas(surface: FacetedSurface, places: np.ndarray, met: np.ndarray) -> tupl
     """Return which nodes have facets alone that meet the other surface, and the areas that these bear on.
 
     Args:
-        surface: A surface.
         places: Places of its nodes on that surface between which areas are measured, shape (n, dim).
         met: Which of its nodes meet the other surface, shape (n,).
     """

@@ -93,8 +93,6 @@ def closable_gaps(
     """Return the gaps that linear displacements can close. Collective.
 
     Args:
-        slave: The slave surface.
-        master: The master surface.
         coupling: Coupling of both, or some of its nodes.
         share: s, the master's share of the motion that closes the gap.
         comm: Communicator of the ranks that share the work.
@@ -130,7 +128,6 @@ def with_given_gaps(
     Args:
         points: Points of the pair with measured gaps.
         first: The same before any design moved the surfaces.
-        pair: The pair.
         place: Coordinates of the slave nodes of ``first``, shape (n, dim), [length].
         comm: Communicator of the ranks; all have the same points.
 
@@ -165,7 +162,6 @@ def in_reach(pair: ContactPair, measured: np.ndarray, place: np.ndarray) -> np.n
     """Return at which points a pair replaces the gap, shape (n,).
 
     Args:
-        pair: The pair.
         measured: Distances of its slave nodes from the master, shape (n,), [length].
         place: Their coordinates, shape (n, dim), [length].
     """
@@ -222,7 +218,6 @@ class MortarPoints:
 
         Args:
             slave: Surface that carries the multipliers.
-            master: The opposite surface.
             bearing: Which slave nodes may carry one, shape (n_nodes,).
             share: The master's share of the motion that closes the gap.
             comm: Communicator of the ranks that share the work; this one by default.
@@ -298,7 +293,6 @@ def find_contact_points(
     prescribed in all components cannot move and are omitted.
 
     Args:
-        scene: The scene.
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         comm: Communicator of the ranks that share the work; this rank alone by default.
         finer: Use better representations of surfaces than requested by the scene, see `true_surface`.
@@ -474,7 +468,6 @@ def _by_mortar(
     Args:
         slave: Side whose nodes carry multipliers.
         movable: Which of them can move.
-        master: The other side.
         comm: Communicator of the ranks that share the work.
         share: The master's share of the motion that closes the gap.
     """

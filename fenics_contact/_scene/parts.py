@@ -197,7 +197,6 @@ class SceneParts:
         """Return which components of a body's nodes supports prescribe, shape (n_nodes, dim).
 
         Args:
-            body: Name of the body.
             supports: Those that count, all by default.
         """
         return ~np.isnan(self.prescribed(body, supports))
@@ -206,7 +205,6 @@ class SceneParts:
         """Return what supports prescribe at the nodes of a body, NaN where free, (n_nodes, dim), [length].
 
         Args:
-            body: Name of the body.
             supports: Those that count, all by default; where they disagree the last one.
         """
         values = np.full(self.bodies[body].mesh.points.shape, np.nan)

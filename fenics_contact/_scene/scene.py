@@ -42,7 +42,6 @@ def bodies_from(
         >>> bodies = bodies_from(meshes, of)  # doctest: +SKIP
 
     Args:
-        meshes: Name to mesh.
         materials: One material for all bodies; or name of the body, or pattern of names with ``*`` and ``?``,
             to its material, or to a mapping from its regions to theirs. Names take precedence over patterns,
             earlier patterns over later ones.

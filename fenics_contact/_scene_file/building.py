@@ -75,8 +75,6 @@ class Builder:
         """Start with nothing built.
 
         Args:
-            source: Source of the document.
-            document: The checked file.
             comm: Communicator on which meshes are built.
         """
         self._source, self._document, self._comm = source, document, comm
@@ -283,7 +281,6 @@ def shape_task(
     """Pose the optimisation of a scene file. Collective.
 
     Args:
-        source: Source of the document.
         document: The file; it has a design.
         contact: Problem that computes the states of its scene.
         shapes: Body name -> its mesh with its shape.

@@ -323,7 +323,6 @@ def check_formulas(part: Any, bodies: Mapping[str, Body]) -> None:
 
     Args:
         part: A part built from the file.
-        bodies: The bodies by name.
 
     Raises:
         InvalidInputError: If one has no finite value at some node, or depends on z in the plane.

@@ -186,7 +186,6 @@ class SolverPart(Part):
         """Cut every body into subdomains, body name -> subdomain of every cell.
 
         Args:
-            scene: The scene.
             ranks: Number of ranks, each of which needs a subdomain if no number is given.
 
         Raises:
@@ -238,9 +237,6 @@ def load_steps(
 
     Args:
         steps: The steps of the file.
-        supports: All supports.
-        loads: All loads.
-        bodies: The bodies by name.
         at: Takes keys and returns a context that refers errors of its block to them.
 
     Raises:

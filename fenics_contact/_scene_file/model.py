@@ -316,7 +316,6 @@ class SupportPart(_Named):
         """Return the support.
 
         Args:
-            dim: Dimension of the bodies.
             value: What a load step prescribes instead.
         """
         return self.made(value=value or self.value or (0.0,) * dim)

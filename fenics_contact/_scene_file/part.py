@@ -93,7 +93,6 @@ def keys_of(
     alias, which is then the key.
 
     Args:
-        of: The class or function.
         without: Arguments that are not keys.
         only: Arguments that are keys; all unless given.
     """

@@ -301,7 +301,6 @@ class SceneFileError(InvalidInputError):
 
         Args:
             name: Name of the file; or the whole message if there are no mistakes.
-            mistakes: The mistakes.
         """
         ordered = (
             () if isinstance(mistakes, str) else tuple(sorted(mistakes, key=lambda mistake: mistake.line))
@@ -468,8 +467,6 @@ def located(source: Source, path: Path, mistakes: list[Mistake] | None = None) -
     """Make an error of the block a mistake at a key.
 
     Args:
-        source: Source of the key.
-        path: The key.
         mistakes: Collects the mistake, which is raised unless given.
     """
     try:

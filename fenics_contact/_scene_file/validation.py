@@ -32,15 +32,7 @@ from fenics_contact._scene_file.values import FREE, MARK, SEPARATOR, Expression,
 
 
 def unknown(source: Source, path: Path, given: str, what: str, known: Iterable[str]) -> Mistake:
-    """Return the mistake of an unknown name.
-
-    Args:
-        source: Source of the scene.
-        path: Path of the name.
-        given: The name.
-        what: What it must name.
-        known: Existing names.
-    """
+    """Return the mistake of an unknown name."""
     names = list(known)
     words = f"{written(path)} must be {what}, one of {listed(names)}, got {as_toml(given)}"
     meant = suggestion(given, names).rstrip()

@@ -322,7 +322,6 @@ def load(reference: str, folder: Path) -> Any:
     """Return the object of a name in a Python file; the file is run.
 
     Args:
-        reference: "file.py:Name".
         folder: Folder to which the file is relative.
 
     Raises:
@@ -406,7 +405,6 @@ def one_of(
 
     Args:
         key: The key, a `Literal` of every table.
-        *tables: The tables.
         default: Its value where the key is missing.
         other: Table without such a key.
         when: Returns from the data whether they are that table.

@@ -210,7 +210,6 @@ def facet_shape_values(local: np.ndarray, corners: int) -> np.ndarray:
 
     Args:
         local: Local coordinates, shape (..., dim − 1).
-        corners: 4, 3 or 2.
 
     Returns:
         Values, shape (..., corners).
@@ -230,7 +229,6 @@ def shape_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.nda
     Args:
         local: Local coordinates, in [−1, 1]² for quadrilaterals, shape (n, 2), in the unit triangle for
             triangles, shape (n, 2), in [−1, 1] for the edges of plane bodies, shape (n, 1).
-        corners: 4, 3 or 2.
 
     Returns:
         Values, shape (n, corners), and derivatives, shape (n, corners, dim − 1).
@@ -478,7 +476,6 @@ def heights(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> He
     """Return the heights of the true surface over points of facets, along the interpolated normals.
 
     Args:
-        surface: The surface.
         facet: Facet of each point, shape (n,).
         local: Local coordinates on it, shape (n, dim − 1).
     """
@@ -501,7 +498,6 @@ def slopes(surface: FacetedSurface, facet: np.ndarray) -> np.ndarray:
     the normal c where h' = −d·c / n·c.
 
     Args:
-        surface: The surface.
         facet: Facets, shape (n,).
     """
     nodes, normals = surface.facets[facet], corner_normals(surface, facet)
@@ -528,7 +524,6 @@ def height_functions(
 
     Args:
         local: Local coordinates as for `shape_functions`, shape (n, dim − 1).
-        corners: 4, 3 or 2.
 
     Returns:
         Those of the slopes, shape (n, corners, 2), their derivatives, shape (n, corners, 2, dim − 1), those

@@ -91,7 +91,6 @@ def _determined(sums: np.ndarray, degree: np.ndarray, narrow: np.ndarray) -> np.
     Args:
         sums: Matrices of the normal equations and their right sides, shape (n, n_powers, n_powers + 1).
         degree: Degrees of the powers, ascending, shape (n_powers,).
-        narrow: As for `PolynomialFit.of`.
     """
     matrix, kept = sums[:, :, :-1], np.zeros_like(sums[:, :, :-1])
     width = int(np.count_nonzero(degree == 1))

@@ -222,7 +222,6 @@ def best_projections(projections: Projection, rounding: float) -> Projection:
     """Keep the projection least beside its facet for each point; then by smallest abs(gap), then facet.
 
     Args:
-        projections: Projections, several per point.
         rounding: Rounding of coordinates, within which gaps at an edge of two facets agree.
     """
     distance = np.abs(projections.gap)

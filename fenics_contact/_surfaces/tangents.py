@@ -54,7 +54,6 @@ def surface_tangents(surface: FacetedSurface, order: int = 2, steepest: float = 
 
     Args:
         surface: The surface in its reference configuration.
-        order: Degree of the polynomials.
         steepest: Cosine of the angle between edge and tangent plane below which the edge stays straight.
     """
     wedges = wedges_of(surface)
@@ -100,12 +99,6 @@ def _fitted_derivatives(
 ) -> sp.csr_matrix:
     """Return weights of the nodes in the derivatives of fitted positions along the axes of wedges.
 
-    Args:
-        surface: The surface.
-        wedges: Its wedges.
-        axes: Their axes, see `_axes`.
-        order: Degree of the polynomials.
-
     Returns:
         Shape (n_wedges · (dim − 1), n_nodes).
     """
@@ -129,10 +122,7 @@ def _mean_derivatives(
     """Return the same of quadratic facets: the mean of those around a node, at the rim that of its facet.
 
     Args:
-        surface: The surface.
         whole: Its quadratic facets, rows of positions in its nodes, shape (n, nodes of a facet).
-        wedges: Its wedges.
-        axes: Their axes, see `_axes`.
     """
     (count, corners), width = surface.facets.shape, surface.dim - 1
     _, slopes = shape_functions(corner_places(corners), corners)

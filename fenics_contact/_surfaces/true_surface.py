@@ -56,7 +56,6 @@ def reconstructed(surface: FacetedSurface, order: int = 2) -> FacetedSurface:
     their curvature, the error is of the fourth order: the difference estimates that of the former.
 
     Args:
-        surface: Facets without relief.
         order: Degree of the polynomials, 2 or 3.
 
     References:
@@ -139,9 +138,6 @@ class Wedges:
 
     def patches(self, order: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the wedges within so many rings of facets around each, and which patches are narrow.
-
-        Args:
-            order: Number of rings.
 
         Returns:
             Pairs of wedges as from `rings_of`, and whether all of a patch lies at the rim, shape (n_wedges,).
@@ -352,8 +348,6 @@ def true_surface(
     """Return a surface of a mesh with its normals and its relief: linear facets through its nodes.
 
     Args:
-        mesh: The mesh.
-        name: Name of the surface.
         geometry: Its representation between the nodes.
         mirrored: Which nodes lie on a plane of symmetry normal to each axis, shape (n_nodes, dim).
         finer: Use a better representation, to estimate the error: the shape, or a reconstruction of the next
@@ -409,7 +403,6 @@ def by_shape(surface: FacetedSurface, shape: SurfaceShape) -> FacetedSurface:
     shapes meet in a crease, or one its mirror image, each facet uses its own.
 
     Args:
-        surface: Facets without relief.
         shape: The shape.
     """
     parts = _parts(shape, surface.points[surface.facets].mean(axis=1))

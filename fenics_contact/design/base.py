@@ -247,7 +247,6 @@ class DesignFunction:
 
         Args:
             alpha: Design variables, shape (size,), [length].
-            value: Largest error of c.
             subgradient: Largest relative error of the subgradient.
         """
         point = self._at_known_state(alpha)

@@ -146,7 +146,6 @@ class MeshMotion:
 
         Args:
             decomposition: Which rank owns which cells.
-            name: Name of the body.
             body: The body in its reference shape.
             moving: Nodes of the design surface.
             held: Components of nodes that do not move, shape (n_nodes, dim): all of them, or on a plane of

@@ -94,7 +94,6 @@ def safe_log(log: Callable[..., None], message: str, *arguments: Any, **named: A
 
     Args:
         log: Method of a logger, such as ``logger.info``.
-        message: The message.
         *arguments: Values that are formatted into it.
         **named: Keyword arguments of the method.
 

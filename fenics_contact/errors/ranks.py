@@ -145,7 +145,6 @@ def exchanged(
     """Return where all ranks are, and this rank's error, possibly an interrupt received while waiting.
 
     Args:
-        own: The communicator from `own_of`.
         error: This rank's error, or None.
         where: Name of this rank's call.
         wait: Seconds after which a rank with an error ends the program; None for never.

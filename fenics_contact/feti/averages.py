@@ -19,7 +19,6 @@ def nodal_mean(decomposition: Decomposition, displacement: np.ndarray) -> np.nda
     Copies on all ranks count, so that the mean does not depend on the distribution.
 
     Args:
-        decomposition: Meshes and numbering.
         displacement: This rank's torn displacement, shape (torn_size,), [length].
 
     Returns:
@@ -41,7 +40,6 @@ def nodal_mean_at(decomposition: Decomposition, field: np.ndarray, nodes: np.nda
     """Return the same mean of a torn field at some nodes, on all ranks. Collective.
 
     Args:
-        decomposition: Numbering.
         field: This rank's part of the field, shape (torn_size,).
         nodes: Nodes among those of all bodies, shape (n,).
 
@@ -59,7 +57,6 @@ def nodal_mean_transposed(decomposition: Decomposition, nodes: np.ndarray, value
     """Return the torn field that does the same work on a torn field as values at nodes do on its means.
 
     Args:
-        decomposition: Numbering.
         nodes: Different nodes among those of all bodies, shape (n,).
         values: Values at these nodes, shape (n, dim).
 
@@ -77,7 +74,6 @@ def nodal_sum(decomposition: Decomposition, force: np.ndarray) -> np.ndarray:
     """Return the sum of a torn force over all copies of each node, on all ranks. Collective.
 
     Args:
-        decomposition: Meshes and numbering.
         force: This rank's torn force, shape (torn_size,), [force].
 
     Returns:

@@ -80,7 +80,6 @@ class Relations:
         those of the supports, and make them redundant where supports hold both surfaces.
 
         Args:
-            tearing: Node numbering and copies.
             fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         """
         if self.count == 0:
@@ -111,7 +110,6 @@ def on_copies(
     """Return rows on nodal displacements, the means of copies weighted by stiffness, as rows of B.
 
     Args:
-        tearing: Node numbering and copies.
         row: Row of each entry, shape (n_entries,).
         node: Its node, shape (n_entries,).
         component: Its component, shape (n_entries,).
@@ -133,7 +131,6 @@ def tangential_relations(points: ContactPoints, frictional: np.ndarray, prescrib
     """Return the slip t_a·(u_slave − u_master): dim − 1 consecutive rows for each frictional point.
 
     Args:
-        points: All contact points.
         frictional: Numbers of the points that have friction.
         prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
     """
@@ -150,7 +147,6 @@ def tied_relations(points: ContactPoints, ties: Sequence[Tie], fixed: np.ndarray
 
     Args:
         points: Points of the ties, see `find_tied_points`.
-        ties: The ties.
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
     """
     dim = points.normal.shape[1]

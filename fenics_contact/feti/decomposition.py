@@ -101,7 +101,6 @@ def tear(
     """Cut the bodies along a partition of their cells and distribute the subdomains over ranks.
 
     Args:
-        scene: The scene.
         partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
         ranks: Number of ranks; each has about the same work, of every body consecutive subdomains.
         stiffness: Body name -> typical nodal stiffness of every cell, shape (n_cells,), [force / length].
@@ -142,7 +141,6 @@ def _costs(copy_subdomain: np.ndarray, shared: np.ndarray, count: int, dim: int)
     Args:
         copy_subdomain: Subdomain of each copy of a node.
         shared: Whether other subdomains share that node.
-        count: Number of subdomains.
         dim: Displacement components of a node.
     """
     size = dim * np.bincount(copy_subdomain, minlength=count)
@@ -294,7 +292,6 @@ def gluing_rows(tearing: Tearing, fixed: np.ndarray) -> GluingRows:
     0). A prescribed one has m rows, one for each copy, which glue it as well.
 
     Args:
-        tearing: Copies of the nodes.
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
     """
     multiplicity = tearing.multiplicity
@@ -503,7 +500,6 @@ class DualNumbering:
         """Build numbering and exchange. Collective on ``comm``.
 
         Args:
-            comm: Communicator.
             owner: Owning rank of every row, shape (n_rows,), replicated.
             touched: Row numbers that this rank's subdomains enter, ascending.
         """
@@ -602,7 +598,6 @@ class Sharing:
         """Determine which ranks share which items. Collective on ``comm``.
 
         Args:
-            comm: Communicator.
             keys: Number of each item that this rank holds, ascending, shape (n,).
             mine: Positions in ``keys`` of those that other ranks may hold as well.
         """

@@ -55,8 +55,6 @@ class DirectSystem:
         """Factor the stiffness.
 
         Args:
-            torn: The system.
-            timer: Collects the wall time.
             previous: System of another load, whose factor is reused.
         """
         self.torn = torn

@@ -57,7 +57,6 @@ class DirichletPreconditioner:
         """Factor the contact block of B D⁻¹ Bᵀ. Collective.
 
         Args:
-            inverse: The factored subdomains.
             B: This rank's part of B on the interface, shape (n_local_rows, n_interface).
             compliance: Diagonal of D⁻¹, shape (n_interface,), the same for all components of a node.
             numbering: Owners and exchange of multipliers.

@@ -141,9 +141,7 @@ class ExplicitOperator:
         """Condense a subdomain on its interface.
 
         Args:
-            subdomain: Its stiffness and kernel.
             interface: Interface dofs b, shape (n_b,).
-            condensations: Symbolic factorisations to reuse.
 
         Raises:
             InvalidInputError: If the stiffness is not positive semidefinite.
@@ -323,7 +321,6 @@ class ImplicitOperator(FactoredOperator):
         """Factor a subdomain.
 
         Args:
-            subdomain: Its stiffness and kernel.
             interface: Interface dofs b, shape (n_b,).
         """
         stiffness = subdomain.stiffness
@@ -376,9 +373,7 @@ class TornInverse:
         """Factor the subdomains.
 
         Args:
-            subdomains: This rank's subdomains.
             B: This rank's part of B, shape (n_local_rows, torn_size).
-            condensations: Symbolic factorisations to reuse.
             kind: Sparse factors, dense matrices, or whichever the cost model expects to be faster.
             previous: Operators of another geometry; those of unchanged subdomains are reused.
         """
@@ -504,7 +499,6 @@ def kernel_matrix(
     """Return R of this rank, shape (torn_size, total_modes): only columns of its own subdomains are nonzero.
 
     Args:
-        subdomains: This rank's subdomains.
         total_modes: Number of kernel vectors of all subdomains of all ranks.
         mode_offset: First kernel vector of each of this rank's subdomains.
     """

@@ -24,7 +24,6 @@ def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
     """Return T that replaces the modes of every cut body's first subdomain by those of the body. Collective.
 
     Args:
-        torn: The torn system.
         offset: First mode of each subdomain and the total, replicated, shape (n_subdomains + 1,).
 
     Returns:

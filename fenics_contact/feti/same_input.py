@@ -28,8 +28,6 @@ def check_same_input(comm: MPI.Comm, scene: Scene, **settings: Any) -> None:
     bytes per rank; the cost is the hashing of the meshes.
 
     Args:
-        comm: Communicator.
-        scene: This rank's scene.
         **settings: Other inputs that must be the same, by name.
 
     Raises:

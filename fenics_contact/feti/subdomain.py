@@ -181,9 +181,6 @@ def cut_out(number: int, body_name: str, body: Body, cells: np.ndarray) -> Subdo
     """Build the mesh of one subdomain.
 
     Args:
-        number: Number among all subdomains.
-        body_name: Name of the body.
-        body: The body.
         cells: Its cells that belong to the subdomain.
     """
     mesh = body.mesh
@@ -207,10 +204,8 @@ def assemble(
     """Assemble K_s, f_s and R_s for the present coordinates of ``body``.
 
     Args:
-        mesh: The subdomain.
         body: Its body, with the coordinates to use.
         loads: Loads of the scene, resultants already spread.
-        forms: Compiled forms.
         earlier: The same subdomain in another state. It is returned unchanged if coordinates, materials and
             loads are equal; if only the loads differ, its matrix and kernel are reused.
 

@@ -82,9 +82,6 @@ def meeting_points(
     """Search for contact and tied points, only where the scene has pairs. Collective.
 
     Args:
-        scene: The scene.
-        decomposition: Its subdomains.
-        overlap: Whether bodies may overlap.
         told: Whether doubts about the surfaces were told, as of another design.
 
     Raises:

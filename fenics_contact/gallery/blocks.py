@@ -295,7 +295,6 @@ def graded(n: int, grading: float) -> np.ndarray:
     """Divide [0, 1] into intervals that grow geometrically; those for 2 n halve those for n.
 
     Args:
-        n: Number of intervals.
         grading: Logarithm of the growth over the whole of [0, 1], 0 for equal intervals.
 
     Returns:
@@ -477,7 +476,6 @@ def split_quadrilaterals(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> 
     """Split every quadrilateral into two triangles along a diagonal.
 
     Args:
-        mesh: Quadrilaterals.
         mirrored: (n_cells,) bool: whether the diagonal runs from vertex 1 to vertex 3 and not from vertex 0
             to vertex 2; nowhere unless given.
 

@@ -136,8 +136,6 @@ def _wrap(core: BodyMesh, round_sides: list[str], frame: _Frame, layers: int, gr
     Args:
         core: The box; u from -1 or 0 to 1, likewise v unless straight, w from -1 to 0.
         round_sides: Names of the sides that carry the shell.
-        frame: The maps to space.
-        layers: Cells through the shell.
         grading: Logarithm of the ratio of its thickest to its thinnest layer.
 
     Returns:

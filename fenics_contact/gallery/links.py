@@ -266,11 +266,6 @@ def check_gap(gap: float) -> None:
 def check_fit(first: LinkShape, second: LinkShape, names: tuple[str, str] = ("link 1", "link 2")) -> None:
     """Reject links that cannot be interlocked or would not touch at a single point.
 
-    Args:
-        first: A link.
-        second: Its neighbour.
-        names: Their names in messages.
-
     Raises:
         InvalidInputError: Names the wire that is too large.
     """

@@ -76,7 +76,6 @@ def drawn_together(places: np.ndarray, spot: float, strength: float) -> np.ndarr
     Args:
         places: Ascending points, (n,), from the start of the interval, or symmetric about its middle, to its
             end.
-        spot: Point of concentration.
         strength: κ; 0 returns the points unchanged.
 
     Returns:
@@ -163,7 +162,6 @@ class WireSection:
         """Divide the arc on the ring's inside.
 
         Args:
-            n: Number of pieces.
             strength: Concentration towards the middle, see `drawn_together`; 0 for equal pieces.
 
         Returns:
@@ -178,7 +176,6 @@ class WireSection:
         """Divide the arc at positive b, from the inner to the outer side; (n + 1, 2).
 
         Args:
-            n: Number of pieces.
             strength: Concentration towards the inner side; 0 for equal pieces.
         """
         start = -self.half_angle
@@ -318,9 +315,6 @@ def _spacing(shape: LinkShape) -> Spacing:
     Cells are moved from the legs to graded crowns such that the cells on both sides of their border are most
     similar along the centre line.
 
-    Args:
-        shape: The link.
-
     Returns:
         The spacing; without grading a sixth of the ring for every quarter turn and leg.
     """
@@ -354,7 +348,6 @@ def stations(shape: LinkShape, spacing: Spacing | None = None) -> tuple[np.ndarr
     """Place the section around the ring.
 
     Args:
-        shape: The link.
         spacing: Of the nodes; the link's own unless given.
 
     Returns:
@@ -383,7 +376,6 @@ def ring_lattice(shape: LinkShape, spacing: Spacing | None = None) -> np.ndarray
     """Sweep the section's lattice around the ring.
 
     Args:
-        shape: The link.
         spacing: Of the nodes; the link's own unless given.
 
     Returns:
@@ -421,9 +413,6 @@ def mesh_ring(shape: LinkShape) -> tuple[np.ndarray, np.ndarray, dict[str, np.nd
 
     The geometry has six volumes with the physical name "volume"; the inner side of the crown at the origin is
     named "contact", that of the far crown "grip". Surfaces are read back by these names.
-
-    Args:
-        shape: The link.
 
     Returns:
         Coordinates, (n_nodes, 3); cells, (n_cells, 8); facets by name, (n_facets, 4); all in gmsh's order.

@@ -369,7 +369,6 @@ def thermal_stresses(
     Args:
         C: Stiffness in the scene's axes, Voigt.
         axes: Material axes as rows, shape (dim, dim).
-        expansion: α along them.
     """
     if expansion is None:
         return ()

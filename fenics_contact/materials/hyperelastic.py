@@ -381,8 +381,6 @@ def power_sum(first: Expr, second: Expr, exponent: float, count: int = 32) -> Ex
     Args:
         first: Sum of the numbers (UFL).
         second: Sum of their products in pairs (UFL).
-        exponent: The power.
-        count: Number of quadrature points.
     """
     if exponent < 0:
         return power_sum(second, first, -exponent, count)  # of the reciprocals

@@ -234,15 +234,7 @@ class Hardening:
 def check_plastic(
     young_modulus: float, yield_stress: float, slope: float, kinematic: float, saturation: tuple[float, float]
 ) -> None:
-    """Reject constants for which plastic flow does not exist or is not unique.
-
-    Args:
-        young_modulus: E, already checked.
-        yield_stress: σ_0.
-        slope: H, of isotropic hardening.
-        kinematic: C, of kinematic hardening.
-        saturation: σ_∞ and δ.
-    """
+    """Reject constants for which plastic flow does not exist or is not unique."""
     if not (np.isfinite(yield_stress) and yield_stress > 0):
         raise InvalidInputError(
             f"yield_stress must be a positive number, got {yield_stress!r}: give it in force per area, for "
@@ -303,7 +295,6 @@ def radial_return(
         back: Back stress at the start of the step, deviatoric, shape (n, 3, 3).
         alpha: Equivalent plastic strain there, shape (n,).
         elastic: Bulk modulus and shear modulus.
-        hardening: Yield stress by α.
         kinematic: Slope C of the back stress in tension.
 
     References:

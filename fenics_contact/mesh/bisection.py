@@ -219,7 +219,6 @@ def target_parts(mesh: BodyMesh, nodes: float | None = None) -> int:
     A subdomain that would have m nodes inside a large mesh has (m^(1/d) + 1)^d once it is torn out.
 
     Args:
-        mesh: Any mesh.
         nodes: Nodes of one subdomain, at least 2^d; unless given 700 in 3D and 1000 in 2D, about 2000
             displacements.
 
@@ -250,8 +249,6 @@ def default_partition(
 
     Args:
         mesh: Any mesh that is connected through faces.
-        ranks: Number of MPI ranks.
-        nodes: As in `target_parts`.
         body: Name of the body, for messages.
 
     Returns:

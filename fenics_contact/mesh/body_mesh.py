@@ -101,7 +101,6 @@ def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str) -> None:
     Args:
         points: Coordinates, (n_nodes, 3 | 2).
         cells: Node numbers, (n_cells, nodes of a cell).
-        remedy: Remedy; ends the message.
 
     Raises:
         InvalidInputError: States the number of cells, the worst one and its Jacobian ratio or its position.

@@ -33,7 +33,6 @@ def near_surfaces(
         ... ]  # doctest: +SKIP
 
     Args:
-        meshes: Name to body.
         distance: Largest distance across the gap, [length].
         along: How far beyond these facets the surfaces reach, for bodies that slide, [length].
 

@@ -140,7 +140,6 @@ def check_one_piece(mesh: BodyMesh, body: str = "") -> None:
     """Reject a mesh that is not connected through faces.
 
     Args:
-        mesh: The mesh.
         body: Name of the body, for the message.
 
     Raises:
@@ -161,7 +160,6 @@ def check_face_connected(mesh: BodyMesh, partition: np.ndarray, body: str = "") 
     """Reject a partition with a subdomain that is empty or not connected through faces.
 
     Args:
-        mesh: The mesh.
         partition: (n_cells,) subdomain numbers.
         body: Name of the body, for the message.
 
@@ -217,7 +215,6 @@ def torn_node_counts(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
     """Count the nodes of every subdomain, a node once for each subdomain that it belongs to.
 
     Args:
-        mesh: The mesh.
         partition: (n_cells,) subdomain numbers.
 
     Returns:

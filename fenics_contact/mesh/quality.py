@@ -180,7 +180,6 @@ def check_shapes(
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2), [length].
-        surfaces: Name to facets.
         shapes: Name of a surface to its shape.
 
     Returns:

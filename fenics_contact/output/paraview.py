@@ -106,9 +106,6 @@ def file_of_each(bodies: Iterable[str], folder: Path, stem: str, suffix: str) ->
 
     Args:
         bodies: Names of the bodies, any text.
-        folder: Folder of the files.
-        stem: Beginning of their names.
-        suffix: Suffix with the dot.
 
     Returns:
         Body name -> file. Names that differ only in special characters are numbered, those that no disk takes

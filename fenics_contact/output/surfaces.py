@@ -48,11 +48,12 @@ def moved_surfaces(problem: ShapeProblem | JointProblem, alpha: np.ndarray) -> t
     return tuple(found)
 
 
-def moved_body(problem: ShapeProblem | JointProblem, alpha: np.ndarray, body: str | None) -> tuple[str, BodyMesh]:
+def moved_body(
+    problem: ShapeProblem | JointProblem, alpha: np.ndarray, body: str | None
+) -> tuple[str, BodyMesh]:
     """Return the name and the mesh of a designed body in the shape of a design. Collective.
 
     Args:
-        problem: The problem.
         alpha: Design variables, shape (size,), [length].
         body: Name of the body; may be None if designs move only one.
 

@@ -88,7 +88,6 @@ def colour_subdomains(shared: np.ndarray, family: int) -> list[str]:
 
     Args:
         shared: Number of nodes that subdomains share, (S, S), see `neighbours`.
-        family: Preferred family of colours.
 
     Returns:
         S colours.
@@ -422,7 +421,6 @@ def sheet(paper: BinaryIO, size: tuple[int, int], title: str) -> Iterator[Figure
     Args:
         paper: A file opened for bytes.
         size: Width and height in pixels.
-        title: Title above everything.
 
     Yields:
         The figure.

@@ -95,7 +95,6 @@ def outline(shape: SurfaceShape, points: np.ndarray) -> list[np.ndarray]:
     each end of the part beside the bodies and four lines between them.
 
     Args:
-        shape: The obstacle.
         points: All nodes of the bodies, (n, dim).
     """
     if isinstance(shape, Plane):
@@ -241,7 +240,6 @@ def draw_field_on_bodies(
 
     Args:
         bodies: Undeformed bodies with linear cells and, if they moved, their ``displacement``.
-        field: The field.
         path: PNG file to write, or None.
         obstacles: Rigid obstacles to draw beside them.
         spot: The contact of which a detail is drawn, in space two sections; None for no detail.

@@ -233,11 +233,9 @@ def draw_field(
     """Colour plane cells by nodal or cell values.
 
     Args:
-        axes: Where to.
         points: Coordinates, (n_nodes, 2).
         cells: Node numbers, (n_cells, 3 | 4).
         values: Shape (n_nodes,) or (n_cells,).
-        look: ``cmap``, ``vmin`` and ``vmax``.
     """
     if len(values) == len(points):
         mesh, shown = refined(points, cells, values)
@@ -399,7 +397,6 @@ def section_frame(view: View, spot: Spot, points: np.ndarray, reach: float | Non
     """Return the frame around a contact, limited to the visible bodies.
 
     Args:
-        view: View onto the section.
         spot: Centre and size of the contact.
         points: All nodes of the bodies, (n, 3).
         reach: Extent up and down, [length]; by default five times the radius of the contact.

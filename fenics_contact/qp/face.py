@@ -152,7 +152,6 @@ def face_basis(
     """Return Z of a face: its columns are orthonormal, shape (size, n_face), owned rows and columns.
 
     Args:
-        layout: Positions of the multipliers.
         closed: Contacts whose normal row is free, shape (n_contact,).
         stick: Discs of which both rows are free, shape (n_friction,).
         sliding: Discs that are free across a direction; in two dimensions none.
@@ -179,7 +178,6 @@ def classify(
     Args:
         layout: Positions of normal and tangential multipliers.
         slip_bound: Ψ, shape (n_friction,), owned.
-        multiplier: λ, owned.
         residual: r = F λ − d − Gᵀα, owned.
         step: ρ, positive, the same for the components of one disc, shape (size,), owned.
     """

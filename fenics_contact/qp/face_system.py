@@ -205,7 +205,6 @@ class CoupledSystem:
 
         Args:
             system: The symmetric system of the face.
-            coarse: Equilibrium of all multipliers.
             tested: W, shape (n_owned, n_face).
             moving: Z, shape (n_owned, n_face).
             curvature: κ, by default that of the face.

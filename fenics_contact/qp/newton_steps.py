@@ -90,7 +90,6 @@ class Forcing:
         """Return the weighted residual at which a face is solved, by choice 1.
 
         Args:
-            residuals: Those of the iterate.
             mismatch: Difference of the last residual from the one that its face predicted, relative to the
                 residual before; None if the face has changed.
             care: Factor on the relative tolerance, at most one.
@@ -133,7 +132,6 @@ def damp(
         at: Returns the point at a fraction of it.
         measured: Returns the residuals by which points are compared.
         earlier: Those of the last two points, None without.
-        fractions: Those that are tried.
     """
     end = measured(full)
     if any(old is not None and not end.is_worse_than(old) for old in earlier):

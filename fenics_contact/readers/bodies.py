@@ -164,7 +164,6 @@ def bodies_of(mesh: TaggedMesh, bodies: Any = None, surfaces: Any = None) -> dic
     Every body has its own nodes: those on a boundary that two bodies share are duplicated.
 
     Args:
-        mesh: The mesh.
         bodies: The groups of each body, see `chosen_bodies`.
         surfaces: The facet labels of each surface, see `chosen_surfaces`.
 

@@ -220,10 +220,7 @@ def chosen_faces(
     """Resolve the caller's choice of surfaces.
 
     Args:
-        faces: All faces.
         groups: Name of a group of the file, or of a face, to numbers of faces.
-        surfaces: The choice.
-        source: The file, for messages.
 
     Returns:
         Name of the surface to numbers of its faces.

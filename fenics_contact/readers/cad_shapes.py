@@ -34,8 +34,6 @@ def shape_of_entity(
     """Return the shape of a face, in the plane of a curve, of gmsh's current model.
 
     Args:
-        gmsh: The module, initialised.
-        entity: Dimension and tag.
         middles: Points on or close to it, (n, 3 | 2), [length].
         outwards: Directions out of the body there, (n, 3 | 2).
 

@@ -288,10 +288,8 @@ def chosen_grid(
 
     Args:
         grids: The grids of the file.
-        name: Its name, or None.
         argument: Its name among the caller's arguments.
         suits: Whether a grid is suitable.
-        path: The file, for messages.
         optional: Whether there may be none.
 
     Raises:

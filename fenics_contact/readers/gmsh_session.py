@@ -39,7 +39,6 @@ def tagged_mesh_of(gmsh: ModuleType, source: str) -> TaggedMesh:
     """Return the cells of the highest dimension and the physical groups of gmsh's current model.
 
     Args:
-        gmsh: The module, initialised.
         source: Name of the model, for messages.
 
     Returns:

@@ -122,7 +122,6 @@ def cells_of(
     """Sort the blocks of a mesh into cells and facets.
 
     Args:
-        mesh: The mesh.
         source: Where it comes from, for messages.
         corners_only: Whether quadratic cells are reduced to their corners.
 
@@ -218,9 +217,7 @@ def labels_of(
     """Return the labels of cells, facets and nodes.
 
     Args:
-        mesh: The mesh.
         blocks: The roles of its blocks.
-        cells: Cell type to nodes.
         labels: What groups the cells, see `read_mesh`.
         source: Where the mesh comes from, for messages.
         everything: Whether every cell must have a label.

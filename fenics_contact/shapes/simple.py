@@ -61,7 +61,6 @@ def evaluate_shape(shape: SurfaceShape, what: Quantity, points: np.ndarray) -> n
 
     Args:
         shape: The shape of a surface, or a rigid obstacle.
-        what: Name of the member.
         points: Points, shape (n, dim), [length].
 
     Returns:

@@ -406,10 +406,7 @@ def draw_stacked(
     """Draw stacked bars of phases, with the sum above them.
 
     Args:
-        axes: Matplotlib axes.
         bars: Time of every phase, by bar.
-        names: Labels below the bars.
-        unit: Unit after the sums.
     """
     phases = dict.fromkeys(phase for bar in bars for phase in bar)
     others = [phase for phase in phases if phase not in ORDER]

@@ -181,8 +181,6 @@ def measured(
     """Run once and return all measurements. Collective.
 
     Args:
-        comm: Communicator.
-        scene: As for `find_study`.
         parameters: The settings, as `Parameters.as_dict` returns them.
         verify: Whether to compute errors, too, not only times.
     """

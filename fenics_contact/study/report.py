@@ -240,9 +240,6 @@ def write_report(folder: str | Path, results: Results, *, figures: bool = True) 
 def write_overview(folder: str | Path) -> Path:
     """Write ``README.md`` of a folder of studies, each in its own folder.
 
-    Args:
-        folder: The folder.
-
     Raises:
         InvalidInputError: If it holds no study.
     """

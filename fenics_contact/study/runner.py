@@ -207,8 +207,6 @@ def measure_all(
 
     Args:
         jobs: The jobs, in the order of measurement.
-        store: Store of the measurements.
-        title: Title in progress reports.
         warm_up: Jobs that fill the cache of compiled forms; run first if anything is missing, and not stored.
         stream: Stream for progress; stderr by default.
 

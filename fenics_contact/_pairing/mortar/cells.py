@@ -183,7 +183,6 @@ def clip_pulled_back(
 
     Args:
         subject: Polygons or intervals as for `clip`.
-        window: Windows as for `clip`.
         by_vertices: Derivative by the vertices, zero for unused ones and those left out, shape (n, any
             number, dim − 1).
 
@@ -408,7 +407,6 @@ def overlaps_of(
         planes: Planes of the slave facets.
         pair_slave: Slave facet of each pair, ascending, shape (n,).
         pair_master: Master facet of each pair, shape (n,).
-        master: The master surface.
     """
     subject, heights = laid_flat(master.points[master.facets[pair_master]], planes, pair_slave)
     window = planes.flat[pair_slave]
@@ -468,11 +466,6 @@ class CellDerivatives:
 
 def cells_pulled_back(overlaps: Overlaps, cells: Cells, by: CellDerivatives) -> tuple[np.ndarray, np.ndarray]:
     """Vector-Jacobian product of cells with respect to the flat corners of both facets of each pair.
-
-    Args:
-        overlaps: The overlaps.
-        cells: Their cells.
-        by: Derivatives by them.
 
     Returns:
         By ``overlaps.subject`` and by ``overlaps.window``, in their shapes.

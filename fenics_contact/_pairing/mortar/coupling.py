@@ -58,7 +58,6 @@ def dual_integrals(cells: Cells, field: np.ndarray) -> tuple[np.ndarray, np.ndar
     """Integrate the dual functions with the slave's and the master's shape functions and with a field.
 
     Args:
-        cells: The integration cells.
         field: Values v at the quadrature points, shape (n, q).
 
     Returns:
@@ -214,9 +213,6 @@ def relief_of_cells(
     """Return the height of the true slave over its facets less that of the master, shape (n, q), [length].
 
     Args:
-        cells: Quadrature points.
-        slave: The slave surface.
-        master: The master surface.
         pairs: Slave facet and master facet of each pair, shape (n_pairs,) each.
         along: Direction of the heights for each pair, out of the slave facet, shape (n_pairs, dim).
     """
@@ -292,7 +288,6 @@ def mortar_coupling(
 
     Args:
         slave: Surface that carries the multipliers.
-        master: The opposite surface.
         comm: Communicator of the ranks that share the work, all with the same surfaces; this one by default.
 
     Raises:

@@ -50,7 +50,6 @@ def integrals_pulled_back(
     """Vector-Jacobian product of `dual_integrals` with respect to the cells and the field.
 
     Args:
-        basis: The dual functions.
         field: Values at the quadrature points, shape (n, q).
         by_coverage: Derivative by D_e, shape (n_facets, corners).
         by_integrals: By the integrals with the master's shape functions and, last, with the field, shape
@@ -166,8 +165,6 @@ def relief_pulled_back(
     """Vector-Jacobian product of `relief_of_cells` with respect to cells and directions.
 
     Args:
-        cells: Quadrature points.
-        surfaces: Slave and master.
         pairs: Slave facet and master facet of each pair, shape (n_pairs,) each.
         along: Direction of the heights at each cell, shape (n, dim).
         by_relief: Derivative by the heights, shape (n, q).
@@ -241,9 +238,6 @@ def mortar_pulled_back(
 
     Args:
         slave: Surface that carries the multipliers.
-        master: The opposite surface.
-        coupling: The coupling of both.
-        by: Derivatives by its results.
         comm: Communicator of the ranks that share the work; this one by default. All have the same arguments.
         beside: Distance beside the place, relative to the smallest radius of a master facet.
 
@@ -271,7 +265,6 @@ def moved_aside(master: FacetedSurface, beside: float = 1e-9) -> FacetedSurface:
     """Return the master beside its place, so that no edge lies exactly over one of the slave.
 
     Args:
-        master: The surface.
         beside: Distance relative to the smallest radius of a facet.
     """
     corners = master.points[master.facets]
@@ -365,11 +358,8 @@ def _cells_of_sums(
     """Return the derivatives by cells and by the mean normals of the slave facets, shape (n_facets, dim).
 
     Args:
-        surfaces: Slave and master.
         facets: The slave's facets, shape (n_facets,).
         normal: Their mean normals, shape (n_facets, dim).
-        overlaps: Overlaps of these facets.
-        cells: Their cells.
         sums: Derivatives by the sums of integrals.
         into: Derivatives by both surfaces, which grow by those through the heights of true surfaces.
     """
@@ -426,8 +416,6 @@ def weight_derivatives(
 
     Args:
         slave: Surface that carries the multipliers.
-        master: The opposite surface.
-        coupling: The coupling of both.
         wanted: Points whose weights are differentiated, a mask, shape (n,).
         comm: Communicator of the ranks that share the work; this one by default. All have the same arguments.
     """

@@ -47,7 +47,6 @@ class Gathering:
 
         Args:
             whole: The coupling of all nodes that face the master.
-            slave: Its slave.
         """
         well = whole.area > HARDLY * slave.areas[whole.node]
         hardly = np.flatnonzero(~well)
@@ -101,7 +100,6 @@ class Gathering:
 
         Args:
             coupling: The coupling at the points.
-            by: Derivatives by its results.
             places: Coordinates of the nodes of slave and master, [length].
         """
         whole, middle = self.whole, places[0].mean(axis=0)

@@ -165,7 +165,6 @@ def laid_flat(points: np.ndarray, planes: Planes, index: np.ndarray) -> tuple[np
 
     Args:
         points: Shape (n, k, dim), [length].
-        planes: The planes.
         index: Plane of each group of points, shape (n,).
 
     Returns:
@@ -189,9 +188,7 @@ def planes_pulled_back(
     an integral does not. So origins may stay, and axes a change by −(a · δn) n only.
 
     Args:
-        planes: The planes.
         corners: Corners of their facets, shape (n, corners, dim).
-        by_flat: Derivative by ``planes.flat``.
         by_normal: Direct derivative by the normals, shape (n, dim).
         opposite: Points laid flat, shape (m, k, dim), their planes, shape (m,), and the derivative by their
             coordinates in the plane, shape (m, k, dim − 1).

@@ -51,7 +51,6 @@ def patch_points(patches: SmoothPatches, coefficients: np.ndarray, local: np.nda
     """Evaluate patches.
 
     Args:
-        patches: The patches.
         coefficients: Those of the patch of each point, shape (n, n_functions, dim).
         local: Local coordinates, shape (n, dim − 1).
     """

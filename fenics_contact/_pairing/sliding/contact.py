@@ -148,9 +148,7 @@ class SlidingContact:
         """Return points that were stored, and where they stood. Collective.
 
         Args:
-            stored: What `SlidingPoints.stored` returned.
             coordinates: The coordinates of then, shape (n_nodes, dim), [length].
-            time: The time of then.
         """
         found = self.at(coordinates, LastPoints.of(stored), time)
         return found, MaterialPoints.of(stored, len(coordinates))

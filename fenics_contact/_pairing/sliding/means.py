@@ -49,7 +49,6 @@ class MeanMotion:
         """Return v·Σ δW_j x_j, how the mean of the master moves as its weights change, (n, n_dofs).
 
         Args:
-            points: The contact points.
             coordinates: Of all nodes, shape (n_nodes, dim), [length].
             along: v, shape (n, dim).
         """
@@ -78,7 +77,6 @@ class MeanMotion:
         That is t_c·Σ δW_j x_j + δt_c·way.
 
         Args:
-            points: The contact points.
             coordinates: Of all nodes, shape (n_nodes, dim), [length].
             way: The slip as vectors, shape (n, dim), [length].
         """
@@ -97,7 +95,6 @@ class MeanMotion:
         tangent of a point and each component of a node.
 
         Args:
-            points: The contact points.
             normal: λ_N, shape (n,), [force].
             friction: τ in the points' tangents, shape (n, dim − 1), [force].
         """
@@ -142,7 +139,6 @@ class MeanTangents:
         """Return those of points without forces.
 
         Args:
-            count: Number of points.
             width: Number of tangents of each.
             size: Number of coordinates of all nodes.
         """
@@ -209,7 +205,6 @@ class MovingMeans:
         """Couple the surfaces of a pair. Collective on ``comm``.
 
         Args:
-            meeting: The pair.
             coordinates: Of all nodes, shape (n_nodes, dim), [length].
             comm: Communicator of the ranks that share the work.
         """

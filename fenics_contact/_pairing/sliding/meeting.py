@@ -117,9 +117,7 @@ def meetings_of(scene: Scene, fixed: np.ndarray, comm: MPI.Comm) -> tuple[Meetin
     """Return the pairs of a scene in its reference configuration. Collective.
 
     Args:
-        scene: The scene.
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
-        comm: Communicator of the ranks.
     """
     number = slave = np.zeros(0, dtype=np.int64)
     if scene.contacts and scene.ties:
@@ -160,8 +158,6 @@ def _within_body(meeting: Meeting, master: FacetedSurface, facets: float = 3.0) 
     those on the other side of a thin wall.
 
     Args:
-        meeting: The meeting.
-        master: The master surface.
         facets: Reach of the contact in sizes of facets.
     """
     assert meeting.patches is not None
@@ -200,7 +196,6 @@ def shared_once(meetings: tuple[Meeting, ...], scene: Scene) -> tuple[Meeting, .
 
     Args:
         meetings: The pairs in the reference configuration.
-        scene: Their scene.
     """
     pairs, result = scene.contacts, list(meetings)
     for other, pair in enumerate(pairs):

@@ -40,7 +40,6 @@ def turning_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.n
 
     Args:
         local: Local coordinates, shape (n, 2).
-        corners: 4 or 3.
 
     Returns:
         Values, shape (n, 2 · corners), first derivatives, (n, 2 · corners, 2), and second ones, (n, 2 ·
@@ -157,7 +156,6 @@ def patch_functions(local: np.ndarray, corners: int, order: int) -> PatchValues:
 
     Args:
         local: Local coordinates as for `fenics_contact._surfaces.facets.shape_functions`, shape (n, dim − 1).
-        corners: 4, 3 or 2.
         order: 1, or 2 for patches that are pieces of quadratic facets.
     """
     edges = edge_functions(local, corners, order)
@@ -182,11 +180,6 @@ def edge_functions(local: np.ndarray, corners: int, order: int) -> PatchValues:
     turns have the mean zero, by bubbles that leave the rim of a piece as it is: forces of a uniform pressure
     are then those of the quadratic shape functions, 0 and a third of a triangle at its corners and midpoints
     and not the eighth and eighth more of the pieces around each node.
-
-    Args:
-        local: As for `patch_functions`.
-        corners: As there.
-        order: As there.
     """
     return _evaluated(local, *_polynomials(corners, order))
 
@@ -196,10 +189,7 @@ def edge_derivatives(control: sp.csr_matrix, corners: int, order: int, t: float,
 
     Args:
         control: Weights of the nodes in `edge_functions`, shape (n_facets · functions, n_nodes).
-        corners: As for `patch_functions`.
-        order: As there.
         t: Place on each edge, from 0 to 1.
-        way: 1 or −1.
     """
     place = corner_places(corners)
     after, step = np.roll(place, -1, axis=0), np.roll(place, -way, axis=0) - place
@@ -319,7 +309,6 @@ def edge_turns(tangents: SurfaceTangents, control: sp.csr_matrix, order: int) ->
         tangents: The tangents at the corners, of a surface in space.
         control: Weights of the nodes in the patches' functions along edges, see `edge_functions`, shape
             (n_facets · functions, n_nodes).
-        order: As for `edge_functions`.
 
     Returns:
         Shape (n_facets · corners · 2, n_nodes): of both functions of each edge, see `turning_functions`; zero

@@ -126,7 +126,6 @@ class SlidingPoints:
 
         Args:
             values: Values at the other points, shape (n_other, ...).
-            other: The other points.
         """
         result = np.zeros((self.points.count, *values.shape[1:]), dtype=values.dtype)
         _, here, there = np.intersect1d(self.key, other.key, assume_unique=True, return_indices=True)
@@ -140,7 +139,6 @@ class SlidingPoints:
 
         Args:
             friction: Forces in the other points' tangents, shape (n_other, dim − 1).
-            other: The other points.
         """
         vectors = np.einsum("na,nad->nd", friction, other.points.tangents)
         return self._in_frames(self.carry(vectors, other), self.carry(other.points.normal, other))
@@ -153,7 +151,6 @@ class SlidingPoints:
 
         Args:
             slip: Slip in the other points' tangents, shape (n_other, dim − 1), [length].
-            other: The other points.
         """
         turn = self._turned_masters(other)
         vectors = self.carry(np.einsum("na,nad->nd", slip, other.points.tangents), other)
@@ -238,11 +235,7 @@ class SlidingPoints:
         return MaterialPoints(self.key, points.pair, points.master, foot)
 
     def stored(self, start: MaterialPoints) -> dict[str, np.ndarray]:
-        """Return the arrays from which `SlidingContact.found_again` finds the same points.
-
-        Args:
-            start: Where the nodes stood.
-        """
+        """Return the arrays from which `SlidingContact.found_again` finds the same points."""
         found = {f"found.{name}": getattr(self.points, name) for name in LAST}
         return found | start.stored()
 
@@ -351,11 +344,7 @@ class SlidingPoints:
         return interleaved(parts)
 
     def slip_by_start(self, start: SlidingPoints) -> sp.csr_matrix:
-        """Return the derivative of `slip` by the coordinates at its start, shaped as `slip_rows`.
-
-        Args:
-            start: The points there.
-        """
+        """Return the derivative of `slip` by the coordinates at its start, shaped as `slip_rows`."""
         _, here, there = np.intersect1d(self.key, start.key, assume_unique=True, return_indices=True)
         plain: list[np.ndarray | None] = [
             np.eye(self.coordinates.shape[1]) if now is None or then is None else now[0] @ then[0].T

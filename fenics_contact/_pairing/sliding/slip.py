@@ -113,10 +113,8 @@ def slip_by_start(
     −t_a·Q δf, with the obstacle's rotation Q since the start and the foot f of the node on it.
 
     Args:
-        points: The points now.
         coordinates: Coordinates of all nodes now, shape (n_nodes, dim), [length].
         start: The points at the start.
-        differential: Theirs.
         alike: Numbers of points now and of the same points at the start; others have no derivative.
         turned: Q of each pair, shape (dim, dim); None for pairs of mortar contact, which are left out.
 
@@ -158,11 +156,9 @@ def slip_by_start_of_means(
     Of t_a·Σ (W_j − W_j,start) x_j it is −t_a·Σ δW_j,start x_j, with the master where it lies now.
 
     Args:
-        points: The points now.
         coordinates: Coordinates of all nodes now, shape (n_nodes, dim), [length].
         start: All points at the start, and which of them are those of the pair.
         means: The coupling of the pair at the start.
-        alike: As for `slip_by_start`.
 
     Returns:
         As `slip_by_start`.

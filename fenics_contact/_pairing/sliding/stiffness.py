@@ -104,10 +104,6 @@ def point_motion(points: ContactPoints, differential: Differential) -> PointMoti
 
     (x_s − S)·S,_a = 0 gives H δξ = S,_a·δv + r n·δS,_a with δv = δx_s − Σ W_j δx_j, and with the dual
     tangents δn = −S^a (n·δS,_a + n·S,_ab δξ_b). On an obstacle δn is the curvature times δx_s.
-
-    Args:
-        points: Contact points.
-        differential: Their differential.
     """
     normal, width, jump = points.normal, points.normal.shape[1] - 1, points.jump
     inverse, solved = inverse_metrics(points, differential)
@@ -187,8 +183,6 @@ def geometric_stiffness(
     −δ²g = pᵀ m⁻¹ k H⁻¹ p + pᵀ H⁻¹ q + qᵀ H⁻¹ p + r qᵀ H⁻¹ q: rank 2 (dim − 1) at each point.
 
     Args:
-        points: Contact points.
-        differential: Their differential.
         multiplier: λ_N, shape (n,), [force]; points where it is not positive contribute nothing.
         rounding: Values of D below this fraction of the largest are left out.
 
@@ -260,8 +254,6 @@ def friction_stiffness(points: ContactPoints, differential: Differential, fricti
     coordinates through δn and δξ, see `point_motion`: rank 2 (dim − 1) at each point, unsymmetric.
 
     Args:
-        points: Contact points.
-        differential: Their differential.
         friction: τ in the points' tangents, shape (n, dim − 1), [force].
     """
     rubbed, jump = np.flatnonzero(friction.any(axis=1)), points.jump

@@ -35,7 +35,6 @@ def nested_box(core: float, size: float, count: int, cell: str = "hexahedron") -
         core: Side of the cube of equal cells, [length].
         size: Side of the body, [length].
         count: Cells along the side of the core.
-        cell: "hexahedron" or "tetrahedron".
 
     Returns:
         The mesh with surfaces ``x0, x1, y0, y1, z0, z1``.
@@ -62,7 +61,6 @@ def nested_half(core: float, size: float, count: int, cell: str = "quadrilateral
         core: Half the width and the height of the rectangle of equal cells, [length].
         size: Half the width and the height of the body, [length].
         count: Cells on the height of the core.
-        cell: "quadrilateral" or "triangle".
 
     Returns:
         The mesh with surfaces ``x0, x1, y0, y1``.
