@@ -31,7 +31,6 @@ from functools import cache, wraps
 from inspect import Signature, signature
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
 
-from fenics_contact.errors import ranks as meeting
 from fenics_contact.errors.kinds import (
     FenicsContactError,
     InvalidInputError,
@@ -301,7 +300,7 @@ def collective(comm: MPI.Comm, where: str, *, closed: bool = False, users: bool 
         raise
     except BaseException as error:
         if comm.size > 1 and not hasattr(error, _AGREED):
-            wait = min(max(time.perf_counter() - begun, meeting.SHORTEST_WAIT), meeting.LONGEST_WAIT)
+            wait = min(max(time.perf_counter() - begun, SHORTEST_WAIT), LONGEST_WAIT)
             agree(comm, error, where, wait=wait, users=users)
         raise
     if closed:
