@@ -152,9 +152,9 @@ DISTRIBUTED = """
     from mpi4py import MPI
     from fenics_contact import _dolfinx
     import dolfinx.fem, dolfinx.mesh
-    from fenics_contact import solve_scene
+    from fenics_contact import Body, Scene, Support, Traction, solve_scene
+    from fenics_contact.materials import IsotropicElasticity
     from fenics_contact.readers import from_dolfinx
-    from fenics_contact._scene import *
 
     comm = MPI.COMM_WORLD
     kind = dolfinx.mesh.CellType.{cell}
