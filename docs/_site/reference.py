@@ -34,7 +34,7 @@ ORDER = (
 OUTSIDE = [
     (
         "py:.*",
-        r"(numpy|np|scipy|sp|mpi4py|MPI|PETSc|petsc4py|dolfinx|ufl|pyvista|matplotlib|npt|rich|typer|pydantic|tomlkit)\b.*",
+        r"(numpy|np|scipy|sp|mpi4py|MPI|PETSc|petsc4py|dolfinx|ufl|pyvista|pv|matplotlib|npt|rich|typer|pydantic|tomlkit)\b.*",
     ),
     ("py:.*", r"(abc|collections|enum|pathlib|typing)\..*|Path"),
     (
@@ -163,7 +163,7 @@ def constant(module: ModuleType, name: str) -> tuple[list[str], str]:
 
 def defining_module(module: ModuleType, name: str) -> str:
     """Return the name of the module from which a room takes ``name``."""
-    for node in ast.parse(inspect.getsource(module)).body:
+    for node in ast.walk(ast.parse(inspect.getsource(module))):  # the front names them for type checkers
         if isinstance(node, ast.ImportFrom) and node.module and name in [alias.name for alias in node.names]:
             taken_from = importlib.import_module(node.module)
             return defining_module(taken_from, name)
@@ -257,14 +257,16 @@ def resolve(
 
 @cache
 def private_names() -> frozenset[str]:
-    """Return what the package's modules define: in signatures such names may stand without a link."""
+    """Return what the package's modules and their classes define: such names may stand without a link."""
     names: set[str] = set()
     for info in pkgutil.walk_packages(fenics_contact.__path__, f"{PACKAGE}."):
         names.add(info.name.rpartition(".")[2])
         specification = find_spec(info.name)
         assert specification
         assert specification.origin
-        for node in ast.parse(Path(specification.origin).read_text()).body:
+        tree = ast.parse(Path(specification.origin).read_text())
+        classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
+        for node in [*tree.body, *(member for owner in classes for member in owner.body)]:
             targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
             names.update(target.id for target in targets if isinstance(target, ast.Name))
             names.add(getattr(node, "name", ""))

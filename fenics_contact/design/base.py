@@ -30,7 +30,7 @@ def comm_of(problem: DesignProblem[Any], *_: Any, **__: Any) -> MPI.Comm:
 
 
 class DesignProblem(ABC, Generic[Point]):
-    """J(α) with a subgradient over the designs of a scene, as `optimize.minimize` and checkpoints take it.
+    """J(α) with a subgradient over the designs of a scene, as `minimize` and checkpoints take it.
 
     It keeps the first, the best and the last design with their states. A problem of several states or meshes
     consists of problems of one each, its parts.

@@ -345,7 +345,7 @@ class ContactArea(OfPressures):
 
     The area on which an even pressure has the same resultant and the same mean square. Where the pressure is
     even it is the area in contact; it is 8/9 of that of Hertz' elliptic spot and 0.925 of that of his strip.
-    `contact.contact_area` locates the rim between nodes; its derivative is infinite where nodes open. Here
+    `contact_area` locates the rim between nodes; its derivative is infinite where nodes open. Here
     the pressures of all nodes are differentiated and their areas, not the place of the rim.
 
     To enlarge it, minimise ``-ContactArea()`` or `PressureUnevenness`.

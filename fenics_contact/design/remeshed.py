@@ -176,7 +176,7 @@ class Remeshed(SingleProblem):
 
         Args:
             problem: The problem on its first mesh.
-            mesher: Makes the new meshes, such as `mesh_io.refilled`; by default the cells are kept as they
+            mesher: Makes the new meshes, such as `readers.refilled`; by default the cells are kept as they
                 are moved, and the motion of the mesh starts from there.
             share: Smallest share of its Jacobian that a cell may keep before a new mesh is made.
             most: Largest number of new meshes; a design that needs more is an `InvalidDesignError`.

@@ -130,7 +130,7 @@ class LoadCases(JointProblem):
         return all(problem.inexact for problem in self.problems.values())
 
     def pieces(self, alpha: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return J_k and gradients of the cases beside the largest, for `optimize`. Collective.
+        """Return J_k and gradients of the cases beside the largest, for the optimiser. Collective.
 
         Args:
             alpha: The design evaluated last, shape (size,), [length].

@@ -13,7 +13,7 @@ calls, the graph is partitioned in a separate process.
 Partition of any mesh by METIS: small interfaces between subdomains of similar size.
 
 The graph is the dual one: a vertex for every cell, an edge for every face that two cells share, weighted by
-its area; see `partition.weights`. METIS may return a disconnected part and, when parts are small, a part
+its area; see `mesh.partition`. METIS may return a disconnected part and, when parts are small, a part
 without cells; both are repaired. It balances parts to the cell, which leaves jagged boundaries; these are
 smoothed.
 

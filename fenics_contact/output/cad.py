@@ -392,7 +392,7 @@ def write_step(
 ) -> StepFile:
     """Write a designed body, or its designed surfaces alone, as a STEP file. Collective.
 
-    The designed surfaces are B-splines of degree five through points of `shape.MovedSurface`. The body is
+    The designed surfaces are B-splines of degree five through points of `design.MovedSurface`. The body is
     closed by the flat sides of the reference shape; where these are not flat, as beside the crown of a chain
     link, only the surfaces can be written. A plane body is a plane face, its other edges are straight lines
     from node to node.
@@ -407,7 +407,7 @@ def write_step(
         scale: Millimetres in the scene's unit of length: coordinates in the file are in millimetres.
 
     Returns:
-        The file, how far its surfaces deviate, and the volume of its body; `mesh_io.read_cad` reads it.
+        The file, how far its surfaces deviate, and the volume of its body; `read_cad` reads it.
 
     Raises:
         InvalidInputError: If the body is not designed, alpha does not fit, or the file has another suffix.

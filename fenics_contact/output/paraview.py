@@ -164,7 +164,7 @@ def write_vtu(
 ) -> Path:
     """Write a state for ParaView: a file for each body and a multi-block file to open. Collective.
 
-    They hold the fields of `contact.GatheredFields`, and the given fields on cells. Plane bodies lie in the
+    They hold the fields of `results.GatheredFields`, and the given fields on cells. Plane bodies lie in the
     plane z = 0, their vectors have zero z component.
 
     Args:

@@ -2,7 +2,7 @@
 
 from fenics_contact.readers.cad import CadFace, InBox, OnCylinder, OnPlane
 from fenics_contact.readers.dolfinx import DolfinxBodies, from_dolfinx, read_xdmf
-from fenics_contact.readers.gmsh import from_gmsh_model, read_msh
+from fenics_contact.readers.gmsh import from_gmsh_model, read_msh, refilled
 from fenics_contact.readers.gmsh_session import gmsh_model
 from fenics_contact.readers.meshio import from_meshio
 
@@ -18,4 +18,5 @@ __all__ = [
     "gmsh_model",
     "read_msh",
     "read_xdmf",
+    "refilled",
 ]

@@ -142,8 +142,8 @@ def _read(path: Path) -> TaggedMesh:
 def refilled(mesh: BodyMesh) -> BodyMesh:
     """Return new tetrahedra behind the boundary of a body, which keeps its nodes, facets and named surfaces.
 
-    For a body that was deformed so far that its cells have become thin, see `shape.Remeshed`. Cells grow from
-    the size of the facets around them. Nodes have other numbers afterwards.
+    For a body that was deformed so far that its cells have become thin, see `design.Remeshed`. Cells
+    grow from the size of the facets around them. Nodes have other numbers afterwards.
 
     Args:
         mesh: Linear tetrahedra without regions and without true shapes of surfaces, in one piece.

@@ -469,11 +469,11 @@ class State(ABC):
 
         Args:
             deformed: Scale factor of the displacement added to the points; 0 for the undeformed bodies.
-            linear: Cut quadratic cells into linear ones on the same nodes, as pictures of `viz` do.
+            linear: Cut quadratic cells into linear ones on the same nodes, as `pictures` do.
 
         Returns:
             A ``pyvista.MultiBlock`` with an ``UnstructuredGrid`` for each body under its name, which holds
-            the fields of `GatheredFields`, which `io.write_vtu` writes: on points ``displacement``, stresses
+            the fields of `GatheredFields`, which `write_vtu` writes: on points ``displacement``, stresses
             ``nodal_...`` and contact ``contact_...``, on cells ``von_mises``, ``stress``,
             ``principal_stress`` and ``subdomain``. Plane bodies lie in the plane z = 0.
 

@@ -27,7 +27,7 @@ BALANCED: Literal["balanced"] = "balanced"
 #: A largest relative residual, or "balanced".
 RunTolerance: TypeAlias = float | Literal["balanced"]
 
-#: Discretisations of contact, see `scene.ContactPair`.
+#: Discretisations of contact, see `ContactPair`.
 DISCRETISATIONS = ("node", "mortar")
 #: How Coulomb's law is solved: within every Newton step, or by an outer loop of Tresca problems.
 SOLVERS = ("newton", "fixed point")
@@ -40,9 +40,9 @@ class Parameters:
     Attributes:
         size: Mesh resolution in the scene's own count: cells on the contact radius, for instance.
         cell: Type of the cells, a key of `geometry.CELL_TYPES`.
-        discretisation: "node" or "mortar", see `scene.ContactPair`.
+        discretisation: "node" or "mortar", see `ContactPair`.
         tolerance: Largest relative residual, or "balanced".
-        solver: "newton" (`qp.FaceNewton`) or "fixed point" (`contact.FixedPoint` around it).
+        solver: "newton" (`qp.FaceNewton`) or "fixed point" (`FixedPoint` around it).
         subdomains: Approximate number of subdomains; None: of a suitable size.
     """
 

@@ -23,7 +23,7 @@ from fenics_contact.design import Remeshed, StrainEnergy
 from fenics_contact.errors import InvalidDesignError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
-from fenics_contact.readers.gmsh import refilled
+from fenics_contact.readers import refilled
 
 STONE = IsotropicElasticity(100.0, 0.2)
 COUNTS = (8, 2, 6)

@@ -15,7 +15,7 @@ from fenics_contact.design.motion import MeshMotion
 from fenics_contact.errors import FenicsContactError, InvalidDesignError, InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.mesh import boundary_faces
-from fenics_contact.readers.gmsh import refilled
+from fenics_contact.readers import refilled
 from tests.shape.bridges import COUNTS, FAR, bridge, bridge_problem, farthest
 
 
