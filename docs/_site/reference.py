@@ -6,6 +6,7 @@ import ast
 import importlib
 import inspect
 import pkgutil
+import re
 from collections.abc import Iterator
 from enum import Enum
 from functools import cache
@@ -273,10 +274,28 @@ def private_names() -> frozenset[str]:
     return frozenset(names - {""})
 
 
+def correct_backlinks(
+    app: Sphinx, pagename: str, templatename: str, context: dict[str, Any], doctree: nodes.document | None
+) -> None:
+    """Let pages of sources point to where each of their names is described.
+
+    Names of one module may be offered by the front and by a public module; viewcode takes one for all.
+    """
+    if pagename.startswith("_modules/"):
+        public = "|".join(room for room in rooms() if room != PACKAGE)
+        link = rf"(docs/reference/(\w+)\.html)#{PACKAGE}\.(?:(?:{public})\.)?"
+        context["body"] = re.sub(
+            link,
+            lambda found: f"{found[1]}#{PACKAGE}." + ("" if found[2] == PACKAGE else f"{found[2]}."),
+            context["body"],
+        )
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Connect to Sphinx."""
     app.add_directive("rooms", Rooms)
     app.connect("missing-reference", resolve)
+    app.connect("html-page-context", correct_backlinks)
     docstrings.connect(app)
     signatures.connect(app)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

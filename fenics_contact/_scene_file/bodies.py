@@ -503,6 +503,7 @@ def _plate(
         half_width: The strip reaches from y = 0 to this, [length].
         ends: x of both ends, at or beyond the square around the hole, [length].
         heights: z of bottom and top, [length].
+        n_layers: Cells through the thickness.
         n: Cells along an eighth of the hole.
         n_radial: Cells from the hole to the square around it; n unless given.
     """

@@ -113,7 +113,7 @@ def test_a_torque_on_a_flat_face_is_a_traction_around_its_middle() -> None:
             {"at": 3.0},
             "TotalForce.at must be a sequence .each a number. or None, got 3.0: point at which",
         ),
-        (False, {"moment": "big"}, "TotalForce.moment must be .* got 'big': moment beside that of the force"),
+        (False, {"moment": "big"}, "TotalForce.moment must be .* got 'big': moment besides that of"),
     ],
 )
 def test_what_does_not_fit_the_space_is_refused(plane: bool, given: dict[str, Any], words: str) -> None:
