@@ -6,31 +6,27 @@ exactly into their planes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, TypeAlias
+
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
-from fenics_contact.errors import InvalidDesignError
-from fenics_contact.shapes.parametric import tensor_grid
-from collections.abc import Sequence
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+
+from fenics_contact._base.display import displayed
+from fenics_contact.errors import InvalidDesignError, InvalidInputError, collectively, together
 from fenics_contact.gallery.links import DesignSurface
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import boundary_faces, vector_areas
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import TypeAlias
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from pathlib import Path
-from types import ModuleType
-from typing import TYPE_CHECKING, Any
-from fenics_contact._base.display import displayed
-from fenics_contact.errors import InvalidInputError, collectively, together
-from fenics_contact.output.surfaces import moved_body, moved_surfaces
 from fenics_contact.output.files import replacing
+from fenics_contact.output.surfaces import moved_body, moved_surfaces
 from fenics_contact.readers.gmsh_session import gmsh_model, silenced
+from fenics_contact.shapes.parametric import tensor_grid
 
 if TYPE_CHECKING:
     from fenics_contact.design.design import MovedSurface
@@ -365,7 +361,6 @@ class StepFile:
     """A STEP file that was written.
 
     Attributes:
-        path: The file.
         deviation: Largest distance of its B-splines from the designed surfaces, [length].
         points: Number of control points of each B-spline along a parameter.
         volume: Volume of the body in it, in the plane its area; None for surfaces alone, [length³].

@@ -7,31 +7,26 @@ reason; the remaining file blocks no other run.
 from __future__ import annotations
 
 import errno
+import json
+import logging
+import math
 import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING
-from fenics_contact._base.files import hidden_folder, replace_all
-from fenics_contact.errors import FenicsContactError, agree, together
-import json
-import math
-from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
+import socket
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import fields, is_dataclass
+from datetime import datetime
 from enum import Enum
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
 import numpy as np
+
 from fenics_contact._base.display import in_short
-from fenics_contact.errors import InvalidInputError, together
-import logging
-import socket
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from datetime import datetime
-from fenics_contact._base.files import locked
+from fenics_contact._base.files import hidden_folder, locked, replace_all
+from fenics_contact.errors import FenicsContactError, InvalidInputError, agree, together
 
 if TYPE_CHECKING:
     from mpi4py import MPI

@@ -2,37 +2,32 @@
 
 from __future__ import annotations
 
-import math
-import xml.etree.ElementTree as ET
-from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from xml.sax.saxutils import quoteattr
-from fenics_contact.errors import InvalidInputError
 import hashlib
+import math
 import os
 import re
-from collections.abc import Iterable
-from collections.abc import Mapping
+import shutil
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
+from xml.sax.saxutils import quoteattr
+
 import numpy as np
+
+from fenics_contact import _dolfinx
+from fenics_contact._base.files import remove_abandoned
+from fenics_contact._base.libraries import MPI
+from fenics_contact.errors import InvalidInputError, collectively, together
+from fenics_contact.output.files import replacing, replacing_together, write_text
 from fenics_contact.results.fields import in_space
 from fenics_contact.results.state import State
-from fenics_contact.errors import InvalidInputError, collectively, together
-from fenics_contact.output.files import replacing
-from fenics_contact import _dolfinx
-from fenics_contact._base.libraries import MPI
-from fenics_contact.errors import InvalidInputError, collectively
-from fenics_contact.output.files import replacing_together
-from functools import partial
-import shutil
-from collections.abc import Callable, Mapping, Sequence
-from fenics_contact._base.files import remove_abandoned
-from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.output.files import write_text
 
 if TYPE_CHECKING:
     import meshio
+
     from fenics_contact._optimize.result import Record
     from fenics_contact.design.problem import ShapeProblem
     from fenics_contact.design.several import JointProblem

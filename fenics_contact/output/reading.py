@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
 from fenics_contact._base.requirements import require_extra
 from fenics_contact.errors import InvalidInputError
-import json
-from typing import Any
 
 if TYPE_CHECKING:
     import pyvista
@@ -24,7 +24,6 @@ class StoredFields:
     """A file with the fields of one state.
 
     Attributes:
-        file: A VTU or VTM file.
         value: Its time, load factor or number in a series, 0 where there is none.
         label: Its description in a series, such as the name of a load step.
     """

@@ -5,41 +5,40 @@ It describes the scene as plain data, and holds forces, moments and provenance.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import datetime
+import importlib
+import platform
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import partial
-from typing import Any
-from fenics_contact.output.files import plain
+from importlib import metadata
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fenics_contact import _dolfinx
+from fenics_contact._base.libraries import MPI, PETSc
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
+from fenics_contact._scene.plan import SolverKind
 from fenics_contact._scene.scene import Scene
-from fenics_contact.materials.elastic import Material
-from collections.abc import Mapping, Sequence
-import numpy as np
-from fenics_contact.results.forces import Resultant
-from fenics_contact.results.state import State
-import importlib
-import platform
-from importlib import metadata
-from types import ModuleType
-from fenics_contact import _dolfinx
-from fenics_contact._base.libraries import MPI, PETSc
-import datetime
-import re
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
-from fenics_contact.results.area import contact_area
-from fenics_contact.results.contact import Status
-from fenics_contact.results.linear_state import as_linear
-from fenics_contact.results.rigid_motions import UnheldMotion
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti.direct import DirectSolution
-from fenics_contact.output.files import write_json
+from fenics_contact.materials.elastic import Material
+from fenics_contact.output.files import plain, write_json
 from fenics_contact.output.paraview import checked_name
 from fenics_contact.output.reading import FORMAT, FORMAT_VERSION
 from fenics_contact.qp.solution import SolverStep
-from fenics_contact._scene.plan import SolverKind
+from fenics_contact.results.area import contact_area
+from fenics_contact.results.contact import Status
+from fenics_contact.results.forces import Resultant
+from fenics_contact.results.linear_state import as_linear
+from fenics_contact.results.rigid_motions import UnheldMotion
+from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
     from fenics_contact._accuracy.state_errors import StateErrors
@@ -310,8 +309,8 @@ def write_optimisation_result(
     | ``optimisation.stop`` | ``converged``, ``reason``, ``iterations``, ``evaluations``, ``f_products`` |
     | ``optimisation.constraints`` | of each nonlinear one ``name``, ``value``, ``lower``, ``upper``, \
 ``violation``, ``multiplier``; None for no limit |
-    | ``optimisation.history`` | one list for each attribute of `fenics_contact._optimize.result.Record`, one entry \
-an evaluation; None where a trial point was rejected as invalid |
+    | ``optimisation.history`` | one list for each attribute of `design.Record`, one entry an \
+evaluation; None where a trial point was rejected as invalid |
 
     Args:
         result: The result of `minimize`.

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-import numpy as np
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.design.design import MovedSurface
 from math import ceil, log10
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fenics_contact.design.design import MovedSurface
 from fenics_contact.errors import InvalidInputError, collectively, together
-from fenics_contact.output.files import write_text
-from fenics_contact.shapes.parametric import tensor_grid
-from fenics_contact.output.files import replacing
 from fenics_contact.mesh.cell_types import FACET_TYPES
 from fenics_contact.mesh.faces import boundary_faces
+from fenics_contact.output.files import replacing, write_text
+from fenics_contact.shapes.parametric import tensor_grid
 
 if TYPE_CHECKING:
-    from fenics_contact.mesh.body_mesh import BodyMesh
     from fenics_contact.design.problem import ShapeProblem
     from fenics_contact.design.several import JointProblem
+    from fenics_contact.mesh.body_mesh import BodyMesh
 
 
 #: Largest distance of a node from its smooth surface, relative to the extent of the surface.
