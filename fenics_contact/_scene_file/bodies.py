@@ -238,11 +238,7 @@ class OwnMaterial(Part):
     )
 
     def build(self, folder: Path) -> Material:
-        """Return the material; runs the file.
-
-        Raises:
-            InvalidInputError: If the class does not exist or does not take these parameters.
-        """
+        """Return the material; runs the file."""
         kind = load(self.model, folder)
         with scene_file_code(f"{self.model!r} with the parameters {sorted(self.parameters)}"):
             try:
@@ -309,11 +305,7 @@ class Placed(Part):
     translate: Vector | None = Field(None, description="displacement of the mesh, applied last, [length]")
 
     def build(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
-        """Return the bodies by the names that `part` takes, "" for the only one. Collective.
-
-        Raises:
-            InvalidInputError: If they cannot be meshed or placed.
-        """
+        """Return the bodies by the names that `part` takes, "" for the only one. Collective."""
         return {name: self.arranged(shape) for name, shape in self.shapes(folder, comm).items()}
 
     def shapes(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
@@ -321,11 +313,7 @@ class Placed(Part):
         return {"": Shaped(self.made())}
 
     def arranged(self, shape: Shaped) -> Shaped:
-        """Return a shape placed by the keys.
-
-        Raises:
-            InvalidInputError: If its cells are quadratic already, or a vector does not fit.
-        """
+        """Return a shape placed by the keys."""
         if self.quadratic:
             shape = replace(shape, mesh=quadratic(shape.mesh))
         dim = shape.mesh.dim

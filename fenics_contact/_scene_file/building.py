@@ -72,20 +72,12 @@ class Builder:
     """
 
     def __init__(self, source: Source, document: Document, comm: MPI.Comm) -> None:
-        """Start with nothing built.
-
-        Args:
-            comm: Communicator on which meshes are built.
-        """
+        """Start with nothing built."""
         self._source, self._document, self._comm = source, document, comm
         self._mistakes: list[Mistake] = []
 
     def bodies(self) -> tuple[dict[str, Body], dict[str, Shaped]]:
-        """Return the bodies with their shapes. Collective.
-
-        Raises:
-            SceneFileError: Naming every mesh, material and body that cannot be built.
-        """
+        """Return the bodies with their shapes. Collective."""
         shapes: dict[str, Mapping[str, Shaped]] = {}
         for name, mesh in self._document.meshes.items():
             with self._at("meshes", name):
@@ -124,11 +116,7 @@ class Builder:
         raise SceneFileError(self._source.name, [wrong])
 
     def scene(self, bodies: Mapping[str, Body]) -> Scene:
-        """Return the scene of the bodies.
-
-        Raises:
-            SceneFileError: Naming every support, load and pair that does not suit the bodies.
-        """
+        """Return the scene of the bodies."""
         self._check_surfaces(bodies)
         document, dim = self._document, next(iter(bodies.values())).mesh.dim
         empty = Scene(bodies)
@@ -195,9 +183,6 @@ def with_fields_read(source: Source, document: AnyDocument, comm: MPI.Comm) -> A
     """Return a document in which every field from a file is a function of position. Collective on ``comm``.
 
     Each file is read once, on rank 0.
-
-    Raises:
-        SceneFileError: Naming every file that cannot be read.
     """
     mistakes: list[Mistake] = []
     read: dict[tuple[Any, ...], SampledField] = {}
@@ -280,14 +265,7 @@ def shape_task(
 ) -> ShapeTask:
     """Pose the optimisation of a scene file. Collective.
 
-    Args:
-        document: The file; it has a design.
-        contact: Problem that computes the states of its scene.
-        shapes: Body name -> its mesh with its shape.
-        steps: All load steps; none where everything acts at once.
-
-    Raises:
-        InvalidInputError: If a surface cannot be designed or numbers do not fit the number of variables.
+    `shapes`: body name -> its mesh with its shape.
     """
     design = document.design
     assert design is not None

@@ -302,13 +302,7 @@ class DesignPart(Part):
 def design_surface(shape: Shaped, surface: str, body: str) -> DesignSurface:
     """Return a surface with its smooth coordinates.
 
-    Args:
-        shape: The body's mesh with its shape.
-        surface: "contact" of a chain link, a side of a structured mesh, or a curve of a plane one.
-        body: Name of the body, for messages.
-
-    Raises:
-        InvalidInputError: If the surface is neither.
+    `shape`: the body's mesh with its shape.
     """
     if shape.crown is not None and surface == "contact":
         return shape.crown
@@ -319,14 +313,7 @@ def design_surface(shape: Shaped, surface: str, body: str) -> DesignSurface:
 
 
 def check_formulas(part: Any, bodies: Mapping[str, Body]) -> None:
-    """Evaluate the formulas of a support, load or pair at the nodes, as solvers will.
-
-    Args:
-        part: A part built from the file.
-
-    Raises:
-        InvalidInputError: If one has no finite value at some node, or depends on z in the plane.
-    """
+    """Evaluate the formulas of a support, load or pair at the nodes, as solvers will."""
     if isinstance(part, Support):
         if any(map(callable, part.value)):
             part.values(_nodes(bodies[part.body], part.surface))
@@ -339,11 +326,7 @@ def check_formulas(part: Any, bodies: Mapping[str, Body]) -> None:
 
 
 def check_pair(pair: ContactPair, key: str, bodies: Mapping[str, Body]) -> None:
-    """Evaluate the friction, gap or interference of a pair, whichever the key is, at the slave's nodes.
-
-    Raises:
-        InvalidInputError: If it is a function that has no finite value somewhere, or a negative one.
-    """
+    """Evaluate the friction, gap or interference of a pair, whichever the key is, at the slave's nodes."""
     nodes = _nodes(bodies[pair.slave.body], pair.slave.name)
     if key == "friction":
         pair.friction_at(nodes)

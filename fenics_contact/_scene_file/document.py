@@ -143,11 +143,7 @@ class SolverPart(Part):
         return BalancedTolerance()
 
     def chosen(self, scene: Scene, partitions: Mapping[str, np.ndarray]) -> DualSolver | None:
-        """Return the dual solver given by the keys, None for the default one.
-
-        Raises:
-            InvalidInputError: If one is given for nonlinear materials, whose Newton's method has its own.
-        """
+        """Return the dual solver given by the keys, None for the default one."""
         if scene.is_nonlinear and (self.method != "auto" or self.max_products is not None):
             raise InvalidInputError(
                 "method and max_products are for linear materials, this scene has others, which Newton's "
@@ -168,11 +164,7 @@ class SolverPart(Part):
         return replace(solver, max_products=self.max_products)  # type: ignore[type-var]
 
     def following(self, scene: Scene) -> AutomaticSteps | None:
-        """Return how loads on nonlinear materials are followed, None for the default.
-
-        Raises:
-            InvalidInputError: If it is given for linear materials, or its parts contradict each other.
-        """
+        """Return how loads on nonlinear materials are followed, None for the default."""
         if self.newton is None:
             return None
         if not scene.is_nonlinear:
@@ -185,11 +177,7 @@ class SolverPart(Part):
     def cut(self, scene: Scene, ranks: int) -> dict[str, np.ndarray]:
         """Cut every body into subdomains, body name -> subdomain of every cell.
 
-        Args:
-            ranks: Number of ranks, each of which needs a subdomain if no number is given.
-
-        Raises:
-            InvalidInputError: If a body has fewer cells than subdomains or is not structured.
+        `ranks`: number of ranks, each of which needs a subdomain if no number is given.
         """
         asked = self.subdomains if isinstance(self.subdomains, Mapping) else {}
         everywhere = None if asked or self.subdomains == "auto" else self.subdomains
@@ -234,13 +222,6 @@ def load_steps(
     A support or load that a step does not name keeps its value; a named one changes linearly from the value
     before, initially its own, to the one given. A formula that depends on t is evaluated at the end of each
     load step instead, also in later steps and where it is the initial value; t starts at zero.
-
-    Args:
-        steps: The steps of the file.
-        at: Takes keys and returns a context that refers errors of its block to them.
-
-    Raises:
-        InvalidInputError: If there are too many, or one has a value that cannot be used.
     """
     with at("steps"):
         _require_few(steps)

@@ -313,11 +313,7 @@ class SupportPart(_Named):
     )
 
     def build(self, dim: int, value: tuple[Any, ...] | None = None) -> Support:
-        """Return the support.
-
-        Args:
-            value: What a load step prescribes instead.
-        """
+        """Return the support."""
         return self.made(value=value or self.value or (0.0,) * dim)
 
 

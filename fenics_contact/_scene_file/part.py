@@ -92,9 +92,7 @@ def keys_of(
     The table's own declaration of a key takes precedence: another type, a default, a description, or an
     alias, which is then the key.
 
-    Args:
-        without: Arguments that are not keys.
-        only: Arguments that are keys; all unless given.
+    `only`: arguments that are keys; all unless given.
     """
 
     def derive(table: Table) -> Table:

@@ -74,11 +74,7 @@ class SceneFile:
 
     @property
     def scene(self) -> Scene:
-        """The scene. Collective on first use.
-
-        Raises:
-            SceneFileError: Naming every mesh, body, support, load or pair that cannot be built.
-        """
+        """The scene. Collective on first use."""
         return self._built[0]
 
     @cached_property
@@ -126,17 +122,12 @@ class SceneFile:
     def sequence(self, checkpoint: Checkpoint | None = None) -> LoadSequence:
         """Return the history of the scene before its first load step. Collective.
 
-        Args:
-            checkpoint: File from which an interrupted history continues, or None.
+        `checkpoint`: file from which an interrupted history continues, or None.
         """
         return LoadSequence(self.problem, checkpoint=checkpoint, count=len(self.steps))
 
     def require_design(self) -> None:
-        """Reject a file without an optimisation.
-
-        Raises:
-            SceneFileError: If it describes none.
-        """
+        """Reject a file without an optimisation."""
         if self.document.design is None:
             words = (
                 "an optimisation needs [design] with [[design.surfaces]], got none: add them, or find the "
@@ -145,11 +136,7 @@ class SceneFile:
             raise SceneFileError(self.source.name, [self.source.mistake((), words)])
 
     def shape_task(self) -> ShapeTask:
-        """Return the shape optimisation that the file describes. Collective.
-
-        Raises:
-            SceneFileError: If it describes none, or it cannot be posed.
-        """
+        """Return the shape optimisation that the file describes. Collective."""
         self.require_design()
         steps = self.steps
         with self._at("design"):

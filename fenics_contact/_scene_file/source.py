@@ -99,11 +99,7 @@ def value_at(data: Any, path: Path) -> Any:
 
 
 def replaced(data: Any, path: Path, value: Any) -> Any:
-    """Return a copy of the data with another value at a path.
-
-    Raises:
-        KeyError: If a list on the path has no such entry, or a value on the path has no keys.
-    """
+    """Return a copy of the data with another value at a path."""
     if not path:
         return value
     first, rest = path[0], path[1:]
@@ -137,11 +133,7 @@ _BLANK_OR_COMMA = re.compile(r"(?:[ \t\r\n,]|#[^\n]*)*")
 
 
 def lines_of(text: str) -> dict[Path, int]:
-    """Return the line, from 1, on which every key, table and entry of a list begins.
-
-    Args:
-        text: A valid TOML text; for any other the result is meaningless.
-    """
+    """Return the line, from 1, on which every key, table and entry of a list begins."""
     return _Scanner(text).lines
 
 
@@ -297,11 +289,7 @@ class SceneFileError(InvalidInputError):
     """
 
     def __init__(self, name: str, mistakes: Iterable[Mistake] | str = ()) -> None:
-        """Build the message from the mistakes.
-
-        Args:
-            name: Name of the file; or the whole message if there are no mistakes.
-        """
+        """Build the message from the mistakes."""
         ordered = (
             () if isinstance(mistakes, str) else tuple(sorted(mistakes, key=lambda mistake: mistake.line))
         )
@@ -368,15 +356,7 @@ class Source:
         return Mistake(path, line, place, words)
 
     def with_overrides(self, overrides: Sequence[str]) -> Source:
-        """Return the source with other values for some keys.
-
-        Args:
-            overrides: ``KEY=VALUE``, such as ``contacts.0.friction.coefficient=0.2``; a value that is not
-                TOML is a string.
-
-        Raises:
-            SceneFileError: If one has another form or its key does not exist.
-        """
+        """Return the source with other values for some keys."""
         data, places = dict(self.data), dict(self.overrides)
         for override in overrides:
             try:
@@ -395,11 +375,7 @@ class Source:
 
 
 def parse(text: str, name: str, folder: FilePath) -> Source:
-    """Read the text of a scene file.
-
-    Raises:
-        SceneFileError: If it is not TOML, with the line.
-    """
+    """Read the text of a scene file."""
     if text.startswith(BYTE_ORDER_MARK):
         words = (
             "must be TOML in UTF-8, which has no byte-order mark, got one before the first character: let "
@@ -466,8 +442,7 @@ def _resolved(data: Any, path: Path) -> Path:
 def located(source: Source, path: Path, mistakes: list[Mistake] | None = None) -> Iterator[None]:
     """Make an error of the block a mistake at a key.
 
-    Args:
-        mistakes: Collects the mistake, which is raised unless given.
+    `mistakes`: collects the mistake, which is raised unless given.
     """
     try:
         yield

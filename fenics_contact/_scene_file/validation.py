@@ -180,11 +180,7 @@ NEEDED = {
 
 
 def validated(source: Source) -> Document:
-    """Return the checked document of a source.
-
-    Raises:
-        SceneFileError: Naming all mistakes.
-    """
+    """Return the checked document of a source."""
     unseen = invisible_texts(source)
     if unseen:
         raise SceneFileError(source.name, unseen)

@@ -136,15 +136,9 @@ class Expression:
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Evaluate at points.
 
-        Args:
-            points: Coordinates, shape (n, dim), [length].
+        `points`: coordinates, shape (n, dim), [length].
 
-        Returns:
-            One number per point, shape (n,).
-
-        Raises:
-            InvalidInputError: If the formula depends on z and the points lie in the plane, on t and there is
-                no time, or has no finite value somewhere.
+        Returns one number per point, shape (n,).
         """
         values = {name: points[:, axis] for axis, name in enumerate(COORDINATES[: points.shape[1]])}
         if self.changes and self.time is None:
@@ -319,14 +313,7 @@ def is_reference(text: object) -> bool:
 
 
 def load(reference: str, folder: Path) -> Any:
-    """Return the object of a name in a Python file; the file is run.
-
-    Args:
-        folder: Folder to which the file is relative.
-
-    Raises:
-        InvalidInputError: If there is no such file, it cannot be run or does not define the name.
-    """
+    """Return the object of a name in a Python file; the file is run."""
     file, _, name = reference.rpartition(":")
     path = folder / file
     require_file(path, "a Python file")
@@ -401,15 +388,7 @@ def one_of(
     when: Callable[[Any], bool] | None = None,
     called: str = "",
 ) -> Read:
-    """Discriminate tables by the value of one key.
-
-    Args:
-        key: The key, a `Literal` of every table.
-        default: Its value where the key is missing.
-        other: Table without such a key.
-        when: Returns from the data whether they are that table.
-        called: Name of the key's value in that table for messages.
-    """
+    """Discriminate tables by the value of one key."""
     kinds = {kind: table for table in tables for kind in get_args(table.model_fields[key].annotation)}
 
     def tag(value: Any) -> str | None:
