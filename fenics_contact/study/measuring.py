@@ -57,8 +57,7 @@ def _solver(parameters: Parameters) -> DualSolver | None:
 def cut(scene: Scene, subdomains: int | None, ranks: int) -> dict[str, np.ndarray] | None:
     """Cut the bodies into about the given number of subdomains in total, in proportion to their cells.
 
-    Returns:
-        Body name -> subdomain of every cell; None where no number is given.
+    Returns body name -> subdomain of every cell; None where no number is given.
     """
     if subdomains is None:
         return None
@@ -130,8 +129,7 @@ class TrueErrors:
 def true_errors(states: tuple[State, ...]) -> TrueErrors | None:
     """Solve the last step again, as exactly as possible, and compare. Collective.
 
-    Returns:
-        The errors; None where no such solution could be computed.
+    Returns the errors; None where no such solution could be computed.
     """
     state = states[-1]
     if not isinstance(state, LinearState) or not isinstance(state.solution, DualSolution):
@@ -178,12 +176,7 @@ def _distance(state: LinearState, other: DualSolution, displacement: np.ndarray)
 def measured(
     comm: MPI.Comm, scene: str, parameters: Mapping[str, Any], *, verify: bool = False
 ) -> dict[str, Any]:
-    """Run once and return all measurements. Collective.
-
-    Args:
-        parameters: The settings, as `Parameters.as_dict` returns them.
-        verify: Whether to compute errors, too, not only times.
-    """
+    """Run once and return all measurements. Collective."""
     study, settings = find_study(scene), parameters_from(parameters)
     _dolfinx.release()  # loads dolfinx, which is not part of a run's time
     comm.Barrier()

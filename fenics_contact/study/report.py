@@ -238,11 +238,7 @@ def write_report(folder: str | Path, results: Results, *, figures: bool = True) 
 
 
 def write_overview(folder: str | Path) -> Path:
-    """Write ``README.md`` of a folder of studies, each in its own folder.
-
-    Raises:
-        InvalidInputError: If it holds no study.
-    """
+    """Write ``README.md`` of a folder of studies, each in its own folder."""
     target = Path(folder) / "README.md"
     write_text(target, overview_page(Path(folder)))
     return target

@@ -224,9 +224,7 @@ class Extrapolation:
 def extrapolate(spacing: Sequence[float], values: Sequence[float]) -> Extrapolation:
     """Extrapolate to h = 0 by Richardson's rule with the measured rate.
 
-    Args:
-        spacing: Mesh sizes, falling, (n,).
-        values: Values on them, (n,).
+    `spacing`: mesh sizes, falling, (n,); `values`: values on them, (n,).
 
     References:
         P. J. Roache, Quantification of uncertainty in computational fluid dynamics, Annu. Rev. Fluid Mech.
@@ -257,9 +255,7 @@ def extrapolate(spacing: Sequence[float], values: Sequence[float]) -> Extrapolat
 def measured_rate(spacing: Sequence[float], errors: Sequence[float]) -> float | None:
     """Return the slope of errors over mesh sizes in logarithms, fitted to the three finest meshes.
 
-    Args:
-        spacing: Mesh sizes, falling, (n,).
-        errors: Errors on them, positive, (n,).
+    `spacing`: mesh sizes, falling, (n,); `errors`: errors on them, positive, (n,).
     """
     h, e = np.asarray(spacing, dtype=np.float64)[-3:], np.asarray(errors, dtype=np.float64)[-3:]
     if len(h) < 2 or not np.all(e > 0.0):

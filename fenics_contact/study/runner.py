@@ -205,13 +205,7 @@ def measure_all(
     A job is repeated only after all others were measured, so that a temporary load does not affect one job
     only.
 
-    Args:
-        jobs: The jobs, in the order of measurement.
-        warm_up: Jobs that fill the cache of compiled forms; run first if anything is missing, and not stored.
-        stream: Stream for progress; stderr by default.
-
-    Raises:
-        MissingRequirementError: If several ranks are requested and there is no mpirun.
+    `stream`: stream for progress; stderr by default.
     """
     launcher(max(job.ranks for job in jobs) or 1)  # raises if the ranks cannot be started
     for repeat in range(max(job.repeats for job in jobs)):
@@ -250,13 +244,6 @@ def summarised(name: str, records: Sequence[Record]) -> Record:
     """Return one record for all measurements of a job.
 
     Seconds, memory and load become medians, also by phase; everything else is from the first one.
-
-    Args:
-        name: Of the job, for errors.
-        records: At least one, none of them failed.
-
-    Raises:
-        ValueError: If counts differ between measurements.
     """
     first = records[0]
     for key in ("counts", "refused"):
@@ -379,11 +366,7 @@ class StudyPlan:
 def prepare(
     scene: str, runs: str | Path, *, sweep: Sweep | None = None, settings: Settings | None = None
 ) -> StudyPlan:
-    """Plan a study; arguments as for `run_study`.
-
-    Raises:
-        InvalidInputError: If the scene is unknown.
-    """
+    """Plan a study; arguments as for `run_study`."""
     study, settings = find_study(scene), settings or Settings()
     chosen = sweep or study.sweep
     common = Job(

@@ -17,14 +17,7 @@ BUILT_IN = ("hertz", "cattaneo_mindlin", "chain_links")
 
 
 def find_study(name: str) -> StudyScene:
-    """Return the built-in study of a name, or the one that a Python file defines as ``study``.
-
-    Args:
-        name: One of `BUILT_IN`, or the path of a file that ends in ".py".
-
-    Raises:
-        InvalidInputError: If there is no such study, or the file defines none.
-    """
+    """Return the built-in study of a name, or the one that a Python file defines as ``study``."""
     if name.endswith(".py"):
         return _from_file(Path(name))
     if name not in BUILT_IN:

@@ -31,13 +31,9 @@ TURNED = {
 def nested_box(core: float, size: float, count: int, cell: str = "hexahedron") -> BodyMesh:
     """Mesh the cube [0, size]³: equal cells near the origin, layers around them that grow with the distance.
 
-    Args:
-        core: Side of the cube of equal cells, [length].
-        size: Side of the body, [length].
-        count: Cells along the side of the core.
+    `core`: side of the cube of equal cells, [length]; `size`: side of the body, [length].
 
-    Returns:
-        The mesh with surfaces ``x0, x1, y0, y1, z0, z1``.
+    Returns the mesh with surfaces ``x0, x1, y0, y1, z0, z1``.
     """
     inner = box_lattice([np.linspace(0.0, core, count + 1)] * 3)
     sides = [_facing(inner, axis) for axis in range(3)]
@@ -57,13 +53,8 @@ def nested_box(core: float, size: float, count: int, cell: str = "hexahedron") -
 def nested_half(core: float, size: float, count: int, cell: str = "quadrilateral") -> BodyMesh:
     """Mesh the rectangle [−size, size] × [0, size] in the same way.
 
-    Args:
-        core: Half the width and the height of the rectangle of equal cells, [length].
-        size: Half the width and the height of the body, [length].
-        count: Cells on the height of the core.
-
-    Returns:
-        The mesh with surfaces ``x0, x1, y0, y1``.
+    `core`: half the width and the height of the rectangle of equal cells, [length]; `size`: half the width
+    and the height of the body, [length].
     """
     inner = rectangle_lattice([np.linspace(-core, core, 2 * count + 1), np.linspace(0.0, core, count + 1)])
     sides = [inner.surfaces[side] for side in ("x0", "x1", "y1")]
@@ -81,9 +72,8 @@ def _shells(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Enlarge the skin of the core, layer by layer.
 
-    Returns:
-        All points; the nodes of the skin, ascending, shape (n,); the nodes of all layers, that of the core
-        first, shape (n_layers + 1, n).
+    Returns all points; the nodes of the skin, ascending, shape (n,); the nodes of all layers, that of the
+    core first, shape (n_layers + 1, n).
     """
     skin = np.unique(np.concatenate([facets.ravel() for facets in sides]))
     layers = max(1, round(np.log(size / core) / np.log1p(1.0 / count)))
@@ -99,8 +89,7 @@ def _facing(inner: BodyMesh, axis: int) -> tuple[np.ndarray, np.ndarray]:
     Cells of all layers are numbered along the axes like those of a lattice, with the outward direction in
     place of their own axis, so that all can be split alike.
 
-    Returns:
-        Facets, (n, 4), and the vertex numbers of their inner copies, then of their outer ones, (n, 8).
+    Returns facets, (n, 4), and the vertex numbers of their inner copies, then of their outer ones, (n, 8).
     """
     facets = inner.surfaces[f"{'xyz'[axis]}1"]
     corners = inner.points[facets]
@@ -111,11 +100,7 @@ def _facing(inner: BodyMesh, axis: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def mirrored(mesh: BodyMesh) -> BodyMesh:
-    """Return the mesh mirrored at the plane z = 0, or the line y = 0; its lower face becomes the upper one.
-
-    Args:
-        mesh: Hexahedra, tetrahedra, quadrilaterals or triangles with the surfaces of a box or rectangle.
-    """
+    """Return the mesh mirrored at z = 0, or y = 0 in the plane; its lower face becomes the upper one."""
     points = mesh.points * np.array([1.0, 1.0, -1.0])[-mesh.dim :]
     cells = mesh.cells[:, TURNED[mesh.cell_type]]
     return BodyMesh(points, cells, box_sides(points, cells))
