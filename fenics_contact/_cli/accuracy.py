@@ -149,11 +149,7 @@ def _measure(plan: StudyPlan) -> int:
 
 
 def _sweep(given: Mapping[str, Sequence[Any] | None], sweep: Sweep) -> Sweep:
-    """Return the runs selected by the options, the scene's by default.
-
-    Raises:
-        InvalidInputError: If a cell type is unknown.
-    """
+    """Return the runs selected by the options, the scene's by default."""
     known: dict[str, Any] = {name: tuple(values) for name, values in given.items() if values}
     chosen = replace(sweep, **known)
     if known.get("sizes") and sweep.base.size not in chosen.sizes:

@@ -142,11 +142,7 @@ def facts(rows: dict[str, Any], title: str = "") -> Table:
 
 
 def write_stdout(text: str) -> None:
-    """Write to stdout; if its reader has closed it, write nothing and continue.
-
-    Raises:
-        OutputError: If it cannot be written, for instance to a full disk.
-    """
+    """Write to stdout; if its reader has closed it, write nothing and continue."""
     try:
         sys.stdout.write(text)
         sys.stdout.flush()

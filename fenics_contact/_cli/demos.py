@@ -61,11 +61,7 @@ def demo(
 
 
 def folder_of_demos() -> Path:
-    """Return the folder of the demos: beside the package in a checkout, inside it if installed.
-
-    Raises:
-        InvalidInputError: If there is none.
-    """
+    """Return the folder of the demos: beside the package in a checkout, inside it if installed."""
     package = Path(__file__).resolve().parents[1]
     for folder in (package.parent / "demos", package / "demos"):
         if any(folder.glob("demo_*.py")):

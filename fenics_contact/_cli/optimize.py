@@ -44,11 +44,7 @@ _MILLIMETRES = {"µm": 1e-3, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in
 
 
 def check_design_files(file: SceneFile) -> None:
-    """Refuse kinds of files that the scene cannot have, before anything is solved.
-
-    Raises:
-        InvalidInputError: If the scene is plane and STL is asked for, or STEP in an unknown unit.
-    """
+    """Refuse kinds of files that the scene cannot have, before anything is solved."""
     kinds, length = file.document.output.design, file.document.units.length
     if "stl" in kinds and file.scene.dim == 2:
         raise InvalidInputError('output.design must be "csv" or "step" for a plane scene, got "stl"')

@@ -142,8 +142,7 @@ def _show(console: Console, file: SceneFile, state: State, title: str = "") -> N
 def _through_steps(console: Console, file: SceneFile, resume: bool | None) -> dict[str, State]:
     """Solve all load steps and write each. Collective.
 
-    Returns:
-        Some of the states by name, the last one among them.
+    Returns some of the states by name, the last one among them.
     """
     checkpoint = checkpoint_of(file, resume)
     rows, drawn = list[dict[str, Any]](), dict[str, State]()

@@ -28,11 +28,7 @@ class Gallery:
     missing: list[str] = field(default_factory=list)
 
     def require_all(self) -> None:
-        """Refuse to end well without a picture that the scene file requests, once everything else is written.
-
-        Raises:
-            InvalidInputError: If one is missing; the reason was printed where it was drawn.
-        """
+        """Refuse to end well without a requested picture, once everything else is written."""
         if self.missing:
             raise InvalidInputError(
                 f"the pictures that a scene file requests must be possible, {', '.join(self.missing)} could "
