@@ -64,11 +64,7 @@ class SplineFit:
 
 
 def fitted(surface: MovedSurface, tolerance: float, most: int = 129) -> SplineFit:
-    """Interpolate a moved surface by a B-spline, with more points until it is close enough.
-
-    Raises:
-        CadError: If the surface folds, or that many points are not enough.
-    """
+    """Interpolate a moved surface by a B-spline, with more points until it is close enough."""
     count, axes = 17, len(surface.ticks)
     allowed = tolerance * float(np.ptp(surface.after(surface.parameters), axis=0).max())
     while True:
@@ -184,9 +180,6 @@ def flat_sides(
 
     Sides are flat where they are so in the reference shape; the nodes of the mesh near a designed surface
     follow it a little.
-
-    Raises:
-        CadError: If the other sides are not flat, or a rim of a surface is not one edge of a flat side.
     """
     facets, _ = boundary_faces(mesh.linear.cells, mesh.dim)
     areas = vector_areas(mesh.points, facets)
@@ -297,9 +290,7 @@ Plane: TypeAlias = tuple[np.ndarray, float]
 def corners_in_planes(points: np.ndarray, sides: Sequence[FlatSide]) -> dict[int, np.ndarray]:
     """Return the position of every corner of flat sides in all of their planes, by node.
 
-    Args:
-        points: Coordinates of the nodes, shape (n_nodes, dim), [length].
-        sides: The flat sides; of a plane body the face itself, whose corners stay.
+    `points`: coordinates of the nodes, shape (n_nodes, dim), [length].
     """
     planes: dict[int, list[Plane]] = {}
     for side in sides:
@@ -311,11 +302,7 @@ def corners_in_planes(points: np.ndarray, sides: Sequence[FlatSide]) -> dict[int
 
 
 def rims_in_planes(fits: Sequence[SplineFit], sides: Sequence[FlatSide], tolerance: float) -> list[SplineFit]:
-    """Return surfaces whose rims lie in the planes of the flat sides that they border on.
-
-    Raises:
-        CadError: If a rim is farther off.
-    """
+    """Return surfaces whose rims lie in the planes of the flat sides that they border on."""
     planes: list[dict[int, Plane]] = [{} for _ in fits]
     for side in sides:
         for edge in (edge for loop in side.loops for edge in loop):

@@ -45,9 +45,6 @@ def replacing(*targets: Path) -> Iterator[tuple[Path, ...]]:
 
     Yields:
         For every target a path of the same name in a hidden folder beside it.
-
-    Raises:
-        OutputError: If the disk is full or the folder cannot be written to; says what to do.
     """
     folder = targets[0].parent
     try:
@@ -72,11 +69,7 @@ def replacing_together(
     size: int,
     repair: Callable[[Path], None] | None = None,
 ) -> None:
-    """Let all ranks write the same files, and move them to their targets when all are done. Collective.
-
-    Raises:
-        OutputError: On all ranks, if the disk is full or the folder cannot be written to.
-    """
+    """Let all ranks write the same files, and move them to their targets when all are done. Collective."""
     with _on_first_rank(comm, targets[0]) as hidden:
         with together(comm):
             if comm.rank == 0:
@@ -174,11 +167,7 @@ def json_text(data: Any) -> str:
 
 
 def plain(data: Any, place: str = "data", *, lenient: bool = False) -> Any:
-    """Convert data to JSON's types.
-
-    Raises:
-        InvalidInputError: If some part cannot be converted; states which.
-    """
+    """Convert data to JSON's types."""
 
     def inside(part: Any, where: str) -> Any:
         return plain(part, f"{place}{where}", lenient=lenient)

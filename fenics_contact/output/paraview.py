@@ -66,11 +66,7 @@ def collection(name: str, members: Sequence[Member]) -> str:
 
 
 def read_collection(path: Path) -> list[Member]:
-    """Return the members of a PVD file whose multi-block files exist.
-
-    Raises:
-        InvalidInputError: If it cannot be read or was not written by a `ResultSeries`.
-    """
+    """Return the members of a PVD file whose multi-block files exist."""
     name, members = path.stem, []
     try:
         for entry in ET.parse(path).getroot().iter("DataSet"):
@@ -99,12 +95,8 @@ LONGEST = 200
 def file_of_each(bodies: Iterable[str], folder: Path, stem: str, suffix: str) -> dict[str, Path]:
     """Name one file for each body: "state_link_1.vtu" for the body "link 1".
 
-    Args:
-        bodies: Names of the bodies, any text.
-
-    Returns:
-        Body name -> file. Names that differ only in special characters are numbered, those that no disk takes
-        are cut and end in a number made from the whole name.
+    Returns body name -> file. Names that differ only in special characters are numbered, those that no disk
+    takes are cut and end in a number made from the whole name.
     """
     files: dict[str, Path] = {}
     for body in bodies:
@@ -120,11 +112,7 @@ def file_of_each(bodies: Iterable[str], folder: Path, stem: str, suffix: str) ->
 
 
 def checked_name(folder: str | Path, name: str, suffix: str) -> Path:
-    """Return the path of a file name in a folder.
-
-    Raises:
-        InvalidInputError: If the name is empty, contains a folder or is too long.
-    """
+    """Return the path of a file name in a folder."""
     if not name.strip(".") or Path(name).name != name:
         raise InvalidInputError(
             f"name must be the beginning of a file's name, got {name!r}: put folders into folder"
@@ -331,11 +319,7 @@ def write_vtx(
 
 
 def require_vtx() -> None:
-    """Raise if ADIOS2 is missing.
-
-    Raises:
-        InvalidInputError: Names the formats to use instead.
-    """
+    """Raise if ADIOS2 is missing."""
     if not _dolfinx.has_vtx():
         version = ".".join(map(str, _dolfinx.version()))
         raise InvalidInputError(
@@ -381,18 +365,7 @@ class ResultSeries:
     def __init__(
         self, folder: str | Path, name: str, comm: MPI.Comm, *, formats: Sequence[str] = ("vtu",)
     ) -> None:
-        """Read existing members; nothing is written yet. Collective on ``comm``.
-
-        Args:
-            folder: Output folder; created with the first member.
-            name: Name of the series, the beginning of all file names.
-            comm: Communicator of the states.
-            formats: Any of "vtu", "xdmf" and "vtx"; VTU files are always written.
-
-        Raises:
-            InvalidInputError: If the name contains a folder, a format is unknown or unavailable, or a PVD
-                file of that name does not belong to a series.
-        """
+        """Read existing members; nothing is written yet. Collective on ``comm``."""
         inherited: list[Member] = []
         with together(comm):
             self.path = checked_name(folder, name, ".pvd")

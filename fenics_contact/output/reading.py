@@ -33,12 +33,7 @@ class StoredFields:
     label: str = ""
 
     def read(self) -> dict[str, pyvista.UnstructuredGrid]:
-        """Return body name -> grid with all fields.
-
-        Raises:
-            InvalidInputError: If the file is missing.
-            MissingRequirementError: If pyvista is not installed.
-        """
+        """Return body name -> grid with all fields."""
         require_extra("files of fields", "viz", "pyvista")
         import pyvista
 
@@ -60,12 +55,6 @@ def fields_of_result(folder: Path) -> Path | None:
 
 def stored_fields(path: str | Path) -> list[StoredFields]:
     """Return the members of a PVD file in the order of their values; any other file as the only one.
-
-    Args:
-        path: File with one of the suffixes `FIELD_FILES`, such as `ResultSeries` and `write_vtu` write.
-
-    Raises:
-        InvalidInputError: If a PVD file names no file or cannot be read.
 
     Example:
         >>> [member.label for member in stored_fields("output/history.pvd")]  # doctest: +SKIP

@@ -54,8 +54,7 @@ readable = partial(plain, lenient=True)
 def described_scene(scene: Scene, subdomains: Mapping[str, int], time: float = 0.0) -> dict[str, Any]:
     """Return bodies, supports, loads and pairs of a scene as plain data.
 
-    Returns:
-        See `fenics_contact.write_result`. Functions are given by their names, numbers by their values.
+    See `fenics_contact.write_result`. Functions are given by their names, numbers by their values.
     """
     return {
         "dimension": scene.dim,
@@ -125,9 +124,6 @@ def listed_forces(forces: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any
     """Return the entries of a record of forces by what they are: "reaction 0", ..., "sum of loads", ...
 
     Each has ``force``, ``moment`` and ``about``; those of surfaces ``body`` and ``surface``, too.
-
-    Args:
-        forces: What `forces_record` returns, or the entry of a result file.
     """
     words = {"reactions": "reaction", "contacts": "contact", "ties": "tie"}
     single = [(f"{words[kind]} {k}", entry) for kind in words for k, entry in enumerate(forces[kind])]

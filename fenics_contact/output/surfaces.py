@@ -26,11 +26,7 @@ OFF = 1e-9
 
 
 def moved_surfaces(problem: ShapeProblem | JointProblem, alpha: np.ndarray) -> tuple[MovedSurface, ...]:
-    """Return the surface of every design, moved. Collective.
-
-    Raises:
-        InvalidInputError: If alpha does not fit, or a surface is moved by other designs as well.
-    """
+    """Return the surface of every design, moved. Collective."""
     points = problem.points_of(alpha)
     parts = np.split(np.asarray(alpha), np.cumsum([design.size for design in problem.designs])[:-1])
     found = []
@@ -53,12 +49,8 @@ def moved_body(
 ) -> tuple[str, BodyMesh]:
     """Return the name and the mesh of a designed body in the shape of a design. Collective.
 
-    Args:
-        alpha: Design variables, shape (size,), [length].
-        body: Name of the body; may be None if designs move only one.
-
-    Raises:
-        InvalidInputError: If the body is not designed, or several are and none is named.
+    `alpha`: design variables, shape (size,), [length]; `body`: name of the body; may be None if designs move
+    only one.
     """
     designed = sorted({design.body for design in problem.designs})
     if body not in designed and (body is not None or len(designed) > 1):
