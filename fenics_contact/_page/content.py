@@ -46,9 +46,7 @@ class Arrays:
     def add(self, values: np.ndarray, *, exact: bool = False) -> int:
         """Return the number of an array, added unless it is there.
 
-        Args:
-            values: Numbers of any shape, (n, ...); integers are kept as such.
-            exact: Whether numbers keep single precision, as coordinates do; others keep four digits.
+        `values`: numbers of any shape, (n, ...); integers are kept as such.
         """
         whole = np.issubdtype(values.dtype, np.integer) and values.min(initial=0) >= 0
         kept = np.ascontiguousarray(values, dtype="<u4" if whole else "<f4")
@@ -70,11 +68,7 @@ class Arrays:
 
 
 def rounded(values: np.ndarray, dropped: int = 10) -> np.ndarray:
-    """Round numbers of single precision to four digits, which compress better.
-
-    Args:
-        dropped: How many of their 23 binary digits after the first are zero then.
-    """
+    """Round numbers of single precision to four digits, which compress better."""
     bits = np.where(np.isfinite(values), values, np.float32(np.nan)).astype("<f4").view("<u4")
     half = np.uint32(1 << (dropped - 1))
     mask = np.uint32(0xFFFFFFFF ^ ((1 << dropped) - 1))
@@ -84,11 +78,10 @@ def rounded(values: np.ndarray, dropped: int = 10) -> np.ndarray:
 def body_entry(name: str, grid: pyvista.UnstructuredGrid, arrays: Arrays) -> dict[str, Any]:
     """Return the geometry and the fields of a body as numbers of arrays.
 
-    Returns:
-        ``points``, (n, 3); ``triangles``, (t, 3) nodes of the skin, and the cell ``owner`` of each, (t,);
-        ``edges`` and ``outline``, (e, 2) nodes of the lines of the mesh on the skin and of its sharp edges;
-        ``cells``, (c, 3 | 4 | 8) corners; ``nodes`` and ``on_cells``, the fields by name. Quadratic cells are
-        cut into linear ones.
+    Returns ``points``, (n, 3); ``triangles``, (t, 3) nodes of the skin, and the cell ``owner`` of each, (t,);
+    ``edges`` and ``outline``, (e, 2) nodes of the lines of the mesh on the skin and of its sharp edges;
+    ``cells``, (c, 3 | 4 | 8) corners; ``nodes`` and ``on_cells``, the fields by name. Quadratic cells are cut
+    into linear ones.
     """
     cells, pieces, dim = linear_cells(name, grid)
     faces, owner = boundary_faces(cells, 3) if dim == 3 else (cells, np.arange(len(cells)))
@@ -154,9 +147,7 @@ _SHAPES: tuple[tuple[tuple[str, ...], type], ...] = (
 def obstacle_entries(record: Mapping[str, Any], points: np.ndarray) -> list[dict[str, Any]]:
     """Return type and lines of each different rigid obstacle; no lines if it is of another shape.
 
-    Args:
-        record: The record of the result, see `fenics_contact.output.read_result`.
-        points: All nodes of the bodies, (n, 3).
+    `points`: all nodes of the bodies, (n, 3).
     """
     scene = record.get("scene") or {}
     dim = int(scene.get("dimension") or 3)

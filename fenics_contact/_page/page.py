@@ -78,11 +78,7 @@ def source_of_states(states: Mapping[str, State]) -> Source:
 
 
 def source_of_files(path: Path) -> Source:
-    """Return the fields of a folder of results, of its result.json or of a file of fields, and the record.
-
-    Raises:
-        InvalidInputError: If there is no result, or one without fields.
-    """
+    """Return the fields of a folder of results, of its result.json or of a file of fields, and the record."""
     folder = path if path.is_dir() else path.parent
     if path.suffix in FIELD_FILES:
         fields: Path | None = path
@@ -119,11 +115,7 @@ class Page:
     path: Path | None = None
 
     def __fspath__(self) -> str:
-        """Return the path of the file.
-
-        Raises:
-            InvalidInputError: If the page was written to no file.
-        """
+        """Return the path of the file."""
         if self.path is None:
             raise InvalidInputError(
                 "this needs the file of a page, but the page was not written: give result_page a path, such "
