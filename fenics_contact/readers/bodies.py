@@ -77,16 +77,8 @@ class SurfaceParts:
 def chosen_bodies(mesh: TaggedMesh, bodies: Any) -> dict[str, BodyParts]:
     """Resolve the caller's choice of bodies.
 
-    Args:
-        mesh: The mesh with its groups.
-        bodies: None for every group; a list of labels; or name of the body to a label, to a list of labels,
-            or to a mapping from the name of a region to a label.
-
-    Returns:
-        Name of the body to its groups.
-
-    Raises:
-        InvalidInputError: If a label is not there.
+    `bodies`: None for every group; a list of labels; or name of the body to a label, to a list of labels, or
+    to a mapping from the name of a region to a label.
     """
     if bodies is None:
         bodies = list(mesh.groups)
@@ -109,11 +101,7 @@ def chosen_bodies(mesh: TaggedMesh, bodies: Any) -> dict[str, BodyParts]:
 def chosen_surfaces(mesh: TaggedMesh, surfaces: Any) -> dict[str, SurfaceParts]:
     """Resolve the caller's choice of surfaces, in the same forms but without regions.
 
-    Returns:
-        Name of the surface to its facets and sets of nodes.
-
-    Raises:
-        InvalidInputError: If a label is not there.
+    Returns the name of the surface to its facets and sets of nodes.
     """
     known = {**mesh.node_sets, **mesh.facets}
     if surfaces is None:
@@ -163,16 +151,7 @@ def bodies_of(mesh: TaggedMesh, bodies: Any = None, surfaces: Any = None) -> dic
 
     Every body has its own nodes: those on a boundary that two bodies share are duplicated.
 
-    Args:
-        bodies: The groups of each body, see `chosen_bodies`.
-        surfaces: The facet labels of each surface, see `chosen_surfaces`.
-
-    Returns:
-        Name to body. A surface belongs to every body on whose boundary some of its facets lie.
-
-    Raises:
-        InvalidInputError: If a label does not exist, cells belong to two bodies or regions, a body has cells
-            of several types or an invalid mesh, or a facet lies inside a body or on no cell at all.
+    Returns the name to body. A surface belongs to every body on whose boundary some of its facets lie.
     """
     chosen, facets = chosen_bodies(mesh, bodies), chosen_surfaces(mesh, surfaces)
     _check_facets_belong(mesh, facets)

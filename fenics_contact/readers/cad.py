@@ -217,17 +217,7 @@ FaceChoice: TypeAlias = Sequence[Label] | Mapping[str, Chosen | Sequence[Chosen]
 def chosen_faces(
     faces: Sequence[CadFace], groups: Mapping[Label, Sequence[int]], surfaces: Any, source: str
 ) -> dict[str, list[int]]:
-    """Resolve the caller's choice of surfaces.
-
-    Args:
-        groups: Name of a group of the file, or of a face, to numbers of faces.
-
-    Returns:
-        Name of the surface to numbers of its faces.
-
-    Raises:
-        InvalidInputError: If a choice finds no face, or two choose the same; the message lists the faces.
-    """
+    """Resolve the caller's choice of surfaces."""
     if isinstance(surfaces, str | int):
         surfaces = [surfaces]
     if not isinstance(surfaces, Mapping):

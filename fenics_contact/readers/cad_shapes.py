@@ -33,13 +33,11 @@ def shape_of_entity(
 ) -> SurfaceShape | None:
     """Return the shape of a face, in the plane of a curve, of gmsh's current model.
 
-    Args:
-        middles: Points on or close to it, (n, 3 | 2), [length].
-        outwards: Directions out of the body there, (n, 3 | 2).
+    `middles`: points on or close to it, (n, 3 | 2), [length]; `outwards`: directions out of the body there,
+    (n, 3 | 2).
 
-    Returns:
-        A plane, sphere, cylinder, cone or torus if it is one, else a spline through its points; None if the
-        model has only a mesh and no geometry.
+    Returns a plane, sphere, cylinder, cone or torus if it is one, else a spline through its points; None if
+    the model has only a mesh and no geometry.
     """
     if gmsh.model.getType(*entity).startswith("Discrete"):
         return None
@@ -131,18 +129,11 @@ def cad_shapes(
     other faces become splines through their points. The shapes no longer need gmsh, and can be sent to other
     ranks. A surface of several faces is `Joined`.
 
-    Args:
-        mesh: A body of the model with the nodes of gmsh's mesh, from `from_gmsh_model`, not moved.
-        surfaces: Name of a surface of the body to the physical groups (by name, or number), or named
-            entities, of which it consists. All surfaces with the name of such a group unless given.
+    `surfaces`: name of a surface of the body to the physical groups (by name, or number), or named entities,
+    of which it consists. All surfaces with the name of such a group unless given.
 
-    Returns:
-        Name of the surface to its shape. Surfaces whose faces have no geometry, as in a mesh that was read
-        from a file, and those whose nodes have left it are omitted.
-
-    Raises:
-        InvalidInputError: If gmsh is not initialised, or the body or the model does not have a surface.
-        MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
+    Returns the name of the surface to its shape. Surfaces whose faces have no geometry, as in a mesh that was
+    read from a file, and those whose nodes have left it are omitted.
     """
     gmsh = running_gmsh()
     if gmsh is None:

@@ -222,12 +222,7 @@ class Grid:
 
 
 def grids_of(path: Path) -> list[Grid]:
-    """List the grids of an XDMF file.
-
-    Raises:
-        InvalidInputError: If the file is missing, is not an XDMF file, or its cells are not linear or
-            complete quadratic ones of one type.
-    """
+    """List the grids of an XDMF file."""
     require_file(path)
     try:
         root = ElementTree.parse(path).getroot()
@@ -284,17 +279,7 @@ def chosen_grid(
     path: Path,
     optional: bool = False,
 ) -> Grid | None:
-    """Return the grid of a name, or the only suitable one.
-
-    Args:
-        grids: The grids of the file.
-        argument: Its name among the caller's arguments.
-        suits: Whether a grid is suitable.
-        optional: Whether there may be none.
-
-    Raises:
-        InvalidInputError: If there is no such grid, or there are several and none is named.
-    """
+    """Return the grid of a name, or the only suitable one."""
     suitable = [grid for grid in grids if suits(grid) and name in (None, grid.name)]
     if len(suitable) == 1:
         return suitable[0]

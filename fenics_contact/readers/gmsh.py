@@ -145,13 +145,7 @@ def refilled(mesh: BodyMesh) -> BodyMesh:
     For a body that was deformed so far that its cells have become thin, see `design.Remeshed`. Cells
     grow from the size of the facets around them. Nodes have other numbers afterwards.
 
-    Args:
-        mesh: Linear tetrahedra without regions and without true shapes of surfaces, in one piece.
-
-    Raises:
-        InvalidInputError: If the mesh is another one.
-        MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
-        FenicsContactError: If gmsh fails, such as where the boundary penetrates itself.
+    `mesh`: linear tetrahedra without regions and without true shapes of surfaces, in one piece.
 
     Example:
         >>> from fenics_contact.gallery import block

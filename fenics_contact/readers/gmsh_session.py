@@ -38,15 +38,7 @@ _INCOMPLETE = (16, 17)
 def tagged_mesh_of(gmsh: ModuleType, source: str) -> TaggedMesh:
     """Return the cells of the highest dimension and the physical groups of gmsh's current model.
 
-    Args:
-        source: Name of the model, for messages.
-
-    Returns:
-        Nodes in the order of their tags, cells in the order of entities, labels by name.
-
-    Raises:
-        InvalidInputError: If there are no cells, one has no physical group, or they are not linear or
-            complete quadratic triangles, quadrilaterals, tetrahedra or hexahedra, plane ones in a plane.
+    Returns nodes in the order of their tags, cells in the order of entities, labels by name.
     """
     elements = {dim: _elements(gmsh, dim, source) for dim in (3, 2)}
     dim = 3 if elements[3] else 2
@@ -232,11 +224,7 @@ def gmsh_model(name: str, **more: float) -> Iterator[ModuleType]:
 
 
 def running_gmsh() -> ModuleType | None:
-    """Return the module ``gmsh`` if it is initialised, else None.
-
-    Raises:
-        MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
-    """
+    """Return the module ``gmsh`` if it is initialised, else None."""
     with _interrupt_handler_kept():
         gmsh = _import_gmsh()
         return gmsh if _is_initialised(gmsh) else None

@@ -54,16 +54,6 @@ def with_element_sets(mesh: meshio.Mesh, path: Path) -> meshio.Mesh:
 
     meshio 5.3 assigns the n-th of these names to the n-th block, even if a block has none or two blocks have
     the same.
-
-    Args:
-        mesh: meshio's mesh; its sets of those names are replaced.
-        path: The file; files of other formats, and those that include others, are skipped.
-
-    Returns:
-        The same mesh.
-
-    Raises:
-        InvalidInputError: If the file lists nodes in several places, of which meshio keeps the last.
     """
     if path.suffix.lower() != ".inp":
         return mesh
@@ -121,16 +111,8 @@ def cells_of(
 ) -> tuple[np.ndarray, list[Block], dict[str, np.ndarray]]:
     """Sort the blocks of a mesh into cells and facets.
 
-    Args:
-        source: Where it comes from, for messages.
-        corners_only: Whether quadratic cells are reduced to their corners.
-
-    Returns:
-        Coordinates, (n_nodes, 3 | 2), the role of each block, and cell type to nodes, (n_cells, nodes of a
-        cell).
-
-    Raises:
-        InvalidInputError: If there are no cells, or prisms, pyramids or others that bodies cannot have.
+    Returns coordinates, (n_nodes, 3 | 2), the role of each block, and cell type to nodes, (n_cells, nodes of
+    a cell).
     """
     dim = max((block.dim for block in mesh.cells if len(block)), default=0)
     if dim < 2:
@@ -216,18 +198,7 @@ def labels_of(
 ) -> tuple[Groups, Facets, dict[Label, np.ndarray]]:
     """Return the labels of cells, facets and nodes.
 
-    Args:
-        blocks: The roles of its blocks.
-        labels: What groups the cells, see `read_mesh`.
-        source: Where the mesh comes from, for messages.
-        everything: Whether every cell must have a label.
-
-    Returns:
-        Label to cell type to cells, label to corners of facets, label to nodes.
-
-    Raises:
-        InvalidInputError: If ``labels`` does not exist or is needed and not given, a set does not fit the
-            mesh, or a cell has no label.
+    Returns label to cell type to cells, label to corners of facets, label to nodes.
     """
     sets = _sets(mesh, blocks, source)
     node_sets = {name: np.asarray(nodes, dtype=np.int64) for name, nodes in _node_sets(mesh).items()}
@@ -527,11 +498,7 @@ def _read(path: Path, tagged: Callable[..., TaggedMesh], file_format: str | None
 
 
 def read_with_meshio(path: Path, file_format: str | None = None) -> meshio.Mesh:
-    """Read a file as meshio does, by its format or its ending.
-
-    Raises:
-        InvalidInputError: If it is missing, of unknown format, or cannot be read.
-    """
+    """Read a file as meshio does, by its format or its ending."""
     require_file(path)
     import meshio
 
