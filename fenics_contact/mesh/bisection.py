@@ -218,15 +218,10 @@ def target_parts(mesh: BodyMesh, nodes: float | None = None) -> int:
 
     A subdomain that would have m nodes inside a large mesh has (m^(1/d) + 1)^d once it is torn out.
 
-    Args:
-        nodes: Nodes of one subdomain, at least 2^d; unless given 700 in 3D and 1000 in 2D, about 2000
-            displacements.
+    `nodes`: nodes of one subdomain, at least 2^d; unless given 700 in 3D and 1000 in 2D, about 2000
+    displacements.
 
-    Returns:
-        Number of subdomains, at least 1 and at most the number of cells.
-
-    Raises:
-        InvalidInputError: If no subdomain can have so few nodes.
+    Returns number of subdomains, at least 1 and at most the number of cells.
     """
     nodes = TARGET_NODES[mesh.dim] if nodes is None else nodes
     if not 2**mesh.dim <= nodes < np.inf:
@@ -247,15 +242,8 @@ def default_partition(
     share a pattern. The cuts are those of `bisection_partition`. Only a body with fewer cells than ranks has
     fewer subdomains than there are ranks.
 
-    Args:
-        mesh: Any mesh that is connected through faces.
-        body: Name of the body, for messages.
-
-    Returns:
-        (n_cells,) subdomain numbers, every subdomain connected through faces; the same on every rank.
-
-    Raises:
-        InvalidInputError: If the mesh consists of separate parts, or an argument cannot be used.
+    Returns (n_cells,) subdomain numbers, every subdomain connected through faces; the same on
+    every rank.
     """
     check_count(ranks, "ranks")
     check_one_piece(mesh, body)
@@ -282,13 +270,10 @@ def smoothed(partition: np.ndarray, pairs: np.ndarray, areas: np.ndarray) -> np.
     In each pass only cells move that gain more than all their neighbours, so that no two moves interfere. A
     cell that shares no face with its own subdomain stays: no subdomain loses its last one.
 
-    Args:
-        partition: (n_cells,) subdomain numbers.
-        pairs: Pairs of cells that share a face, (n, 2).
-        areas: Areas of these faces, (n,).
+    `partition`: (n_cells,) subdomain numbers; `pairs`: pairs of cells that share a face, (n, 2); `areas`:
+    areas of these faces, (n,).
 
-    Returns:
-        (n_cells,) subdomain numbers.
+    Returns (n_cells,) subdomain numbers.
     """
     cell, other = np.concatenate([pairs, pairs[:, ::-1]]).T
     area, parts = np.tile(areas, 2), int(partition.max()) + 1
@@ -309,10 +294,8 @@ def smoothed(partition: np.ndarray, pairs: np.ndarray, areas: np.ndarray) -> np.
 def _gains(partition: np.ndarray, towards: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the largest gain of each cell by a move, zero if it stays, and the target subdomain.
 
-    Args:
-        partition: (n_cells,) subdomain numbers.
-        towards: Cell and subdomain beyond every face, from both sides, as one number, (2 n,).
-        area: Areas of the faces, (2 n,).
+    `partition`: (n_cells,) subdomain numbers; `towards`: cell and subdomain beyond every face, from both
+    sides, as one number, (2 n,); `area`: areas of the faces, (2 n,).
     """
     parts = int(partition.max()) + 1
     unique, where = np.unique(towards, return_inverse=True)

@@ -98,12 +98,7 @@ def checked_cells(cells: ArrayLike, n_nodes: int, dim: int) -> np.ndarray:
 def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str) -> None:
     """Reject a mesh with an inverted or degenerate cell, or so far from the origin that rounding bends cells.
 
-    Args:
-        points: Coordinates, (n_nodes, 3 | 2).
-        cells: Node numbers, (n_cells, nodes of a cell).
-
-    Raises:
-        InvalidInputError: States the number of cells, the worst one and its Jacobian ratio or its position.
+    `points`: coordinates, (n_nodes, 3 | 2); `cells`: node numbers, (n_cells, nodes of a cell).
     """
     thick = thickness(points, cells)
     inverted = np.flatnonzero(thick <= 0.0)

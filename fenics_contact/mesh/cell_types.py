@@ -251,12 +251,7 @@ OF_THE_FILE = (
 def cell_type_of(cells: np.ndarray, dim: int) -> CellType:
     """Return the type of cells; for four nodes it depends on the dimension.
 
-    Args:
-        cells: Node numbers, (n_cells, nodes of a cell).
-        dim: Dimension of the space, 2 or 3.
-
-    Raises:
-        InvalidInputError: If there are no such cells in this dimension.
+    `cells`: node numbers, (n_cells, nodes of a cell).
     """
     for cell in CELL_TYPES.values():
         if cell.dim == dim and cells.ndim == 2 and cells.shape[1] == cell.nodes.shape[0]:
@@ -287,12 +282,9 @@ _OTHERS = ("interval", "quadrilateral", "hexahedron")
 def shape_values(cell: CellType, positions: np.ndarray) -> np.ndarray:
     """Evaluate the shape functions.
 
-    Args:
-        cell: The type of cells, or of facets.
-        positions: Reference coordinates, (m, dim).
+    `positions`: reference coordinates, (m, dim).
 
-    Returns:
-        (m, nodes of a cell).
+    The result has shape (m, nodes of a cell).
     """
     return _tabulated(cell, positions, 0)[0]
 
@@ -300,12 +292,9 @@ def shape_values(cell: CellType, positions: np.ndarray) -> np.ndarray:
 def shape_gradients(cell: CellType, positions: np.ndarray) -> np.ndarray:
     """Evaluate the gradients of the shape functions in reference coordinates.
 
-    Args:
-        cell: The type of cells, or of facets.
-        positions: Reference coordinates, (m, dim).
+    `positions`: reference coordinates, (m, dim).
 
-    Returns:
-        (m, nodes of a cell, dim).
+    The result has shape (m, nodes of a cell, dim).
     """
     return np.moveaxis(_tabulated(cell, positions, 1)[1:], 0, 2)
 
@@ -317,12 +306,7 @@ def quadrature(cell: CellType, degree: int | None = None) -> tuple[np.ndarray, n
     Two Gauss points per direction on linear and three on quadratic edges, quadrilaterals and hexahedra; rules
     of degree two on linear and of degree five on quadratic simplices.
 
-    Args:
-        cell: The type of cells, or of facets.
-        degree: Degree of polynomials that another rule integrates exactly.
-
-    Returns:
-        Reference coordinates, (m, dim), and weights that add up to the reference volume, (m,).
+    Returns reference coordinates, (m, dim), and weights that add up to the reference volume, (m,).
     """
     import basix
 

@@ -35,8 +35,7 @@ NOTHING = 1e-10
 def coordinate_rounding(points: np.ndarray) -> float:
     """Return the largest distance of nodes that are meant to coincide, [length].
 
-    Args:
-        points: Coordinates, (n_nodes, 3 | 2).
+    `points`: coordinates, (n_nodes, 3 | 2).
     """
     return float(LAST_BITS * np.finfo(np.float64).eps * np.abs(points).max(initial=0.0))
 
@@ -44,8 +43,7 @@ def coordinate_rounding(points: np.ndarray) -> float:
 def computed_rounding(points: np.ndarray) -> float:
     """Return how far off a length may be that a few operations make of coordinates, [length].
 
-    Args:
-        points: Coordinates, (n_nodes, 3 | 2).
+    `points`: coordinates, (n_nodes, 3 | 2).
     """
     return OPERATIONS * coordinate_rounding(points)
 
@@ -53,13 +51,9 @@ def computed_rounding(points: np.ndarray) -> float:
 def coincident_pairs(points: np.ndarray, tolerance: float = NOTHING) -> np.ndarray:
     """Return the pairs of nodes that coincide.
 
-    Args:
-        points: Coordinates, (n_nodes, 3 | 2).
-        tolerance: Distance over the diagonal of the bounding box up to which nodes coincide; far from the
-            origin the rounding of their coordinates is added.
+    `points`: coordinates, (n_nodes, 3 | 2).
 
-    Returns:
-        (n_pairs, 2) node numbers, each pair and the list ascending.
+    Returns (n_pairs, 2) node numbers, each pair and the list ascending.
     """
     reach = tolerance * float(np.linalg.norm(np.ptp(points, axis=0))) + coordinate_rounding(points)
     pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
@@ -69,11 +63,7 @@ def coincident_pairs(points: np.ndarray, tolerance: float = NOTHING) -> np.ndarr
 def check_no_coincident_nodes(points: np.ndarray) -> None:
     """Reject a mesh with coincident nodes.
 
-    Args:
-        points: Coordinates, (n_nodes, 3 | 2).
-
-    Raises:
-        InvalidInputError: States their number, the first pair and its position.
+    `points`: coordinates, (n_nodes, 3 | 2).
     """
     pairs = coincident_pairs(points)
     if pairs.shape[0] == 0:
@@ -127,13 +117,10 @@ def merge_duplicate_nodes(
 def cell_faces(cells: np.ndarray, dim: int = 3) -> np.ndarray:
     """List the faces of every cell, outward.
 
-    Args:
-        cells: Node numbers, (n_cells, 8) for hexahedra, (n_cells, 4) for tetrahedra or (dim=2)
-            quadrilaterals, (n_cells, 3) for triangles; quadratic ones have 27, 10, 9 or 6.
-        dim: Dimension of the space, 2 or 3.
+    `cells`: node numbers, (n_cells, 8) for hexahedra, (n_cells, 4) for tetrahedra or (dim=2) quadrilaterals,
+    (n_cells, 3) for triangles; quadratic ones have 27, 10, 9 or 6.
 
-    Returns:
-        Node numbers of the faces, (n_cells, faces of a cell, nodes of a face).
+    Returns node numbers of the faces, (n_cells, faces of a cell, nodes of a face).
     """
     return cells[:, cell_type_of(cells, dim).faces]
 
@@ -146,11 +133,9 @@ def corners_of(faces: np.ndarray, dim: int) -> np.ndarray:
 def face_keys(faces: np.ndarray) -> np.ndarray:
     """Reduce faces to two integers each that do not depend on the order of the nodes.
 
-    Args:
-        faces: Node numbers, (n, 4 | 3 | 2) or of quadratic cells (n, 9 | 6 | 3), all below 2**31.
+    `faces`: node numbers, (n, 4 | 3 | 2) or of quadratic cells (n, 9 | 6 | 3), all below 2**31.
 
-    Returns:
-        (n, 2) int64; equal rows belong to faces with equal nodes.
+    Returns (n, 2) int64; equal rows belong to faces with equal nodes.
     """
     nodes = np.zeros((faces.shape[0], 4), dtype=np.int64)
     corners = faces[:, : 3 if faces.shape[1] == 6 else 4]
@@ -161,11 +146,7 @@ def face_keys(faces: np.ndarray) -> np.ndarray:
 def number_faces(faces: np.ndarray) -> np.ndarray:
     """Number faces so that those with the same nodes have the same number.
 
-    Args:
-        faces: Node numbers, as in `face_keys`.
-
-    Returns:
-        (n,) int64 consecutive numbers from 0.
+    Returns (n,) int64 consecutive numbers from 0.
     """
     if faces.shape[0] == 0:
         return np.zeros(0, dtype=np.int64)
@@ -197,15 +178,7 @@ def boundary_faces(cells: np.ndarray, dim: int = 3) -> tuple[np.ndarray, np.ndar
 def shared_faces(cells: np.ndarray, dim: int = 3) -> tuple[np.ndarray, np.ndarray]:
     """Find the faces that two cells share.
 
-    Args:
-        cells: Node numbers, as in `cell_faces`.
-        dim: Dimension of the space, 2 or 3.
-
-    Returns:
-        The faces, outward of the first cell, (n, nodes of a face), and their two cells, (n, 2).
-
-    Raises:
-        InvalidInputError: If more than two cells share a face.
+    Returns the faces, outward of the first cell, (n, nodes of a face), and their two cells, (n, 2).
     """
     faces = cell_faces(cells, dim)
     flat = faces.reshape(-1, faces.shape[2])
@@ -230,12 +203,9 @@ def neighbours(cells: np.ndarray, dim: int = 3) -> np.ndarray:
 def match_faces(faces: np.ndarray, candidates: np.ndarray) -> np.ndarray:
     """Find each face among the candidates, whatever its orientation.
 
-    Args:
-        faces: Node numbers, (n, k).
-        candidates: Node numbers, (m, k), all different faces.
+    `faces`: node numbers, (n, k); `candidates`: node numbers, (m, k), all different faces.
 
-    Returns:
-        (n,) positions in ``candidates``, -1 where there is none.
+    Returns (n,) positions in ``candidates``, -1 where there is none.
     """
     numbers = number_faces(np.concatenate([candidates, faces]))
     position = np.full(numbers.max(initial=-1) + 1, -1, dtype=np.int64)
@@ -246,16 +216,7 @@ def match_faces(faces: np.ndarray, candidates: np.ndarray) -> np.ndarray:
 def orient(cells: np.ndarray, facets: np.ndarray, dim: int = 3) -> np.ndarray:
     """Return boundary facets in the cells' order: cyclic and outward.
 
-    Args:
-        cells: Node numbers, as in `cell_faces`.
-        facets: Node numbers, (n, nodes of a face), the corners in any order.
-        dim: Dimension of the space, 2 or 3.
-
-    Returns:
-        The same facets, outward.
-
-    Raises:
-        InvalidInputError: If a facet is not on the boundary.
+    `facets`: node numbers, (n, nodes of a face), the corners in any order.
     """
     boundary, _ = boundary_faces(cells, dim)
     matches = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
@@ -273,11 +234,9 @@ def start_at_smallest(facets: np.ndarray) -> np.ndarray:
 
     Edges stay as they are: both directions would be one cycle, but differ in the side the normal points to.
 
-    Args:
-        facets: Node numbers in cyclic order, (n, k).
+    `facets`: node numbers in cyclic order, (n, k).
 
-    Returns:
-        The rotated facets, (n, k).
+    Returns the rotated facets, (n, k).
     """
     k = facets.shape[1]
     if k == 2:
@@ -293,14 +252,11 @@ def vector_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
     it is the chord rotated clockwise by a right angle, also for curved edges. Quadratic facets in space are
     treated as four linear ones. Over a closed surface the vector areas add up to zero.
 
-    Args:
-        points: Coordinates, (n_nodes, 3 | 2).
-        facets: Node numbers in cyclic order, (n, 4 | 3) or quadratic (n, 9 | 6), or edges with the body on
-            their left, (n, 2 | 3).
+    `points`: coordinates, (n_nodes, 3 | 2); `facets`: node numbers in cyclic order, (n, 4 | 3) or quadratic
+    (n, 9 | 6), or edges with the body on their left, (n, 2 | 3).
 
-    Returns:
-        (n, 3 | 2) vectors: normal times area (for a warped facet: of its projection along the mean normal) or
-        length.
+    Returns (n, 3 | 2) vectors: normal times area (for a warped facet: of its projection along
+    the mean normal) or length.
     """
     pieces = FACET_TYPES[facets.shape[1], points.shape[1]].pieces
     if points.shape[1] == 3 and len(pieces) > 1:

@@ -48,16 +48,10 @@ from fenics_contact.mesh.partition import cell_weights, check_one_piece, check_p
 def part_graph(graph: csr_matrix, vertices: np.ndarray, parts: int) -> np.ndarray:
     """Return METIS's part of every vertex.
 
-    Args:
-        graph: Cost of cutting two vertices apart, integers of at least 1, (n, n), symmetric.
-        vertices: Weight of each vertex, integers of at least 1, (n,).
-        parts: Number of parts, at least 2.
+    `graph`: cost of cutting two vertices apart, integers of at least 1, (n, n), symmetric; `vertices`: weight
+    of each vertex, integers of at least 1, (n,); `parts`: number of parts, at least 2.
 
-    Returns:
-        (n,) part numbers; a part may be in pieces or have no vertices.
-
-    Raises:
-        MissingRequirementError: If pymetis is missing, too old, cannot be loaded or does not run.
+    Returns (n,) part numbers; a part may be in pieces or have no vertices.
     """
     alone = _may_have_lost_its_calls()
     with _own_functions_first():

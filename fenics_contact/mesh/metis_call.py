@@ -19,15 +19,11 @@ def part_graph(
 ) -> np.ndarray:
     """Return METIS's part of every vertex, deterministically.
 
-    Args:
-        indptr: (n + 1,) start of the neighbours of each vertex in ``indices``.
-        indices: (2 n_edges,) neighbours, both directions of every edge.
-        edges: (2 n_edges,) cost of cutting them, integers of at least 1.
-        vertices: (n,) their weights, integers of at least 1.
-        parts: Number of parts, at least 2.
+    `indptr`: (n + 1,) start of the neighbours of each vertex in ``indices``; `indices`: (2 n_edges,)
+    neighbours, both directions of every edge; `edges`: (2 n_edges,) cost of cutting them, integers of at
+    least 1; `vertices`: (n,) their weights, integers of at least 1; `parts`: number of parts, at least 2.
 
-    Returns:
-        (n,) part numbers; a part may be in pieces or have no vertices.
+    Returns (n,) part numbers; a part may be in pieces or have no vertices.
     """
     import pymetis
 

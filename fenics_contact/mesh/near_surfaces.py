@@ -32,16 +32,11 @@ def near_surfaces(
         ...     ContactPair(Surface(a, f"near {b}"), Surface(b, f"near {a}"), Coulomb(0.2)) for a, b in pairs
         ... ]  # doctest: +SKIP
 
-    Args:
-        distance: Largest distance across the gap, [length].
-        along: How far beyond these facets the surfaces reach, for bodies that slide, [length].
+    `distance`: largest distance across the gap, [length]; `along`: how far beyond these facets the surfaces
+    reach, for bodies that slide, [length].
 
-    Returns:
-        The bodies with a surface "near B" on A and "near A" on B for every pair, and the pairs of names, each
-        in the order of the bodies.
-
-    Raises:
-        InvalidInputError: If the distance is not positive, or a surface of that name is there already.
+    Returns the bodies with a surface "near B" on A and "near A" on B for every pair, and the pairs of names,
+    each in the order of the bodies.
     """
     if not 0.0 < distance < np.inf:
         raise InvalidInputError(f"distance must be positive and finite, got {distance}: give the largest gap")

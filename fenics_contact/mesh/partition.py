@@ -64,11 +64,7 @@ def box_partition(mesh: BodyMesh, boxes: tuple[int, ...]) -> np.ndarray:
 
 
 def check_parts(mesh: BodyMesh, parts: int) -> None:
-    """Reject a number of subdomains into which a mesh cannot be cut.
-
-    Raises:
-        InvalidInputError: If it is not between 1 and the number of cells.
-    """
+    """Reject a number of subdomains into which a mesh cannot be cut."""
     check_count(parts, "parts")
     if parts > mesh.n_cells:
         raise InvalidInputError(
@@ -92,16 +88,9 @@ def merge_pieces(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> np.nd
     The largest piece of each subdomain stays; every other piece goes to the subdomain with whose largest
     piece it shares most faces, those that touch none in a later round.
 
-    Args:
-        mesh: A mesh that is itself connected through faces.
-        partition: (n_cells,) subdomain numbers.
-        body: Name of the body, for messages.
+    `partition`: (n_cells,) subdomain numbers.
 
-    Returns:
-        (n_cells,) subdomain numbers, the same subdomains.
-
-    Raises:
-        InvalidInputError: If the mesh consists of separate parts, so that a piece has no neighbour.
+    Returns (n_cells,) subdomain numbers, the same subdomains.
     """
     partition = _checked_partition(mesh, partition).copy()
     pairs = neighbours(mesh.cells, mesh.dim)
@@ -137,14 +126,7 @@ def _named(body: str) -> str:
 
 
 def check_one_piece(mesh: BodyMesh, body: str = "") -> None:
-    """Reject a mesh that is not connected through faces.
-
-    Args:
-        body: Name of the body, for the message.
-
-    Raises:
-        InvalidInputError: States the number of its parts.
-    """
+    """Reject a mesh that is not connected through faces."""
     piece, owner = _face_pieces(
         mesh, np.zeros(mesh.n_cells, dtype=np.int64), neighbours(mesh.cells, mesh.dim)
     )
@@ -159,12 +141,7 @@ def check_one_piece(mesh: BodyMesh, body: str = "") -> None:
 def check_face_connected(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> None:
     """Reject a partition with a subdomain that is empty or not connected through faces.
 
-    Args:
-        partition: (n_cells,) subdomain numbers.
-        body: Name of the body, for the message.
-
-    Raises:
-        InvalidInputError: Names the subdomain.
+    `partition`: (n_cells,) subdomain numbers.
     """
     partition = _checked_partition(mesh, partition)
     _, owner = _face_pieces(mesh, partition, neighbours(mesh.cells, mesh.dim))
@@ -200,11 +177,7 @@ def _checked_partition(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
 def combine(partitions: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Number the subdomains of several bodies consecutively.
 
-    Args:
-        partitions: One partition for each body, each counting from zero.
-
-    Returns:
-        The same with offsets, so that no number occurs in two bodies.
+    Returns the same with offsets, so that no number occurs in two bodies.
     """
     sizes = [int(np.max(p)) + 1 for p in partitions]
     offsets = np.concatenate([[0], np.cumsum(sizes)])
@@ -214,11 +187,9 @@ def combine(partitions: Sequence[np.ndarray]) -> list[np.ndarray]:
 def torn_node_counts(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
     """Count the nodes of every subdomain, a node once for each subdomain that it belongs to.
 
-    Args:
-        partition: (n_cells,) subdomain numbers.
+    `partition`: (n_cells,) subdomain numbers.
 
-    Returns:
-        (S,) node counts; their sum times the dimension is the number of torn displacements.
+    Returns (S,) node counts; their sum times the dimension is the number of torn displacements.
     """
     owner = np.repeat(partition, mesh.cells.shape[1])
     pairs = np.unique(owner * mesh.n_nodes + mesh.cells.ravel())

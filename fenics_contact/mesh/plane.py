@@ -36,16 +36,9 @@ _MIRRORED = {
 def flattened(points: np.ndarray, used: np.ndarray, source: str) -> np.ndarray:
     """Drop the constant third coordinate of a plane mesh.
 
-    Args:
-        points: Coordinates, (n_nodes, 3 | 2).
-        used: Numbers of the nodes of cells; others are ignored.
-        source: Source of the mesh, for the message.
+    `points`: coordinates, (n_nodes, 3 | 2).
 
-    Returns:
-        Coordinates, (n_nodes, 2).
-
-    Raises:
-        InvalidInputError: If the nodes do not lie in a plane of constant z.
+    Returns coordinates, (n_nodes, 2).
     """
     if points.shape[1] == 2:
         return points
@@ -61,12 +54,9 @@ def flattened(points: np.ndarray, used: np.ndarray, source: str) -> np.ndarray:
 def turned_counter_clockwise(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Reverse the cells of one plane surface if all of them run clockwise: its normal was chosen as -z.
 
-    Args:
-        points: Coordinates, (n_nodes, 2).
-        cells: Node numbers, (n_cells, nodes of a cell).
+    `points`: coordinates, (n_nodes, 2); `cells`: node numbers, (n_cells, nodes of a cell).
 
-    Returns:
-        The cells; unchanged if only some run clockwise, which is a mistake in the mesh.
+    Returns the cells; unchanged if only some run clockwise, which is a mistake in the mesh.
     """
     if np.all(jacobians(points, cells).max(axis=1) < 0.0):
         return cells[:, _MIRRORED[cell_type_of(cells, 2).name]]
@@ -76,16 +66,7 @@ def turned_counter_clockwise(points: np.ndarray, cells: np.ndarray) -> np.ndarra
 def turned_right_handed(points: np.ndarray, cells: np.ndarray, source: str) -> np.ndarray:
     """Reverse every cell with negative Jacobian, in meshes without a prescribed order of vertices.
 
-    Args:
-        points: Coordinates, (n_nodes, 3 | 2).
-        cells: Node numbers, (n_cells, nodes of a cell).
-        source: Where the mesh comes from, for the message.
-
-    Returns:
-        The cells.
-
-    Raises:
-        InvalidInputError: If cells that share a face then lie on the same side of it, as one is flipped.
+    `points`: coordinates, (n_nodes, 3 | 2); `cells`: node numbers, (n_cells, nodes of a cell).
     """
     dim = points.shape[1]
     negative = jacobians(points, cells).max(axis=1) < 0.0

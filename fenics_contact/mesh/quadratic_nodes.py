@@ -65,12 +65,8 @@ def in_vtk_order(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.
 def check_node_order(points: np.ndarray, cells: np.ndarray) -> None:
     """Reject quadratic cells whose nodes are in another order than that of VTK.
 
-    Args:
-        points: Coordinates, (n_nodes, 3 | 2) [length].
-        cells: Node numbers, corners first, (n_cells, 6 | 9 | 10 | 27).
-
-    Raises:
-        InvalidInputError: States the order.
+    `points`: coordinates, (n_nodes, 3 | 2) [length]; `cells`: node numbers, corners first, (n_cells, 6 | 9 |
+    10 | 27).
     """
     kind = QUADRATIC[cells.shape[1]]
     ordered = _ordered(points, cells, kind)

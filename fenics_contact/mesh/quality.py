@@ -61,15 +61,12 @@ def _critical_positions(cell: CellType) -> np.ndarray:
 def jacobians(points: np.ndarray, cells: np.ndarray, positions: np.ndarray | None = None) -> np.ndarray:
     """Evaluate the Jacobian determinant of the map from the reference cell.
 
-    Args:
-        points: Coordinates, (n_nodes, 3 | 2).
-        cells: Node numbers, (n_cells, nodes of a cell).
-        positions: Reference coordinates, (m, 3 | 2), for all but linear simplices; unless given the 27 points
-            of `HEXAHEDRON_LATTICE`, the four vertices, or nodes and Gauss points of quadratic cells. A linear
-            simplex has one constant Jacobian: six times its volume, or twice its area.
+    `points`: coordinates, (n_nodes, 3 | 2); `cells`: node numbers, (n_cells, nodes of a cell); `positions`:
+    reference coordinates, (m, 3 | 2), for all but linear simplices; unless given the 27 points of
+    `HEXAHEDRON_LATTICE`, the four vertices, or nodes and Gauss points of quadratic cells. A linear simplex
+    has one constant Jacobian: six times its volume, or twice its area.
 
-    Returns:
-        (n_cells, m), or (n_cells, 1) for linear simplices, in units of volume (area).
+    The result has shape (n_cells, m), or (n_cells, 1) for linear simplices, in units of volume (area).
     """
     cell = cell_type_of(cells, points.shape[1])
     corners = points[cells]
@@ -88,9 +85,8 @@ def jacobians(points: np.ndarray, cells: np.ndarray, positions: np.ndarray | Non
 def jacobian_ratio(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Return the ratio of the smallest to the largest Jacobian in every cell.
 
-    Returns:
-        (n_cells,) values in [-1, 1]: 1 for a parallelepiped, a parallelogram or a proper simplex, 0 or less
-        where the cell is degenerate or inverted.
+    Returns (n_cells,) values in [-1, 1]: 1 for a parallelepiped, a parallelogram or a proper
+    simplex, 0 or less where the cell is degenerate or inverted.
     """
     values = jacobians(points, cells)
     largest = np.maximum(np.abs(values).max(axis=1), np.finfo(float).tiny)
@@ -119,8 +115,7 @@ def cell_volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     Two Gauss points in each direction integrate the quadratic Jacobian of a trilinear map, three that of a
     triquadratic one, of degree five.
 
-    Returns:
-        (n_cells,) volumes.
+    Returns (n_cells,) volumes.
     """
     cell = cell_type_of(cells, points.shape[1])
     if cell.is_affine:
@@ -155,13 +150,10 @@ INWARD = 0.5
 def distance_in_edges(points: np.ndarray, facets: np.ndarray, shape: SurfaceShape) -> np.ndarray:
     """Return the distance of a surface's nodes from a shape, relative to the shortest edge around each.
 
-    Args:
-        points: Coordinates, (n_nodes, 3 | 2), [length].
-        facets: Node numbers of facets, linear or quadratic, (n_facets, nodes of a facet).
-        shape: The shape.
+    `points`: coordinates, (n_nodes, 3 | 2), [length]; `facets`: node numbers of facets, linear or quadratic,
+    (n_facets, nodes of a facet); `shape`: the shape.
 
-    Returns:
-        For each node in ascending order of its number, (n,).
+    One value for each node in ascending order of its number, (n,).
     """
     nodes, local = np.unique(facets, return_inverse=True)
     corners = corners_of(facets, points.shape[1])
@@ -178,16 +170,9 @@ def check_shapes(
 ) -> dict[str, np.ndarray]:
     """Reject shapes on which a surface does not lie.
 
-    Args:
-        points: Coordinates, (n_nodes, 3 | 2), [length].
-        shapes: Name of a surface to its shape.
+    `points`: coordinates, (n_nodes, 3 | 2), [length]; `shapes`: name of a surface to its shape.
 
-    Returns:
-        Name of each of these surfaces to the distances of its nodes, see `distance_in_edges`.
-
-    Raises:
-        InvalidInputError: If there is no such surface, the shape is of another dimension, or nodes lie off it
-            by more than a tenth of an edge, or the shape faces into the body.
+    Returns the name of each of these surfaces to the distances of its nodes, see `distance_in_edges`.
     """
     distances = {}
     for name, shape in shapes.items():
@@ -253,12 +238,9 @@ def _turning(shape: SurfaceShape) -> str:
 def similarity(points: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None:
     """Return rotation, translation and scale that move points, x -> scale · rotation x + translation.
 
-    Args:
-        points: Old positions, (n, dim).
-        moved: New positions, (n, dim).
+    `points`: old positions, (n, dim); `moved`: new positions, (n, dim).
 
-    Returns:
-        (dim, dim), (dim,) and a positive number; None if the motion is not a similarity.
+    The result has shape (dim, dim), (dim,) and a positive number; None if the motion is not a similarity.
 
     References:
         Umeyama, S.: Least-squares estimation of transformation parameters between two point patterns. IEEE
