@@ -224,17 +224,10 @@ def placed(
 ) -> SurfaceShape:
     """Move a shape: its points x are mapped to scale R x + translation.
 
-    Args:
-        shape: Any shape.
-        rotation: The orthogonal matrix R, shape (dim, dim); None for no rotation.
-        translation: Image of the origin, dim entries, [length].
-        scale: Factor > 0 on all lengths.
+    `shape`: any shape; `rotation`: the orthogonal matrix R, shape (dim, dim); None for no rotation;
+    `translation`: image of the origin, dim entries, [length].
 
-    Returns:
-        The moved shape; a placed shape has the combined motion, the parts of a joined one are moved.
-
-    Raises:
-        InvalidInputError: If the matrix is not orthogonal, the scale not positive, or the dimensions differ.
+    Returns the moved shape; a placed shape has the combined motion, the parts of a joined one are moved.
     """
     turn = np.eye(len(translation)) if rotation is None else np.asarray(rotation, dtype=np.float64)
     moved = Placed(shape, tuple(floats(row) for row in np.atleast_2d(turn)), tuple(translation), scale)
@@ -272,12 +265,10 @@ CLOSE = 1e-9
 def recognised(points: np.ndarray, normals: np.ndarray) -> SurfaceShape | None:
     """Return the plane, sphere, cylinder, cone or torus on which points lie; in the plane the line or circle.
 
-    Args:
-        points: Points of the surface, (n, 3 | 2), many more than a shape has parameters, [length].
-        normals: Their unit normals out of the body, (n, 3 | 2).
+    `points`: points of the surface, (n, 3 | 2), many more than a shape has parameters, [length]; `normals`:
+    their unit normals out of the body, (n, 3 | 2).
 
-    Returns:
-        The shape, or None if points lie off all of them by more than a billionth of their extent.
+    Returns the shape, or None if points lie off all of them by more than a billionth of their extent.
     """
     size = float(np.ptp(points, axis=0).max())
     for fit in (_plane, _sphere, _about_an_axis):

@@ -209,11 +209,9 @@ class Patch(ABC):
 def tensor_grid(ticks: Iterable[ArrayLike]) -> np.ndarray:
     """Return all points of which each coordinate is one of its ticks, the last coordinate running fastest.
 
-    Args:
-        ticks: The ticks of each coordinate, k rows of shape (n_i,).
+    `ticks`: the ticks of each coordinate, k rows of shape (n_i,).
 
-    Returns:
-        The points, shape (n_1 ··· n_k, k).
+    Returns the points, shape (n_1 ··· n_k, k).
     """
     axes = np.meshgrid(*map(np.asarray, ticks), indexing="ij")
     return np.stack(axes, axis=-1).reshape(-1, len(axes))
@@ -258,11 +256,7 @@ class Parametric(Patch):
     samples: int = 64
 
     def __post_init__(self) -> None:
-        """Reject an empty range, and an invalid position.
-
-        Raises:
-            InvalidInputError: If the range is empty, or the samples are not finite points.
-        """
+        """Reject an empty range, and an invalid position."""
         count = len(self.lower)
         numbers = count == len(self.upper) and np.isfinite([*self.lower, *self.upper]).all()
         if count not in (1, 2) or not numbers or not np.less(self.lower, self.upper).all():

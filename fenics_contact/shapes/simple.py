@@ -59,16 +59,9 @@ Quantity: TypeAlias = Literal["distance", "normals", "curvatures"]
 def evaluate_shape(shape: SurfaceShape, what: Quantity, points: np.ndarray) -> np.ndarray:
     """Evaluate a member of a shape, and check the result.
 
-    Args:
-        shape: The shape of a surface, or a rigid obstacle.
-        points: Points, shape (n, dim), [length].
+    `shape`: the shape of a surface, or a rigid obstacle; `points`: points, shape (n, dim), [length].
 
-    Returns:
-        The result, shape (n,), (n, dim) or (n, dim, dim).
-
-    Raises:
-        InvalidInputError: If the result has another shape or is not finite.
-        UserCodeError: If it raises.
+    Returns the result, shape (n,), (n, dim) or (n, dim, dim).
     """
     name = f"the {what} of {type(shape).__name__}"
     with user_code(name):
@@ -96,16 +89,9 @@ def closest_points(shape: SurfaceShape, points: np.ndarray) -> np.ndarray:
     x − d(x) n(x), repeated if the distance is not exact, until the points lie on the surface or do not come
     closer.
 
-    Args:
-        shape: The shape.
-        points: Points, shape (n, dim), [length].
+    `shape`: the shape; `points`: points, shape (n, dim), [length].
 
-    Returns:
-        One point of the surface each, shape (n, dim); any of several closest ones.
-
-    Raises:
-        InvalidInputError: If the shape returns NaN or arrays of other shapes.
-        UserCodeError: If it raises.
+    Returns one point of the surface each, shape (n, dim); any of several closest ones.
     """
     closest = np.array(points, dtype=np.float64)
     before = np.inf
@@ -121,17 +107,10 @@ def closest_points(shape: SurfaceShape, points: np.ndarray) -> np.ndarray:
 def principal_curvatures(shape: SurfaceShape, points: np.ndarray) -> np.ndarray:
     """Return the principal curvatures of a surface, positive where its body is convex.
 
-    Args:
-        shape: The shape.
-        points: Points of the surface, shape (n, dim), [length]; elsewhere the parallel surface through the
-            point is meant.
+    `shape`: the shape; `points`: points of the surface, shape (n, dim), [length]; elsewhere the parallel
+    surface through the point is meant.
 
-    Returns:
-        Shape (n, dim − 1), ascending, [1 / length].
-
-    Raises:
-        InvalidInputError: If the shape returns NaN or arrays of other shapes.
-        UserCodeError: If it raises.
+    The result has shape (n, dim − 1), ascending, [1 / length].
     """
     tangents = tangent_bases(evaluate_shape(shape, "normals", points))
     bend = evaluate_shape(shape, "curvatures", points)
@@ -158,9 +137,7 @@ DIFFERENCE = 1e-5
 def differences(function: Callable[[np.ndarray], np.ndarray], points: np.ndarray) -> np.ndarray:
     """Return central differences along each axis, stacked last.
 
-    Args:
-        function: Vectorised, (n, dim) -> (n, ...).
-        points: Points, shape (n, dim).
+    `function`: vectorised, (n, dim) -> (n, ...); `points`: points, shape (n, dim).
     """
     if len(points) == 0:
         return np.zeros((*np.shape(function(points)), points.shape[1]))
@@ -173,11 +150,7 @@ def differences(function: Callable[[np.ndarray], np.ndarray], points: np.ndarray
 
 
 def require_place(shape: object, point: GivenVector, dims: tuple[int, ...] = (2, 3)) -> None:
-    """Reject a point without ``dim`` finite coordinates.
-
-    Raises:
-        InvalidInputError: Names the shape's class.
-    """
+    """Reject a point without ``dim`` finite coordinates."""
     if len(point) not in dims or not np.all(np.isfinite(point)):
         needed = " or ".join(str(dim) for dim in dims)
         raise InvalidInputError(
@@ -187,11 +160,7 @@ def require_place(shape: object, point: GivenVector, dims: tuple[int, ...] = (2,
 
 
 def require_radius(shape: object, radius: float, name: str = "radius") -> None:
-    """Reject a radius that is not positive.
-
-    Raises:
-        InvalidInputError: Names the shape's class.
-    """
+    """Reject a radius that is not positive."""
     if not (np.isfinite(radius) and radius > 0):
         raise InvalidInputError(
             f"{type(shape).__name__}.{name} must be a positive number, got {radius!r}: for a socket or a "
@@ -205,11 +174,7 @@ def outer(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def require_plane(shape: object, profile: object) -> None:
-    """Reject a profile that is a shape in space.
-
-    Raises:
-        InvalidInputError: Names the shape's class and the profile's.
-    """
+    """Reject a profile that is a shape in space."""
     if getattr(profile, "dim", 2) != 2:
         raise InvalidInputError(
             f"{type(shape).__name__}.profile must be a shape in the plane, got a {type(profile).__name__} in "
