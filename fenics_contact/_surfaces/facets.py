@@ -32,12 +32,10 @@ from fenics_contact.mesh.cell_types import FACET_TYPES, CellType, quadrature, sh
 def quadrature_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
     """Return the areas of facets, in the plane the lengths of edges.
 
-    Args:
-        points: Coordinates, shape (n_nodes, 3 or 2), [length].
-        facets: Node numbers as in `BodyMesh.surfaces`, shape (n_facets, nodes of a facet).
+    `points`: coordinates, shape (n_nodes, 3 or 2), [length]; `facets`: node numbers as in
+    `BodyMesh.surfaces`, shape (n_facets, nodes of a facet).
 
-    Returns:
-        Shape (n_facets,), [length²] or [length].
+    The result has shape (n_facets,), [length²] or [length].
     """
     return np.asarray(nodal_areas(points, facets).sum(axis=1), dtype=np.float64)
 
@@ -47,8 +45,7 @@ def nodal_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
 
     Two Gauss points per direction on linear facets, three on quadratic ones.
 
-    Returns:
-        Shape (n_facets, nodes of a facet), [length²] or [length].
+    The result has shape (n_facets, nodes of a facet), [length²] or [length].
     """
     total = np.zeros(facets.shape)
     for at in gauss_points(points, facets):
@@ -142,8 +139,7 @@ def bearing_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
     It is the nodal force of a unit pressure, but that of the corners of quadratic triangles, which vanishes
     on flat ones, is shared by their midpoints.
 
-    Returns:
-        Shape (n_facets, nodes of a facet), [length²] or [length].
+    The result has shape (n_facets, nodes of a facet), [length²] or [length].
     """
     areas = nodal_areas(points, facets)
     if has_midside_pressure(facets):
@@ -179,12 +175,8 @@ def filled_at_corners(facets: np.ndarray, values: np.ndarray) -> np.ndarray:
     midpoints beside it and c is that opposite: between the mean beside it and the linear function through all
     three, so that quadratic fields on regular meshes are exact.
 
-    Args:
-        facets: Node numbers, (n, nodes of a facet); values stay as they are unless there are six.
-        values: Values at nodes, (n_nodes,) or (n_nodes, k).
-
-    Returns:
-        The same with values at the corners.
+    `facets`: node numbers, (n, nodes of a facet); values stay as they are unless there are six; `values`:
+    values at nodes, (n_nodes,) or (n_nodes, k).
     """
     if not has_midside_pressure(facets):
         return values
@@ -208,11 +200,9 @@ CUT = 0.5
 def facet_shape_values(local: np.ndarray, corners: int) -> np.ndarray:
     """Evaluate only the values of the shape functions, at points of any leading shape; see `shape_functions`.
 
-    Args:
-        local: Local coordinates, shape (..., dim − 1).
+    `local`: local coordinates, shape (..., dim − 1).
 
-    Returns:
-        Values, shape (..., corners).
+    Returns values, shape (..., corners).
     """
     if corners == 2:
         return np.asarray(0.5 * (1 + np.array([-1.0, 1.0]) * local), dtype=np.float64)
@@ -226,12 +216,10 @@ def facet_shape_values(local: np.ndarray, corners: int) -> np.ndarray:
 def shape_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.ndarray]:
     """Evaluate the shape functions of facets with 4 (bilinear), 3 or 2 (linear) corners.
 
-    Args:
-        local: Local coordinates, in [−1, 1]² for quadrilaterals, shape (n, 2), in the unit triangle for
-            triangles, shape (n, 2), in [−1, 1] for the edges of plane bodies, shape (n, 1).
+    `local`: local coordinates, in [−1, 1]² for quadrilaterals, shape (n, 2), in the unit triangle for
+    triangles, shape (n, 2), in [−1, 1] for the edges of plane bodies, shape (n, 1).
 
-    Returns:
-        Values, shape (n, corners), and derivatives, shape (n, corners, dim − 1).
+    Returns values, shape (n, corners), and derivatives, shape (n, corners, dim − 1).
     """
     values = facet_shape_values(local, corners)
     if corners == 2:
@@ -358,8 +346,7 @@ class FacetedSurface:
     def areas_at(self, points: np.ndarray) -> np.ndarray:
         """Return the areas that belong to the nodes where these lie elsewhere, shape (n,).
 
-        Args:
-            points: Coordinates of the nodes, shape (n, dim), [length].
+        `points`: coordinates of the nodes, shape (n, dim), [length].
         """
         if self.whole is None:
             return _linear_areas(points, self.facets)
@@ -374,14 +361,9 @@ def faceted_surface(
 
     On a plane of symmetry the average includes the facets of the mirror image: the normals lie in it.
 
-    Args:
-        points: Coordinates, shape (n_nodes, 3), or (n_nodes, 2) where the facets are edges, [length].
-        facets: Node numbers of triangles, quadrilaterals or edges, shape (n_facets, 3, 4 or 2).
-        mirrored: Which nodes lie on a plane of symmetry normal to each axis, shape (n_nodes, dim); by default
-            none.
-
-    Raises:
-        InvalidInputError: If coordinates and facets are not of the same dimension.
+    `points`: coordinates, shape (n_nodes, 3), or (n_nodes, 2) where the facets are edges, [length]; `facets`:
+    node numbers of triangles, quadrilaterals or edges, shape (n_facets, 3, 4 or 2); `mirrored`: which nodes
+    lie on a plane of symmetry normal to each axis, shape (n_nodes, dim); by default none.
     """
     corners, dim = facets.shape[1], points.shape[1]
     if (corners, dim) not in {(2, 2), (3, 3), (4, 3)}:
@@ -419,13 +401,11 @@ def shape_weights(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the nodes of quadratic facets and their weights at points of their linear pieces.
 
-    Args:
-        facets: Node numbers of the quadratic facets, (n, nodes of a facet).
-        facet: Numbers of linear pieces, consecutive ones of a facet, (m,).
-        weights: Linear shape functions of the pieces at the points, (m, corners).
+    `facets`: node numbers of the quadratic facets, (n, nodes of a facet); `facet`: numbers of linear pieces,
+    consecutive ones of a facet, (m,); `weights`: linear shape functions of the pieces at the points, (m,
+    corners).
 
-    Returns:
-        Node numbers and quadratic shape functions, (m, nodes of a facet) each.
+    Returns node numbers and quadratic shape functions, (m, nodes of a facet) each.
     """
     kind, corners = _pieces(facets, facet)
     places = np.einsum("mk,mkd->md", weights, corners)
@@ -437,14 +417,11 @@ def shape_weight_gradients(
 ) -> np.ndarray:
     """Return the derivatives of the weights that `shape_weights` returns by the pieces' local coordinates.
 
-    Args:
-        facets: Node numbers of the quadratic facets, (n, nodes of a facet).
-        facet: Numbers of linear pieces, (m,).
-        weights: Linear shape functions of the pieces at the points, (m, corners).
-        gradients: Their derivatives, (m, corners, dim − 1).
+    `facets`: node numbers of the quadratic facets, (n, nodes of a facet); `facet`: numbers of linear pieces,
+    (m,); `weights`: linear shape functions of the pieces at the points, (m, corners); `gradients`: their
+    derivatives, (m, corners, dim − 1).
 
-    Returns:
-        Shape (m, nodes of a facet, dim − 1).
+    The result has shape (m, nodes of a facet, dim − 1).
     """
     kind, corners = _pieces(facets, facet)
     by_place = shape_gradients(kind, np.einsum("mk,mkd->md", weights, corners))
@@ -475,9 +452,7 @@ class Heights:
 def heights(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> Heights:
     """Return the heights of the true surface over points of facets, along the interpolated normals.
 
-    Args:
-        facet: Facet of each point, shape (n,).
-        local: Local coordinates on it, shape (n, dim − 1).
+    `facet`: facet of each point, shape (n,); `local`: local coordinates on it, shape (n, dim − 1).
     """
     relief = surface.relief
     if relief is None:
@@ -497,8 +472,7 @@ def slopes(surface: FacetedSurface, facet: np.ndarray) -> np.ndarray:
     The derivative of x(ξ) + h n(ξ) along an edge d is d + h' n at its ends; it lies in the tangent plane of
     the normal c where h' = −d·c / n·c.
 
-    Args:
-        facet: Facets, shape (n,).
+    `facet`: facets, shape (n,).
     """
     nodes, normals = surface.facets[facet], corner_normals(surface, facet)
     edges = edges_at_corners(surface.points[nodes])
@@ -522,12 +496,10 @@ def height_functions(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Evaluate the polynomials that multiply slopes and rests, and their derivatives.
 
-    Args:
-        local: Local coordinates as for `shape_functions`, shape (n, dim − 1).
+    `local`: local coordinates as for `shape_functions`, shape (n, dim − 1).
 
-    Returns:
-        Those of the slopes, shape (n, corners, 2), their derivatives, shape (n, corners, 2, dim − 1), those
-        of the rests, shape (n, m), and their derivatives, shape (n, m, dim − 1).
+    Returns those of the slopes, shape (n, corners, 2), their derivatives, shape (n, corners, 2, dim − 1),
+    those of the rests, shape (n, m), and their derivatives, shape (n, m, dim − 1).
     """
     if corners == 3:
         return _over_triangles(local)

@@ -39,13 +39,10 @@ class PolynomialFit:
     ) -> PolynomialFit:
         """Prepare the fit.
 
-        Args:
-            place: Coordinates of nodes in the tangent planes of their centres, in sizes of the patches, shape
-                (n_pairs, dim − 1).
-            height: Their heights over these planes, likewise, shape (n_pairs,).
-            centre: Centre of each, shape (n_pairs,).
-            narrow: Whether a centre and the nodes around it are all at the rim, shape (n_centres,).
-            order: Degree of the polynomials, 2 or 3.
+        `place`: coordinates of nodes in the tangent planes of their centres, in sizes of the patches, shape
+        (n_pairs, dim − 1); `height`: their heights over these planes, likewise, shape (n_pairs,); `centre`:
+        centre of each, shape (n_pairs,); `narrow`: whether a centre and the nodes around it are all at the
+        rim, shape (n_centres,).
         """
         powers = powers_of(place.shape[1], order)
         scale = np.sqrt([comb(sum(power), power[-1]) for power in powers])
@@ -88,9 +85,8 @@ def _inverse_on(matrix: np.ndarray, kept: np.ndarray) -> np.ndarray:
 def _determined(sums: np.ndarray, degree: np.ndarray, narrow: np.ndarray) -> np.ndarray:
     """Return projectors on the coefficients that are fitted, shape (n, n_powers, n_powers).
 
-    Args:
-        sums: Matrices of the normal equations and their right sides, shape (n, n_powers, n_powers + 1).
-        degree: Degrees of the powers, ascending, shape (n_powers,).
+    `sums`: matrices of the normal equations and their right sides, shape (n, n_powers, n_powers + 1);
+    `degree`: degrees of the powers, ascending, shape (n_powers,).
     """
     matrix, kept = sums[:, :, :-1], np.zeros_like(sums[:, :, :-1])
     width = int(np.count_nonzero(degree == 1))
@@ -114,14 +110,11 @@ def _explained(
 ) -> np.ndarray:
     """Return the polynomials of the highest degree that lower ones explain at the nodes.
 
-    Args:
-        matrix: Inner products at the nodes, those of lower degrees first, shape (n, size, size).
-        kept: Projectors on the lower ones that are fitted, shape (n, low, low).
-        narrow: Where one counts as explained in any case, shape (n,).
-        fraction: What may be left of the square of one that is explained.
+    `matrix`: inner products at the nodes, those of lower degrees first, shape (n, size, size); `kept`:
+    projectors on the lower ones that are fitted, shape (n, low, low); `narrow`: where one counts as explained
+    in any case, shape (n,).
 
-    Returns:
-        Orthonormal columns, zero for those that are not explained, shape (n, size − low, size − low).
+    Returns orthonormal columns, zero for those that are not explained, shape (n, size − low, size − low).
     """
     low = kept.shape[1]
     across, own = matrix[:, :low, low:], matrix[:, low:, low:]
@@ -140,10 +133,8 @@ def _explained(
 def _straight(found: np.ndarray, lost: np.ndarray, most: float = 1 / 3) -> np.ndarray:
     """Return the square of the coordinate along which each surface is straight, shape (n, 3).
 
-    Args:
-        found: Quadratic parts of the surfaces without what is lost, shape (n, 3).
-        lost: What the nodes leave open, nearly the square of a coordinate, shape (n, 3).
-        most: Largest square of the part of it that makes a surface developable, of the square of found.
+    `found`: quadratic parts of the surfaces without what is lost, shape (n, 3); `lost`: what the nodes leave
+    open, nearly the square of a coordinate, shape (n, 3).
     """
     bend, free = _matrices(found), _matrices(lost)
     # The smallest s for which det(bend + s free) = 0.

@@ -72,12 +72,9 @@ def node_weights(surface: FacetedSurface, hit: Projection) -> sp.csr_matrix:
 def interpolated_normal(weights: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Interpolate unit normals and scale back to unit length.
 
-    Args:
-        weights: Shape functions, shape (n, corners).
-        normals: Nodal normals, shape (n, corners, dim).
+    `weights`: shape functions, shape (n, corners); `normals`: nodal normals, shape (n, corners, dim).
 
-    Returns:
-        Unit normals, shape (n, dim), and the lengths before scaling, shape (n,).
+    Returns unit normals, shape (n, dim), and the lengths before scaling, shape (n,).
     """
     mean = np.einsum("nk,nkd->nd", weights, normals)
     length = np.linalg.norm(mean, axis=1)
@@ -110,10 +107,7 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     g|`` is used; surfaces that face the same way do not touch. Points without any that lie beside the surface
     by no more than a twentieth of a facet's width are projected on the facet's continuation.
 
-    Args:
-        points: Slave nodes, shape (n, dim), [length].
-        normals: Their outward unit normals, shape (n, dim).
-        master: The surface to project on.
+    `points`: slave nodes, shape (n, dim), [length]; `normals`: their outward unit normals, shape (n, dim).
     """
     corners = master.points[master.facets]
     centroids = corners.mean(axis=1)
@@ -219,11 +213,7 @@ def _newton_step(
 
 
 def best_projections(projections: Projection, rounding: float) -> Projection:
-    """Keep the projection least beside its facet for each point; then by smallest abs(gap), then facet.
-
-    Args:
-        rounding: Rounding of coordinates, within which gaps at an edge of two facets agree.
-    """
+    """Keep the projection least beside its facet for each point; then by smallest abs(gap), then facet."""
     distance = np.abs(projections.gap)
     order = np.lexsort((distance, projections.beside, projections.point))
     _, first, group = np.unique(projections.point[order], return_index=True, return_inverse=True)

@@ -51,10 +51,6 @@ def surface_tangents(surface: FacetedSurface, order: int = 2, steepest: float = 
     Positions themselves are fitted by polynomials over the tangent planes, as heights are in `reconstructed`:
     the derivative along an edge is then a fixed linear combination of nodes, whatever becomes of them. It
     gets the length with which Hermite's cubic follows an arc of a circle.
-
-    Args:
-        surface: The surface in its reference configuration.
-        steepest: Cosine of the angle between edge and tangent plane below which the edge stays straight.
     """
     wedges = wedges_of(surface)
     axes = _axes(surface, wedges)
@@ -99,8 +95,7 @@ def _fitted_derivatives(
 ) -> sp.csr_matrix:
     """Return weights of the nodes in the derivatives of fitted positions along the axes of wedges.
 
-    Returns:
-        Shape (n_wedges · (dim − 1), n_nodes).
+    The result has shape (n_wedges · (dim − 1), n_nodes).
     """
     node, count, dim = wedges.node, len(wedges.node), surface.dim
     centre, around, narrow = wedges.patches(order)
@@ -121,8 +116,7 @@ def _mean_derivatives(
 ) -> sp.csr_matrix:
     """Return the same of quadratic facets: the mean of those around a node, at the rim that of its facet.
 
-    Args:
-        whole: Its quadratic facets, rows of positions in its nodes, shape (n, nodes of a facet).
+    `whole`: its quadratic facets, rows of positions in its nodes, shape (n, nodes of a facet).
     """
     (count, corners), width = surface.facets.shape, surface.dim - 1
     _, slopes = shape_functions(corner_places(corners), corners)

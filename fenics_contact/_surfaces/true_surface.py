@@ -55,9 +55,6 @@ def reconstructed(surface: FacetedSurface, order: int = 2) -> FacetedSurface:
     With cubic polynomials over three rings, and with the error of Hermite's cubics in the middle of an arc of
     their curvature, the error is of the fourth order: the difference estimates that of the former.
 
-    Args:
-        order: Degree of the polynomials, 2 or 3.
-
     References:
         Cazals, F., Pouget, M.: Estimating differential quantities using polynomial fitting of osculating
         jets. Computer Aided Geometric Design 22 (2005).
@@ -265,9 +262,8 @@ def _crossed(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 def _fitted(surface: FacetedSurface, wedges: Wedges, order: int) -> tuple[np.ndarray, np.ndarray]:
     """Fit polynomials around all wedges.
 
-    Returns:
-        Their normals, shape (n_wedges, dim), and their second derivatives along the surface, positive where
-        it is concave, shape (n_wedges, dim, dim), [1 / length].
+    Returns their normals, shape (n_wedges, dim), and their second derivatives along the surface, positive
+    where it is concave, shape (n_wedges, dim, dim), [1 / length].
     """
     node, mirrored = wedges.node, wedges.mirrored
     count, dim = len(node), surface.dim
@@ -347,11 +343,8 @@ def true_surface(
 ) -> FacetedSurface:
     """Return a surface of a mesh with its normals and its relief: linear facets through its nodes.
 
-    Args:
-        geometry: Its representation between the nodes.
-        mirrored: Which nodes lie on a plane of symmetry normal to each axis, shape (n_nodes, dim).
-        finer: Use a better representation, to estimate the error: the shape, or a reconstruction of the next
-            order.
+    `mirrored`: which nodes lie on a plane of symmetry normal to each axis, shape (n_nodes, dim); `finer`: use
+    a better representation, to estimate the error: the shape, or a reconstruction of the next order.
     """
     marks = np.zeros(mesh.points.shape, dtype=bool) if mirrored is None else mirrored
     surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks)
@@ -402,8 +395,7 @@ def by_shape(surface: FacetedSurface, shape: SurfaceShape) -> FacetedSurface:
     Nodes slightly off the shape are not moved; the heights between them are relative to them. Where several
     shapes meet in a crease, or one its mirror image, each facet uses its own.
 
-    Args:
-        shape: The shape.
+    `shape`: the shape.
     """
     parts = _parts(shape, surface.points[surface.facets].mean(axis=1))
     corners = np.zeros((*surface.facets.shape, surface.dim))
@@ -487,13 +479,8 @@ def sample_points(corners: int) -> np.ndarray:
 def height_over(points: np.ndarray, directions: np.ndarray, shape: SurfaceShape) -> np.ndarray:
     """Return the distances from points along directions to a shape, shape (n,), [length].
 
-    Args:
-        points: Points near the shape, shape (n, dim), [length].
-        directions: Unit vectors that point out of it, shape (n, dim).
-        shape: The shape.
-
-    Raises:
-        InvalidInputError: If a direction is tangential to the shape, so that no unique point lies above.
+    `points`: points near the shape, shape (n, dim), [length]; `directions`: unit vectors that point out of
+    it, shape (n, dim); `shape`: the shape.
     """
     height = np.zeros(len(points))
     for _ in range(STEPS):
