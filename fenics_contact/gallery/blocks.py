@@ -39,14 +39,7 @@ _LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_b
 
 
 def require_room(*counts: int) -> None:
-    """Reject a mesh that does not fit into the memory of this machine.
-
-    Args:
-        *counts: Cells along each of the two or three directions.
-
-    Raises:
-        InvalidInputError: States the number of cells, the memory they take and the available memory.
-    """
+    """Reject a mesh that does not fit into the memory of this machine."""
     cells = math.prod(map(int, counts))
     needed, there = cells * BYTES_A_CELL[len(counts)], memory()
     if needed > there:
@@ -100,12 +93,7 @@ def structured_cells(counts: tuple[int, ...], closed: bool = False) -> tuple[np.
 
     Node (i, j, k) has the number ``(i * (n2 + 1) + j) * (n3 + 1) + k``; cells follow the same order.
 
-    Args:
-        counts: Number of cells in each direction, three or two.
-        closed: If true, the first direction is a ring: its last layer of cells ends at its first nodes.
-
-    Returns:
-        Cells, (n_cells, 8 | 4), and their indices, (n_cells, 3 | 2), int64.
+    Returns cells, (n_cells, 8 | 4), and their indices, (n_cells, 3 | 2), int64.
     """
     solid = len(counts) == 3
     n1, n2, n3 = counts if solid else (*counts, 1)
@@ -135,16 +123,10 @@ def split_hexahedra(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> BodyM
     face diagonals where their vertices are numbered alike, as in every structured mesh of this package, and
     whole layers of cells are mirrored.
 
-    Args:
-        mesh: Hexahedra with the vertex order of `structured_cells`.
-        mirrored: (n_cells, 3) bool: whether the diagonal is mirrored in each local direction; nowhere unless
-            given.
+    `mirrored`: (n_cells, 3) bool: whether the diagonal is mirrored in each local direction; nowhere unless
+    given.
 
-    Returns:
-        The tetrahedra on the same nodes, surfaces and regions split alike, grid index repeated.
-
-    Raises:
-        InvalidInputError: If the cells are not hexahedra, or the diagonals of neighbours do not meet.
+    Returns the tetrahedra on the same nodes, surfaces and regions split alike, grid index repeated.
     """
     if mesh.cell_type != "hexahedron":
         raise InvalidInputError(
@@ -221,11 +203,7 @@ def block(
 
 
 def checked_corners(lower: ArrayLike, upper: ArrayLike, axes: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners of a box along the axes, (dim,) each, if they span one.
-
-    Raises:
-        InvalidInputError: If they do not.
-    """
+    """Return the corners of a box along the axes, (dim,) each, if they span one."""
     try:
         low, high = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
@@ -242,11 +220,7 @@ def checked_corners(lower: ArrayLike, upper: ArrayLike, axes: str) -> tuple[np.n
 
 
 def checked_counts(counts: Sequence[int], axes: str) -> list[int]:
-    """Return the numbers of cells along every axis, if the mesh fits into memory.
-
-    Raises:
-        InvalidInputError: If one is not a count, or they are too large.
-    """
+    """Return the numbers of cells along every axis, if the mesh fits into memory."""
     known = np.ndim(counts) == 1 or isinstance(counts, str)
     if not known or len(counts) != len(axes):
         number = "three" if len(axes) == 3 else "two"
@@ -266,12 +240,7 @@ def _listed(axes: str) -> str:
 def checked_ticks(
     lower: ArrayLike, upper: ArrayLike, counts: Sequence[int], grading: Sequence[float], axes: str
 ) -> list[np.ndarray]:
-    """Return the coordinates of the ends of cells along every axis; arguments as for `block`.
-
-    Raises:
-        InvalidInputError: If there is no box, a count is invalid, or cells would be too many or too
-            different.
-    """
+    """Return the coordinates of the ends of cells along every axis; arguments as for `block`."""
     low, high = checked_corners(lower, upper, axes)
     whole = checked_counts(counts, axes)
     check_row(grading, "grading", len(axes))
@@ -294,11 +263,9 @@ def _ticks(low: float, high: float, count: int, grading: float) -> np.ndarray:
 def graded(n: int, grading: float) -> np.ndarray:
     """Divide [0, 1] into intervals that grow geometrically; those for 2 n halve those for n.
 
-    Args:
-        grading: Logarithm of the growth over the whole of [0, 1], 0 for equal intervals.
+    `grading`: logarithm of the growth over the whole of [0, 1], 0 for equal intervals.
 
-    Returns:
-        Ascending ticks, (n + 1,).
+    Returns ascending ticks, (n + 1,).
     """
     uniform = np.linspace(0.0, 1.0, n + 1)
     return uniform if grading == 0.0 else np.asarray(np.expm1(grading * uniform) / np.expm1(grading))
@@ -329,12 +296,10 @@ def box_lattice(ticks: Sequence[np.ndarray], cell: str = "hexahedron") -> BodyMe
 def box_sides(points: np.ndarray, cells: np.ndarray) -> dict[str, np.ndarray]:
     """Sort the boundary faces of a box or rectangle by their direction.
 
-    Args:
-        points: Coordinates, (n_nodes, 3 | 2).
-        cells: Node numbers, (n_cells, n_vertices), of a box along the axes.
+    `points`: coordinates, (n_nodes, 3 | 2); `cells`: node numbers, (n_cells, n_vertices), of a box along the
+    axes.
 
-    Returns:
-        Facets of each of the six `SIDES`, or of the first four.
+    Returns facets of each of the six `SIDES`, or of the first four.
     """
     dim = points.shape[1]
     facets, _ = boundary_faces(cells, dim)
@@ -348,20 +313,13 @@ def box_sides(points: np.ndarray, cells: np.ndarray) -> dict[str, np.ndarray]:
 def extrude(section: BodyMesh, heights: ArrayLike, *, present: ArrayLike | None = None) -> BodyMesh:
     """Sweep a plane mesh along z.
 
-    Args:
-        section: Quadrilaterals in the x-y plane.
-        heights: Ascending z of the layers' planes, (n_layers + 1,).
-        present: Whether a cell of the section is there in a layer, (n_layers, n_cells) bool; everywhere
-            unless given. With it a bolt is swept at once: its head is wider than its shank.
+    `heights`: ascending z of the layers' planes, (n_layers + 1,); `present`: whether a cell of the section is
+    there in a layer, (n_layers, n_cells) bool; everywhere unless given. With it a bolt is swept at once: its
+    head is wider than its shank.
 
-    Returns:
-        Hexahedra, layer by layer. Surfaces are "bottom" and "top", which face along z wherever cells end, and
-        the section's, swept. Walls inside the section, where a cell is present and its neighbour is not, are
-        in no surface. The section's regions and the shapes of its curves are swept, too. No grid.
-
-    Raises:
-        InvalidInputError: If the section is not a mesh of quadrilaterals, heights do not ascend, or
-            ``present`` has another shape.
+    Returns hexahedra, layer by layer. Surfaces are "bottom" and "top", which face along z wherever cells end,
+    and the section's, swept. Walls inside the section, where a cell is present and its neighbour is not, are
+    in no surface. The section's regions and the shapes of its curves are swept, too. No grid.
     """
     if section.cell_type != "quadrilateral":
         raise InvalidInputError(
@@ -475,15 +433,10 @@ def rectangle_lattice(ticks: Sequence[np.ndarray], cell: str = "quadrilateral") 
 def split_quadrilaterals(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> BodyMesh:
     """Split every quadrilateral into two triangles along a diagonal.
 
-    Args:
-        mirrored: (n_cells,) bool: whether the diagonal runs from vertex 1 to vertex 3 and not from vertex 0
-            to vertex 2; nowhere unless given.
+    `mirrored`: (n_cells,) bool: whether the diagonal runs from vertex 1 to vertex 3 and not from vertex 0 to
+    vertex 2; nowhere unless given.
 
-    Returns:
-        The triangles on the same nodes, surfaces unchanged, grid index repeated, regions split alike.
-
-    Raises:
-        InvalidInputError: If the cells are not quadrilaterals, or one is not convex at that diagonal.
+    Returns the triangles on the same nodes, surfaces unchanged, grid index repeated, regions split alike.
     """
     if mesh.cell_type != "quadrilateral":
         raise InvalidInputError(

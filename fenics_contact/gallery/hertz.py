@@ -131,16 +131,7 @@ def half_cylinder(
 
 
 def _wrap(core: BodyMesh, round_sides: list[str], frame: _Frame, layers: int, grading: float) -> BodyMesh:
-    """Map a box in cube coordinates to the core and add the shell on its round sides.
-
-    Args:
-        core: The box; u from -1 or 0 to 1, likewise v unless straight, w from -1 to 0.
-        round_sides: Names of the sides that carry the shell.
-        grading: Logarithm of the ratio of its thickest to its thinnest layer.
-
-    Returns:
-        The body with named surfaces, lifted by the radius.
-    """
+    """Map a box in cube coordinates to the core and add the shell on its round sides."""
     facets = np.concatenate([core.surfaces[side] for side in round_sides])
     require_room(layers, len(facets), 1)
     below = np.concatenate([np.full(core.surfaces[side].shape[0], side == "z0") for side in round_sides])

@@ -250,11 +250,7 @@ def two_links(
 
 
 def check_gap(gap: float) -> None:
-    """Reject an invalid clearance.
-
-    Raises:
-        InvalidInputError: If it is negative or not a number.
-    """
+    """Reject an invalid clearance."""
     check_numbers(gap=gap)
     if gap < 0.0:
         raise InvalidInputError(
@@ -264,11 +260,7 @@ def check_gap(gap: float) -> None:
 
 
 def check_fit(first: LinkShape, second: LinkShape, names: tuple[str, str] = ("link 1", "link 2")) -> None:
-    """Reject links that cannot be interlocked or would not touch at a single point.
-
-    Raises:
-        InvalidInputError: Names the wire that is too large.
-    """
+    """Reject links that cannot be interlocked or would not touch at a single point."""
     for wire, ring, one, two in ((first, second, *names), (second, first, *names[::-1])):
         if wire.width >= 2.0 * ring.inner_radius or wire.thickness >= ring.opening:
             raise InvalidInputError(

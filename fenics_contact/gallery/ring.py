@@ -73,13 +73,10 @@ class Spacing:
 def drawn_together(places: np.ndarray, spot: float, strength: float) -> np.ndarray:
     """Concentrate points of an interval towards its middle or its start.
 
-    Args:
-        places: Ascending points, (n,), from the start of the interval, or symmetric about its middle, to its
-            end.
-        strength: κ; 0 returns the points unchanged.
+    `places`: ascending points, (n,), from the start of the interval, or symmetric about its middle, to its
+    end.
 
-    Returns:
-        Points, (n,), with the same ends.
+    Returns points, (n,), with the same ends.
     """
     if strength == 0.0:
         return places
@@ -161,11 +158,8 @@ class WireSection:
     def inner_arc(self, n: int, strength: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Divide the arc on the ring's inside.
 
-        Args:
-            strength: Concentration towards the middle, see `drawn_together`; 0 for equal pieces.
-
-        Returns:
-            Points (a, b), from negative to positive b, and unit normals out of the section, both (n + 1, 2).
+        Returns points (a, b), from negative to positive b, and unit normals out of the section, both (n + 1,
+        2).
         """
         angle = drawn_together(np.linspace(-self.half_angle, self.half_angle, n + 1), 0.0, strength)
         normals = np.column_stack([-np.cos(angle), np.sin(angle)])
@@ -173,11 +167,7 @@ class WireSection:
         return centre + self.crown_radius * normals, normals
 
     def flank_arc(self, n: int, strength: float = 0.0) -> np.ndarray:
-        """Divide the arc at positive b, from the inner to the outer side; (n + 1, 2).
-
-        Args:
-            strength: Concentration towards the inner side; 0 for equal pieces.
-        """
+        """Divide the arc at positive b, from the inner to the outer side; (n + 1, 2)."""
         start = -self.half_angle
         angle = drawn_together(np.linspace(start, self.half_angle, n + 1), start, strength)
         outward = np.column_stack([np.sin(angle), np.cos(angle)])
@@ -186,14 +176,7 @@ class WireSection:
     def lattice(self, n_a: int, n_b: int, through: float = 0.0, across: float = 0.0) -> np.ndarray:
         """Fill the section by transfinite interpolation between its four arcs.
 
-        Args:
-            n_a: Number of cells along a.
-            n_b: Number of cells along b.
-            through: Concentration of cells towards the inner side, see `drawn_together`.
-            across: Concentration of cells towards b = 0.
-
-        Returns:
-            Points (a, b), (n_a + 1, n_b + 1, 2).
+        Returns points (a, b), (n_a + 1, n_b + 1, 2).
 
         References:
             Gordon and Hall, Construction of curvilinear co-ordinate systems and applications to mesh
@@ -315,8 +298,7 @@ def _spacing(shape: LinkShape) -> Spacing:
     Cells are moved from the legs to graded crowns such that the cells on both sides of their border are most
     similar along the centre line.
 
-    Returns:
-        The spacing; without grading a sixth of the ring for every quarter turn and leg.
+    Returns the spacing; without grading a sixth of the ring for every quarter turn and leg.
     """
     n = shape.n_around // 6
     if shape.grading == 0.0:
@@ -347,12 +329,10 @@ def crown_start(shape: LinkShape) -> int:
 def stations(shape: LinkShape, spacing: Spacing | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Place the section around the ring.
 
-    Args:
-        spacing: Of the nodes; the link's own unless given.
+    `spacing`: of the nodes; the link's own unless given.
 
-    Returns:
-        Points of the wire's centre line, (n_around, 3), and the unit direction a of the section there,
-        (n_around, 3).
+    Returns points of the wire's centre line, (n_around, 3), and the unit direction a of the section there,
+    (n_around, 3).
     """
     spacing = shape.spacing if spacing is None else spacing
     turning, n_leg = 2 * spacing.quarter, spacing.leg
@@ -375,11 +355,9 @@ def stations(shape: LinkShape, spacing: Spacing | None = None) -> tuple[np.ndarr
 def ring_lattice(shape: LinkShape, spacing: Spacing | None = None) -> np.ndarray:
     """Sweep the section's lattice around the ring.
 
-    Args:
-        spacing: Of the nodes; the link's own unless given.
+    `spacing`: of the nodes; the link's own unless given.
 
-    Returns:
-        Points, (n_around, n_a + 1, n_b + 1, 3).
+    Returns points, (n_around, n_a + 1, n_b + 1, 3).
     """
     spacing = shape.spacing if spacing is None else spacing
     line, outward = stations(shape, spacing)
