@@ -65,15 +65,7 @@ Arrays = dict[str, NDArray[Any]]
 
 
 def write_archive(path: Path, kind: str, fingerprint: Mapping[str, str], arrays: Mapping[str, Any]) -> None:
-    """Write arrays with their kind and the problem's fingerprint, atomically.
-
-    Args:
-        fingerprint: Identifies the problem, see `described`.
-        arrays: Numbers and text by name; names must not start with an underscore.
-
-    Raises:
-        CheckpointError: If it cannot be written.
-    """
+    """Write arrays with their kind and the problem's fingerprint, atomically."""
     buffer = io.BytesIO()
     head = {
         "_format": FORMAT,
@@ -87,12 +79,7 @@ def write_archive(path: Path, kind: str, fingerprint: Mapping[str, str], arrays:
 
 
 def read_archive(path: Path, kind: str, fingerprint: Mapping[str, str]) -> Arrays:
-    """Read the arrays of a problem.
-
-    Raises:
-        InvalidInputError: If the file is missing, cannot be read, is not a complete checkpoint, or is of
-            another version, kind or problem; states what differs.
-    """
+    """Read the arrays of a problem."""
     arrays = _loaded(path)
     if str(arrays.pop("_format", "")) != FORMAT:
         raise InvalidInputError(
@@ -305,13 +292,7 @@ class Interruption:
     ) -> None:
         """Stop here if a rank received a signal. Collective on the communicator.
 
-        Args:
-            kept: Describes what a run that ends here leaves, and how to continue it.
-            save: Stores what is not stored yet; collective.
-            comm: Communicator whose ranks agree; that of the run by default.
-
-        Raises:
-            Interrupted: On all ranks, if one of them has received a signal.
+        `comm`: communicator whose ranks agree; that of the run by default.
         """
         self._kept = kept()
         comm = comm or self.comm

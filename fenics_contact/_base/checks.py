@@ -95,9 +95,6 @@ def checked(*own: str) -> Callable[[Class], Class]:
 
     Place it below ``@dataclass``.
 
-    Args:
-        own: Fields whose types the class checks itself.
-
     Example:
         >>> from dataclasses import dataclass
         >>> @dataclass
@@ -130,11 +127,7 @@ def checked(*own: str) -> Callable[[Class], Class]:
 
 
 def _check(instance: Any, cls: type, own: tuple[str, ...]) -> None:
-    """Reject the first field whose value does not fit its type.
-
-    Raises:
-        InvalidInputError: States what the field must be, what it is, and its meaning.
-    """
+    """Reject the first field whose value does not fit its type."""
     hints = _hints(cls)
     for field in fields(instance):
         if field.name in own or field.name not in hints:
@@ -227,11 +220,7 @@ def _named(hint: Any) -> str:
 
 
 def meaning(owner: Any, name: str) -> str:
-    """Return the documentation of a field or an argument of a class or function, "" if there is none.
-
-    Args:
-        name: Name of the field or argument.
-    """
+    """Return the documentation of a field or an argument of a class or function, "" if there is none."""
     for known in getattr(owner, "__mro__", (owner,)):
         text = inspect.cleandoc(known.__doc__ or "")
         if match := re.search(rf"^    {name}: (.*(?:\n {{8}}.*)*)", text, re.MULTILINE):
@@ -242,14 +231,7 @@ def meaning(owner: Any, name: str) -> str:
 
 
 def require_file(path: Path, what: str = "a file") -> None:
-    """Reject a path that is not a readable file, also if its name is too long or its folder closed.
-
-    Args:
-        what: Description of the expected file, with its article.
-
-    Raises:
-        InvalidInputError: States what is there instead.
-    """
+    """Reject a path that is not a readable file, also if its name is too long or its folder closed."""
     try:
         if path.is_file():
             return
@@ -270,11 +252,7 @@ def floats(values: np.ndarray) -> GivenVector:
 
 
 def unit_vector(name: str, value: GivenVector, dim: int) -> GivenVector:
-    """Return a direction at unit length.
-
-    Raises:
-        InvalidInputError: If it does not have ``dim`` finite entries or is zero.
-    """
+    """Return a direction at unit length."""
     length = float(np.linalg.norm(value)) if len(value) == dim else 0.0
     if not (np.isfinite(length) and length > 0):
         raise InvalidInputError(

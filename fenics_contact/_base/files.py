@@ -30,14 +30,7 @@ class CheckpointError(FenicsContactError, OSError):
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a checkpoint by `write_atomically`.
-
-    Args:
-        path: The file; its folder is created.
-
-    Raises:
-        CheckpointError: If the disk is full or the folder cannot be written to; the target is then unchanged.
-    """
+    """Write a checkpoint by `write_atomically`."""
     try:
         write_atomically(path, content)
     except OSError as error:
@@ -50,15 +43,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Replace a file by another, which is on the disk before it is renamed.
-
-    Args:
-        path: The file; its folder is created.
-
-    Raises:
-        OSError: If the disk is full, the folder cannot be written to, or another writer has replaced the file
-            meanwhile; the target is then unchanged, or that of the other writer.
-    """
+    """Replace a file by another, which is on the disk before it is renamed."""
     with hidden_folder(path.parent, path.name) as hidden:
         partial, before = hidden / path.name, _version(path)
         partial.write_bytes(content)

@@ -30,9 +30,6 @@ def described(value: Any, name: str, *, carried: bool = True) -> dict[str, str]:
     contents, functions by their names and the values in their closures and defaults, classes by their names;
     any other object only by its class.
 
-    Args:
-        carried: Whether to describe closures and defaults of functions.
-
     Example:
         >>> described({"length": 2.0}, "beam")
         {'beam': '1 entries', "beam['length']": '2.0'}
@@ -115,12 +112,8 @@ def _class(value: Any) -> str:
 def require_alike(comm: MPI.Comm, descriptions: Mapping[str, str]) -> None:
     """Reject input that differs from rank to rank. Collective on ``comm``.
 
-    Args:
-        comm: Communicator of the ranks that must have the same input.
-        descriptions: This rank's input, from `described`.
-
-    Raises:
-        InvalidInputError: On all ranks; names the differences between two of them.
+    `comm`: communicator of the ranks that must have the same input; `descriptions`: this rank's input, from
+    `described`.
     """
     if comm.size == 1:
         return

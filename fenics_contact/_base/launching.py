@@ -53,11 +53,7 @@ def clean_environment(given: Mapping[str, str] | None = None) -> dict[str, str]:
 
 
 def launcher(ranks: int) -> list[str]:
-    """Return the launcher for a number of ranks: the mpirun beside this Python, or on PATH.
-
-    Raises:
-        MissingRequirementError: If there is no mpirun for several ranks.
-    """
+    """Return the launcher for a number of ranks: the mpirun beside this Python, or on PATH."""
     if ranks == 1:
         return []
     beside = [Path(prefix) / "bin" / "mpirun" for prefix in (sys.prefix, sys.base_prefix)]

@@ -28,12 +28,7 @@ class Late(ModuleType):
         self._module: ModuleType | None = None
 
     def __getattr__(self, name: str) -> Any:
-        """Return an attribute of the module, which is loaded by the first call.
-
-        Raises:
-            MissingRequirementError: The library cannot be loaded or is unsuitable.
-            ForkedProcessError: The process was forked from one that had computed.
-        """
+        """Return an attribute of the module, which is loaded by the first call."""
         check_not_forked()
         if self._module is None:
             self._module = self._load()
@@ -53,10 +48,6 @@ def start(comm: MPI.Comm) -> None:
 
     PETSc's world then consists of these ranks. A program that uses ``PETSc.COMM_WORLD`` itself must import
     petsc4py on all ranks before.
-
-    Raises:
-        MissingRequirementError: PETSc cannot be loaded or is unsuitable.
-        ForkedProcessError: The process was forked from one that had computed.
     """
     check_not_forked()
     ready = _requirements.petsc_is_started()
@@ -70,11 +61,7 @@ _forked = False
 
 
 def check_not_forked() -> None:
-    """Raise where libraries would wait for threads that exist in another process.
-
-    Raises:
-        ForkedProcessError: The process was forked from one that had computed.
-    """
+    """Raise where libraries would wait for threads that exist in another process."""
     if _forked:
         raise ForkedProcessError(
             "computing needs a process that starts its libraries itself, this one was forked from one that "

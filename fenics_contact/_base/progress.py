@@ -176,8 +176,7 @@ _OBEYED = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u206
 def duration(seconds: float | None) -> str:
     """Format a duration: 0.4 s, 8 s, 3 min, 1.5 h.
 
-    Args:
-        seconds: The duration, None if unknown.
+    `seconds`: the duration, None if unknown.
     """
     if seconds is None:
         return "?"

@@ -71,21 +71,13 @@ _PYMETIS = Requirement("pymetis", "2025.2")
 
 
 def check() -> None:
-    """Check all libraries that every part of the package needs, without loading or starting them.
-
-    Raises:
-        MissingRequirementError: A library is missing or too old.
-    """
+    """Check all libraries that every part of the package needs, without loading or starting them."""
     for requirement in [*_NUMERICAL, _MPI4PY, _PETSC4PY, DOLFINX]:
         _check_installed(requirement)
 
 
 def load_mpi() -> ModuleType:
-    """Return ``mpi4py.MPI``; starts MPI unless ``mpi4py.rc`` prevents it.
-
-    Raises:
-        MissingRequirementError: mpi4py cannot be loaded.
-    """
+    """Return ``mpi4py.MPI``; starts MPI unless ``mpi4py.rc`` prevents it."""
     return _load(_MPI4PY, "mpi4py.MPI")
 
 
@@ -96,12 +88,7 @@ def petsc_is_started() -> bool:
 
 
 def load_petsc(world: MPI.Comm | None = None) -> ModuleType:
-    """Return ``petsc4py.PETSc``; starts PETSc on ``world``, by default all ranks, unless it runs. Collective.
-
-    Raises:
-        MissingRequirementError: petsc4py cannot be loaded, or PETSc was built with complex numbers or
-            without a sparse Cholesky factorisation.
-    """
+    """Return ``petsc4py.PETSc``; starts it on ``world``, by default all ranks, unless it runs. Collective."""
     load_mpi()
     if world is not None:
         _load(_PETSC4PY, "petsc4py").init(comm=world)
@@ -119,11 +106,7 @@ def _restore_sigpipe() -> None:
 
 
 def require_extra(use: str, extra: str, *modules: str) -> None:
-    """Check libraries that only a part of the package needs, without loading them.
-
-    Raises:
-        MissingRequirementError: One of them is not installed.
-    """
+    """Check libraries that only a part of the package needs, without loading them."""
     for module in modules:
         if importlib.util.find_spec(module) is None:
             raise MissingRequirementError(
@@ -132,11 +115,7 @@ def require_extra(use: str, extra: str, *modules: str) -> None:
 
 
 def check_gmsh() -> None:
-    """Check gmsh, which only geometries need.
-
-    Raises:
-        MissingRequirementError: gmsh is missing, too old or cannot be loaded.
-    """
+    """Check gmsh, which only geometries need."""
     _check_installed(_GMSH)
     module = _load(_GMSH, "gmsh")
     if _GMSH.version() is None:  # Debian 12 installs it without metadata
@@ -144,11 +123,7 @@ def check_gmsh() -> None:
 
 
 def load_pymetis() -> ModuleType:
-    """Check and return pymetis, which only the partition of graphs needs.
-
-    Raises:
-        MissingRequirementError: pymetis is missing, too old or cannot be loaded.
-    """
+    """Check and return pymetis, which only the partition of graphs needs."""
     _check_installed(_PYMETIS)
     return _load(_PYMETIS, "pymetis")
 

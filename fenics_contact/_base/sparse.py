@@ -103,9 +103,6 @@ def explicit_cost(size: int, interface: int, rates: Rates = MEASURED) -> LocalCo
 def prefers_explicit(size: int, interface: int, *, products: int = PRODUCTS, rates: Rates = MEASURED) -> bool:
     """Return whether dense interface matrices are expected to be faster than sparse factors.
 
-    Args:
-        products: Expected number of products with the dual operator, and with the preconditioner.
-
     Example:
         >>> prefers_explicit(2079, 729), prefers_explicit(10125, 3534)
         (True, False)
@@ -145,13 +142,9 @@ def dispose_with(
 ) -> None:
     """Destroy PETSc objects when their owner is no longer used.
 
-    Args:
-        owner: The Python object that holds them.
-        *objects: They must not refer to the owner.
-        comm: Communicator they live on: that of the scene or of its first ranks, or None for this rank alone.
-            Objects of one rank are destroyed at once, others by `sweep`; they must be registered by all ranks
-            in the same order.
-        keep: An object that must live as long as they do, such as the mesh whose communicator they use.
+    `comm`: communicator they live on: that of the scene or of its first ranks, or None for this rank alone.
+    Objects of one rank are destroyed at once, others by `sweep`; they must be registered by all ranks in the
+    same order.
     """
     finalizer: Any
     if comm is None or comm.size == 1:
@@ -231,12 +224,9 @@ class SharedFactor:
     ) -> None:
         """Sum the shares and factor. Collective on ``comm``.
 
-        Args:
-            comm: Communicator of the ranks that use the factors.
-            share: This rank's summand, shape (m, m).
-            scale: Positive factors for rows and columns that bring the entries to order one, shape (m,),
-                replicated.
-            holders: Ranks that hold the factors; one for every `ROWS_PER_RANK` rows by default.
+        `comm`: communicator of the ranks that use the factors; `share`: this rank's summand, shape (m, m);
+        `scale`: positive factors for rows and columns that bring the entries to order one, shape (m,),
+        replicated; `holders`: ranks that hold the factors; one for every `ROWS_PER_RANK` rows by default.
         """
         start(comm)
         self._comm, self.size, self._scale = comm, share.shape[0], scale
