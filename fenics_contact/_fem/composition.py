@@ -43,11 +43,7 @@ class Composition:
 
 
 def composition(body: Body, cells: np.ndarray) -> Composition:
-    """Return the materials of some cells of a body.
-
-    Args:
-        cells: Cells of the body in the order of the mesh on which forms are to be bound.
-    """
+    """Return the materials of some cells of a body."""
     materials = body.materials
     if len(materials) == 1:
         return Composition(materials)
@@ -67,11 +63,7 @@ def material_sets(body: Body) -> tuple[tuple[Material, ...], ...]:
 def integrate(
     materials: tuple[Material, ...], cell_type: str, integrand: OfMaterial, measure: ufl.Measure
 ) -> tuple[ufl.Form, Constants]:
-    """Return ∫ integrand over all materials (a form) and its constants.
-
-    Args:
-        integrand: Takes each material with its constants.
-    """
+    """Return ∫ integrand over all materials (a form) and its constants."""
     all_constants: list[ufl.Constant] = []
     form = None
     for number, material in enumerate(materials):

@@ -70,12 +70,7 @@ class FormLibrary:
         return self._templates
 
     def prepare(self, scene: Scene) -> None:
-        """Compile the missing forms of a scene. Collective on the library's communicator.
-
-        Raises:
-            InvalidInputError: If a material contradicts itself (see `check_model`), or the value of a load
-                has the wrong shape.
-        """
+        """Compile the missing forms of a scene. Collective on the library's communicator."""
         for body in scene.bodies.values():
             cell_type = body.mesh.cell_type
             for materials in material_sets(body):
@@ -108,11 +103,9 @@ class FormLibrary:
     ) -> _dolfinx.fem.Form:
         """Return the linear form of ``load`` bound to ``space``.
 
-        Args:
-            load: The load; a resultant must have been spread.
-            points: Coordinates by input node of the mesh, shape (n, dim), [length].
-            facets: (cells, local facets) on which a surface load acts.
-            acted: Marks of the nodes of its surface by input node, shape (n,).
+        `points`: coordinates by input node of the mesh, shape (n, dim), [length]; `facets`: (cells, local
+        facets) on which a surface load acts; `acted`: marks of the nodes of its surface by input node, shape
+        (n,).
         """
         template = self._templates[load_key(load, parts.materials, cell_type)]
         cells = parts.cells if isinstance(load, ThermalStrain) else None
@@ -120,11 +113,7 @@ class FormLibrary:
         return template.bind([space], load_parameters(load, parts), functions, facets, cells=cells)
 
     def prepare_mechanics(self, scene: Scene) -> None:
-        """Compile the missing forms of nonlinear materials and following pressures of a scene. Collective.
-
-        Raises:
-            InvalidInputError: If a hyperelastic model contradicts itself (see `check_hyperelastic`).
-        """
+        """Compile the missing forms of nonlinear materials and following pressures of a scene. Collective."""
         from fenics_contact._fem.loads import prepare_following  # linear scenes go without
         from fenics_contact._fem.mechanics import prepare_mechanics
         from fenics_contact._fem.model_checks import check_hyperelastic
@@ -147,8 +136,7 @@ class FormLibrary:
     ) -> Mechanics:
         """Return forces and tangent of the materials ``parts`` on one mesh of a scene with nonlinear ones.
 
-        Args:
-            points: Coordinates by input node, shape (n, dim), [length].
+        `points`: coordinates by input node, shape (n, dim), [length].
         """
         from fenics_contact._fem.mechanics import HyperelasticMechanics, LinearMechanics
 
@@ -272,8 +260,7 @@ class Temperature:
     def fields(self, mesh: _dolfinx.mesh.Mesh, points: np.ndarray) -> tuple[_dolfinx.fem.Function, ...]:
         """Return the Functions for the coefficients.
 
-        Args:
-            points: Coordinates by input node, shape (n, dim), [length].
+        `points`: coordinates by input node, shape (n, dim), [length].
         """
         if not self.of_position:
             return ()

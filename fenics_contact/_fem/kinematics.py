@@ -37,8 +37,7 @@ class Dilatation:
     def __init__(self, space: _dolfinx.fem.FunctionSpace, cell_type: str, points: np.ndarray) -> None:
         """Evaluate the Jacobians of the undeformed cells.
 
-        Args:
-            points: Coordinates by block, shape (n, dim), [length].
+        `points`: coordinates by block, shape (n, dim), [length].
         """
         self._positions, _ = quadrature(CELL_TYPES[cell_type], quadrature_degree(cell_type))
         self._points, self._cells = points, _dolfinx.vtk_cell_dofs(space)
@@ -53,8 +52,7 @@ class Dilatation:
     def least(self, displacement: np.ndarray) -> float:
         """Return the smallest det F of all Gauss points.
 
-        Args:
-            displacement: By dof, shape (dim n,), [length].
+        `displacement`: by dof, shape (dim n,), [length].
         """
         return float(self.at(displacement).min())
 
@@ -71,8 +69,7 @@ HELD = 0.02
 def held_share(moduli: np.ndarray) -> float:
     """Return the share of a dilatation's variation in a cell that is not projected away, see `HELD`.
 
-    Args:
-        moduli: Of the material at rest, by Voigt components, shape (6, 6), [force / length²].
+    `moduli`: of the material at rest, by Voigt components, shape (6, 6), [force / length²].
     """
     bulk, shear = moduli[:3, :3].sum() / 9.0, np.trace(moduli[3:, 3:]) / 3.0
     return float(np.sqrt(min(1.0, HELD * shear / bulk)))
@@ -94,16 +91,14 @@ class MeanStrain:
     def __init__(self, gradients: np.ndarray, polynomials: CellPolynomials, share: float = 0.0) -> None:
         """Project the divergence of each shape function.
 
-        Args:
-            gradients: Of the shape functions, shape (n_cells, n_gauss, nodes, dim), [1 / length].
+        `gradients`: of the shape functions, shape (n_cells, n_gauss, nodes, dim), [1 / length].
         """
         self._gradients, self._polynomials, self._part = gradients, polynomials, 1.0 - share
 
     def averaged(self, tensors: np.ndarray) -> np.ndarray:
         """Return H̄ of H; of the stress on H̄ that which does the same work on H.
 
-        Args:
-            tensors: H, or the stress, shape (n_cells, n_gauss, 3, 3).
+        `tensors`: H, or the stress, shape (n_cells, n_gauss, 3, 3).
         """
         apart = self._apart(np.einsum("cqii->cq", tensors)[..., None])
         return np.asarray(tensors + apart[..., None] * np.eye(3))
@@ -115,8 +110,7 @@ class MeanStrain:
     def blocks(self, tangent: np.ndarray) -> np.ndarray:
         """Return what ∫ ∇v̄ : A : ∇ū has beside ∫ ∇v : A : ∇u, shape (n_cells, dim nodes, dim nodes).
 
-        Args:
-            tangent: A, shape (n_cells, n_gauss, 3, 3, 3, 3), [force / length²].
+        `tangent`: A, shape (n_cells, n_gauss, 3, 3, 3, 3), [force / length²].
         """
         G, dim = self._gradients, self._gradients.shape[-1]
         flat = (*G.shape[:2], -1)
@@ -137,8 +131,7 @@ class GaussPoints:
     def __init__(self, space: _dolfinx.fem.FunctionSpace, cell_type: str, points: np.ndarray) -> None:
         """Evaluate the gradients of the shape functions.
 
-        Args:
-            points: Coordinates by block, shape (n, dim), [length].
+        `points`: coordinates by block, shape (n, dim), [length].
         """
         cell = CELL_TYPES[cell_type]
         positions, weights = quadrature(cell, quadrature_degree(cell_type))
@@ -157,8 +150,7 @@ class GaussPoints:
     def gradient(self, displacement: np.ndarray) -> np.ndarray:
         """Return ∂u_i/∂X_j in three dimensions, zero out of the plane, shape (n_cells, n_gauss, 3, 3).
 
-        Args:
-            displacement: By dof, shape (dim n,), [length].
+        `displacement`: by dof, shape (dim n,), [length].
         """
         dim = self._shape[1]
         nodal = displacement.reshape(self._shape)[self._cells]
@@ -169,8 +161,7 @@ class GaussPoints:
     def force(self, stress: np.ndarray, cells: np.ndarray) -> np.ndarray:
         """Return ∫ P : ∇v over some cells by dof, shape (dim n,), [force].
 
-        Args:
-            stress: P at their points, shape (n_cells, n_gauss, 3, 3), [force / length²].
+        `stress`: P at their points, shape (n_cells, n_gauss, 3, 3), [force / length²].
         """
         dim = self._shape[1]
         weighted = self._weights[cells][..., None, None] * stress[..., :dim, :dim]
@@ -180,8 +171,7 @@ class GaussPoints:
     def mean_strain(self, cells: np.ndarray, moduli: np.ndarray) -> MeanStrain:
         """Return the means of changes of volume in some cells.
 
-        Args:
-            moduli: Of the material at rest, by Voigt components, shape (6, 6), [force / length²].
+        `moduli`: of the material at rest, by Voigt components, shape (6, 6), [force / length²].
         """
         share = held_share(moduli) if self._cell_type in UNSEEN else 0.0
         return MeanStrain(self._gradients[cells], self._polynomials.of(cells), share)
@@ -191,9 +181,7 @@ class GaussPoints:
     ) -> np.ndarray:
         """Return ∫ ∇v : A : ∇u over some cells: entries of the matrix of `assembled`.
 
-        Args:
-            tangent: A at their points, shape (n_cells, n_gauss, 3, 3, 3, 3), [force / length²].
-            means: Means of changes of volume in these cells, where A is the tangent by them.
+        `tangent`: A at their points, shape (n_cells, n_gauss, 3, 3, 3, 3), [force / length²].
         """
         dim, (_, m) = self._shape[1], self.shape
         G, weights = self._gradients[cells], self._weights[cells]
@@ -209,11 +197,7 @@ class GaussPoints:
         return np.bincount(places[cells].ravel(), entries, minlength=self.entries)
 
     def assembled(self, entries: np.ndarray, others: sp.csr_matrix | None = None) -> sp.csr_matrix:
-        """Return the matrix with entries from `stiffness`; its pattern is the same whatever is zero in it.
-
-        Args:
-            others: A matrix of the same mesh that is added.
-        """
+        """Return the matrix with entries from `stiffness`; its pattern is the same whatever is zero in it."""
         indptr, indices, _ = self._pattern
         size = len(indptr) - 1
         if others is not None:
@@ -286,12 +270,7 @@ class MeanDilatation:
         fields: list[_dolfinx.fem.Function],
         dilatation: Dilatation,
     ) -> None:
-        """Bind the forms.
-
-        Args:
-            fields: Displacement, and the `mean_fields`, which `follow` sets.
-            dilatation: Changes of volume on the mesh.
-        """
+        """Bind the forms."""
         self._dilatation, self._polynomials = dilatation, dilatation.polynomials
         self._means, self._pressures, centres = fields[1:]
         self._size = fields[0].x.array.size
@@ -317,9 +296,6 @@ class MeanDilatation:
         """Set the dilatations to those that a step was expected to lead to, θ + M⁻¹ D δu, and the pressures.
 
         Where that turns a cell inside out, or nearly so, to those that it led to.
-
-        Args:
-            origin: Displacement at the start of the step, that of the fields.
         """
         shape = self._polynomials.centres.shape[0], -1
         change = (self._inverse @ (self._volume_changes() @ (displacement - origin))).reshape(shape)

@@ -86,10 +86,8 @@ def load_fields(
 ) -> tuple[_dolfinx.fem.Function, ...]:
     """Return the Functions for a symbol's coefficients.
 
-    Args:
-        space: Space of displacements on the mesh.
-        points: Coordinates by input node of that mesh, shape (n, dim), [length].
-        acted: Marks of the nodes on the load's surface, shape (n,); the value is asked for only there.
+    `points`: coordinates by input node of that mesh, shape (n, dim), [length]; `acted`: marks of the nodes on
+    the load's surface, shape (n,); the value is asked for only there.
     """
     if isinstance(load.value, Ufl) or not callable(load.value):
         return ()
@@ -109,14 +107,7 @@ def load_fields(
 def load_work(
     load: Load, materials: tuple[Material, ...], cell_type: str, value: Expr, v: Expr
 ) -> tuple[ufl.Form, Constants]:
-    """Return the virtual work of a load along ``v``, a UFL form, and the constants of the materials in it.
-
-    Args:
-        load: A load; a resultant must have been spread.
-        materials: Materials of the cells on which it acts.
-        value: Value of the load (UFL), see `Symbol`.
-        v: Test function or another field.
-    """
+    """Return the virtual work of a load along ``v``, a UFL form, and the constants of the materials in it."""
     if isinstance(load, ThermalStrain):
 
         def thermal(material: Any, constants: Constants) -> Expr:

@@ -94,12 +94,10 @@ class FollowingPressure:
     def at(self, displacement: np.ndarray) -> tuple[np.ndarray, sp.csr_matrix]:
         """Return what the force is more than on the undeformed surface, and its stiffness.
 
-        Args:
-            displacement: By dof, shape (dim n,), [length].
+        `displacement`: by dof, shape (dim n,), [length].
 
-        Returns:
-            Force, shape (dim n,), [force]; less its growth with the displacement, shape (dim n, dim n),
-            [force / length].
+        Returns force, shape (dim n,), [force]; less its growth with the displacement, shape (dim n, dim n),
+        [force / length].
         """
         from fenics_contact._fem.kinematics import assembled
 
@@ -162,11 +160,7 @@ def spread_traction(scene: Scene, load: TotalForce) -> Traction:
 
 
 def _turning(load: TotalForce, surface: SurfaceMoments, moment: np.ndarray) -> np.ndarray:
-    """Return b = J⁻¹ M, shape (3,), in the plane (1,).
-
-    Raises:
-        InvalidInputError: If the surface is so narrow that no traction on it has a moment about its length.
-    """
+    """Return b = J⁻¹ M, shape (3,), in the plane (1,)."""
     second = surface.second_moment
     if len(second) == 2:
         return moment / np.trace(second)

@@ -63,11 +63,7 @@ class History:
         return cls(values, {name: _described(body.mesh) for name, body in bodies.items()})
 
     def require(self, scene: Scene) -> None:
-        """Reject a scene to which the history does not belong.
-
-        Raises:
-            InvalidInputError: If its bodies, their cells or the numbers of internal variables are others.
-        """
+        """Reject a scene to which the history does not belong."""
         needed = {name: _shape(body) for name, body in scene.bodies.items() if history_size(body)}
         if set(needed) != set(self.values):
             raise InvalidInputError(
@@ -90,10 +86,8 @@ class History:
     def advanced(self, comm: MPI.Comm, parts: Iterable[tuple[str, np.ndarray, np.ndarray | None]]) -> History:
         """Return the history after a step. Collective on ``comm``.
 
-        Args:
-            comm: Communicator of the ranks that hold the subdomains.
-            parts: For each of this rank's subdomains its body, its cells of the body's mesh and what they
-                remember, as in `on`.
+        `comm`: communicator of the ranks that hold the subdomains; `parts`: for each of this rank's
+        subdomains its body, its cells of the body's mesh and what they remember, as in `on`.
         """
         values = {name: array.copy() for name, array in self.values.items()}
         mine = [part for part in parts if part[0] in values]
@@ -161,13 +155,11 @@ class Mechanics(Protocol):
     ) -> Response:
         """Return the response to a displacement.
 
-        Args:
-            displacement: By dof of the mesh's space, block after block, shape (dim n,), [length].
-            history: Internal variables at the start of the step, for materials that have some, shape
-                (n_cells, n_gauss, k) by the mesh's cells; None for an unloaded body.
-            duration: Of the step; NaN where it is not known, which materials that need it refuse.
-            origin: Displacement at the start of the Newton step that led here, None where there was none:
-                tangents of mean dilatations have the pressures that this step foresaw.
+        `displacement`: by dof of the mesh's space, block after block, shape (dim n,), [length]; `history`:
+        internal variables at the start of the step, for materials that have some, shape (n_cells, n_gauss, k)
+        by the mesh's cells; None for an unloaded body; `origin`: displacement at the start of the Newton step
+        that led here, None where there was none: tangents of mean dilatations have the pressures that this
+        step foresaw.
         """
 
     def least_jacobian(self, displacement: np.ndarray) -> float:
@@ -187,9 +179,8 @@ class HistoryMechanics:
     ) -> None:
         """Evaluate shape functions.
 
-        Args:
-            points: Coordinates by input node, shape (n, dim), [length].
-            others: The mechanics of the materials without history, None where there are none.
+        `points`: coordinates by input node, shape (n, dim), [length]; `others`: the mechanics of the
+        materials without history, None where there are none.
         """
         nodes, dofs = _dolfinx.node_dofs(space)
         by_block = np.empty_like(points)
@@ -217,12 +208,7 @@ class HistoryMechanics:
         duration: float = np.nan,
         origin: np.ndarray | None = None,
     ) -> Response:
-        """Evaluate the materials and assemble; see `Mechanics.at`.
-
-        Raises:
-            InvalidInputError: If the history has another shape, or a material answers what it must not.
-            UserCodeError: If a material raises.
-        """
+        """Evaluate the materials and assemble; see `Mechanics.at`."""
         before, gradient = self._before(history), self._gauss.gradient(displacement)
         after, stress = before.copy(), np.full(gradient.shape, np.nan)
         force, entries = np.zeros(displacement.size), np.zeros(self._gauss.entries)
@@ -356,9 +342,7 @@ class LinearMechanics:
     def __init__(self, stiffness: _dolfinx.fem.Form, mesh: _dolfinx.mesh.Mesh, points: np.ndarray) -> None:
         """Assemble.
 
-        Args:
-            stiffness: The bilinear form, bound to the mesh.
-            points: Coordinates by input node, shape (n, dim), [length].
+        `points`: coordinates by input node, shape (n, dim), [length].
         """
         _dolfinx.update_coordinates(mesh, points)
         indptr, indices, data = _dolfinx.assemble_csr(stiffness)

@@ -169,11 +169,6 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
 
     A kernel with a missing mode makes the generalised inverse blow up, one with an extra mode removes real
     stiffness; both could be taken for a solution.
-
-    Raises:
-        InvalidInputError: If the stiffness is zero, not finite, not symmetric or has a negative energy, the
-            kernel has the wrong shape, dependent modes or modes with energy, or a mode without energy is
-            missing.
     """
     name = type(material).__name__
     K, points = stiffness_of_cell(skewed(CELL_TYPES[cell_type].nodes), cell_type, bind)
@@ -214,13 +209,7 @@ def check_kernel(stiffness: np.ndarray | sp.csr_matrix, kernel: np.ndarray, what
 
     All modes are tested at once, each with a weight of its own.
 
-    Args:
-        stiffness: K, dense or sparse, shape (n, n).
-        kernel: R, shape (n, n_modes).
-        what: Name of their owner, for the message.
-
-    Raises:
-        InvalidInputError: If ‖K R‖ is not small compared with ‖K‖ ‖R‖.
+    `stiffness`: K, dense or sparse, shape (n, n); `kernel`: R, shape (n, n_modes).
     """
     weights = 1 / (1 + np.sqrt(np.arange(2, 2 + kernel.shape[1])))
     energy = np.abs(stiffness @ (kernel @ weights)).max(initial=0.0)
@@ -235,12 +224,7 @@ def check_kernel(stiffness: np.ndarray | sp.csr_matrix, kernel: np.ndarray, what
 
 
 def kernel_of(material: Material, points: np.ndarray) -> np.ndarray:
-    """Return the modes without energy of a material at points, shape (n, dim, n_modes).
-
-    Raises:
-        InvalidInputError: If the material returns other values.
-        UserCodeError: If it raises.
-    """
+    """Return the modes without energy of a material at points, shape (n, dim, n_modes)."""
     name = type(material).__name__
     with user_code(f"the kernel of material {name}"):
         modes = np.asarray(material.kernel(points), dtype=np.float64)
@@ -273,9 +257,7 @@ def skewed(nodes: np.ndarray) -> np.ndarray:
 def stiffness_of_cell(vertices: np.ndarray, cell_type: str, bind: Bind) -> tuple[np.ndarray, np.ndarray]:
     """Return the stiffness of one cell, dense, and its points, both block by block.
 
-    Args:
-        vertices: Coordinates in VTK order, shape (n, dim), [length].
-        bind: Binds the stiffness form of a material.
+    `vertices`: coordinates in VTK order, shape (n, dim), [length].
     """
     mesh = _dolfinx.local_mesh(vertices, np.arange(len(vertices))[None], cell_type)
     space = _dolfinx.coefficient(mesh, "u").function_space

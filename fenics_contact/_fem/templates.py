@@ -64,10 +64,7 @@ class Template:
     ) -> _dolfinx.fem.Form:
         """Return the form on one mesh, with values for its constants and Functions for its coefficients.
 
-        Args:
-            facets: (cells, local facets) of its surface integral.
-            mesh: The mesh, where there are no arguments.
-            cells: Cells of its tagged volume integrals by tag.
+        `facets`: (cells, local facets) of its surface integral.
         """
         mesh = spaces[0].mesh if mesh is None else mesh
         constants = {
@@ -106,16 +103,7 @@ class Templates:
         return key in self._by_key
 
     def get(self, key: Hashable, name: tuple[object, ...], write: Callable[[], Written]) -> Template:
-        """Return the template under ``key``. Collective when it is new, on all ranks or on none.
-
-        Args:
-            key: Everything on which the form depends.
-            write: Returns form, constants and coefficients.
-
-        Raises:
-            InvalidInputError: If ranks write different forms, a number in it is not finite, or it cannot be
-                compiled.
-        """
+        """Return the template under ``key``. Collective when it is new, on all ranks or on none."""
         if key not in self._by_key:
             what = f"the form of {', '.join(map(_called, name))}"
             with together(self._comm):
@@ -224,9 +212,8 @@ class CellPolynomials:
     def __init__(self, points: np.ndarray, cells: np.ndarray, cell_type: str) -> None:
         """Evaluate them at the Gauss points.
 
-        Args:
-            points: Coordinates, shape (n, dim), [length].
-            cells: Nodes of the cells in VTK order, shape (n_cells, nodes of a cell).
+        `points`: coordinates, shape (n, dim), [length]; `cells`: nodes of the cells in VTK order, shape
+        (n_cells, nodes of a cell).
         """
         cell = CELL_TYPES[cell_type]
         positions, weights = quadrature(cell, quadrature_degree(cell_type))
@@ -249,11 +236,9 @@ class CellPolynomials:
     def coefficients(self, given: np.ndarray) -> np.ndarray:
         """Return the coefficients of the projections of values at Gauss points.
 
-        Args:
-            given: Shape (n_cells, n_gauss, k).
+        `given`: shape (n_cells, n_gauss, k).
 
-        Returns:
-            Shape (n_cells, n, k).
+        The result has shape (n_cells, n, k).
         """
         return np.asarray(self.inverse @ (self.values.swapaxes(1, 2) @ (self.weights[..., None] * given)))
 
@@ -267,11 +252,7 @@ class CellPolynomials:
 
 
 def polynomial(coefficients: Expr, centre: Expr, cell_type: str) -> Expr:
-    """Return a polynomial on the template.
-
-    Args:
-        coefficients: Constant in each cell: a scalar, or a vector of `polynomial_size`.
-    """
+    """Return a polynomial on the template."""
     if cell_type not in LINEAR:
         return coefficients
     x = ufl.SpatialCoordinate(_dolfinx.template(cell_type))
