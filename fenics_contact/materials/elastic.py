@@ -42,11 +42,7 @@ def lame(young_modulus: float, poisson_ratio: float) -> tuple[float, float]:
 
 
 def numbers(name: str, values: Sequence[float], count: int, meaning: str) -> tuple[float, ...]:
-    """Return ``count`` finite numbers as floats.
-
-    Raises:
-        InvalidInputError: If they are not; ``meaning`` ends the message.
-    """
+    """Return ``count`` finite numbers as floats."""
     try:
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
@@ -299,11 +295,9 @@ PAIRS = {3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)), 2: ((0, 0), (1, 1)
 def to_vector(tensor: np.ndarray) -> np.ndarray:
     """Return the entries of symmetric tensors in Voigt order, without factors.
 
-    Args:
-        tensor: Shape (..., 3, 3).
+    `tensor`: shape (..., 3, 3).
 
-    Returns:
-        Shape (..., 6).
+    The result has shape (..., 6).
     """
     rows, columns = np.transpose(PAIRS[3])
     return np.asarray(tensor[..., rows, columns])
@@ -340,9 +334,8 @@ def symmetric_product(entries: tuple[ufl.Constant, ...], vector: list[Expr]) -> 
 def rotated_stiffness(C: np.ndarray, axes: np.ndarray) -> np.ndarray:
     """Rotate a stiffness matrix from material axes to those of the scene.
 
-    Args:
-        C: Stiffness in material axes, Voigt, shape (6, 6) or (3, 3).
-        axes: Material axes as rows, orthonormal, shape (dim, dim).
+    `C`: stiffness in material axes, Voigt, shape (6, 6) or (3, 3); `axes`: material axes as rows,
+    orthonormal, shape (dim, dim).
     """
     T = strain_rotation(axes)
     return np.asarray(T.T @ C @ T)
@@ -366,9 +359,7 @@ def thermal_stresses(
 ) -> tuple[float, ...]:
     """Return C : α in Voigt order, nothing without an expansion.
 
-    Args:
-        C: Stiffness in the scene's axes, Voigt.
-        axes: Material axes as rows, shape (dim, dim).
+    `axes`: material axes as rows, shape (dim, dim).
     """
     if expansion is None:
         return ()
@@ -378,11 +369,7 @@ def thermal_stresses(
 
 
 def checked_stiffness(compliance: np.ndarray, constants: str) -> np.ndarray:
-    """Invert a compliance matrix, shape (n, n).
-
-    Raises:
-        InvalidInputError: If it is not positive definite; ``constants`` names what it was built from.
-    """
+    """Invert a compliance matrix, shape (n, n)."""
     scale = np.sqrt(np.abs(np.diag(compliance)))
     smallest = np.linalg.eigvalsh(compliance / np.outer(scale, scale)).min()
     if not smallest > 1e-12:

@@ -377,10 +377,6 @@ def power_sum(first: Expr, second: Expr, exponent: float, count: int = 32) -> Ex
     from 0 to ∞, by Gauss-Jacobi quadrature in v = (1 − t)/(1 + t), in which it is exact at x = 1. Sums of the
     rational functions are rational functions of the invariants: nowhere is there an eigenvalue. The relative
     error is 1e-9 for x between 1/36 and 36, which are stretches of 1/6 to 6, and 5e-6 at stretches of 10.
-
-    Args:
-        first: Sum of the numbers (UFL).
-        second: Sum of their products in pairs (UFL).
     """
     if exponent < 0:
         return power_sum(second, first, -exponent, count)  # of the reciprocals

@@ -87,11 +87,7 @@ class HistoryMaterial(Elasticity):
     mean_dilatation: bool = False
 
     def __init_subclass__(cls, **given: Any) -> None:
-        """Reject a model that replaces the checks of what it returns.
-
-        Raises:
-            InvalidInputError: If it has an `answer` of its own.
-        """
+        """Reject a model that replaces the checks of what it returns."""
         super().__init_subclass__(**given)
         if "answer" in vars(cls):
             raise InvalidInputError(
@@ -290,12 +286,8 @@ def radial_return(
     Backward Euler for von Mises' yield function with associated flow, isotropic and Prager's kinematic
     hardening; the normal of the trial state is that of the final one.
 
-    Args:
-        strain: Trial elastic strain, shape (n, 3, 3).
-        back: Back stress at the start of the step, deviatoric, shape (n, 3, 3).
-        alpha: Equivalent plastic strain there, shape (n,).
-        elastic: Bulk modulus and shear modulus.
-        kinematic: Slope C of the back stress in tension.
+    `strain`: trial elastic strain, shape (n, 3, 3); `back`: back stress at the start of the step, deviatoric,
+    shape (n, 3, 3); `alpha`: equivalent plastic strain there, shape (n,).
 
     References:
         J. C. Simo, T. J. R. Hughes: Computational Inelasticity. Springer 1998, Boxes 3.1 and 3.2.
