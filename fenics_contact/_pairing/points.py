@@ -87,8 +87,7 @@ class ContactPoints:
     def of_surface(self, pair: int, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return slave nodes of a pair whose areas belong to points, ascending, with values of these points.
 
-        Args:
-            values: A value for each point, shape (n,).
+        `values`: A value for each point, shape (n,).
         """
         mine = np.flatnonzero(self.pair == pair)
         if self.taken is None:
@@ -143,8 +142,7 @@ def reference_axes(normals: np.ndarray) -> np.ndarray:
 def movable(points: ContactPoints, fixed: np.ndarray) -> np.ndarray:
     """Return the components of the relative displacement that supports leave free, shape (n_points, dim).
 
-    Args:
-        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
     """
     jump = points.jump
     squares = sp.csr_matrix((jump.data**2, jump.indices, jump.indptr), shape=jump.shape)
@@ -157,9 +155,7 @@ def in_free_frames(points: ContactPoints, fixed: np.ndarray) -> ContactPoints:
 
     Where one component is held, closed points can slip only normal to that axis and the normal.
 
-    Args:
-        points: Points in frames that depend only on the normals.
-        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
     """
     if points.normal.shape[1] == 2:
         return points
@@ -174,9 +170,8 @@ def tangent_frames(normals: np.ndarray, axes: np.ndarray | None = None) -> np.nd
 
     In space (t1, t2, n) is right-handed, in the plane (t, n).
 
-    Args:
-        normals: Unit normals, shape (n, dim).
-        axes: Axes nearest to the first tangents, shape (n, dim); `reference_axes` by default.
+    `normals`: unit normals, shape (n, dim); `axes`: axes nearest to the first tangents, shape (n, dim);
+    `reference_axes` by default.
     """
     if normals.shape[1] == 2:
         return np.stack([normals[:, 1], -normals[:, 0]], axis=1)[:, None]
@@ -191,14 +186,8 @@ def friction_data(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the friction data of each contact point. Collective on ``comm``.
 
-    Returns:
-        Whether it has friction, shape (n,); its Coulomb coefficient (zero under Tresca), shape (n,); its
-        Tresca bound as a nodal force (zero under Coulomb), shape (n,), [force].
-
-    Raises:
-        InvalidInputError: If friction given as a function is negative somewhere, no number, or not the same
-            on all ranks.
-        UserCodeError: If such a function raises.
+    Returns whether it has friction, shape (n,); its Coulomb coefficient (zero under Tresca), shape (n,); its
+    Tresca bound as a nodal force (zero under Coulomb), shape (n,), [force].
     """
     has, coefficient, bound = np.zeros(points.count, dtype=bool), *np.zeros((2, points.count))
     places = scene.points[points.slave]
@@ -265,9 +254,7 @@ def without_tied(
     Where an edge belongs to a tie and to a contact, both hold the same relative displacement. Their normal
     forces would be split at will, and friction would follow. The tie alone has them: it keeps closed.
 
-    Args:
-        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
-        told: Whether nothing is to be logged.
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
     """
     point, tied = _tied(points, ties, scene, fixed)
     if not told:
@@ -303,9 +290,6 @@ def shared_once(points: ContactPoints, scene: Scene, *, told: bool) -> ContactPo
     Where an edge belongs to two contact pairs, or two pairs have the same surfaces, their normal forces would
     be split at will, and friction would follow. The pair whose gap is smaller has them, of equal ones the
     one named first, with its friction and the area of the surfaces of both.
-
-    Args:
-        told: Whether nothing is to be logged.
     """
     kept, lost = _shared(points, scene)
     if not told:
@@ -321,8 +305,7 @@ def areas_taken(
 ) -> tuple[np.ndarray, sp.csr_matrix]:
     """Return the areas that points take over from others, and whose they are, see `ContactPoints.taken`.
 
-    Args:
-        couples: Numbers of points and of those that they stand for, shape (n,) each.
+    `couples`: numbers of points and of those that they stand for, shape (n,) each.
     """
     kept, lost = couples
     beside = np.zeros(len(kept), dtype=bool)

@@ -43,10 +43,8 @@ def shared_projection(
 ) -> Projection:
     """Project nodes of the slave, distributed round-robin over the ranks. Collective.
 
-    Args:
-        chosen: Positions in its nodes; the projection numbers these, shape (n,).
-        master: The surface to project on.
-        comm: Communicator of the ranks; all receive all projections.
+    `chosen`: positions in its nodes; the projection numbers these, shape (n,); `comm`: communicator of the
+    ranks; all receive all projections.
     """
     mine = np.arange(comm.rank, len(chosen), comm.size)
     projection: Projection | None = None
@@ -66,12 +64,7 @@ _LOG = logging.getLogger(__name__)
 def warn_of_surface(
     scene: Scene, surface: Surface, geometry: Geometry, faceted: FacetedSurface, comm: MPI.Comm
 ) -> None:
-    """Warn of nodes off their shape, and of reconstructed facets that stay flat.
-
-    Args:
-        surface: Slave or master of a pair.
-        geometry: Its representation in the pair.
-    """
+    """Warn of nodes off their shape, and of reconstructed facets that stay flat."""
     mesh = scene.bodies[surface.body].mesh.origin
     away = mesh.off_shapes.get(surface.name) if geometry == "best" else None
     name = f"surface {surface.name!r} of {surface.body!r}"
@@ -106,9 +99,8 @@ def warn_of_edge(
     Slave facets that the edge crosses are tied at some of their nodes alone; what the master transmits to
     them between these nodes and its edge is missing.
 
-    Args:
-        held: Which nodes of the slave are tied or held by supports, shape (n_nodes,).
-        comm: Communicator of the ranks that share the work; rank 0 logs.
+    `held`: which nodes of the slave are tied or held by supports, shape (n_nodes,); `comm`: communicator of
+    the ranks that share the work; rank 0 logs.
     """
     whole, some = (each(held[slave.facets], axis=1) for each in (np.all, np.any))
     if not np.any(some & ~whole):
@@ -141,9 +133,7 @@ def warn_of_uneven_pressure(
 
     Only of quadratic cells: linear ones have mortar. Collective.
 
-    Args:
-        pair: A pair by nodes, or a tie.
-        comm: Communicator of the ranks that share the work; rank 0 logs.
+    `comm`: communicator of the ranks that share the work; rank 0 logs.
     """
     if slave.whole is None and master.whole is None:
         return
@@ -171,11 +161,6 @@ def unevenness(
     """Return the estimate of the largest relative error of a uniform pressure at nodes of a slave.
 
     Facets near the end of the other surface are left out. Pressures do not fall below zero.
-
-    Args:
-        there: Projections of its nodes on the master.
-        back: Projections of the master's nodes on the slave.
-        share: The master's share of the compliance of both.
     """
     met, reached = (np.isin(np.arange(len(s.nodes)), h.point) for s, h in ((slave, there), (master, back)))
     spread = sp.eye(len(met), format="csc")[:, there.point]
@@ -200,9 +185,8 @@ def unevenness(
 def _areas(surface: FacetedSurface, places: np.ndarray, met: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return which nodes have facets alone that meet the other surface, and the areas that these bear on.
 
-    Args:
-        places: Places of its nodes on that surface between which areas are measured, shape (n, dim).
-        met: Which of its nodes meet the other surface, shape (n,).
+    `places`: places of its nodes on that surface between which areas are measured, shape (n, dim); `met`:
+    which of its nodes meet the other surface, shape (n,).
     """
     facets = surface.facets if surface.whole is None else surface.whole
     full = met[facets].all(axis=1)

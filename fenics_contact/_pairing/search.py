@@ -92,11 +92,8 @@ def closable_gaps(
 ) -> ClosableGaps:
     """Return the gaps that linear displacements can close. Collective.
 
-    Args:
-        coupling: Coupling of both, or some of its nodes.
-        share: s, the master's share of the motion that closes the gap.
-        comm: Communicator of the ranks that share the work.
-        alone: Whether a point has no node of the slave but its own, shape (n,); others keep their mean.
+    `comm`: communicator of the ranks that share the work; `alone`: whether a point has no node of the slave
+    but its own, shape (n,); others keep their mean.
     """
     weight = coupling.weight
     nodes = np.flatnonzero(np.bincount(weight.indices, minlength=weight.shape[1]))
@@ -125,15 +122,8 @@ def with_given_gaps(
     A given gap holds in the geometry that was given. Where a design has moved the surfaces since then, the
     change of their distance is added: g = g_given + d − d_first.
 
-    Args:
-        points: Points of the pair with measured gaps.
-        first: The same before any design moved the surfaces.
-        place: Coordinates of the slave nodes of ``first``, shape (n, dim), [length].
-        comm: Communicator of the ranks; all have the same points.
-
-    Raises:
-        InvalidDesignError: If a design has brought nodes to the master whose first distance is not known.
-        InvalidInputError: If a function returns anything but lengths, or not the same on all ranks.
+    `place`: coordinates of the slave nodes of ``first``, shape (n, dim), [length]; `comm`: communicator of
+    the ranks; all have the same points.
     """
     with together(comm):
         _, now, then = np.intersect1d(points.slave, first.slave, return_indices=True)
@@ -161,9 +151,8 @@ def with_given_gaps(
 def in_reach(pair: ContactPair, measured: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Return at which points a pair replaces the gap, shape (n,).
 
-    Args:
-        measured: Distances of its slave nodes from the master, shape (n,), [length].
-        place: Their coordinates, shape (n, dim), [length].
+    `measured`: distances of its slave nodes from the master, shape (n,), [length]; `place`: their
+    coordinates, shape (n, dim), [length].
     """
     if pair.adjust is None:
         return np.full(len(measured), pair.gives_all_gaps)
@@ -216,11 +205,8 @@ class MortarPoints:
     ) -> MortarPoints:
         """Couple two surfaces. Collective on ``comm``.
 
-        Args:
-            slave: Surface that carries the multipliers.
-            bearing: Which slave nodes may carry one, shape (n_nodes,).
-            share: The master's share of the motion that closes the gap.
-            comm: Communicator of the ranks that share the work; this one by default.
+        `bearing`: which slave nodes may carry one, shape (n_nodes,); `comm`: communicator of the ranks that
+        share the work; this one by default.
         """
         from fenics_contact._pairing.mortar.coupling import mortar_coupling
         from fenics_contact._pairing.mortar.gathering import Gathering
@@ -292,14 +278,8 @@ def find_contact_points(
     Each rank searches a share of the nodes, and all receive all points. Nodes whose displacement is
     prescribed in all components cannot move and are omitted.
 
-    Args:
-        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
-        comm: Communicator of the ranks that share the work; this rank alone by default.
-        finer: Use better representations of surfaces than requested by the scene, see `true_surface`.
-        told: Whether doubts about the surfaces were told.
-
-    Raises:
-        InvalidInputError: If no node of a slave surface faces its master.
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `comm`: communicator of the
+    ranks that share the work; this rank alone by default.
     """
     return _points_of_pairs(scene, scene.contacts, fixed, comm or MPI.COMM_SELF, finer, told)
 
@@ -316,9 +296,7 @@ def without_rounding(gap: np.ndarray, points: np.ndarray) -> np.ndarray:
 
     Otherwise bodies that only touch would be pressed apart by that rounding.
 
-    Args:
-        gap: Gaps, shape (n,), [length].
-        points: Coordinates of one of the surfaces, shape (m, dim), [length].
+    `gap`: gaps, shape (n,), [length]; `points`: coordinates of one of the surfaces, shape (m, dim), [length].
     """
     return np.where(np.abs(gap) <= computed_rounding(points), 0.0, gap)
 
@@ -465,11 +443,7 @@ def _by_mortar(
 ) -> ContactPoints:
     """Pair each slave node with the mean of the master weighted by its dual basis function. Collective.
 
-    Args:
-        slave: Side whose nodes carry multipliers.
-        movable: Which of them can move.
-        comm: Communicator of the ranks that share the work.
-        share: The master's share of the motion that closes the gap.
+    `comm`: communicator of the ranks that share the work.
     """
     met = MortarPoints.of(slave.surface, master.surface, movable, share, comm)
     coupling, nodes = met.coupling, np.concatenate([slave.nodes, master.nodes])

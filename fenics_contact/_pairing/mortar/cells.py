@@ -45,12 +45,7 @@ def candidate_pairs(slave: Planes, master: Planes) -> tuple[np.ndarray, np.ndarr
     facets further away along the normal than twice the sum of both radii (the maximum for an inclination of
     60 degrees) belong to another layer.
 
-    Args:
-        slave: Planes of the slave facets.
-        master: Planes of the master facets.
-
-    Returns:
-        Slave facet, ascending, and master facet of each pair, each shape (n,).
+    Returns slave facet, ascending, and master facet of each pair, each shape (n,).
     """
     feet = _feet(slave, master)
     pairs = [_near(slave, master, feet, members) for members in _size_classes(master.radius)]
@@ -104,14 +99,11 @@ def _near(
 def clip(subject: np.ndarray, window: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Clip polygons to convex windows (Sutherland–Hodgman), all pairs at once; intervals to intervals.
 
-    Args:
-        subject: Polygons, shape (n, k, 2), or intervals, shape (n, 2, 1).
-        window: Convex polygons, counterclockwise, shape (n, m, 2), or intervals, shape (n, 2, 1). Vertices
-            may be repeated.
+    `subject`: polygons, shape (n, k, 2), or intervals, shape (n, 2, 1); `window`: convex polygons,
+    counterclockwise, shape (n, m, 2), or intervals, shape (n, 2, 1). Vertices may be repeated.
 
-    Returns:
-        Vertices in the order of the subject, shape (n, k', 2) or (n, 2, 1), unused ones equal to the first,
-        and their numbers, shape (n,), zero for empty intersections.
+    Returns vertices in the order of the subject, shape (n, k', 2) or (n, 2, 1), unused ones equal to the
+    first, and their numbers, shape (n,), zero for empty intersections.
     """
     if window.shape[2] == 1:
         low = np.maximum(subject.min(axis=1), window.min(axis=1))
@@ -181,13 +173,10 @@ def clip_pulled_back(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Vector-Jacobian product of `clip` with respect to polygons and windows.
 
-    Args:
-        subject: Polygons or intervals as for `clip`.
-        by_vertices: Derivative by the vertices, zero for unused ones and those left out, shape (n, any
-            number, dim − 1).
+    `by_vertices`: derivative by the vertices, zero for unused ones and those left out, shape (n, any number,
+    dim − 1).
 
-    Returns:
-        In the shapes of ``subject`` and ``window``.
+    The result is in the shapes of ``subject`` and ``window``.
     """
     if window.shape[2] == 1:
         return _interval_pulled_back(subject, window, by_vertices)
@@ -252,13 +241,12 @@ def _interval_pulled_back(
 def simplices(vertices: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cut convex polygons into triangles between their first vertex and the opposite sides.
 
-    Args:
-        vertices: Polygons, shape (n, k, 2), or intervals, shape (n, 2, 1), as `clip` returns them.
-        count: Numbers of vertices, shape (n,).
+    `vertices`: polygons, shape (n, k, 2), or intervals, shape (n, 2, 1), as `clip` returns them; `count`:
+    numbers of vertices, shape (n,).
 
-    Returns:
-        Triangles, shape (m, 3, 2), or intervals, shape (m, 2, 1), which of the given polygons or intervals
-        each belongs to, ascending, shape (m,), and which of its vertices are the corners, shape (m, dim).
+    Returns triangles, shape (m, 3, 2), or intervals, shape (m, 2, 1), which of the given polygons or
+    intervals each belongs to, ascending, shape (m,), and which of its vertices are the corners, shape (m,
+    dim).
     """
     if vertices.shape[2] == 1:
         chosen = np.flatnonzero(count)
@@ -280,15 +268,12 @@ def hidden(
 
     A partly hidden piece counts as hidden.
 
-    Args:
-        vertices: Pieces in the planes of the slave facets, as `clip` returns them, shape (n, k, dim − 1).
-        count: Their numbers of vertices, shape (n,).
-        height: Mean heights above the plane, shape (n,), [length].
-        facet: Slave facet of each piece, shape (n,).
-        area: Area (length) of the slave facets, shape (n_facets,).
+    `vertices`: pieces in the planes of the slave facets, as `clip` returns them, shape (n, k, dim − 1);
+    `count`: their numbers of vertices, shape (n,); `height`: mean heights above the plane, shape (n,),
+    [length]; `facet`: slave facet of each piece, shape (n,); `area`: area (length) of the slave facets, shape
+    (n_facets,).
 
-    Returns:
-        Whether a piece is hidden, shape (n,).
+    Returns whether a piece is hidden, shape (n,).
     """
     behind = np.zeros(len(vertices), dtype=bool)
     if vertices.shape[1] < 2:
@@ -403,10 +388,8 @@ def overlaps_of(
 ) -> Overlaps:
     """Clip pairs of facets.
 
-    Args:
-        planes: Planes of the slave facets.
-        pair_slave: Slave facet of each pair, ascending, shape (n,).
-        pair_master: Master facet of each pair, shape (n,).
+    `pair_slave`: slave facet of each pair, ascending, shape (n,); `pair_master`: master facet of each pair,
+    shape (n,).
     """
     subject, heights = laid_flat(master.points[master.facets[pair_master]], planes, pair_slave)
     window = planes.flat[pair_slave]
@@ -467,8 +450,7 @@ class CellDerivatives:
 def cells_pulled_back(overlaps: Overlaps, cells: Cells, by: CellDerivatives) -> tuple[np.ndarray, np.ndarray]:
     """Vector-Jacobian product of cells with respect to the flat corners of both facets of each pair.
 
-    Returns:
-        By ``overlaps.subject`` and by ``overlaps.window``, in their shapes.
+    Derivatives by ``overlaps.subject`` and by ``overlaps.window``, in their shapes.
     """
     pair, pieces, subject, window = overlaps.pair, overlaps.pieces, overlaps.subject, overlaps.window
     over_pairs = SumsBy(pair, len(subject))

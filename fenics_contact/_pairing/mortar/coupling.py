@@ -57,13 +57,11 @@ CORNERS = {
 def dual_integrals(cells: Cells, field: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Integrate the dual functions with the slave's and the master's shape functions and with a field.
 
-    Args:
-        field: Values v at the quadrature points, shape (n, q).
+    `field`: values v at the quadrature points, shape (n, q).
 
-    Returns:
-        D_e = ∫ N_i over the covered part of each facet, shape (n_facets, corners), ∫ ψ_i N_j of each pair,
-        shape (n_pairs, corners, master corners), both [length²] or [length], and ∫ ψ_i v of each pair, shape
-        (n_pairs, corners).
+    Returns D_e = ∫ N_i over the covered part of each facet, shape (n_facets, corners), ∫ ψ_i N_j of each
+    pair, shape (n_pairs, corners, master corners), both [length²] or [length], and ∫ ψ_i v of each pair,
+    shape (n_pairs, corners).
     """
     basis = DualBasis.on(cells)
     integrals = basis.integrals(np.concatenate([cells.master, field[:, :, None]], axis=2))
@@ -212,9 +210,8 @@ def relief_of_cells(
 ) -> np.ndarray:
     """Return the height of the true slave over its facets less that of the master, shape (n, q), [length].
 
-    Args:
-        pairs: Slave facet and master facet of each pair, shape (n_pairs,) each.
-        along: Direction of the heights for each pair, out of the slave facet, shape (n_pairs, dim).
+    `pairs`: slave facet and master facet of each pair, shape (n_pairs,) each; `along`: direction of the
+    heights for each pair, out of the slave facet, shape (n_pairs, dim).
     """
     at_slave, at_master = (facet[cells.pair] for facet in pairs)
     direction = along[cells.pair]
@@ -286,12 +283,7 @@ def mortar_coupling(
 
     Each rank integrates some of the slave facets, and all receive the whole coupling.
 
-    Args:
-        slave: Surface that carries the multipliers.
-        comm: Communicator of the ranks that share the work, all with the same surfaces; this one by default.
-
-    Raises:
-        InvalidInputError: If a slave facet is not convex or the surfaces are not of the same dimension.
+    `comm`: communicator of the ranks that share the work, all with the same surfaces; this one by default.
 
     References:
         Puso, M. A., Laursen, T. A.: A mortar segment-to-segment contact method for large deformation solid
@@ -339,9 +331,8 @@ def _integrals(
 ) -> tuple[np.ndarray, sparse.csr_matrix, np.ndarray]:
     """Integrate over the chosen facets.
 
-    Returns:
-        D, shape (slave nodes,), M, shape (slave nodes, master nodes), and ∫ ψ_i times the height of the true
-        surfaces over their facets, slave less master, shape (slave nodes, dim).
+    Returns D, shape (slave nodes,), M, shape (slave nodes, master nodes), and ∫ ψ_i times the height of the
+    true surfaces over their facets, slave less master, shape (slave nodes, dim).
     """
     area, shape = np.zeros(len(slave.nodes)), (len(slave.nodes), len(master.nodes))
     total, relief = sparse.csr_matrix(shape), np.zeros_like(slave.points)

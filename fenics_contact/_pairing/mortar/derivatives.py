@@ -49,14 +49,11 @@ def integrals_pulled_back(
 ) -> tuple[CellDerivatives, np.ndarray]:
     """Vector-Jacobian product of `dual_integrals` with respect to the cells and the field.
 
-    Args:
-        field: Values at the quadrature points, shape (n, q).
-        by_coverage: Derivative by D_e, shape (n_facets, corners).
-        by_integrals: By the integrals with the master's shape functions and, last, with the field, shape
-            (n_pairs, corners, master corners + 1).
+    `field`: values at the quadrature points, shape (n, q); `by_coverage`: derivative by D_e, shape (n_facets,
+    corners); `by_integrals`: by the integrals with the master's shape functions and, last, with the field,
+    shape (n_pairs, corners, master corners + 1).
 
-    Returns:
-        By the cells, and by the field, shape (n, q).
+    Derivatives by the cells, and by the field, shape (n, q).
     """
     cells, facet = basis.cells, basis.facet
     functions = np.concatenate([cells.master, field[:, :, None]], axis=2)
@@ -164,14 +161,10 @@ def relief_pulled_back(
 ) -> tuple[CellDerivatives, np.ndarray]:
     """Vector-Jacobian product of `relief_of_cells` with respect to cells and directions.
 
-    Args:
-        pairs: Slave facet and master facet of each pair, shape (n_pairs,) each.
-        along: Direction of the heights at each cell, shape (n, dim).
-        by_relief: Derivative by the heights, shape (n, q).
-        into: Derivatives by slave and master, which grow by those through normals and slopes.
+    `pairs`: slave facet and master facet of each pair, shape (n_pairs,) each; `along`: direction of the
+    heights at each cell, shape (n, dim); `by_relief`: derivative by the heights, shape (n, q).
 
-    Returns:
-        By the cells, and by the direction at each, shape (n, dim).
+    Derivatives by the cells, and by the direction at each, shape (n, dim).
     """
     at_slave, at_master = (facet[cells.pair] for facet in pairs)
     by_local, by_slave, by_along = _heights_pulled_back(
@@ -236,13 +229,9 @@ def mortar_pulled_back(
     whose dual functions differ on both sides, and jumps where one layer of the master hides another: there
     the derivative is that of one side.
 
-    Args:
-        slave: Surface that carries the multipliers.
-        comm: Communicator of the ranks that share the work; this one by default. All have the same arguments.
-        beside: Distance beside the place, relative to the smallest radius of a master facet.
+    `comm`: communicator of the ranks that share the work; this one by default. All have the same arguments.
 
-    Returns:
-        By slave and by master, the same on all ranks.
+    Derivatives by slave and by master, the same on all ranks.
     """
     comm = comm or MPI.COMM_SELF
     into = SurfaceDerivatives.zero(slave), SurfaceDerivatives.zero(master)
@@ -262,11 +251,7 @@ def mortar_pulled_back(
 
 
 def moved_aside(master: FacetedSurface, beside: float = 1e-9) -> FacetedSurface:
-    """Return the master beside its place, so that no edge lies exactly over one of the slave.
-
-    Args:
-        beside: Distance relative to the smallest radius of a facet.
-    """
+    """Return the master beside its place, so that no edge lies exactly over one of the slave."""
     corners = master.points[master.facets]
     size = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max(axis=1).min()
     step = beside * size + 100 * computed_rounding(master.points)
@@ -357,11 +342,7 @@ def _cells_of_sums(
 ) -> tuple[CellDerivatives, np.ndarray]:
     """Return the derivatives by cells and by the mean normals of the slave facets, shape (n_facets, dim).
 
-    Args:
-        facets: The slave's facets, shape (n_facets,).
-        normal: Their mean normals, shape (n_facets, dim).
-        sums: Derivatives by the sums of integrals.
-        into: Derivatives by both surfaces, which grow by those through the heights of true surfaces.
+    `facets`: the slave's facets, shape (n_facets,); `normal`: their mean normals, shape (n_facets, dim).
     """
     slave, master = surfaces
     nodes, pairs = slave.facets[facets], (facets[overlaps.facet], overlaps.master)
@@ -414,10 +395,8 @@ def weight_derivatives(
     As in `mortar_pulled_back` nodes and facets are fixed, and the derivative is that of the master beside its
     place.
 
-    Args:
-        slave: Surface that carries the multipliers.
-        wanted: Points whose weights are differentiated, a mask, shape (n,).
-        comm: Communicator of the ranks that share the work; this one by default. All have the same arguments.
+    `wanted`: points whose weights are differentiated, a mask, shape (n,); `comm`: communicator of the ranks
+    that share the work; this one by default. All have the same arguments.
     """
     comm = comm or MPI.COMM_SELF
     marked = np.zeros(len(slave.nodes), dtype=bool)
@@ -535,9 +514,8 @@ def _of_nodes(
 def _over_facets(facet: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """Return the nodes of the master over each slave facet, −1 beyond their number, (n_facets, most).
 
-    Args:
-        facet: Slave facet of each pair, shape (n_pairs,).
-        nodes: Nodes of the master's facet, shape (n_pairs, master corners).
+    `facet`: slave facet of each pair, shape (n_pairs,); `nodes`: nodes of the master's facet, shape (n_pairs,
+    master corners).
     """
     count = int(nodes.max()) + 1
     which, node = np.divmod(np.unique(facet[:, None] * count + nodes), count)

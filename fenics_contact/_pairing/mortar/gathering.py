@@ -44,9 +44,6 @@ class Gathering:
 
         A node without a neighbour that does keeps its multiplier, and so do all where the rest could not
         bear a body that tips.
-
-        Args:
-            whole: The coupling of all nodes that face the master.
         """
         well = whole.area > HARDLY * slave.areas[whole.node]
         hardly = np.flatnonzero(~well)
@@ -85,11 +82,7 @@ class Gathering:
         return MortarCoupling(node, self.part @ whole.area, weight, normal, relief, gap)
 
     def weights(self, n_nodes: int) -> sp.csr_matrix:
-        """Return the weights of the slave's nodes in its means, shape (n, n_nodes).
-
-        Args:
-            n_nodes: Number of nodes of the slave.
-        """
+        """Return the weights of the slave's nodes in its means, shape (n, n_nodes)."""
         own = self.own
         return sp.csr_matrix((own.data, self.whole.node[own.indices], own.indptr), (own.shape[0], n_nodes))
 
@@ -98,9 +91,7 @@ class Gathering:
     ) -> CouplingDerivatives:
         """Vector-Jacobian product of the points with respect to the whole coupling, places and normals fixed.
 
-        Args:
-            coupling: The coupling at the points.
-            places: Coordinates of the nodes of slave and master, [length].
+        `places`: coordinates of the nodes of slave and master, [length].
         """
         whole, middle = self.whole, places[0].mean(axis=0)
         along = by.gap[:, None] * coupling.normal

@@ -22,12 +22,9 @@ def local_coordinates(points: np.ndarray, flat: np.ndarray) -> np.ndarray:
     product p = s t solves d₁ d₂ p² − (1 + d₂ s₀ + d₁ t₀) p + s₀ t₀ = 0; of its roots the one that tends to
     s₀ t₀ for d → 0 belongs to the inside of a convex facet.
 
-    Args:
-        points: Points of each facet, shape (n, q, dim − 1).
-        flat: Corners, shape (n, corners, dim − 1).
+    `points`: points of each facet, shape (n, q, dim − 1); `flat`: corners, shape (n, corners, dim − 1).
 
-    Returns:
-        Local coordinates as `shape_functions` takes them, shape (n, q, dim − 1).
+    Returns local coordinates as `shape_functions` takes them, shape (n, q, dim − 1).
     """
     corners = flat.shape[1]
     if corners == 2:
@@ -51,13 +48,10 @@ def local_coordinates_pulled_back(
 
     From x = Σ N_j(ξ) x_j follows J δξ = δx − Σ N_j δx_j with J = ∂x/∂ξ.
 
-    Args:
-        local: ξ, shape (n, q, dim − 1).
-        flat: Corners, shape (n, corners, dim − 1).
-        by_local: Derivative by ξ, in its shape.
+    `local`: ξ, shape (n, q, dim − 1); `flat`: corners, shape (n, corners, dim − 1); `by_local`: derivative by
+    ξ, in its shape.
 
-    Returns:
-        By the points, shape (n, q, dim − 1), and by the corners, in the shape of ``flat``.
+    Derivatives by the points, shape (n, q, dim − 1), and by the corners, in the shape of ``flat``.
     """
     n, points, width = local.shape
     values, slopes = shape_functions(local.reshape(-1, width), flat.shape[1])
@@ -90,8 +84,7 @@ def _affine(away: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def rule(dim: int) -> tuple[np.ndarray, np.ndarray]:
     """Return a quadrature rule of degree 5: three points of intervals (dim 2), seven of triangles (dim 3).
 
-    Returns:
-        Barycentric coordinates, shape (q, dim), and weights that add up to one, shape (q,).
+    Returns barycentric coordinates, shape (q, dim), and weights that add up to one, shape (q,).
     """
     positions, weights = quadrature(FACET_TYPES[3, 2] if dim == 2 else CELL_TYPES["triangle6"])
     return np.column_stack([1 - positions.sum(axis=1), positions]), weights / weights.sum()
@@ -163,12 +156,9 @@ def planes_of(surface: FacetedSurface, chosen: np.ndarray) -> Planes:
 def laid_flat(points: np.ndarray, planes: Planes, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Project points along the normals onto planes.
 
-    Args:
-        points: Shape (n, k, dim), [length].
-        index: Plane of each group of points, shape (n,).
+    `points`: shape (n, k, dim), [length]; `index`: plane of each group of points, shape (n,).
 
-    Returns:
-        Coordinates in the plane, shape (n, k, dim − 1), and heights above it, shape (n, k), [length].
+    Returns coordinates in the plane, shape (n, k, dim − 1), and heights above it, shape (n, k), [length].
     """
     away = points - planes.origin[index][:, None]
     flat = away @ planes.axes[index].transpose(0, 2, 1)
@@ -187,14 +177,11 @@ def planes_pulled_back(
     The derived function must not depend on where in a plane its origin is and how its axes lie in it, which
     an integral does not. So origins may stay, and axes a change by −(a · δn) n only.
 
-    Args:
-        corners: Corners of their facets, shape (n, corners, dim).
-        by_normal: Direct derivative by the normals, shape (n, dim).
-        opposite: Points laid flat, shape (m, k, dim), their planes, shape (m,), and the derivative by their
-            coordinates in the plane, shape (m, k, dim − 1).
+    `corners`: corners of their facets, shape (n, corners, dim); `by_normal`: direct derivative by the
+    normals, shape (n, dim); `opposite`: points laid flat, shape (m, k, dim), their planes, shape (m,), and
+    the derivative by their coordinates in the plane, shape (m, k, dim − 1).
 
-    Returns:
-        In the shapes of ``corners`` and of the points.
+    The result is in the shapes of ``corners`` and of the points.
     """
     points, index, by_points = opposite
     axes, normal = planes.axes, planes.normal
@@ -223,11 +210,7 @@ def _normals_pulled_back(corners: np.ndarray, normal: np.ndarray, by_normal: np.
 
 
 def check_convex(planes: Planes, chosen: np.ndarray) -> None:
-    """Check that the flat facets are convex, as required of clipping windows.
-
-    Raises:
-        FoldedFacetsError: If a quadrilateral is folded or has a re-entrant corner.
-    """
+    """Check that the flat facets are convex, as required of clipping windows."""
     if planes.flat.shape[1] != 4:
         return
     turned = [np.roll(planes.flat, shift, axis=1) - planes.flat for shift in (-1, 1)]

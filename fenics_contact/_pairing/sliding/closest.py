@@ -50,9 +50,8 @@ class PatchPoints:
 def patch_points(patches: SmoothPatches, coefficients: np.ndarray, local: np.ndarray) -> PatchPoints:
     """Evaluate patches.
 
-    Args:
-        coefficients: Those of the patch of each point, shape (n, n_functions, dim).
-        local: Local coordinates, shape (n, dim − 1).
+    `coefficients`: those of the patch of each point, shape (n, n_functions, dim); `local`: local coordinates,
+    shape (n, dim − 1).
     """
     at = patches.functions(local)
     place = np.einsum("nb,nbd->nd", at.value, coefficients)
@@ -102,13 +101,10 @@ class ClosestPoints:
         A target keeps its last facet as long as its closest point is barely outside it: on an edge between
         two facets it would else change sides for ever.
 
-        Args:
-            targets: Points, shape (n, dim), [length].
-            normals: Outward unit normals there, shape (n, dim).
-            facet: Their last facets, −1 where there is none, shape (n,).
-            local: Last local coordinates, shape (n, dim − 1).
-            met: Whether they may lie behind facets where a body meets itself, shape (n,); by default those
-                that have a last facet.
+        `targets`: points, shape (n, dim), [length]; `normals`: outward unit normals there, shape (n, dim);
+        `facet`: their last facets, −1 where there is none, shape (n,); `local`: last local coordinates, shape
+        (n, dim − 1); `met`: whether they may lie behind facets where a body meets itself, shape (n,); by
+        default those that have a last facet.
         """
         known = np.flatnonzero(facet >= 0)
         kept = self._solve(targets, normals, known, facet[known], local[known])
@@ -241,9 +237,7 @@ def _second(here: PatchPoints, away: np.ndarray) -> tuple[np.ndarray, np.ndarray
 def summed_normals(surface: FacetedSurface, points: np.ndarray) -> np.ndarray:
     """Return the sums of the area vectors around nodes, within planes of symmetry, shape (n, dim), [length²].
 
-    Args:
-        surface: The surface in the reference configuration.
-        points: Present coordinates of its nodes, shape (n, dim), [length].
+    `points`: present coordinates of its nodes, shape (n, dim), [length].
     """
     summed = np.zeros_like(points)
     np.add.at(summed, surface.facets, corner_products(points, surface.facets))
@@ -254,9 +248,7 @@ def summed_normals(surface: FacetedSurface, points: np.ndarray) -> np.ndarray:
 def moved_surface(surface: FacetedSurface, points: np.ndarray) -> FacetedSurface:
     """Return a surface in its present place, made of its facets. Areas stay those of the reference.
 
-    Args:
-        surface: The surface in the reference configuration.
-        points: Present coordinates of its nodes, shape (n, dim), [length].
+    `points`: present coordinates of its nodes, shape (n, dim), [length].
     """
     summed = summed_normals(surface, points)
     length = np.linalg.norm(summed, axis=1)
@@ -267,9 +259,7 @@ def moved_surface(surface: FacetedSurface, points: np.ndarray) -> FacetedSurface
 def summed_normals_by_points(surface: FacetedSurface, along: np.ndarray) -> sp.csr_matrix:
     """Return v·δN for the sums N of `summed_normals` and given vectors v, shape (n, n · dim).
 
-    Args:
-        surface: The surface in its present place.
-        along: v, zero in components that planes of symmetry take away, shape (n, dim).
+    `along`: v, zero in components that planes of symmetry take away, shape (n, dim).
     """
     facets, dim = surface.facets, surface.dim
     corners, v = surface.points[facets], along[facets]
@@ -327,9 +317,7 @@ class Roles:
     def are_slaves(self, found: Projection, last: np.ndarray) -> np.ndarray:
         """Return which closest points make their candidates slaves, shape (n,).
 
-        Args:
-            found: Closest points; ``point`` counts the candidates.
-            last: Last facets of all candidates, −1 where there is none, shape (n_candidates,).
+        `last`: last facets of all candidates, −1 where there is none, shape (n_candidates,).
         """
         known = last[found.point] >= 0
         return known | (self._go_forward(found, known) & ~self._are_masters(found, last))

@@ -85,11 +85,9 @@ class SlidingContact:
     ) -> SlidingContact:
         """Prepare the pairs of a scene. Collective on ``comm``.
 
-        Args:
-            scene: The scene in its reference configuration.
-            fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
-            comm: Communicator of the ranks that share the work; this rank alone by default.
-            reach: Distance beyond which nodes need no point, [length].
+        `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `comm`: communicator of
+        the ranks that share the work; this rank alone by default; `reach`: distance beyond which nodes need
+        no point, [length].
         """
         comm = comm or MPI.COMM_SELF
         meetings = shared_once(meetings_of(scene, fixed, comm), scene)
@@ -109,15 +107,7 @@ class SlidingContact:
     ) -> SlidingPoints:
         """Return the contact points of the bodies where they lie now. Collective.
 
-        Args:
-            coordinates: Present coordinates of the nodes of all bodies, shape (n_nodes, dim), [length].
-            last: Points at nearby coordinates: nodes stay on the facets that they had as long as they can.
-            time: Time at which moving obstacles are asked.
-            start: All points since the start of the load step: where a body meets itself, nodes that had one
-                are known to be on the side from which they came.
-
-        Raises:
-            InvalidInputError: If the coordinates have another shape or are not finite.
+        `coordinates`: present coordinates of the nodes of all bodies, shape (n_nodes, dim), [length].
         """
         coordinates = np.asarray(coordinates, dtype=np.float64)
         needed = self.scene.points.shape
@@ -147,8 +137,7 @@ class SlidingContact:
     ) -> tuple[SlidingPoints, MaterialPoints]:
         """Return points that were stored, and where they stood. Collective.
 
-        Args:
-            coordinates: The coordinates of then, shape (n_nodes, dim), [length].
+        `coordinates`: the coordinates of then, shape (n_nodes, dim), [length].
         """
         found = self.at(coordinates, LastPoints.of(stored), time)
         return found, MaterialPoints.of(stored, len(coordinates))

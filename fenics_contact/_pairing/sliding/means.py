@@ -48,9 +48,7 @@ class MeanMotion:
     def feet(self, points: ContactPoints, coordinates: np.ndarray, along: np.ndarray) -> sp.csr_matrix:
         """Return v·Σ δW_j x_j, how the mean of the master moves as its weights change, (n, n_dofs).
 
-        Args:
-            coordinates: Of all nodes, shape (n_nodes, dim), [length].
-            along: v, shape (n, dim).
+        `coordinates`: of all nodes, shape (n_nodes, dim), [length]; `along`: v, shape (n, dim).
         """
         away = coordinates[self.node] - coordinates[points.slave[self.point]]
         lever = np.einsum("md,md->m", away, along[self.point])
@@ -76,9 +74,8 @@ class MeanMotion:
 
         That is t_c·Σ δW_j x_j + δt_c·way.
 
-        Args:
-            coordinates: Of all nodes, shape (n_nodes, dim), [length].
-            way: The slip as vectors, shape (n, dim), [length].
+        `coordinates`: of all nodes, shape (n_nodes, dim), [length]; `way`: the slip as vectors, shape (n,
+        dim), [length].
         """
         turned = frame_changes(points.normal, points.axes, points.tangents)
         change = np.einsum("ncad,nd->nca", turned, way)
@@ -94,9 +91,8 @@ class MeanMotion:
         With p = −λ_N n + Σ τ_a t_a these change by δp, and over the master by −δW_ij p_i: one column for each
         tangent of a point and each component of a node.
 
-        Args:
-            normal: λ_N, shape (n,), [force].
-            friction: τ in the points' tangents, shape (n, dim − 1), [force].
+        `normal`: λ_N, shape (n,), [force]; `friction`: τ in the points' tangents, shape (n, dim − 1),
+        [force].
         """
         turned = frame_changes(points.normal, points.axes, points.tangents)
         change = np.einsum("nc,ncad->nad", friction, turned) - normal[:, None, None] * points.tangents
@@ -136,12 +132,7 @@ class MeanTangents:
 
     @classmethod
     def none(cls, count: int, width: int, size: int) -> MeanTangents:
-        """Return those of points without forces.
-
-        Args:
-            width: Number of tangents of each.
-            size: Number of coordinates of all nodes.
-        """
+        """Return those of points without forces."""
         nothing = sp.csr_matrix((size, 0))
         stiffness = LowRank(nothing, nothing, np.zeros(0, dtype=np.int64))
         return cls(stiffness, sp.csr_matrix((count, size)), sp.csr_matrix((count * width, size)))
@@ -204,9 +195,8 @@ class MovingMeans:
     def of(cls, meeting: Meeting, coordinates: np.ndarray, comm: MPI.Comm) -> MovingMeans:
         """Couple the surfaces of a pair. Collective on ``comm``.
 
-        Args:
-            coordinates: Of all nodes, shape (n_nodes, dim), [length].
-            comm: Communicator of the ranks that share the work.
+        `coordinates`: of all nodes, shape (n_nodes, dim), [length]; `comm`: communicator of the ranks that
+        share the work.
         """
         assert meeting.facets is not None
         slave = moved_surface(meeting.slave, coordinates[meeting.slave_nodes])
@@ -235,8 +225,7 @@ class MovingMeans:
 
         Collective.
 
-        Args:
-            by_area: Shape (n,).
+        `by_area`: shape (n,).
         """
         count, dim = self.coupling.normal.shape
         none = np.zeros((count, 0)), np.zeros((len(self.master.nodes), 0))
@@ -253,12 +242,9 @@ class MovingMeans:
     ) -> MeanTangents:
         """Return what the linearisation has beside the rows of the forces. Collective.
 
-        Args:
-            points: The contact points of this pair.
-            coordinates: Of all nodes, shape (n_nodes, dim), [length].
-            forces: λ_N, shape (n,), and τ in the points' tangents, shape (n, dim − 1), [force].
-            slid: The slip as vectors, shape (n, dim), [length], and the weights of all nodes from which it
-                counts, shape (n, n_nodes).
+        `coordinates`: of all nodes, shape (n_nodes, dim), [length]; `forces`: λ_N, shape (n,), and τ in the
+        points' tangents, shape (n, dim − 1), [force]; `slid`: the slip as vectors, shape (n, dim), [length],
+        and the weights of all nodes from which it counts, shape (n, n_nodes).
         """
         normal, friction = forces
         rubbed, (way, before) = (friction != 0.0).any(axis=1), slid
@@ -274,9 +260,7 @@ class MovingMeans:
     def motion(self, points: ContactPoints, wanted: np.ndarray) -> MeanMotion:
         """Differentiate normals and weights of wanted points. Collective.
 
-        Args:
-            points: The contact points of this pair.
-            wanted: Points that need it, a mask, shape (n,).
+        `wanted`: points that need it, a mask, shape (n,).
         """
         nodes, dim = np.concatenate([self.slave_nodes, self.master_nodes]), self.slave.dim
         dof = (dim * nodes[:, None] + np.arange(dim)).ravel()
@@ -337,11 +321,8 @@ class PointAreas:
     ) -> PointAreas:
         """Measure the areas of points.
 
-        Args:
-            scene: The scene in its reference configuration.
-            points: Its points where the bodies lie now, with the areas of before.
-            coordinates: Of all nodes now, shape (n_nodes, dim), [length].
-            means: The coupling of each pair of mortar contact; None for other pairs.
+        `coordinates`: of all nodes now, shape (n_nodes, dim), [length]; `means`: the coupling of each pair of
+        mortar contact; None for other pairs.
         """
         count, before = points.count, points.area
         areas = cls(np.zeros(count), before, np.ones(count), *np.zeros((2, count), dtype=bool))
@@ -375,8 +356,7 @@ class PointAreas:
 
         The last is zero by nodes, and where another part counts.
 
-        Args:
-            by_true: Derivative by `true`, shape (n,).
+        `by_true`: derivative by `true`, shape (n,).
         """
         ratio = np.where(self.facing, np.where(self.much, 1.0, self.before / self.now), 0.0)
         by_part = by_true * self.share

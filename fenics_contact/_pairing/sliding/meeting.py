@@ -90,12 +90,10 @@ class Meeting:
     ) -> Projection:
         """Return the closest points of the candidates on the master. Collective.
 
-        Args:
-            coordinates: Of all nodes, shape (n_nodes, dim), [length].
-            last: Last facets, −1 where there is none, shape (n_candidates,), and local coordinates.
-            met: Whether candidates are known to be on the side of their points, shape (n_candidates,).
-            reach: Distance beyond which no point is wanted, [length].
-            comm: Communicator of the ranks, each of which projects a share.
+        `coordinates`: of all nodes, shape (n_nodes, dim), [length]; `last`: last facets, −1 where there is
+        none, shape (n_candidates,), and local coordinates; `met`: whether candidates are known to be on the
+        side of their points, shape (n_candidates,); `reach`: distance beyond which no point is wanted,
+        [length]; `comm`: communicator of the ranks, each of which projects a share.
         """
         assert self.patches is not None
         mine = np.arange(comm.rank, len(self.candidates), comm.size)
@@ -116,8 +114,7 @@ class Meeting:
 def meetings_of(scene: Scene, fixed: np.ndarray, comm: MPI.Comm) -> tuple[Meeting, ...]:
     """Return the pairs of a scene in its reference configuration. Collective.
 
-    Args:
-        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
     """
     number = slave = np.zeros(0, dtype=np.int64)
     if scene.contacts and scene.ties:
@@ -156,9 +153,6 @@ def _within_body(meeting: Meeting, master: FacetedSurface, facets: float = 3.0) 
 
     Candidates have no points on patches on which they lie, nor on facets behind them in the undeformed body:
     those on the other side of a thin wall.
-
-    Args:
-        facets: Reach of the contact in sizes of facets.
     """
     assert meeting.patches is not None
     corners = master.points[master.facets]
@@ -193,9 +187,6 @@ def shared_once(meetings: tuple[Meeting, ...], scene: Scene) -> tuple[Meeting, .
     Wherever the bodies lie, such nodes have the same counterpart in both pairs: the split of their force
     would not be determined. They keep the area of both surfaces. By mortar the counterparts are means over
     different facets, and of other masters a node may leave one for the other: these points are left alone.
-
-    Args:
-        meetings: The pairs in the reference configuration.
     """
     pairs, result = scene.contacts, list(meetings)
     for other, pair in enumerate(pairs):

@@ -38,12 +38,10 @@ def turning_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.n
 
     so that each of two edges has the twist that it needs where they meet. First derivatives are continuous.
 
-    Args:
-        local: Local coordinates, shape (n, 2).
+    `local`: local coordinates, shape (n, 2).
 
-    Returns:
-        Values, shape (n, 2 · corners), first derivatives, (n, 2 · corners, 2), and second ones, (n, 2 ·
-        corners, 2, 2).
+    Returns values, shape (n, 2 · corners), first derivatives, (n, 2 · corners, 2), and second ones, (n, 2 ·
+    corners, 2, 2).
 
     References:
         H. Chiyokura, F. Kimura, Design of solids with free-form surfaces, Computer Graphics 17 (1983), with
@@ -154,9 +152,7 @@ def n_functions(corners: int, order: int) -> int:
 def patch_functions(local: np.ndarray, corners: int, order: int) -> PatchValues:
     """Evaluate the functions of patches with 4, 3 or 2 corners: `edge_functions`, `turning_functions`.
 
-    Args:
-        local: Local coordinates as for `fenics_contact._surfaces.facets.shape_functions`, shape (n, dim − 1).
-        order: 1, or 2 for patches that are pieces of quadratic facets.
+    `local`: local coordinates as for `fenics_contact._surfaces.facets.shape_functions`, shape (n, dim − 1).
     """
     edges = edge_functions(local, corners, order)
     if corners == 2:
@@ -187,9 +183,7 @@ def edge_functions(local: np.ndarray, corners: int, order: int) -> PatchValues:
 def edge_derivatives(control: sp.csr_matrix, corners: int, order: int, t: float, way: int) -> sp.csr_matrix:
     """Return weights of the nodes in derivatives at t of all edges, towards their next or last corner.
 
-    Args:
-        control: Weights of the nodes in `edge_functions`, shape (n_facets · functions, n_nodes).
-        t: Place on each edge, from 0 to 1.
+    `control`: weights of the nodes in `edge_functions`, shape (n_facets · functions, n_nodes).
     """
     place = corner_places(corners)
     after, step = np.roll(place, -1, axis=0), np.roll(place, -way, axis=0) - place
@@ -305,14 +299,11 @@ def edge_turns(tangents: SurfaceTangents, control: sp.csr_matrix, order: int) ->
     and C' are linear in the nodes with fixed weights, p and q are fixed: so whatever becomes of the nodes, M
     and C' span a plane that both patches have in common.
 
-    Args:
-        tangents: The tangents at the corners, of a surface in space.
-        control: Weights of the nodes in the patches' functions along edges, see `edge_functions`, shape
-            (n_facets · functions, n_nodes).
+    `control`: weights of the nodes in the patches' functions along edges, see `edge_functions`, shape
+    (n_facets · functions, n_nodes).
 
-    Returns:
-        Shape (n_facets · corners · 2, n_nodes): of both functions of each edge, see `turning_functions`; zero
-        at edges that end in a straight tangent.
+    The result has shape (n_facets · corners · 2, n_nodes): of both functions of each edge, see
+    `turning_functions`; zero at edges that end in a straight tangent.
 
     References:
         H. Chiyokura, F. Kimura, Design of solids with free-form surfaces, Computer Graphics 17 (1983).
@@ -340,10 +331,8 @@ def edge_turns(tangents: SurfaceTangents, control: sp.csr_matrix, order: int) ->
 def _split(edge: np.ndarray, across: np.ndarray, pair: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return unit vectors M orthogonal to the edge, on the side of its patch's corner, p and q.
 
-    Args:
-        edge: C' in the axes of the tangent plane, shape (n_facets, corners, 2).
-        across: p M + q C' likewise.
-        pair: Both tangents of the corner, whose sense is that of the facet, shape (n_facets, corners, 2, 2).
+    `edge`: C' in the axes of the tangent plane, shape (n_facets, corners, 2); `pair`: both tangents of the
+    corner, whose sense is that of the facet, shape (n_facets, corners, 2, 2).
     """
     sense = np.sign(np.linalg.det(pair))[..., None]
     length = np.linalg.norm(edge, axis=2)
@@ -408,8 +397,7 @@ class SmoothPatches:
     def coefficients(self, points: np.ndarray) -> np.ndarray:
         """Return the coefficients of all patches, shape (n_facets, n_functions, dim).
 
-        Args:
-            points: Present coordinates of the surface's nodes, shape (n_nodes, dim), [length].
+        `points`: present coordinates of the surface's nodes, shape (n_nodes, dim), [length].
         """
         return np.asarray(self.control @ points).reshape(len(self.facets), -1, self.dim)
 
@@ -420,9 +408,8 @@ class SmoothPatches:
     def weights(self, facet: np.ndarray, values: np.ndarray) -> sp.csr_matrix:
         """Return the weights of the surface's nodes at points, shape (n, n_nodes).
 
-        Args:
-            facet: Facets, shape (n,).
-            values: Functions there, or one of their derivatives, shape (n, n_functions).
+        `facet`: facets, shape (n,); `values`: functions there, or one of their derivatives, shape (n,
+        n_functions).
         """
         count, size = values.shape
         column = size * facet[:, None] + np.arange(size)
@@ -445,13 +432,7 @@ def _positions(surface: FacetedSurface, count: int) -> sp.csr_matrix:
 
 
 def _bent(surface: FacetedSurface, tangents: SurfaceTangents, control: sp.csr_matrix) -> sp.csr_matrix:
-    """Return by which weights the tangents of quadratic edges differ from straight ones, as their ``bends``.
-
-    Args:
-        surface: The surface, with quadratic facets.
-        tangents: Its tangents; those that are not smooth do not differ.
-        control: Weights of the nodes in the patches' functions without tangents.
-    """
+    """Return the weights by which tangents of quadratic edges differ from straight ones, as ``bends``."""
     corner, parts = surface.facets.ravel(), []
     for way in (1, -1):
         other = np.roll(surface.facets, -way, axis=1).ravel()

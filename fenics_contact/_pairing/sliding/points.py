@@ -44,12 +44,8 @@ def with_given_offsets(
     between facets and may differ from that of the true surfaces: in the given geometry, undeformed, it is
     what the pair says.
 
-    Args:
-        meetings: The pairs of a scene without offsets.
-        scene: That scene before any design moved its surfaces.
-        stood: Its points there, with the distances that are measured while bodies move.
-        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
-        comm: Communicator of the ranks; all have the same pairs and points.
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `comm`: communicator of the
+    ranks; all have the same pairs and points.
     """
     first = find_contact_points(scene, fixed, comm, told=True)
     result = []
@@ -124,8 +120,7 @@ class SlidingPoints:
     def carry(self, values: np.ndarray, other: SlidingPoints) -> np.ndarray:
         """Return values of another set of points at these, zero where it has no such point.
 
-        Args:
-            values: Values at the other points, shape (n_other, ...).
+        `values`: values at the other points, shape (n_other, ...).
         """
         result = np.zeros((self.points.count, *values.shape[1:]), dtype=values.dtype)
         _, here, there = np.intersect1d(self.key, other.key, assume_unique=True, return_indices=True)
@@ -137,8 +132,7 @@ class SlidingPoints:
 
         They turn with the normals, by the smallest rotation.
 
-        Args:
-            friction: Forces in the other points' tangents, shape (n_other, dim − 1).
+        `friction`: forces in the other points' tangents, shape (n_other, dim − 1).
         """
         vectors = np.einsum("na,nad->nd", friction, other.points.tangents)
         return self._in_frames(self.carry(vectors, other), self.carry(other.points.normal, other))
@@ -149,8 +143,7 @@ class SlidingPoints:
         It turns with the master where the nodes stand now, from there by the smallest rotation of normals:
         what bodies that turn together have slipped before stays what it is beside them.
 
-        Args:
-            slip: Slip in the other points' tangents, shape (n_other, dim − 1), [length].
+        `slip`: slip in the other points' tangents, shape (n_other, dim − 1), [length].
         """
         turn = self._turned_masters(other)
         vectors = self.carry(np.einsum("na,nad->nd", slip, other.points.tangents), other)
@@ -200,11 +193,9 @@ class SlidingPoints:
     def met_areas_pulled_back(self, by_met: np.ndarray) -> np.ndarray:
         """Vector-Jacobian product of parts that face masters with respect to the coordinates. Collective.
 
-        Args:
-            by_met: Derivative by the areas of the slave that face the master, of mortar contact alone, (n,).
+        `by_met`: derivative by the areas of the slave that face the master, of mortar contact alone, (n,).
 
-        Returns:
-            Shape (n_nodes, dim).
+        The result has shape (n_nodes, dim).
         """
         result = np.zeros_like(self.coordinates)
         for mine, means in self._by_means:
@@ -242,10 +233,8 @@ class SlidingPoints:
     def mean_tangents(self, normal: np.ndarray, friction: np.ndarray, start: MaterialPoints) -> MeanTangents:
         """Return what derivatives of mortar contact have beside the rows of its forces. Collective.
 
-        Args:
-            normal: λ_N, shape (n,), [force].
-            friction: τ in the points' tangents, shape (n, dim − 1), [force].
-            start: Where the nodes stood, see `material_points`.
+        `normal`: λ_N, shape (n,), [force]; `friction`: τ in the points' tangents, shape (n, dim − 1),
+        [force].
         """
         (way, weights), count = self._way(start), self.points.count
         total = MeanTangents.none(count, friction.shape[1], self.coordinates.size)
@@ -277,11 +266,8 @@ class SlidingPoints:
         That is, of the contact forces f of mortar contact at fixed multipliers, and of its gaps g beside
         `gap_rows`.
 
-        Args:
-            normal: λ_N, shape (n,), [force].
-            friction: τ in the points' tangents, shape (n, dim − 1), [force].
-            by_gap: Shape (n,).
-            field: By dof of all nodes, shape (n_dofs,).
+        `normal`: λ_N, shape (n,), [force]; `friction`: τ in the points' tangents, shape (n, dim − 1),
+        [force]; `by_gap`: shape (n,); `field`: by dof of all nodes, shape (n_dofs,).
         """
         total = np.zeros(self.coordinates.size)
         for mine, means in self._by_means:
@@ -306,11 +292,7 @@ class SlidingPoints:
         Unchanged when everything moves as one rigid piece. Nodes without a point at the start have no slip,
         see `MaterialPoints.extended`.
 
-        Args:
-            start: Where the nodes stood, see `material_points`.
-
-        Returns:
-            Slip in the present tangents, shape (n, dim − 1), [length].
+        Returns slip in the present tangents, shape (n, dim − 1), [length].
         """
         way, _ = self._way(start)
         return np.asarray(np.einsum("nd,nad->na", way, self.points.tangents))

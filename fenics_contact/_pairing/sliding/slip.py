@@ -112,14 +112,11 @@ def slip_by_start(
     Of t_a·(x_s − Σ W_j(ξ₀) x_j) it is −t_a·S,_b(ξ₀) δξ₀_b, with the master where it lies now; on obstacles
     −t_a·Q δf, with the obstacle's rotation Q since the start and the foot f of the node on it.
 
-    Args:
-        coordinates: Coordinates of all nodes now, shape (n_nodes, dim), [length].
-        start: The points at the start.
-        alike: Numbers of points now and of the same points at the start; others have no derivative.
-        turned: Q of each pair, shape (dim, dim); None for pairs of mortar contact, which are left out.
+    `coordinates`: coordinates of all nodes now, shape (n_nodes, dim), [length]; `turned`: Q of each pair,
+    shape (dim, dim); None for pairs of mortar contact, which are left out.
 
-    Returns:
-        Shape (n · (dim − 1), n_dofs), dof dim · node + component, rows as those of `SlidingPoints.slip_rows`.
+    The result has shape (n · (dim − 1), n_dofs), dof dim · node + component, rows as those of
+    `SlidingPoints.slip_rows`.
     """
     count, nodes = points.count, len(coordinates)
     width, dim = points.tangents.shape[1:]
@@ -155,13 +152,7 @@ def slip_by_start_of_means(
 
     Of t_a·Σ (W_j − W_j,start) x_j it is −t_a·Σ δW_j,start x_j, with the master where it lies now.
 
-    Args:
-        coordinates: Coordinates of all nodes now, shape (n_nodes, dim), [length].
-        start: All points at the start, and which of them are those of the pair.
-        means: The coupling of the pair at the start.
-
-    Returns:
-        As `slip_by_start`.
+    `coordinates`: coordinates of all nodes now, shape (n_nodes, dim), [length].
     """
     every, mine = start
     count, (width, dim) = points.count, points.tangents.shape[1:]

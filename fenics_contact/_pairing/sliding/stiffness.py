@@ -36,9 +36,7 @@ class Differential:
 def without_patches(curvature: np.ndarray, n_nodes: int) -> Differential:
     """Return the differential of points that are on no patches.
 
-    Args:
-        curvature: Second derivatives of the distance of rigid obstacles, shape (n, dim, dim), [1 / length].
-        n_nodes: Number of nodes of all bodies.
+    `curvature`: second derivatives of the distance of rigid obstacles, shape (n, dim, dim), [1 / length].
     """
     count, dim, _ = curvature.shape
     none = (sp.csr_matrix((count, n_nodes)),) * (dim - 1)
@@ -61,9 +59,7 @@ def join_differentials(parts: Sequence[Differential], dim: int, n_nodes: int) ->
 def spread(vectors: np.ndarray, weights: sp.csr_matrix) -> sp.csr_matrix:
     """Return v · Σ w_j u_j for each point, shape (n, n_nodes · dim); dof dim · node + component.
 
-    Args:
-        vectors: v, shape (n, dim).
-        weights: w, shape (n, n_nodes).
+    `vectors`: v, shape (n, dim); `weights`: w, shape (n, n_nodes).
     """
     count, dim = vectors.shape
     row = np.repeat(np.arange(count), np.diff(weights.indptr))
@@ -128,10 +124,8 @@ def _combined(factors: np.ndarray, rows: Sequence[sp.csr_matrix]) -> sp.csr_matr
 def frame_changes(normal: np.ndarray, axes: np.ndarray, change: np.ndarray) -> np.ndarray:
     """Return how tangents turn with their normals, see `tangent_frames`, shape (n, dim − 1, k, dim).
 
-    Args:
-        normal: Unit normals, shape (n, dim).
-        axes: Axes nearest to the first tangents, shape (n, dim).
-        change: Changes of the normals, shape (n, k, dim).
+    `normal`: unit normals, shape (n, dim); `axes`: axes nearest to the first tangents, shape (n, dim);
+    `change`: changes of the normals, shape (n, k, dim).
     """
     if normal.shape[1] == 2:
         return np.stack([change[..., 1], -change[..., 0]], axis=2)[:, None]
@@ -182,9 +176,7 @@ def geometric_stiffness(
     With p_a = S,_a·δv, q_a = n·δS,_a, m = S,_a·S,_b, k = n·S,_ab and H = m − r k,
     −δ²g = pᵀ m⁻¹ k H⁻¹ p + pᵀ H⁻¹ q + qᵀ H⁻¹ p + r qᵀ H⁻¹ q: rank 2 (dim − 1) at each point.
 
-    Args:
-        multiplier: λ_N, shape (n,), [force]; points where it is not positive contribute nothing.
-        rounding: Values of D below this fraction of the largest are left out.
+    `multiplier`: λ_N, shape (n,), [force]; points where it is not positive contribute nothing.
 
     References:
         P. Wriggers, Computational Contact Mechanics, 2nd ed., Springer 2006, chapters 4 and 6.
@@ -253,8 +245,7 @@ def friction_stiffness(points: ContactPoints, differential: Differential, fricti
     The tangents turn with the normal, and the force on the master moves over its nodes. Both depend on the
     coordinates through δn and δξ, see `point_motion`: rank 2 (dim − 1) at each point, unsymmetric.
 
-    Args:
-        friction: τ in the points' tangents, shape (n, dim − 1), [force].
+    `friction`: τ in the points' tangents, shape (n, dim − 1), [force].
     """
     rubbed, jump = np.flatnonzero(friction.any(axis=1)), points.jump
     if not (differential.tangents[rubbed].any() or differential.curvature[rubbed].any()):
