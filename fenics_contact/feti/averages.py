@@ -18,12 +18,10 @@ def nodal_mean(decomposition: Decomposition, displacement: np.ndarray) -> np.nda
 
     Copies on all ranks count, so that the mean does not depend on the distribution.
 
-    Args:
-        displacement: This rank's torn displacement, shape (torn_size,), [length].
+    `displacement`: this rank's torn displacement, shape (torn_size,), [length].
 
-    Returns:
-        Displacement of the nodes of all bodies, NaN on nodes that this rank does not hold, shape
-        (n_nodes, dim), [length].
+    Returns displacement of the nodes of all bodies, NaN on nodes that this rank does not hold, shape
+    (n_nodes, dim), [length].
     """
     tearing = decomposition.tearing
     here, columns = decomposition.held
@@ -39,12 +37,10 @@ def nodal_mean(decomposition: Decomposition, displacement: np.ndarray) -> np.nda
 def nodal_mean_at(decomposition: Decomposition, field: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """Return the same mean of a torn field at some nodes, on all ranks. Collective.
 
-    Args:
-        field: This rank's part of the field, shape (torn_size,).
-        nodes: Nodes among those of all bodies, shape (n,).
+    `field`: this rank's part of the field, shape (torn_size,); `nodes`: nodes among those of all bodies,
+    shape (n,).
 
-    Returns:
-        Shape (n, dim), replicated.
+    The result has shape (n, dim), replicated.
     """
     tearing = decomposition.tearing
     place, copy, block = decomposition.copies_here(nodes)
@@ -56,12 +52,10 @@ def nodal_mean_at(decomposition: Decomposition, field: np.ndarray, nodes: np.nda
 def nodal_mean_transposed(decomposition: Decomposition, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return the torn field that does the same work on a torn field as values at nodes do on its means.
 
-    Args:
-        nodes: Different nodes among those of all bodies, shape (n,).
-        values: Values at these nodes, shape (n, dim).
+    `nodes`: different nodes among those of all bodies, shape (n,); `values`: values at these nodes, shape (n,
+    dim).
 
-    Returns:
-        This rank's part of the field, shape (torn_size,).
+    Returns this rank's part of the field, shape (torn_size,).
     """
     tearing = decomposition.tearing
     place, copy, block = decomposition.copies_here(nodes)
@@ -73,11 +67,9 @@ def nodal_mean_transposed(decomposition: Decomposition, nodes: np.ndarray, value
 def nodal_sum(decomposition: Decomposition, force: np.ndarray) -> np.ndarray:
     """Return the sum of a torn force over all copies of each node, on all ranks. Collective.
 
-    Args:
-        force: This rank's torn force, shape (torn_size,), [force].
+    `force`: this rank's torn force, shape (torn_size,), [force].
 
-    Returns:
-        Forces on the nodes of all bodies, shape (n_nodes, dim), replicated, [force].
+    Returns forces on the nodes of all bodies, shape (n_nodes, dim), replicated, [force].
     """
     tearing = decomposition.tearing
     here, block = decomposition.held

@@ -40,8 +40,7 @@ class Relations:
     def of_supports(self, prescribed: np.ndarray) -> np.ndarray:
         """Return the contribution of prescribed displacements to each row, shape (n_rows,), [length].
 
-        Args:
-            prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
+        `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
         """
         moved = self.points.jump @ np.nan_to_num(prescribed)
         return np.asarray(np.einsum("rd,rd->r", self.directions, moved[self.which]))
@@ -53,8 +52,7 @@ class Relations:
         closed point cannot slip, and an open one opens. Such a row is left to the normal one unless it has
         the larger free part, or supports drive the point along it: then it slips.
 
-        Args:
-            fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+        `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
         """
         free = movable(self.points, fixed)[self.which]
         left = np.where(free, self.directions, 0.0)
@@ -79,8 +77,7 @@ class Relations:
         these rows orthogonal to them. Prescribed components are known: kept, they would couple these rows to
         those of the supports, and make them redundant where supports hold both surfaces.
 
-        Args:
-            fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+        `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
         """
         if self.count == 0:
             none = np.zeros(0, dtype=np.int64)
@@ -109,12 +106,9 @@ def on_copies(
 ) -> Rows:
     """Return rows on nodal displacements, the means of copies weighted by stiffness, as rows of B.
 
-    Args:
-        row: Row of each entry, shape (n_entries,).
-        node: Its node, shape (n_entries,).
-        component: Its component, shape (n_entries,).
-        value: Its value, shape (n_entries,).
-        slaves: For each row a node whose rank owns it, shape (n_rows,).
+    `row`: row of each entry, shape (n_entries,); `node`: its node, shape (n_entries,); `component`: its
+    component, shape (n_entries,); `value`: its value, shape (n_entries,); `slaves`: for each row a node whose
+    rank owns it, shape (n_rows,).
     """
     entry, copy = tearing.copies_of(node)
     owner = tearing.subdomain_rank[tearing.copy_subdomain[tearing.first_copy[slaves]]]
@@ -130,9 +124,7 @@ def normal_relations(points: ContactPoints) -> Relations:
 def tangential_relations(points: ContactPoints, frictional: np.ndarray, prescribed: np.ndarray) -> Relations:
     """Return the slip t_a·(u_slave − u_master): dim − 1 consecutive rows for each frictional point.
 
-    Args:
-        frictional: Numbers of the points that have friction.
-        prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
+    `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
     """
     dim = points.normal.shape[1]
     which, directions = np.repeat(frictional, dim - 1), points.tangents[frictional].reshape(-1, dim)
@@ -145,9 +137,7 @@ def tied_relations(points: ContactPoints, ties: Sequence[Tie], fixed: np.ndarray
 
     A component that a support prescribes on the slave node is left to the support.
 
-    Args:
-        points: Points of the ties, see `find_tied_points`.
-        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
     """
     dim = points.normal.shape[1]
     sliding = np.array([tie.sliding for tie in ties], dtype=bool)[points.pair]

@@ -100,10 +100,8 @@ def tear(
 ) -> Tearing:
     """Cut the bodies along a partition of their cells and distribute the subdomains over ranks.
 
-    Args:
-        partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
-        ranks: Number of ranks; each has about the same work, of every body consecutive subdomains.
-        stiffness: Body name -> typical nodal stiffness of every cell, shape (n_cells,), [force / length].
+    `ranks`: number of ranks; each has about the same work, of every body consecutive subdomains; `stiffness`:
+    body name -> typical nodal stiffness of every cell, shape (n_cells,), [force / length].
     """
     numbers = NodeNumbers.of(scene)
     names, node_offset = numbers.body_names, numbers.node_offset
@@ -136,13 +134,7 @@ def tear(
 
 
 def _costs(copy_subdomain: np.ndarray, shared: np.ndarray, count: int, dim: int) -> np.ndarray:
-    """Return the estimated cost of each subdomain, shape (n_subdomains,), [s].
-
-    Args:
-        copy_subdomain: Subdomain of each copy of a node.
-        shared: Whether other subdomains share that node.
-        dim: Displacement components of a node.
-    """
+    """Return the estimated cost of each subdomain, shape (n_subdomains,), [s]."""
     size = dim * np.bincount(copy_subdomain, minlength=count)
     interface = dim * np.bincount(copy_subdomain[shared], minlength=count)
     return np.array([expected_seconds(int(n), int(b)) for n, b in zip(size, interface, strict=True)])
@@ -211,11 +203,7 @@ def stack(parts: Sequence[Rows]) -> Rows:
 def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
     """Collect the supports node by node.
 
-    Returns:
-        The value of each prescribed component, NaN where it is free, shape (n_nodes, dim), [length].
-
-    Raises:
-        InvalidInputError: If two supports prescribe different values for one component of a node.
+    Returns the value of each prescribed component, NaN where it is free, shape (n_nodes, dim), [length].
     """
     prescribed = np.full((tearing.n_nodes, scene.dim), np.nan)
     for support in scene.supports:
@@ -242,11 +230,9 @@ def weighted_helmert(stiffness: np.ndarray) -> np.ndarray:
     Row k is the difference between the stiffness-weighted mean of the first k copies and the next one; with
     equal stiffnesses these are the rows of a Helmert matrix.
 
-    Args:
-        stiffness: D of the copies of each node, shape (n, m).
+    `stiffness`: D of the copies of each node, shape (n, m).
 
-    Returns:
-        Shape (n, m − 1, m).
+    The result has shape (n, m − 1, m).
     """
     count, copies = stiffness.shape
     rows = np.zeros((count, copies - 1, copies))
@@ -271,11 +257,7 @@ class GluingRows:
     fixed: np.ndarray
 
     def right_side(self, prescribed: np.ndarray) -> np.ndarray:
-        """Return c of the rows for displacements from `prescribed_displacements`.
-
-        Raises:
-            InvalidInputError: If the prescribed components are not those for which the rows were built.
-        """
+        """Return c of the rows for displacements from `prescribed_displacements`."""
         if not np.array_equal(~np.isnan(prescribed), self.fixed):
             raise InvalidInputError(
                 "the supports of a scene may change their values, not what they hold: "
@@ -291,8 +273,7 @@ def gluing_rows(tearing: Tearing, fixed: np.ndarray) -> GluingRows:
     A free component of a node with m copies has m − 1 gluing rows of unit length (see `weighted_helmert`, c =
     0). A prescribed one has m rows, one for each copy, which glue it as well.
 
-    Args:
-        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
     """
     multiplicity = tearing.multiplicity
     counts = np.where(fixed, multiplicity[:, None], multiplicity[:, None] - 1)
@@ -499,9 +480,8 @@ class DualNumbering:
     def __init__(self, comm: MPI.Comm, owner: np.ndarray, touched: np.ndarray) -> None:
         """Build numbering and exchange. Collective on ``comm``.
 
-        Args:
-            owner: Owning rank of every row, shape (n_rows,), replicated.
-            touched: Row numbers that this rank's subdomains enter, ascending.
+        `owner`: owning rank of every row, shape (n_rows,), replicated; `touched`: row numbers that this
+        rank's subdomains enter, ascending.
         """
         self.comm = comm
         self.total = len(owner)
@@ -573,11 +553,9 @@ class DualNumbering:
     def sum_rows(self, local: sp.csr_matrix) -> sp.csr_matrix:
         """Add up the ranks' shares of a sparse matrix with one row for each multiplier. Collective.
 
-        Args:
-            local: This rank's share, shape (n_local, n_columns), rows as in local vectors.
+        `local`: this rank's share, shape (n_local, n_columns), rows as in local vectors.
 
-        Returns:
-            The owned rows, shape (n_owned, n_columns).
+        Returns the owned rows, shape (n_owned, n_columns).
         """
         shares = local.tocoo()
         rank = self._owner[self.local_rows][shares.row]
@@ -597,9 +575,8 @@ class Sharing:
     def __init__(self, comm: MPI.Comm, keys: np.ndarray, mine: np.ndarray) -> None:
         """Determine which ranks share which items. Collective on ``comm``.
 
-        Args:
-            keys: Number of each item that this rank holds, ascending, shape (n,).
-            mine: Positions in ``keys`` of those that other ranks may hold as well.
+        `keys`: number of each item that this rank holds, ascending, shape (n,); `mine`: positions in ``keys``
+        of those that other ranks may hold as well.
         """
         self.comm = comm
         every = comm.allgather(keys[mine]) if comm.size > 1 else [keys[mine]]
@@ -614,8 +591,7 @@ class Sharing:
 
         The ranks that share an item obtain bitwise equal sums.
 
-        Args:
-            values: This rank's parts, shape (n, ...).
+        `values`: this rank's parts, shape (n, ...).
         """
         if self.comm.size == 1:
             return values

@@ -52,11 +52,7 @@ class DirectSystem:
     def __init__(
         self, torn: TornSystem, timer: PhaseTimer | None = None, *, previous: DirectSystem | None = None
     ) -> None:
-        """Factor the stiffness.
-
-        Args:
-            previous: System of another load, whose factor is reused.
-        """
+        """Factor the stiffness."""
         self.torn = torn
         (body,) = torn.subdomains
         self._fixed = torn.B.indices

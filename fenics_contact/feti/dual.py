@@ -56,11 +56,8 @@ class DirichletPreconditioner:
     ) -> None:
         """Factor the contact block of B D⁻¹ Bᵀ. Collective.
 
-        Args:
-            B: This rank's part of B on the interface, shape (n_local_rows, n_interface).
-            compliance: Diagonal of D⁻¹, shape (n_interface,), the same for all components of a node.
-            numbering: Owners and exchange of multipliers.
-            n_gluing: Number of gluing and Dirichlet rows; rows of ties and contacts have the higher numbers.
+        `B`: this rank's part of B on the interface, shape (n_local_rows, n_interface); `compliance`: diagonal
+        of D⁻¹, shape (n_interface,), the same for all components of a node.
         """
         self._inverse, self._numbering = inverse, numbering
         self._B = scaled_columns(B, compliance)
@@ -78,16 +75,14 @@ class DirichletPreconditioner:
 
         Rows that are not on the face would stiffen their neighbours, the more the stiffer the slave.
 
-        Args:
-            restriction: Z with orthonormal columns, shape (n_owned, n_face), owned.
+        `restriction`: Z with orthonormal columns, shape (n_owned, n_face), owned.
         """
         return PreconditionerOfFace(self, self._contact.on_face(restriction))
 
     def lifting(self, restriction: sp.csr_matrix) -> Lifting:
         """Return the displacements of the interface that close rows of a face. Collective.
 
-        Args:
-            restriction: Z with orthonormal columns, shape (n_owned, n_face), owned.
+        `restriction`: Z with orthonormal columns, shape (n_owned, n_face), owned.
         """
         return Lifting(self, self._contact.on_face(restriction))
 
@@ -254,13 +249,10 @@ def _dependent_part(
 
     T = ε D (A + ε D)⁻¹ keeps D N and multiplies the rest by ε / (ε + its eigenvalues).
 
-    Args:
-        matrix: A, positive semidefinite, shape (n, n).
-        regularised: Factors of A + ε D.
-        right: x, shape (n,).
+    `matrix`: A, positive semidefinite, shape (n, n); `right`: x, shape (n,).
 
-    Returns:
-        Both vectors, shape (n,), and the number of the block of A that a row belongs to, −1 where z is zero.
+    Returns both vectors, shape (n,), and the number of the block of A that a row belongs to, −1 where z is
+    zero.
     """
     diagonal = matrix.diagonal()
     left = np.where(diagonal > 0.0, right, 0.0)
@@ -324,11 +316,7 @@ class DualSystem:
     ) -> None:
         """Factor the subdomains and assemble d, G, e. Collective.
 
-        Args:
-            torn: The torn system.
-            timer: Collects the wall time.
-            kind: How the subdomains are stored; the cost model chooses by default.
-            previous: System of another geometry; the factors of unchanged subdomains are reused.
+        `kind`: how the subdomains are stored; the cost model chooses by default.
         """
         timer = timer or PhaseTimer()
         comm = torn.numbering.comm
@@ -502,9 +490,6 @@ class DualSystem:
         """Remove the motions in the kernel of B from R, and their rows from G. Collective.
 
         They must not be unknowns: rounding would load them, differently on every face, and nothing resists.
-
-        Raises:
-            InfeasibleError: The load drives one of them.
         """
         unfelt, k = coarse.gram.null_space, coarse.gram.null_space.shape[1]
         # Without one mode of each, the others still span every motion that B sees.
@@ -592,8 +577,7 @@ class DualSystem:
 
         Small, as such a row has no flexibility: any slip that supports prescribe must count as slip.
 
-        Returns:
-            The diagonal, and marks of the rows that got a small one, both owned.
+        Returns the diagonal, and marks of the rows that got a small one, both owned.
         """
         layout, comm = self.torn.layout, self.torn.numbering.comm
         total, count = comm.allreduce(

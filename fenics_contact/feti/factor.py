@@ -28,11 +28,7 @@ class Factor:
     """
 
     def __init__(self, matrix: sp.csr_matrix) -> None:
-        """Factor ``matrix``, shape (n, n).
-
-        Raises:
-            ConvergenceError: If it has no such factors.
-        """
+        """Factor ``matrix``, shape (n, n)."""
         self.size = matrix.shape[0]
         given = symmetric_matrix(matrix, shared=True)
         pc = PETSc.PC().create(PETSc.COMM_SELF)
@@ -79,11 +75,7 @@ class Factor:
 
 
 def require_factored(factor: PETSc.Mat) -> None:
-    """Reject factors that MUMPS could not complete: PETSc passes over that until they are used.
-
-    Raises:
-        ConvergenceError: With the code of MUMPS.
-    """
+    """Reject factors that MUMPS could not complete: PETSc passes over that until they are used."""
     code = factor.getMumpsInfog(1)
     if code < 0:
         raise _failure(f"MUMPS ends with INFOG(1) = {code}")
@@ -121,9 +113,7 @@ def _failure(reason: str) -> ConvergenceError:
 def symmetric_matrix(matrix: sp.csr_matrix, *, shared: bool = False) -> PETSc.Mat:
     """Return a symmetric positive definite matrix on one rank in PETSc's format.
 
-    Args:
-        matrix: The matrix, shape (n, n).
-        shared: Whether both may have the same entries in memory.
+    `matrix`: the matrix, shape (n, n).
     """
     if shared and not matrix.has_canonical_format:
         matrix = matrix.copy()
@@ -158,12 +148,9 @@ def _solver() -> str:
 def fixing_nodes(points: np.ndarray, count: int = FIXING_NODES) -> np.ndarray:
     """Select well-spread nodes: each one is the farthest from those already selected.
 
-    Args:
-        points: Coordinates, shape (n, dim).
-        count: Number of nodes to select.
+    `points`: coordinates, shape (n, dim).
 
-    Returns:
-        Row numbers of ``points``, shape (min(count, n),).
+    Returns row numbers of ``points``, shape (min(count, n),).
     """
     distance = np.linalg.norm(points - points.mean(axis=0), axis=1)
     chosen = [int(np.argmax(distance))]
@@ -180,10 +167,8 @@ def regularised(stiffness: sp.csr_matrix, kernel: np.ndarray, points: np.ndarray
     R̂ is the kernel restricted to a few fixing nodes and orthonormalised; ρ is the largest diagonal
     entry of K.
 
-    Args:
-        stiffness: K, shape (dim n, dim n), block b of dim dofs at ``points[b]``.
-        kernel: Columns that span the kernel of K, shape (dim n, n_modes).
-        points: Coordinates by block, shape (n, dim).
+    `stiffness`: K, shape (dim n, dim n), block b of dim dofs at ``points[b]``; `kernel`: columns that span
+    the kernel of K, shape (dim n, n_modes); `points`: coordinates by block, shape (n, dim).
 
     References:
         Brzobohatý, Dostál, Kozubek, Kovář, Markopoulos: Cholesky decomposition with fixing nodes to
@@ -214,11 +199,7 @@ def held_by(stiffness: sp.csr_matrix, dofs: np.ndarray, motions: np.ndarray, wei
 
 
 def petsc_call(name: str, *arguments: object) -> None:
-    """Call a function by its name; integers are handles of objects.
-
-    Raises:
-        PETSc.Error: If it returns an error.
-    """
+    """Call a function by its name; integers are handles of objects."""
     wrapped = [ctypes.c_void_p(a) if isinstance(a, int) else a for a in arguments]
     code = getattr(_petsc(), name)(*wrapped)
     if code:

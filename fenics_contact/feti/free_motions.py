@@ -42,12 +42,7 @@ class FreeMotions:
         return len(self.load)
 
     def of_rows(self, dof: np.ndarray, relations: Sequence[Relations]) -> sp.csr_matrix:
-        """Return Q of all rows, shape (n_rows, n), of those on nodes.
-
-        Args:
-            dof: Node and component of each gluing and Dirichlet row, as node · dim + component.
-            relations: The rows of ties and contacts.
-        """
+        """Return Q of all rows, shape (n_rows, n), of those on nodes."""
         parts = [self.columns[dof]]
         for relation in relations:
             dim = relation.directions.shape[1]
@@ -59,12 +54,7 @@ class FreeMotions:
     def require_felt(self, relations: Sequence[Relations], fixed: np.ndarray) -> None:
         """Reject rows of ties and contacts in which nothing but rigid surfaces moves.
 
-        Args:
-            relations: The rows of ties and contacts.
-            fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
-
-        Raises:
-            InvalidInputError: Says how many.
+        `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
         """
         moving = _moving(self.columns, fixed.shape)
         for relation in relations:
@@ -88,12 +78,7 @@ NO_MOTIONS = FreeMotions(sp.csr_matrix((0, 0)), np.zeros(0))
 
 
 def free_motions(scene: Scene, tearing: Tearing) -> FreeMotions:
-    """Return the free motions of all rigid surfaces on the nodes of their bodies.
-
-    Raises:
-        InvalidInputError: If a support holds nodes of a rigid surface that are free to move, or the slave of
-            a contact or tie has some.
-    """
+    """Return the free motions of all rigid surfaces on the nodes of their bodies."""
     columns, loads, size = [], [], tearing.n_nodes * scene.dim
     for number, surface in enumerate(scene.supports):
         if not isinstance(surface, RigidSurface) or not surface.free.any():

@@ -41,9 +41,7 @@ class Condensation:
     def __init__(self, pattern: sp.csr_matrix, interface: np.ndarray) -> None:
         """Prepare for symmetric matrices with the sparsity of ``pattern``.
 
-        Args:
-            pattern: Any matrix with the pattern, shape (n, n).
-            interface: The dofs b, shape (n_b,).
+        `pattern`: any matrix with the pattern, shape (n, n); `interface`: the dofs b, shape (n_b,).
         """
         self._size, self._interface = len(interface), interface
         self._structure = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType))
@@ -140,11 +138,7 @@ class ExplicitOperator:
     def __init__(self, subdomain: Subdomain, interface: np.ndarray, condensations: Condensations) -> None:
         """Condense a subdomain on its interface.
 
-        Args:
-            interface: Interface dofs b, shape (n_b,).
-
-        Raises:
-            InvalidInputError: If the stiffness is not positive semidefinite.
+        `interface`: interface dofs b, shape (n_b,).
         """
         stiffness, self._interface = subdomain.stiffness, interface
         schur = condensations.schur_complement(stiffness, interface)
@@ -258,11 +252,8 @@ class FactoredOperator:
     ) -> None:
         """Keep the factors and the blocks that couple the interface.
 
-        Args:
-            stiffness: Of the subdomain, shape (n, n).
-            interface: Interface dofs b, shape (n_b,).
-            whole: Inverse of the stiffness, or of one that is held.
-            inside: Inverse on all other dofs; None without any.
+        `stiffness`: of the subdomain, shape (n, n); `interface`: interface dofs b, shape (n_b,); `inside`:
+        inverse on all other dofs; None without any.
         """
         self._interface, self._factor, self._inside = interface, whole, inside
         self._rest = dofs_inside(stiffness, interface)
@@ -320,8 +311,7 @@ class ImplicitOperator(FactoredOperator):
     def __init__(self, subdomain: Subdomain, interface: np.ndarray) -> None:
         """Factor a subdomain.
 
-        Args:
-            interface: Interface dofs b, shape (n_b,).
+        `interface`: interface dofs b, shape (n_b,).
         """
         stiffness = subdomain.stiffness
         inside = dofs_inside(stiffness, interface)
@@ -372,10 +362,7 @@ class TornInverse:
     ) -> None:
         """Factor the subdomains.
 
-        Args:
-            B: This rank's part of B, shape (n_local_rows, torn_size).
-            kind: Sparse factors, dense matrices, or whichever the cost model expects to be faster.
-            previous: Operators of another geometry; those of unchanged subdomains are reused.
+        `B`: this rank's part of B, shape (n_local_rows, torn_size).
         """
         self.offset = np.cumsum([0] + [subdomain.mesh.size for subdomain in subdomains])
         self._subdomains, self._kind = tuple(subdomains), kind
@@ -418,8 +405,7 @@ class TornInverse:
 
         Rigid motions have no energy; they are subtracted first, to avoid cancellation.
 
-        Args:
-            displacement: w, shape (n_interface,).
+        `displacement`: w, shape (n_interface,).
         """
         energy, force = 0.0, np.zeros_like(displacement)
         each = zip(self._subdomains, self.operators, self._local, self._parts, strict=True)
@@ -436,8 +422,7 @@ class TornInverse:
     def extend(self, displacement: np.ndarray) -> np.ndarray:
         """Return the torn displacement of least energy for one of the interface, shape (torn_size,).
 
-        Args:
-            displacement: w, shape (n_interface,).
+        `displacement`: w, shape (n_interface,).
         """
         whole = np.zeros(self.offset[-1])
         each = zip(self.operators, self._parts, self.offset[:-1], self.offset[1:], strict=True)
@@ -498,9 +483,8 @@ def kernel_matrix(
 ) -> sp.csr_matrix:
     """Return R of this rank, shape (torn_size, total_modes): only columns of its own subdomains are nonzero.
 
-    Args:
-        total_modes: Number of kernel vectors of all subdomains of all ranks.
-        mode_offset: First kernel vector of each of this rank's subdomains.
+    `total_modes`: number of kernel vectors of all subdomains of all ranks; `mode_offset`: first kernel vector
+    of each of this rank's subdomains.
     """
     blocks = sp.block_diag([subdomain.kernel for subdomain in subdomains], format="coo")
     own = np.concatenate(

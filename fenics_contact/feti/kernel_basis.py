@@ -23,11 +23,9 @@ SPANNED = 1e-10
 def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
     """Return T that replaces the modes of every cut body's first subdomain by those of the body. Collective.
 
-    Args:
-        offset: First mode of each subdomain and the total, replicated, shape (n_subdomains + 1,).
+    `offset`: first mode of each subdomain and the total, replicated, shape (n_subdomains + 1,).
 
-    Returns:
-        Coefficients of the new basis vectors in the old ones as columns, (n_modes, n_modes), replicated.
+    Returns coefficients of the new basis vectors in the old ones as columns, (n_modes, n_modes), replicated.
     """
     comm = torn.numbering.comm
     with together(comm):

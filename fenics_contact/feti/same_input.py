@@ -26,13 +26,6 @@ def check_same_input(comm: MPI.Comm, scene: Scene, **settings: Any) -> None:
     Compares hashes of all arrays, the text of all numbers, the parameters of materials, and values of
     functions of position at a few nodes; of other functions and objects only the names. One message of some
     bytes per rank; the cost is the hashing of the meshes.
-
-    Args:
-        **settings: Other inputs that must be the same, by name.
-
-    Raises:
-        InvalidInputError: On all ranks; names what differs.
-        UserCodeError: If a function or a material fails.
     """
     if comm.size == 1:
         return

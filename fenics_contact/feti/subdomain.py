@@ -47,12 +47,10 @@ class LocalOperator(Protocol):
 
         Both in double precision.
 
-        Args:
-            displacement: w of the interface, shape (n_b,).
+        `displacement`: w of the interface, shape (n_b,).
 
-        Returns:
-            The displacement, w itself on the interface and −K_ii⁻¹ K_ib w inside, shape (n,), and S w, shape
-            (n_b,).
+        Returns the displacement, w itself on the interface and −K_ii⁻¹ K_ib w inside, shape (n,), and S w,
+        shape (n_b,).
         """
 
     def invert(self, right: np.ndarray) -> np.ndarray:
@@ -67,10 +65,8 @@ def interface_dofs(touched: np.ndarray, kernel: np.ndarray, points: np.ndarray) 
 
     With the interface fixed the inside must have no rigid motion, or K_ii would be singular.
 
-    Args:
-        touched: Marks of the dofs, shape (n,).
-        kernel: Columns that span the kernel of K, shape (n, n_modes).
-        points: Coordinates by block of dim dofs, shape (n / dim, dim).
+    `touched`: marks of the dofs, shape (n,); `kernel`: columns that span the kernel of K, shape (n, n_modes);
+    `points`: coordinates by block of dim dofs, shape (n / dim, dim).
     """
     modes, _ = np.linalg.qr(kernel)
     trace = np.linalg.svd(modes[touched], compute_uv=False)
@@ -178,11 +174,7 @@ class CachedMatrix:
 
 
 def cut_out(number: int, body_name: str, body: Body, cells: np.ndarray) -> SubdomainMesh:
-    """Build the mesh of one subdomain.
-
-    Args:
-        cells: Its cells that belong to the subdomain.
-    """
+    """Build the mesh of one subdomain."""
     mesh = body.mesh
     used, local = np.unique(mesh.cells[cells], return_inverse=True)
     local = local.reshape(len(cells), -1)
@@ -201,18 +193,7 @@ def assemble(
     forms: FormLibrary,
     earlier: Subdomain | None = None,
 ) -> Subdomain:
-    """Assemble K_s, f_s and R_s for the present coordinates of ``body``.
-
-    Args:
-        body: Its body, with the coordinates to use.
-        loads: Loads of the scene, resultants already spread.
-        earlier: The same subdomain in another state. It is returned unchanged if coordinates, materials and
-            loads are equal; if only the loads differ, its matrix and kernel are reused.
-
-    Raises:
-        InvalidInputError: If a matrix or load entry is not a number, or the material's kernel is not a
-            kernel.
-    """
+    """Assemble K_s, f_s and R_s for the present coordinates of ``body``."""
     parts = composition(body, mesh.cells)
     points = body.mesh.points[mesh.nodes]
     acting = tuple(load for load in loads if _acts(load, mesh, body))

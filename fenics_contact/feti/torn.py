@@ -53,9 +53,6 @@ def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
     """Reject an initial geometry whose bodies overlap by more than their faceting explains.
 
     Overlap that the pair declares, see `ContactPair.interference`, is a load like any other.
-
-    Raises:
-        InvalidInputError: Names the pair, the number of nodes and the depth.
     """
     by_mortar = np.array([pair.by_mortar for pair in scene.contacts])
     # Where a facet of length h misses an arc of curvature κ by κh²/8, the dual basis, which is negative in
@@ -79,14 +76,7 @@ def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
 def meeting_points(
     scene: Scene, decomposition: Decomposition, *, overlap: bool, told: bool = False
 ) -> tuple[ContactPoints, ContactPoints]:
-    """Search for contact and tied points, only where the scene has pairs. Collective.
-
-    Args:
-        told: Whether doubts about the surfaces were told, as of another design.
-
-    Raises:
-        InvalidInputError: As `check_no_penetration`.
-    """
+    """Search for contact and tied points, only where the scene has pairs. Collective."""
     tearing, fixed, comm = decomposition.tearing, decomposition.fixed, decomposition.comm
     points = ties = join_points([], scene.dim, tearing.n_nodes)
     if scene.contacts:
@@ -105,11 +95,7 @@ def meeting_points(
 
 
 def check_apart(scene: Scene, decomposition: Decomposition) -> None:
-    """Search for contact and reject bodies that overlap at the start. Collective.
-
-    Raises:
-        InvalidInputError: As `check_no_penetration`.
-    """
+    """Search for contact and reject bodies that overlap at the start. Collective."""
     if scene.contacts:
         points = find_contact_points(scene, decomposition.fixed, decomposition.comm, told=True)
         check_no_penetration(scene, points)
@@ -118,13 +104,8 @@ def check_apart(scene: Scene, decomposition: Decomposition) -> None:
 def gap_with_room(normal: Relations, fixed: np.ndarray, prescribed: np.ndarray) -> np.ndarray:
     """Return the gaps; between surfaces held by supports, penetration due to faceting is removed.
 
-    Args:
-        normal: The normal rows of all contact points.
-        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
-        prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
-
-    Raises:
-        InvalidInputError: If supports press surfaces into each other.
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `prescribed`: prescribed
+    components of all nodes, NaN where free, shape (n_nodes, dim).
     """
     points = normal.points
     missing = np.where(normal.freedom(fixed) <= SLIGHT, normal.of_supports(prescribed) - points.gap, 0.0)
@@ -428,11 +409,7 @@ def meeting_at(
 ) -> TornSystem:
     """Return a system with other contact points, those of bodies that have moved. Collective.
 
-    Args:
-        torn: The system; it has no rigid surfaces that are free to move.
-        points: The points; their gaps are the right sides of the normal rows, those of the others are zero.
-        prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
-        further: Rows of equality after all others, with a zero right side.
+    `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
     """
     ties, known = torn.ties, torn.numbering
     system = _with_rows(
