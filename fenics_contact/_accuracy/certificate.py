@@ -60,11 +60,7 @@ def nearest(problem: DualProblem, feasible: FeasibleSet, start: Vector, enough: 
     Where the cone has only one multiplier in equilibrium, α grows without bound while G λ − e tends to zero.
     Norms are those of the scaled multipliers.
 
-    Args:
-        enough: Norm of G λ − e, measured in multipliers, at which to stop.
-
-    Returns:
-        Within the cone, owned; in equilibrium unless there is no such multiplier.
+    Returns within the cone, owned; in equilibrium unless there is no such multiplier.
     """
     search = _Search(problem, feasible, start)
     point = search.at(np.zeros(problem.coarse.m))
@@ -221,11 +217,9 @@ def admissible(
     indicates slip, friction is set on its circle: a deficit there costs energy of first order, as gap and
     slip are not small. Elsewhere λ is projected on the cone.
 
-    Args:
-        slip_bound: Ψ, shape (n_friction,), owned.
-        follows: Discs whose slip bound follows the normal force, shape (n_friction,), owned. That of the
-            others is given and not raised.
-        residual: r = F λ − d − Gᵀα, owned.
+    `slip_bound`: Ψ, shape (n_friction,), owned; `follows`: discs whose slip bound follows the normal force,
+    shape (n_friction,), owned. That of the others is given and not raised; `residual`: r = F λ − d − Gᵀα,
+    owned.
     """
     layout = problem.layout
     trial = multiplier - contact_step(layout, problem.diagonal) * residual
@@ -286,11 +280,9 @@ def basis(
 ) -> sp.csr_matrix:
     """Return Z of a face, see `fenics_contact.qp.face.face_basis`, by the directions of friction forces.
 
-    Args:
-        closed: Contacts whose normal row is in it, shape (n_contact,).
-        stick: Discs of which both rows are in it, shape (n_friction,).
-        turning: Discs of which the direction across the friction force is in it, shape (n_friction,).
-        multiplier: Multiplier with the friction forces, owned.
+    `closed`: contacts whose normal row is in it, shape (n_contact,); `stick`: discs of which both rows are in
+    it, shape (n_friction,); `turning`: discs of which the direction across the friction force is in it, shape
+    (n_friction,); `multiplier`: multiplier with the friction forces, owned.
     """
     tau = multiplier[layout.tangential]
     length = np.linalg.norm(tau, axis=1, keepdims=True)
@@ -342,10 +334,8 @@ def lift(system: DualSystem, known: Admissible, residual: Vector, cancelled: flo
     the preconditioned residual rᵀ M r. The effect of regularising the contact block is corrected at the cost
     of that small block alone; S is applied once, for half an F-product.
 
-    Args:
-        known: An admissible multiplier with its statuses.
-        residual: Its r = F λ − d − Gᵀα, owned, [length].
-        cancelled: Norm of the displacements that cancel in r, [length].
+    `residual`: its r = F λ − d − Gᵀα, owned, [length]; `cancelled`: norm of the displacements that cancel in
+    r, [length].
     """
     comm, tangential = system.problem.comm, system.problem.layout.tangential
     slid = np.linalg.norm(residual[tangential], axis=1)
@@ -478,9 +468,6 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
 
     It holds to rounding: energies and products are in double precision, rows that are closed to 1e-9 of their
     initial violation count as closed, and a load that is balanced to 1e-9 as balanced.
-
-    Args:
-        solution: A solution of its problem, of any accuracy.
 
     References:
         W. Prager, J. L. Synge, Approximations in elasticity based on the concept of function space, Quart.

@@ -42,12 +42,7 @@ def moduli(forms: FormLibrary, material: Material, cell_type: str) -> np.ndarray
     the displacement g x it stores C g : g times the volume. Some materials resist displacements, too: that
     contribution scales with the square of the cell size and is eliminated by two sizes.
 
-    Args:
-        forms: Compiled forms, including those of the material.
-        material: A material whose moduli are the same everywhere.
-
-    Returns:
-        Shape (dim², dim²), g_kj at index dim k + j, [force / length²].
+    The result has shape (dim², dim²), g_kj at index dim k + j, [force / length²].
     """
     parts = Composition((material,))
 
@@ -68,14 +63,11 @@ def energy_of_difference(
 ) -> np.ndarray:
     """Return ∫ C (g − ∇u) : (g − ∇u) over each of some cells of one material.
 
-    Args:
-        moduli: C from `moduli`, shape (dim², dim²), [force / length²].
-        points: Coordinates of the nodes, shape (n, nodes of a cell, dim), [length].
-        displacement: u at the nodes, shape (n, nodes of a cell, dim), [length].
-        gradient: g at the nodes, (k, j) for ∂u_k/∂x_j, shape (n, nodes of a cell, dim, dim).
+    `moduli`: C from `moduli`, shape (dim², dim²), [force / length²]; `points`: coordinates of the nodes,
+    shape (n, nodes of a cell, dim), [length]; `displacement`: u at the nodes, shape (n, nodes of a cell,
+    dim), [length]; `gradient`: g at the nodes, (k, j) for ∂u_k/∂x_j, shape (n, nodes of a cell, dim, dim).
 
-    Returns:
-        Shape (n,), [force · length].
+    The result has shape (n,), [force · length].
     """
     cell = CELL_TYPES[cell_type]
     integrate = _over_simplices if cell.is_affine else _by_quadrature
@@ -114,10 +106,9 @@ def _cell_gradients(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return ∇u and the Jacobian determinant of cells at one point, shapes (n, dim, dim) and (n,).
 
-    Args:
-        points: Coordinates of the nodes, shape (n, nodes of a cell, dim).
-        displacement: u there, shape (n, nodes of a cell, dim).
-        slopes: Gradients of the shape functions at the point, shape (nodes of a cell, dim).
+    `points`: coordinates of the nodes, shape (n, nodes of a cell, dim); `displacement`: u there, shape (n,
+    nodes of a cell, dim); `slopes`: gradients of the shape functions at the point, shape (nodes of a cell,
+    dim).
     """
     jacobian = np.matmul(points.transpose(0, 2, 1), slopes)
     determinant, adjugate = determinants(jacobian), _adjugate(jacobian)
@@ -182,15 +173,11 @@ def energy_on_subdomain(
 ) -> np.ndarray:
     """Return ∫ C (g − ∇u) : (g − ∇u) over every cell of a subdomain, as if all were of one material.
 
-    Args:
-        form: The compiled form of the material.
-        blocks: Block of each node of some cells, shape (n, nodes of a cell); elsewhere the result is
-            undefined.
-        displacement: u at these nodes, shape (n, nodes of a cell, dim), [length].
-        gradient: g there, shape (n, nodes of a cell, dim, dim), dimensionless.
+    `blocks`: block of each node of some cells, shape (n, nodes of a cell); elsewhere the result is undefined;
+    `displacement`: u at these nodes, shape (n, nodes of a cell, dim), [length]; `gradient`: g there, shape
+    (n, nodes of a cell, dim, dim), dimensionless.
 
-    Returns:
-        Shape (n_cells,), in the order of the subdomain's mesh, [force · length].
+    The result has shape (n_cells,), in the order of the subdomain's mesh, [force · length].
     """
     space = subdomain.mesh.space
     mesh, dim = space.mesh, subdomain.mesh.dim
@@ -252,12 +239,8 @@ def discretisation_error(torn: TornSystem, displacement: np.ndarray) -> Discreti
     cell it is meaningless. Where a mesh locks completely, the error exceeds the displacement and the estimate
     does not follow. The geometry error of facets on a curved surface is not included.
 
-    Args:
-        displacement: This rank's torn displacement, shape (torn_size,), [length]: that of a state is
-            `State.conforming_displacement`. Where copies of a node differ, their mean is used.
-
-    Returns:
-        The estimate.
+    `displacement`: this rank's torn displacement, shape (torn_size,), [length]: that of a state is
+    `State.conforming_displacement`. Where copies of a node differ, their mean is used.
     """
     scene, comm = torn.scene, torn.decomposition.comm
     energies = {name: _Energies(torn, body) for name, body in scene.bodies.items()}
@@ -298,10 +281,8 @@ class _Energies:
     def by_cell(self, subdomain: Subdomain, displacement: np.ndarray, gradient: np.ndarray) -> np.ndarray:
         """Return ∫ C (g − ∇u) : (g − ∇u) over each cell of a subdomain, shape (n_cells,), [force · length].
 
-        Args:
-            subdomain: A subdomain of the body.
-            displacement: u at the nodes of its cells, shape (n_cells, nodes of a cell, dim), [length].
-            gradient: g there, shape (n_cells, nodes of a cell, dim, dim), dimensionless.
+        `displacement`: u at the nodes of its cells, shape (n_cells, nodes of a cell, dim), [length];
+        `gradient`: g there, shape (n_cells, nodes of a cell, dim, dim), dimensionless.
         """
         mesh, whole = subdomain.mesh, self._body.mesh
         nodes, kind = whole.cells[mesh.cells], self._body.material_of_cells[mesh.cells]

@@ -66,11 +66,9 @@ class Polynomials:
     def values(self, away: np.ndarray) -> np.ndarray:
         """Evaluate them: d_i, then ½ d_i², d_i d_j / √2, and so on.
 
-        Args:
-            away: Differences of positions, shape (..., dim).
+        `away`: differences of positions, shape (..., dim).
 
-        Returns:
-            Shape (..., m).
+        The result has shape (..., m).
         """
         columns = []
         for degree in range(1, self.degree + 1):
@@ -92,9 +90,7 @@ class Polynomials:
     def turned(self, tensors: np.ndarray, turn: np.ndarray) -> np.ndarray:
         """Return Σ t_i..j T_ia ... T_jb: highest derivatives by coordinates x of those by T x.
 
-        Args:
-            tensors: Shape (n, dim, ..., dim, k).
-            turn: T, shape (n, dim, dim).
+        `tensors`: shape (n, dim, ..., dim, k); `turn`: T, shape (n, dim, dim).
         """
         for axis in range(1, self.degree + 1):
             front = np.moveaxis(tensors, axis, 1)
@@ -242,8 +238,7 @@ class Patches:
     def moments(self, displacement: np.ndarray) -> Iterator[Moments]:
         """Yield the normal equations of all sites in chunks. Collective.
 
-        Args:
-            displacement: Displacement of each site, shape (n_sites, dim), [length].
+        `displacement`: displacement of each site, shape (n_sites, dim), [length].
         """
         shared = self.sites.sharing.shared
         alone = np.ones(self.sites.count, dtype=bool)
@@ -327,11 +322,9 @@ ALIKE = 1.5
 def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
     """Return the recovered displacement gradient at every site. Collective.
 
-    Args:
-        displacement: Displacement of each site, shape (n_sites, dim), [length].
+    `displacement`: displacement of each site, shape (n_sites, dim), [length].
 
-    Returns:
-        ∂u_k/∂x_j as entry (k, j), shape (n_sites, dim, dim), dimensionless.
+    Returns ∂u_k/∂x_j as entry (k, j), shape (n_sites, dim, dim), dimensionless.
     """
     patches = find_patches(sites)
     dim, penalty, highest = patches.dim, _penalty(patches), patches.polynomials.highest
@@ -353,10 +346,8 @@ def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
 def _ask_neighbours(patches: Patches, open_: Moments, doubt: np.ndarray, coefficients: np.ndarray) -> None:
     """Refit undetermined sites with the highest derivatives of neighbours, layer by layer. Collective.
 
-    Args:
-        open_: Normal equations of the n undetermined sites.
-        doubt: Measure of how poorly each is determined, shape (n,).
-        coefficients: Coefficients of all sites, which are overwritten, shape (n_sites, m, dim), [length].
+    `doubt`: measure of how poorly each is determined, shape (n,); `coefficients`: coefficients of all sites,
+    which are overwritten, shape (n_sites, m, dim), [length].
     """
     comm = patches.sites.sharing.comm
     known = np.ones(patches.sites.count, dtype=bool)
@@ -375,12 +366,9 @@ def _ask_neighbours(patches: Patches, open_: Moments, doubt: np.ndarray, coeffic
 def _fitted(patches: Patches, moments: Moments, derivatives: np.ndarray) -> np.ndarray:
     """Refit with given highest derivatives where a patch leaves them undetermined.
 
-    Args:
-        moments: Normal equations of the sites, n of them.
-        derivatives: ∂u_k/∂x_i...∂x_j as entry (i, ..., j, k), shape (n, dim, ..., dim, dim).
+    `derivatives`: ∂u_k/∂x_i...∂x_j as entry (i, ..., j, k), shape (n, dim, ..., dim, dim).
 
-    Returns:
-        Coefficients, shape (n, m, dim), [length].
+    Returns coefficients, shape (n, m, dim), [length].
     """
     polynomials, back = patches.polynomials, np.linalg.inv(patches.turn[moments.rows])
     firm, right = FIRM[polynomials.degree], moments.right.copy()
@@ -395,12 +383,9 @@ def _mean_of_neighbours(
 
     Collective.
 
-    Args:
-        rows: The sites, shape (n,).
-        known: Which sites are known, shape (n_sites,).
+    `rows`: the sites, shape (n,); `known`: which sites are known, shape (n_sites,).
 
-    Returns:
-        Shapes (n,) and (n, dim, ..., dim, dim): ∂u_k/∂x_i...∂x_j as entry (i, ..., j, k).
+    The result has shapes (n,) and (n, dim, ..., dim, dim): ∂u_k/∂x_i...∂x_j as entry (i, ..., j, k).
     """
     sites, dim = patches.sites, patches.dim
     links = sites.neighbours[rows]

@@ -35,11 +35,7 @@ def friction_error(system: DualSystem, solution: DualSolution, certificate: Cert
     that of Coulomb's law, including the raise of slip bounds for the certificate. Zero where nothing slips,
     and where slip bounds do not follow the normal forces.
 
-    Args:
-        solution: A solution of its problem.
-
-    Returns:
-        Energy norm of the change, [√(force · length)].
+    Returns energy norm of the change, [√(force · length)].
     """
     torn, layout, known = system.torn, system.problem.layout, certificate.known
     coefficient = torn.friction_coefficient[system.torn.owned_discs]
@@ -162,8 +158,7 @@ def solver_errors(system: DualSystem | DirectSystem, solution: DualSolution | Di
 def state_errors(solver: SolverErrors, estimate: DiscretisationError, norm: float) -> StateErrors:
     """Combine the errors of a state.
 
-    Args:
-        norm: Energy norm of the displacement, [√(force · length)].
+    `norm`: energy norm of the displacement, [√(force · length)].
     """
     by_body = {name: _ratio(value, norm) for name, value in estimate.by_body.items()}
     parts = (solver.algebraic, solver.friction, estimate.total)
