@@ -45,11 +45,7 @@ class CompiledForm:
 
         Integrals without a tag cover the whole mesh, those with a tag only the entities given for it.
 
-        Args:
-            spaces: dolfinx function spaces of the form's arguments, in their order.
-            coefficients: Template coefficient -> dolfinx Function on ``mesh``.
-            facets: Tag of a surface integral -> (cells, local facets) from `match_facets`.
-            cells: Tag of a volume integral -> cells of ``mesh``; no cell has two tags.
+        `facets`: tag of a surface integral -> (cells, local facets) from `match_facets`.
         """
         if old():
             return self._bind_old(mesh, spaces, coefficients, constants, facets or {}, cells or {})

@@ -24,9 +24,8 @@ def _partitioner(destinations: cpp.graph.AdjacencyList_int32) -> Callable[..., c
 def local_mesh(points: np.ndarray, cells: np.ndarray, cell_type: str) -> dolfinx.mesh.Mesh:
     """Build a mesh on this rank only.
 
-    Args:
-        points: Coordinates, shape (n, dim), [length].
-        cells: Rows of node numbers in VTK order, shape (m, n_vertices).
+    `points`: coordinates, shape (n, dim), [length]; `cells`: rows of node numbers in VTK order, shape (m,
+    n_vertices).
     """
     return _create_mesh(MPI.COMM_SELF, points, cells, cell_type, np.zeros((len(cells), 1), dtype=np.int32))
 
@@ -36,10 +35,8 @@ def rank_mesh(
 ) -> dolfinx.mesh.Mesh:
     """Build a distributed mesh with cells on given ranks; a rank may have none. Collective on ``comm``.
 
-    Args:
-        points: All coordinates, shape (n_nodes, dim), replicated, [length].
-        cells: All cells, rows of node numbers in VTK order, replicated.
-        rank: Owner of each cell, shape (n_cells,), replicated.
+    `points`: all coordinates, shape (n_nodes, dim), replicated, [length]; `rank`: owner of each cell, shape
+    (n_cells,), replicated.
     """
     bounds = np.linspace(0, len(points), comm.size + 1).astype(int)
     mine = np.flatnonzero(rank == comm.rank)

@@ -59,9 +59,7 @@ def lagrange_degree(space: dolfinx.fem.FunctionSpace) -> int | None:
 def cell_field(mesh: dolfinx.mesh.Mesh, name: str, values: np.ndarray) -> dolfinx.fem.Function:
     """Return a field on ``mesh`` that is constant on each cell, by the values on this rank's own cells.
 
-    Args:
-        name: Name of the field (a C identifier).
-        values: Shape (n_owned, ...): numbers, vectors or tensors.
+    `values`: shape (n_owned, ...): numbers, vectors or tensors.
     """
     element = cellwise_element(cell_type_of_mesh(mesh), values.shape[1:])
     field = dolfinx.fem.Function(_space(mesh, element), name=name)
@@ -142,12 +140,10 @@ def update_coordinates(mesh: dolfinx.mesh.Mesh, points: np.ndarray) -> None:
 def match_facets(mesh: dolfinx.mesh.Mesh, surface: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Find the facets of ``mesh`` whose nodes form a row of ``surface``.
 
-    Args:
-        mesh: A mesh on one rank.
-        surface: Corners of facets as input nodes, shape (n_facets, n_corners), any order.
+    `mesh`: A mesh on one rank; `surface`: corners of facets as input nodes, shape (n_facets, n_corners), any
+    order.
 
-    Returns:
-        Cells and local facet numbers of those on this mesh, one entry each.
+    Returns cells and local facet numbers of those on this mesh, one entry each.
     """
     cell_type = cell_type_of_mesh(mesh)
     local = np.array(facet_vertices(cell_type))

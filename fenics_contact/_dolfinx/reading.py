@@ -83,14 +83,7 @@ def read_mesh(path: Path, name: str, inline: bool) -> dolfinx.mesh.Mesh:
 def read_tags(
     path: Path, mesh: dolfinx.mesh.Mesh, name: str, inline: bool, own_points: bool
 ) -> dolfinx.mesh.MeshTags:
-    """Read the first attribute of a grid of an XDMF file as tags on ``mesh``.
-
-    Args:
-        own_points: Whether the grid has its own points, which must then be those of the mesh.
-
-    Raises:
-        InvalidInputError: If the points differ, or some of the tagged cells or facets are not in the mesh.
-    """
+    """Read the first attribute of a grid of an XDMF file as tags on ``mesh``."""
     tdim = mesh.topology.dim
     mesh.topology.create_connectivity(tdim - 1, tdim)
     with _opened(path, inline) as file:
