@@ -57,11 +57,7 @@ ScalarValue = float | OfPosition | Ufl
 
 
 def checked_vector(name: str, value: Any) -> Any:
-    """Return numbers as a tuple of floats, a function or UFL as it is.
-
-    Raises:
-        InvalidInputError: If it is not a vector of two or three components.
-    """
+    """Return numbers as a tuple of floats, a function or UFL as it is."""
     if isinstance(value, Ufl) or callable(value):
         return value
     array = finite_numbers(value)
@@ -74,11 +70,7 @@ def checked_vector(name: str, value: Any) -> Any:
 
 
 def checked_scalar(name: str, value: Any) -> Any:
-    """Return a number as a float, a function or UFL as it is.
-
-    Raises:
-        InvalidInputError: If it is none of them.
-    """
+    """Return a number as a float, a function or UFL as it is."""
     if isinstance(value, Ufl) or callable(value):
         return value
     array = finite_numbers(value)
@@ -101,12 +93,7 @@ def finite_numbers(value: Any) -> np.ndarray | None:
 def evaluate(name: str, function: OfPosition, points: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """Evaluate a function of position.
 
-    Args:
-        points: Points, shape (n, dim), [length].
-
-    Raises:
-        InvalidInputError: If it returns another shape or something other than finite numbers.
-        UserCodeError: If it raises.
+    `points`: points, shape (n, dim), [length].
     """
     with user_code(f"the function given as {name}"):
         values = finite_numbers(function(points.copy()))
@@ -127,15 +114,9 @@ def gradients_of(name: str, function: OfPosition, points: np.ndarray, shape: tup
     their values; at a kink the slope is the mean of both sides. The function is asked for at points that lie
     outside the body by one step.
 
-    Args:
-        points: Points, shape (n, dim), [length].
+    `points`: points, shape (n, dim), [length].
 
-    Returns:
-        Shape ``(n, *shape, dim)``, the derivatives last.
-
-    Raises:
-        InvalidInputError: If it returns another shape or something other than finite numbers.
-        UserCodeError: If it raises.
+    The result has shape ``(n, *shape, dim)``, the derivatives last.
     """
     step = 1e-5 * (float(np.ptp(points, axis=0).max(initial=0.0)) or 1.0)
     beside = f"{name}, asked {step:.1e} beside the nodes for its gradient"
@@ -209,11 +190,7 @@ class SampledField:
             )
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
-        """Evaluate at points, shape (n, dim) -> (n,), or (n, dim) for a vector.
-
-        Raises:
-            InvalidInputError: If one is farther than ``reach`` from all given ones, or in another space.
-        """
+        """Evaluate at points, shape (n, dim) -> (n,), or (n, dim) for a vector."""
         known, values = self._in_space(points.shape[1])
         self._refuse_far(points, known)
         if len(points) == 0 or len(known) == 1:

@@ -124,12 +124,9 @@ def hertz_approach(
     theory holds if they are positive and the contact is smaller than the surfaces. Along a line, where the
     approach depends on the whole bodies, it is the depth κ a²/2 by which they would overlap undeformed.
 
-    Args:
-        force: Force that presses the bodies together, [force], in the plane [force / length].
-        modulus: E*, [force / length²].
-        place: Coordinates of the nodes of one surface that face the other, shape (n, dim), [length].
-        normal: Normals of the gaps there, shape (n, dim).
-        gap: Gaps, shape (n,), [length].
+    `force`: force that presses the bodies together, [force], in the plane [force / length]; `modulus`: E*,
+    [force / length²]; `place`: coordinates of the nodes of one surface that face the other, shape (n, dim),
+    [length]; `normal`: normals of the gaps there, shape (n, dim); `gap`: gaps, shape (n,), [length].
     """
     curvatures, reach = _relative_curvatures(place, normal[np.argmin(gap)], gap)
     if force <= 0.0 or len(curvatures) == 0:
@@ -149,9 +146,8 @@ def _relative_curvatures(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Fit a quadratic polynomial to the gap around its minimum.
 
-    Returns:
-        The relative curvatures, ascending, shape (dim − 1,), [1 / length], and how far the nodes reach along
-        their directions, shape (dim − 1,), [length]; nothing if there are too few nodes.
+    Returns the relative curvatures, ascending, shape (dim − 1,), [1 / length], and how far the nodes reach
+    along their directions, shape (dim − 1,), [length]; nothing if there are too few nodes.
     """
     dim = place.shape[1]
     axes = tangent_bases(normal[None])[0]
@@ -408,9 +404,8 @@ def unpaired(
     Only facets outside of the surfaces that pairs and ties of the two name are looked for in the cells of the
     other. Those that go there behind a named surface are left out: how far that passes is the pair's matter.
 
-    Args:
-        moved: Body name -> displacement of its nodes, shape (n_nodes, dim), [length].
-        reach: The largest displacement of all bodies, [length].
+    `moved`: body name -> displacement of its nodes, shape (n_nodes, dim), [length]; `reach`: the largest
+    displacement of all bodies, [length].
     """
     named = _named(scene, both)
     counts, deep = np.zeros(3, dtype=int), DEEP * reach

@@ -92,8 +92,7 @@ def held_components(scene: SceneParts, body: str, modes: np.ndarray) -> np.ndarr
 
     Of a rigid surface with free components the others count, as displacement and rotation of its point.
 
-    Args:
-        modes: Motions at its nodes, shape (n_nodes, dim, n_modes).
+    `modes`: motions at its nodes, shape (n_nodes, dim, n_modes).
     """
     mesh = scene.bodies[body].mesh
     loose = [each for each in scene.supports if isinstance(each, RigidSurface) and each.free.any()]
@@ -126,11 +125,9 @@ def _of_point(surface: RigidSurface, mesh: BodyMesh, modes: np.ndarray) -> np.nd
 def resisted_motions(held: np.ndarray) -> np.ndarray:
     """Return an orthonormal basis of the rigid motions that supports resist.
 
-    Args:
-        held: What the motions move of prescribed components, shape (n, n_modes), see `held_components`.
+    `held`: what the motions move of prescribed components, shape (n, n_modes), see `held_components`.
 
-    Returns:
-        Coefficients of the modes as columns, shape (n_modes, rank).
+    Returns coefficients of the modes as columns, shape (n_modes, rank).
     """
     # The edge of a thin plate moves little when the plate turns about it: singular values resolve how much,
     # their squares would be lost in rounding.
@@ -231,8 +228,7 @@ class Plan:
 def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensitivity: bool = False) -> Plan:
     """Decide what a scene needs.
 
-    Args:
-        sensitivity: Whether derivatives by the shape are wanted.
+    `sensitivity`: whether derivatives by the shape are wanted.
     """
     from fenics_contact._scene.pair_geometry import pair_geometry, unpaired_bodies
 

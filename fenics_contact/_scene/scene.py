@@ -40,17 +40,6 @@ def bodies_from(
         >>> meshes = read_msh("chain.msh")  # doctest: +SKIP
         >>> of = {"link *": steel, "pin": {"core": steel, "coat": zinc}}  # doctest: +SKIP
         >>> bodies = bodies_from(meshes, of)  # doctest: +SKIP
-
-    Args:
-        materials: One material for all bodies; or name of the body, or pattern of names with ``*`` and ``?``,
-            to its material, or to a mapping from its regions to theirs. Names take precedence over patterns,
-            earlier patterns over later ones.
-
-    Returns:
-        Name to body, in the order of the meshes.
-
-    Raises:
-        InvalidInputError: If a body has no material, or a material no body.
     """
     if not isinstance(materials, Mapping):
         return {name: Body(mesh, materials) for name, mesh in meshes.items()}
