@@ -92,11 +92,6 @@ def safe_log(log: Callable[..., None], message: str, *arguments: Any, **named: A
     A user's handler that raises is treated as in the standard library: its traceback goes to stderr if
     ``logging.raiseExceptions`` is set, and the run continues.
 
-    Args:
-        log: Method of a logger, such as ``logger.info``.
-        *arguments: Values that are formatted into it.
-        **named: Keyword arguments of the method.
-
     Example:
         >>> safe_log(logging.getLogger("fenics_contact").debug, "%d products", 3)
     """
@@ -113,12 +108,6 @@ def user_code(what: str) -> Iterator[None]:
 
     An exit counts as a failure, too: a load or a material may not end a program, least of all on one rank.
     Errors of this package, which such code may raise on purpose, and interrupts pass.
-
-    Args:
-        what: Name of the code, for the message: "the function given as Traction on body 'bar'".
-
-    Raises:
-        UserCodeError: If the block raises; the cause is chained.
 
     Example:
         >>> with user_code("the stress of material Foam"):
@@ -143,11 +132,7 @@ def failure(what: str, error: BaseException) -> UserCodeError:
 
 @contextmanager
 def scene_file_code(what: str) -> Iterator[None]:
-    """Run code that a scene file names: any exception, also an exit, is a mistake in the file.
-
-    Raises:
-        InvalidInputError: With the class and the message of the exception.
-    """
+    """Run code that a scene file names: any exception, also an exit, is a mistake in the file."""
     try:
         yield
     except InvalidInputError:

@@ -143,10 +143,8 @@ def exchanged(
 ) -> tuple[list[int], BaseException | None]:
     """Return where all ranks are, and this rank's error, possibly an interrupt received while waiting.
 
-    Args:
-        error: This rank's error, or None.
-        where: Name of this rank's call.
-        wait: Seconds after which a rank with an error ends the program; None for never.
+    `error`: this rank's error, or None; `where`: name of this rank's call; `wait`: seconds after which a rank
+    with an error ends the program; None for never.
     """
     post = Post(own, place_of(where) if error is None else FAILED)
     begun, warned = time.monotonic(), not where
@@ -173,8 +171,7 @@ def exchanged(
 def _answer_until_all_have_ended(process: int) -> None:
     """Stay until the other ranks have ended, too, as MPI itself would, but answer those that call.
 
-    Args:
-        process: Id of the process that is the rank; forked children are not ranks.
+    `process`: id of the process that is the rank; forked children are not ranks.
     """
     finalized = any(sys.modules[type(own).__module__].Is_finalized() for own in _open.values())
     if os.getpid() != process or finalized:
@@ -345,11 +342,7 @@ def _communicator(
     arguments: tuple[Any, ...],
     named: dict[str, Any],
 ) -> MPI.Comm:
-    """Return the communicator in the arguments of a call.
-
-    Raises:
-        InvalidInputError: If arguments are missing or in another order, so that there is none.
-    """
+    """Return the communicator in the arguments of a call."""
     cause: Exception | None = None
     try:
         wanted.bind(*arguments, **named)
