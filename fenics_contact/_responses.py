@@ -46,7 +46,6 @@ class Answer:
     """Quantities of interest at one set of parameters, bitwise equal on all ranks.
 
     Attributes:
-        parameters: Every parameter with its value.
         values: Quantity to value; nan where there is no state.
         subgradients: Quantity to a subgradient by the parameters, shape (n_parameters,), where it is known.
         failure: Why there is no state; empty where there is one.
@@ -83,7 +82,6 @@ class Response(ABC):
     """A function of named numbers.
 
     Attributes:
-        nominal: Parameter to its default value.
         evaluations: Number of answers so far, failed ones included.
         products: Products with the dual operator so far.
     """

@@ -150,7 +150,6 @@ class Statuses:
     """Statuses of contact at a multiplier, and the rows that are free for them.
 
     Attributes:
-        problem: The dual problem.
         closed: Closed contacts, shape (n_contact,), owned.
         stick: Sticking discs, shape (n_friction,), owned.
         slip: Discs on the circle, shape (n_friction,), owned; the others are pinned (Ψ = 0).
@@ -194,7 +193,6 @@ class Admissible:
 
     Attributes:
         multiplier: λ with λ_N ≥ 0, ‖τ‖ ≤ Ψ and G λ = e, owned.
-        statuses: Statuses of contact.
         slip_bound: Ψ of the Tresca problem, shape (n_friction,), owned. It is the given one unless that
             follows the normal forces of a solution and no multiplier within it balances the load: at a load
             that friction only just resists this depends on the solver's tolerance. It is then raised to the
@@ -390,8 +388,6 @@ class _Rows:
     """The rows that a correction closes: all equality rows and some of contacts.
 
     Attributes:
-        system: The dual system.
-        known: An admissible multiplier.
         closed: Contacts to close, shape (n_contact,), owned.
         stick: Discs whose slip is removed, shape (n_friction,), owned.
         across: Discs whose slip across the friction force is removed, shape (n_friction,), owned.
@@ -432,7 +428,6 @@ class Certificate:
             admissible pair was found.
         moved: Its part due to making the multiplier admissible.
         gap: J(v) − θ(λ) of the admissible pair, [force · length].
-        known: The admissible multiplier and its statuses.
         error: Estimated error of the state's multiplier, owned, [force].
     """
 

@@ -46,7 +46,6 @@ class Polynomials:
     that of the full tensor of derivatives. Derivatives of the highest degree come last.
 
     Attributes:
-        dim: Number of coordinates.
         degree: Highest degree, at least 2.
     """
 
@@ -124,7 +123,6 @@ class Sites:
     """The nodes of this rank's cells of one order, one site for every material that meets there.
 
     Attributes:
-        order: Order of the cells.
         node: Node of each site among those of all bodies, shape (n_sites,).
         points: Coordinates, shape (n_sites, dim), [length].
         sharing: Sites that other ranks hold as well.
@@ -218,7 +216,6 @@ class Patches:
     number of cells that it shares with the site.
 
     Attributes:
-        sites: The sites.
         turn: T of each site: a difference d of positions is T d in its own coordinates, shape (n_sites, dim,
             dim), [1 / length].
         weight: Sum of the weights of each patch, shape (n_sites,).

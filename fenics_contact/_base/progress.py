@@ -48,17 +48,9 @@ class Event:
 
     Attributes:
         task: Identifies a piece of work among those under way.
-        what: The work: "factor", "load steps".
-        kind: Kind of the event.
-        unit: Unit of the count: "products".
-        number: Number done.
-        total: Total number.
         most: Largest number, if the total is unknown.
         measure: Quantity that must become small: the residual.
-        target: Its target.
-        measured: Its name.
         value: Best value so far, of an optimisation.
-        words: Further text for readers.
     """
 
     task: int
@@ -99,9 +91,6 @@ class Event:
 
 class Task:
     """A piece of work that reports its progress if there are listeners.
-
-    Attributes:
-        outcome: Reported when it ends.
 
     Example:
         >>> with Task("load steps", total=2) as task:

@@ -72,7 +72,6 @@ class LocalCost:
     """Cost of one subdomain.
 
     Attributes:
-        setup: Seconds to factor it.
         product: Seconds to apply K⁺ and S once each on the interface.
     """
 
@@ -215,7 +214,6 @@ class SharedFactor:
     """LU factors of Σ A_rank by MUMPS on the first ranks of a communicator.
 
     Attributes:
-        size: Number of rows.
         holders: Number of ranks that hold the factors.
     """
 

@@ -22,7 +22,6 @@ class MeshArrays:
 
     Attributes:
         cell_type: Type of the cells; dolfinx's name if bodies cannot have them.
-        dim: Topological dimension of the cells.
         points: Coordinates, (n_nodes, geometric dimension), in the order of dolfinx's input.
         inputs: dolfinx's number of each of them in its input, ascending, (n_nodes,).
         cells: Node numbers, (n_cells, nodes of a cell), in the order of dolfinx's input; nodes of cells that

@@ -23,7 +23,6 @@ class Composition:
     """The materials of the cells of one mesh.
 
     Attributes:
-        materials: The materials.
         cells: Tag (from 1, in the order of the materials) -> cells of the mesh; None if there is only one.
     """
 

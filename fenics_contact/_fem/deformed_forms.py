@@ -35,11 +35,7 @@ class Fields(NamedTuple):
     """The displacement, and the dilatation and pressure of cells, on the template.
 
     Attributes:
-        u: Displacement.
-        dilatation: θ, a polynomial in each cell.
-        pressure: U'(θ), projected on such polynomials.
         tests: Such polynomials as test and as trial function.
-        unseen: Whether `UNSEEN` names the cells.
     """
 
     u: Expr

@@ -181,8 +181,6 @@ class MortarPoints:
     """Slave nodes with the mean of the master that each of them meets.
 
     Attributes:
-        slave: Surface that carries the multipliers.
-        master: The opposite surface.
         coupling: Their coupling, at some of its nodes.
         gathering: What the nodes gather of others that hardly face the master; None if there are none.
         closable: Gaps that linear displacements can close; None where both surfaces are their facets.
@@ -306,9 +304,7 @@ class _Side:
     """One of two surfaces of a pair.
 
     Attributes:
-        surface: The surface.
         nodes: Its nodes among those of all bodies, shape (n,).
-        n_nodes: Number of nodes of all bodies.
     """
 
     surface: FacetedSurface

@@ -321,7 +321,6 @@ class Unpaired:
     """Two bodies that no pair or tie keeps apart, or whose surfaces of these are too small.
 
     Attributes:
-        bodies: Their names.
         paired: Whether a pair or tie names surfaces of both.
         counts: Facets outside of these surfaces that touch the other body before loads, those that lie in it,
             and those that displacements move into it.

@@ -44,12 +44,7 @@ class EffectName(StrEnum):
 
 @dataclass(frozen=True)
 class Effect:
-    """One physical effect in a scene, and the reason for it.
-
-    Attributes:
-        name: Which one.
-        reason: What in the scene causes it.
-    """
+    """One physical effect in a scene, and the reason for it."""
 
     name: EffectName
     reason: str
@@ -169,13 +164,8 @@ class Plan:
     """What the solution of a scene needs; nothing else is built.
 
     Attributes:
-        effects: The effects in the scene.
-        subdomains: Subdomains of all bodies.
-        unknowns: Displacement unknowns of all subdomains.
         multipliers: Number of multipliers by kind; those of ties and contact are upper bounds, as only nodes
             that face their master have one.
-        solver: How the equilibrium is computed.
-        cone: Which inequalities the multipliers obey.
         fixed_point: Whether slip bounds follow the normal forces (Coulomb's law).
         coarse_motions: Rigid motions of the subdomains and free ones of rigid surfaces, the size of the
             coarse problem; 0 without one.

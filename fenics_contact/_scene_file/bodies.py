@@ -275,7 +275,6 @@ class Shaped:
     """A mesh with its shape.
 
     Attributes:
-        mesh: The mesh.
         crown: The smooth surface that a design may move, of chain links.
     """
 

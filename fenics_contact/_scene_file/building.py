@@ -222,11 +222,9 @@ class ShapeTask:
     """A shape optimisation, ready to run.
 
     Attributes:
-        problem: J(α) with its subgradient.
         start: Design variables at the start, [length].
         bounds: Least and largest values of the variables, [length].
         constraints: The linear ones in one, volumes, and limits of other objectives.
-        method: The optimiser.
         restore: Whether the start may violate limits of other objectives.
     """
 

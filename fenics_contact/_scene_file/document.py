@@ -256,11 +256,8 @@ class _LoadHistory:
     """All loads, or all supports, within a step, as a function of time.
 
     Attributes:
-        parts: Those of the file.
-        dim: Dimension of the bodies.
         ways: Their values before the step and at its end, or as formulas in t.
         begin: Time at the begin of the step.
-        duration: Of the step.
     """
 
     parts: tuple[Any, ...]

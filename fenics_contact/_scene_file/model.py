@@ -216,11 +216,7 @@ class TiePart(Part):
 
 
 class _Named(Part):
-    """A part that load steps change.
-
-    Attributes:
-        changed: The argument that they change.
-    """
+    """A part that load steps change."""
 
     changed: ClassVar[str] = "value"
     name: str | None = Field(None, description="how load steps call it")

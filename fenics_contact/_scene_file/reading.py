@@ -37,8 +37,6 @@ class SceneFile:
     """A scene file that was read and checked. Meshes are built on first access.
 
     Attributes:
-        source: Its source.
-        document: Its content, part by part.
         comm: Communicator on which it was read, and on which everything is built.
     """
 

@@ -265,7 +265,6 @@ class Mistake:
     """One mistake.
 
     Attributes:
-        path: Path of keys.
         line: Line of the file, from 1; 0 where there is none.
         place: Name of the place in messages: "line 12", "--set solver.tolerance", "" for a dictionary.
         words: What is needed, what was given, what to do.
@@ -325,9 +324,7 @@ class Source:
     """The source of a scene.
 
     Attributes:
-        name: Its name in messages.
         folder: Folder to which its file names are relative.
-        data: Its data, including overrides.
         text: The file's text, "" for a scene that came as a dictionary.
         overrides: Overridden keys -> how they were given.
     """

@@ -186,13 +186,7 @@ class VectorExpression:
 
 @dataclass(frozen=True)
 class Between:
-    """A value on the way from one to another, each a number or a function of position.
-
-    Attributes:
-        start: The one.
-        end: The other.
-        share: Part of the way.
-    """
+    """A value on the way from one to another, each a number or a function of position."""
 
     start: float | OfPosition
     end: float | OfPosition
@@ -346,11 +340,7 @@ LONGEST_NAME, LONGEST_PATH = 255, 4000
 
 @dataclass(frozen=True, eq=False)
 class Read:
-    """Lets pydantic use another annotation for a key than type checkers.
-
-    Attributes:
-        annotation: The annotation for pydantic.
-    """
+    """Lets pydantic use another annotation for a key than type checkers."""
 
     annotation: Any
 

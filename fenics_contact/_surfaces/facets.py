@@ -85,7 +85,6 @@ class GaussPoint:
     """One point of a quadrature rule in every facet.
 
     Attributes:
-        weight: Its weight in the reference facet.
         values: Shape functions, shape (nodes of a facet,).
         gradients: Their derivatives by the reference coordinates, shape (nodes of a facet, dim − 1).
         tangents: Derivatives of the place by these, shape (n_facets, dim − 1, dim), [length].

@@ -20,7 +20,6 @@ class Relations:
     """The relative displacement that each row measures: d·(u_slave − Σ w_j u_master,j).
 
     Attributes:
-        points: Contact or tied points.
         which: Point of each row, shape (n_rows,).
         directions: d of each row, shape (n_rows, dim).
         resting: Marks of friction rows along which supports prescribe no slip, shape (n_rows,); None for

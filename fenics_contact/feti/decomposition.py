@@ -45,7 +45,6 @@ class Tearing(NodeNumbers):
     a pair (node, subdomain); copies are sorted by node, then by subdomain.
 
     Attributes:
-        dim: Displacement components of a node.
         subdomain_offset: First subdomain of each body and the total, shape (n_bodies + 1,).
         subdomain_rank: Owner of each subdomain, shape (n_subdomains,).
         first_copy: First copy of each node and the total, shape (n_nodes + 1,).
@@ -325,7 +324,6 @@ class Decomposition:
         block_offset: First block of dofs of each of them in this rank's torn vector, and the total.
         copy_block: Block of each copy in this rank's torn vector, −1 if another rank holds it.
         gluing: Gluing and Dirichlet rows of all subdomains.
-        forms: Compiled forms.
         condensations: Symbolic factorisations of this rank's subdomains.
     """
 
@@ -470,7 +468,6 @@ class DualNumbering:
     ghosts, the touched entries that other ranks own.
 
     Attributes:
-        comm: Communicator.
         owned: Row numbers that this rank owns, ascending, shape (n_owned,).
         ghosts: Row numbers that it touches but does not own, ascending, shape (n_ghosts,).
         offset: Position of the first owned entry in the concatenation of all ranks' owned parts.

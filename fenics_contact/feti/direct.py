@@ -43,7 +43,6 @@ class DirectSystem:
 
     Attributes:
         torn: The system; it has one subdomain and only rows of supports.
-        products: Products with a dual operator: none.
     """
 
     products = 0

@@ -96,9 +96,6 @@ class Condensations:
 
     Subdomains of a regular partition share one pattern and a handful of interfaces, and a new geometry
     changes neither.
-
-    Attributes:
-        analysed: Symbolic factorisations made so far.
     """
 
     def __init__(self) -> None:
@@ -347,7 +344,6 @@ class TornInverse:
     Attributes:
         offset: First dof of each subdomain in the torn vector, and the total, shape (n + 1,).
         interface: Interface dofs in the torn vector, shape (n_interface,).
-        operators: The factored subdomains.
         factored: Number of newly factored ones; the others are reused.
     """
 

@@ -85,8 +85,6 @@ class SubdomainMesh:
     Blocks of dofs, one dof per direction, are numbered as dolfinx numbers them.
 
     Attributes:
-        number: Number among all subdomains.
-        body: Name of the body.
         cells: Cells of the body's mesh, in this mesh's order.
         nodes: Nodes of the body, by block: block b sits on node ``nodes[b]``.
         space: dolfinx function space of displacements on the subdomain's own mesh.
@@ -129,14 +127,12 @@ class Subdomain:
     Those that differ only in their loads share one `matrix`.
 
     Attributes:
-        mesh: Mesh and numbering.
         material: The materials and their regions for which it was assembled.
         loads: The loads for which it was assembled.
         points: Coordinates by block, shape (n, dim), [length].
         load: f_s, shape (dim n,), [force].
         kernel: R_s, shape (dim n, n_modes): zero-energy modes as columns.
         typical_stiffness: Mean diagonal entry of K_s, [force / length].
-        matrix: K_s, freed once it is factored.
     """
 
     mesh: SubdomainMesh

@@ -31,7 +31,6 @@ class _Frame:
     """Cube coordinates (u, v, w) of a round body.
 
     Attributes:
-        radius: Radius of the body.
         flat: Directions along which the body is straight: (1,) for a cylinder along y, () for a ball.
     """
 

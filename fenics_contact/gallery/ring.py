@@ -54,7 +54,6 @@ class Spacing:
         quarter: Cells on a quarter turn of a crown.
         leg: Cells on a leg, all of one length.
         along: Strength κ on the crowns, 0 for equal cells.
-        across: Strength across the wire.
         through: Strength through its thickness, towards its inner side.
     """
 
@@ -99,7 +98,6 @@ class WireSection:
 
     Attributes:
         thickness: Size along a (radially in the ring).
-        width: Size along b (across the ring).
         roundness: Turning angle of every arc over 90 degrees, above 0 and below 1.
     """
 

@@ -211,7 +211,6 @@ class Hardening:
         yield_stress: σ_0, [force / length²].
         slope: H, [force / length²].
         saturation_stress: σ_∞, [force / length²].
-        saturation_rate: δ, per plastic strain.
     """
 
     yield_stress: float

@@ -71,8 +71,6 @@ class _Cut:
 
     Attributes:
         order: Its cells along the direction, (n,).
-        cells: Number of cells before the cut.
-        parts: Number of subdomains that they become.
         cost: Area, increased if the cut is uneven.
     """
 
@@ -93,8 +91,6 @@ class _Piece:
         weights: Weight of each cell, (n,), with 1 for a subdomain.
         pairs: Pairs of cells that share a face, in its own numbering, (n_pairs, 2).
         areas: Areas of these faces, (n_pairs,).
-        first: Number of its first subdomain.
-        parts: Number of its subdomains.
     """
 
     cells: np.ndarray

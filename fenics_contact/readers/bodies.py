@@ -53,7 +53,6 @@ class BodyParts:
     """The groups of a body.
 
     Attributes:
-        labels: The groups.
         regions: Their names as regions, or None for a body without regions.
     """
 
@@ -67,7 +66,6 @@ class SurfaceParts:
 
     Attributes:
         facets: Corners of facets, arrays of (n, 4 | 3 | 2) node numbers.
-        nodes: Sets of node numbers.
     """
 
     facets: Sequence[np.ndarray]

@@ -189,7 +189,6 @@ class Grid:
     """One grid.
 
     Attributes:
-        name: Its name.
         topology: XDMF's name of its cells, in lower case.
         has_points: Whether it has coordinates of its own.
         has_values: Whether it has values on its cells.

@@ -165,7 +165,6 @@ class Placed:
         shape: The shape.
         rotation: The orthogonal matrix R by rows; it may be a reflection.
         translation: Image of the origin, [length].
-        scale: Factor > 0 on all lengths.
     """
 
     shape: SurfaceShape

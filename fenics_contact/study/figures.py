@@ -54,11 +54,7 @@ class Series:
     """Some runs of a study.
 
     Attributes:
-        name: Its label.
-        runs: The runs, coarse ones first.
-        colour: Its colour.
         symbol: Its symbol, so that colours are not needed.
-        connected: Whether the runs form a sequence.
     """
 
     name: str

@@ -117,7 +117,6 @@ class TrueErrors:
         algebraic: Distance from the solution for the state's own slip bounds.
         total: Distance from the solution of the friction law, including the error of the slip bounds.
         uncertainty: Error of these reference solutions, by their own certificates.
-        tolerance: Residual of the reference solutions.
     """
 
     algebraic: float

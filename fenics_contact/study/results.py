@@ -161,8 +161,6 @@ class CertificateCheck:
         checked: Number of runs of which both are known.
         unknown: Number of runs without one of them.
         smallest_factor: Smallest ratio of the certificate to the true error, 1 or more if it is a bound.
-        largest_factor: Largest ratio.
-        broken: Descriptions of violations.
     """
 
     checked: int
@@ -271,7 +269,6 @@ class Reference:
         kind: "extrapolated", "finest mesh", or the source of the true value, such as "theory".
         value: Its value; None for an exact one, which may differ from run to run.
         rate: Rate of the extrapolation, None without one.
-        note: Why nothing was extrapolated.
         true: Whether it is an exact value, which every run stores with its own.
     """
 

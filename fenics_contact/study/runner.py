@@ -41,17 +41,12 @@ class Job:
     """A measurement.
 
     Attributes:
-        name: Its name in progress and tables.
         function: Function called on all ranks, ``"module:function"``, with the communicator and the
             arguments. It returns a mapping that JSON can hold, the same on every rank.
-        arguments: Named arguments that JSON can hold.
         first: Additional ones for the first measurement only.
         ranks: MPI ranks; 0: one process without MPI, whose function receives None for the communicator.
         threads: BLAS threads of each rank; None: one, unless the environment sets another number.
-        repeats: Number of measurements.
         short: Duration, [s], from which it is measured only once, as disturbances matter little.
-        limit: Seconds after which it is aborted.
-        weight: Approximate duration relative to others.
     """
 
     name: str
@@ -137,7 +132,6 @@ class Store:
     """Finished measurements on disk, one file each.
 
     Attributes:
-        folder: Folder of the files.
         mark: Mark of the measured code, see `fingerprint`.
     """
 
@@ -325,9 +319,7 @@ class StudyPlan:
     """A study that can be measured.
 
     Attributes:
-        study: The scene.
         base: Settings around which one at a time is varied.
-        jobs: All runs, coarse ones first.
         store: Store of the measurements, marked with the code at the start.
         ranks: MPI ranks of every run.
     """

@@ -163,9 +163,7 @@ class Outcome:
     """The result of one run; everything in it is replicated or collective.
 
     Attributes:
-        problem: The solved problem.
         states: States at the end of every load step.
-        parameters: Settings of the run.
         gradient: Derivative of the total potential by the design, shape (n_variables,); empty without one.
     """
 

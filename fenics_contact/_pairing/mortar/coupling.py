@@ -73,7 +73,6 @@ class DualBasis:
     """The dual functions on the covered parts of slave facets.
 
     Attributes:
-        cells: The integration cells.
         over_facet: Sums over the cells of each facet.
         over_pair: Sums over the cells of each pair.
         facet: Facet of each pair, shape (n_pairs,).

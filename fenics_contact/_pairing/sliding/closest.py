@@ -37,7 +37,6 @@ class PatchPoints:
         tangents: S,_a, shape (n, dim − 1, dim).
         second: S,_ab, shape (n, dim − 1, dim − 1, dim).
         normal: Outward unit normals, shape (n, dim).
-        functions: The patches' functions there.
     """
 
     place: np.ndarray
@@ -71,7 +70,6 @@ class ClosestPoints:
     """Search of closest points on a surface as it lies now.
 
     Attributes:
-        patches: The patches.
         points: Coordinates of the surface's nodes, shape (n_nodes, dim), [length].
         coefficients: Coefficients of the patches, shape (n_facets, n_functions, dim), [length].
         reach: Distance beyond which no point is wanted, [length].
@@ -303,7 +301,6 @@ class Roles:
     are parallel are slaves. So those of one side of a fold are, as a whole.
 
     Attributes:
-        patches: The surface.
         places: Its nodes in the undeformed body, shape (n_nodes, dim), [length].
         candidates: Its nodes that may be slaves, shape (n_candidates,).
         touched: Whether a candidate moves a patch, shape (n_facets, n_candidates).

@@ -53,7 +53,6 @@ class SlidingContact:
     are searched anew only for nodes that leave theirs.
 
     Attributes:
-        scene: The scene in its reference configuration.
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         comm: Communicator of the ranks; all have all points.
         reach: Distance beyond which nodes have no point, [length].

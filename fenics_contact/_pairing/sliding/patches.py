@@ -362,7 +362,6 @@ class SmoothPatches:
         facets: Facets as rows of node positions on the surface, shape (n_facets, corners).
         control: Weights of the surface's nodes in the coefficients of each facet's functions, shape (n_facets
             · n_functions, n_nodes).
-        dim: Dimension of space.
         order: 1, or 2 where facets are pieces of quadratic ones: patches then are these, but for what smooths
             the edges between them.
     """

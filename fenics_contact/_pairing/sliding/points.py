@@ -101,7 +101,6 @@ class SlidingPoints:
         coordinates: Present coordinates of all nodes, shape (n_nodes, dim), [length].
         means: The coupling of each pair of mortar contact; None for other pairs.
         placements: Rotation and translation of each pair's moving obstacle; None for other masters.
-        differential: What derivatives need.
         lost: Slave nodes that face a facet but for which no closest point was found.
     """
 
