@@ -1,11 +1,4 @@
-"""Scenes and designs as functions of parameters, for programs that call plain functions.
-
-The result of a response.
-
-From parameters to quantities of interest, by states of a scene or designs.
-
-A collective function called by a program that runs on rank 0 alone, while the other ranks serve.
-"""
+"""Scenes and designs as functions of parameters, for programs that call plain functions."""
 
 from __future__ import annotations
 

@@ -1,14 +1,8 @@
 """Contacts known by formula: Hertz's point and line, a pin in a hole, the relief of a roller.
 
-Checks of the arguments of formulas.
-
-Hertz's theory of the contact of two smooth bodies, at a point and along a line.
-
 References:
     Johnson, Contact mechanics, Cambridge University Press (1985), sections 4.1 and 4.2.
     Carlson, Numerical computation of real or complex elliptic integrals, Numer. Algorithms 10 (1995), 13-26.
-
-A pin in a hole of nearly its size, with contact over a large arc.
 
 Hertz's theory assumes that surfaces are nearly flat on the scale of the contact, unlike those of a pin in a
 tight hole.
@@ -17,8 +11,6 @@ References:
     Persson, On the stress distribution of cylindrical elastic bodies in contact, Chalmers (1964).
     Ciavarella and Decuzzi, The state of stress induced by the plane frictionless cylindrical contact,
     Int. J. Solids Struct. 38 (2001), 4507-4523 and 4525-4533.
-
-Profiles of rollers under which the pressure is the same all along the axis.
 
 References:
     Lundberg, Elastische Berührung zweier Halbräume, Forsch. Geb. Ingenieurwes. 10 (1939), 201-211.

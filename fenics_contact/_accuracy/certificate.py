@@ -1,13 +1,4 @@
-"""An upper bound of the algebraic error by duality, from an admissible multiplier and displacement.
-
-An upper bound of the algebraic error from duality: an admissible multiplier and displacement.
-
-The nearest multiplier within its cone and in equilibrium: the projection on the intersection.
-
-An admissible multiplier near a computed one: within its cone and in equilibrium.
-
-An admissible displacement near a computed one, and the energy of the correction.
-"""
+"""An upper bound of the algebraic error by duality, from an admissible multiplier and displacement."""
 
 from __future__ import annotations
 

@@ -1,11 +1,4 @@
-"""Recovery-based estimate of the discretisation error of a displacement.
-
-The moduli of a material as numbers, from its stiffness on one cell.
-
-Energy of the difference between recovered displacement gradients and those of the displacement.
-
-The energy of a difference of gradients for moduli that vary in space: by compiled forms.
-"""
+"""Recovery-based estimate of the discretisation error of a displacement."""
 
 from __future__ import annotations
 

@@ -13,12 +13,6 @@ References:
     Z. Zhang and A. Naga, A new finite element gradient recovery method: superconvergence property, SIAM J.
     Sci. Comput. 26 (2005); O. C. Zienkiewicz and J. Z. Zhu, The superconvergent patch recovery and a
     posteriori error estimates, Int. J. Numer. Meth. Engng 33 (1992).
-
-Polynomials about a point by their derivatives there, scaled to be rotationally invariant.
-
-Sites: the nodes of the bodies, each once for every material around it.
-
-The patch of nodes around every site, with the normal equations of polynomial fits.
 """
 
 from __future__ import annotations

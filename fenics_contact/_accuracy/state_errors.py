@@ -1,9 +1,4 @@
-"""The errors of a state, all in one norm: solver, friction law, mesh and geometry.
-
-Error due to slip bounds that do not satisfy Coulomb's law exactly, in energy norm.
-
-Stop once the mesh, not the solver, limits the accuracy of a state.
-"""
+"""The errors of a state, all in one norm: solver, friction law, mesh and geometry."""
 
 from __future__ import annotations
 

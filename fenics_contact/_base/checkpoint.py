@@ -1,7 +1,5 @@
 """Checkpoints of runs: files of arrays by name, and the point at which a signal stops a run.
 
-The checkpoint of a run, and the treatment of an existing one.
-
 Arrays by name in a file of NumPy's .npz format, with their kind and the fingerprint of the problem.
 
 The format is a zip archive with one .npy file per array, which `numpy.load` reads with
@@ -26,8 +24,6 @@ A minimisation has ``centre.*`` (best point ``x``, ``value``, ``subgradient``), 
 ``first_t``, ``careful`` (state of the method), ``history.*`` (a list for each attribute of a `Record` of the
 optimiser) and ``fun.*``, the memory of the function: of a shape problem the states of the first, best and
 last design, and the one to start from.
-
-Stopping of runs by signals, at the next point at which everything can be stored.
 """
 
 from __future__ import annotations

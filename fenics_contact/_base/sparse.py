@@ -1,22 +1,10 @@
 """Sparse matrices: what they cost, factors that several ranks use, rounding, threads.
 
-Cost model for sparse factors and dense matrices of a subdomain, from measured rates.
-
 The choice depends only on sizes, not on timings, so that a run is reproducible. `python -m benchmarks.prices`
 repeats the measurements and compares them with the predictions.
 
-Destroy PETSc objects together with the Python object that uses them.
-
 petsc4py frees nothing when a Python reference goes away: PETSc objects must be destroyed explicitly, those
 shared by several ranks on all of them in the same order.
-
-How far sums of floating-point numbers that cancel can be trusted.
-
-Sparse matrices whose rows or columns are multiplied by numbers, without the cost of a product.
-
-A sparse matrix factored on a few ranks and used by all.
-
-Oversubscription by BLAS threads of MPI ranks.
 """
 
 from __future__ import annotations

@@ -1,9 +1,4 @@
-"""UFL forms of a scene, each compiled once and bound to every subdomain mesh.
-
-Typical nodal stiffness of cells, for weighting stiff and soft neighbours.
-
-The temperature change of a body in UFL, and the stress including thermal strain.
-"""
+"""UFL forms of a scene, each compiled once and bound to every subdomain mesh."""
 
 from __future__ import annotations
 

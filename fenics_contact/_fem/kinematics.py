@@ -1,13 +1,4 @@
-"""Deformation at Gauss points, and volume changes in the mean of cells, against locking.
-
-Changes of volume: the determinant of the deformation gradient in the cells of a mesh.
-
-Changes of volume in the mean of each cell, against locking where plastic flow keeps the volume.
-
-Displacement gradients at the Gauss points of a mesh, and the forces and stiffness of stresses there.
-
-Volume energies of the dilatation of cells, against locking of nearly incompressible bodies.
-"""
+"""Deformation at Gauss points, and volume changes in the mean of cells, against locking."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""Pressures that follow a surface, and tractions with a given resultant.
-
-Pressure that follows the surface of a body under large deformations.
-
-Forces and moments spread over a surface: the traction that has a given resultant.
-"""
+"""Pressures that follow a surface, and tractions with a given resultant."""
 
 from __future__ import annotations
 

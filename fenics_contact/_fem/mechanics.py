@@ -1,15 +1,4 @@
-"""Internal forces and tangents of linear, hyperelastic and history-dependent materials.
-
-What every mesh with materials of nonlinear stress offers: internal forces and tangent.
-
-What the materials of a scene remember, at the Gauss points of its bodies.
-
-Internal forces and tangent of meshes with materials that have a history.
-
-Internal forces and tangent of hyperelastic materials.
-
-Internal forces of linear bodies beside nonlinear ones.
-"""
+"""Internal forces and tangents of linear, hyperelastic and history-dependent materials."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Compiled forms with their constants and coefficients, and the integration measures.
-
-Polynomials in the cells of a mesh, on which changes of volume are projected.
-"""
+"""Compiled forms with their constants and coefficients, and the integration measures."""
 
 from __future__ import annotations
 

@@ -1,11 +1,4 @@
-"""Contact points: nodes of one surface with their counterparts on another surface or an obstacle.
-
-The friction law of each contact point.
-
-Common numbering of the nodes of all bodies of a scene.
-
-Contact points whose condition a tie beside the contact, or another contact pair, has as well.
-"""
+"""Contact points: nodes of one surface with their counterparts on another surface or an obstacle."""
 
 from __future__ import annotations
 

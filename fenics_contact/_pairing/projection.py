@@ -1,11 +1,5 @@
 """Projection of some nodes of a surface onto another one, shared by the ranks.
 
-Warnings about the surfaces between which gaps are measured.
-
-Warnings about ties by nodes that reach beyond the master's edge.
-
-Warnings about pairs by nodes of quadratic cells whose meshes do not match: uniform pressures are missed.
-
 Slave nodes exert a uniform pressure p by forces p a, with the areas a that belong to them. These reach the
 master as p Wᵀ a, with the weights W of its nodes in their counterparts, but the same pressure on the master
 makes p b. So its nodes move by what r = Wᵀ a − b does to them, and forces of the slave change by p λ until

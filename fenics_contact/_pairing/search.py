@@ -1,17 +1,9 @@
 """Contact points of a scene, by nodes and by mortar, with the gaps that pairs give.
 
-Gaps between true surfaces that linear displacements can close, at the points of a mortar coupling.
-
 Where the gap g closes, the slave moves by (1 − s) g and the master by s g, s its share of the compliance, up
 to rigid motions. The constraint contains linear interpolants of that, I g on the slave and J g on the master:
 it can close (1 − s) g(x_i) + s ∫ ψ_i J g. The mean of g itself includes its curvature between nodes. Nodes
 that are partly beside the other surface keep that mean, and so do points with several nodes of the slave.
-
-Gaps that a contact pair gives in place of measured ones: clearances, interferences, adjusted points.
-
-Points of mortar contact and the reverse mode through them; the coupling is loaded where there are any.
-
-Contact points of a scene: the counterpart on the master, normal and gap of each slave node.
 """
 
 from __future__ import annotations

@@ -1,15 +1,4 @@
-"""Bodies of a scene file: meshes, their placement, surfaces, materials.
-
-What a scene file chooses for surfaces: groups of a mesh file, or faces of a CAD file by where they lie.
-
-Materials of bodies: those of the package by their constants, and user-defined classes.
-
-Placement of meshes: scaled, rotated, moved.
-
-Meshes from files.
-
-Meshes of built-in shapes: keys are the arguments of their functions.
-"""
+"""Bodies of a scene file: meshes, their placement, surfaces, materials."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""From a checked scene file to meshes, bodies and a scene; errors refer to their keys.
-
-Fields from files in a scene file, read before anything is built from it.
-
-From the [design] of a scene file to a shape problem and its minimisation.
-"""
+"""From a checked scene file to meshes, bodies and a scene; errors refer to their keys."""
 
 from __future__ import annotations
 

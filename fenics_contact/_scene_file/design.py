@@ -1,15 +1,4 @@
-"""The shape optimisation of a scene file: surfaces, objectives, constraints, optimiser.
-
-Shape optimisation: moving surfaces, what is minimised, and how.
-
-What a shape optimisation minimises: an objective by its name, a table with its arguments, or a sum.
-
-What must hold of a design: its volume, linear functions of its variables, limits of objectives.
-
-Surfaces that a design may move: crowns of chain links, sides of meshes, curves of plane ones.
-
-Evaluation of formulas at the nodes before anything is solved, so that errors refer to their keys.
-"""
+"""The shape optimisation of a scene file: surfaces, objectives, constraints, optimiser."""
 
 from __future__ import annotations
 

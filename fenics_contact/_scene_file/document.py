@@ -1,13 +1,4 @@
-"""A whole scene file, with its load steps and solvers.
-
-A whole scene file.
-
-How Newton's method follows the load of nonlinear materials.
-
-How the scene is solved: solver, tolerance, subdomains.
-
-Load steps, several at once: values change linearly to those at the end, or as formulas of the time.
-"""
+"""A whole scene file, with its load steps and solvers."""
 
 from __future__ import annotations
 

@@ -1,11 +1,4 @@
-"""Pairs, obstacles, loads and supports of a scene file.
-
-Obstacles of scene files that move: their path as numbers and formulas in t.
-
-Pairs of surfaces that may touch or stay together, and rigid obstacles.
-
-Loads on surfaces and volumes, and prescribed displacements.
-"""
+"""Pairs, obstacles, loads and supports of a scene file."""
 
 from __future__ import annotations
 

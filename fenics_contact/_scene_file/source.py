@@ -1,13 +1,4 @@
-"""The text of a scene file: its data and their lines.
-
-Keys of a scene file as paths, and as text.
-
-Line numbers of the keys of a TOML text.
-
-Mistakes in scene files: where they are, what is allowed, what was given.
-
-Errors of values of a scene file, referred to their keys.
-"""
+"""The text of a scene file: its data and their lines."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""Conversion of pydantic's errors to messages.
-
-Checks that names to which parts of a scene file refer exist.
-
-JSON schema of scene files, for editors.
-"""
+"""Conversion of pydantic's errors to messages."""
 
 from __future__ import annotations
 

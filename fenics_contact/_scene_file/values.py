@@ -1,8 +1,6 @@
 """Types of values in a scene file: rows of numbers, formulas, file names; each with its requirement.
 
 Formulas in x, y, z and t as text, evaluated at points; only arithmetic is accepted, no code is run.
-
-Names from a Python file of the user's own: "file.py:Name".
 """
 
 from __future__ import annotations

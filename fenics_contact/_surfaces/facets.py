@@ -1,19 +1,9 @@
 """Faceted surfaces: areas, moments, averaged normals, heights of a true surface over them.
 
-Faceted surfaces with a continuous normal field: shape functions, averaged nodal normals, nodal areas.
-
-Areas of facets, linear and quadratic, and moments of area, with the quadrature of the load forms.
-
-Facets of six nodes: a pressure bears on the midpoints of their edges, hardly on their corners.
-
 The shape functions of the corners of a quadratic triangle have the mean zero, those of the midpoints a third:
 a uniform pressure makes forces at the midpoints alone. With the midpoints as points of contact, each with a
 third of the facet, forces are those of a quadrature rule that is exact for quadratic displacements, and a
 uniform pressure is found exactly.
-
-Displacements of quadratic facets at points of the linear pieces that stand for them.
-
-Heights of a true surface over its flat facets, see `fenics_contact._surfaces.facets.Relief`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""The surface that facets represent: of a known shape, reconstructed, or the facets themselves.
-
-Reconstruction of the true surface from the nodes of its facets where it is smooth.
-"""
+"""The surface that facets represent: of a known shape, reconstructed, or the facets themselves."""
 
 from __future__ import annotations
 

@@ -1,12 +1,8 @@
 """An error of one rank becomes an error of all.
 
-The exchange by which ranks meet: each reports where it is, and learns where the others are.
-
 It takes place on a communicator of this package's own, a duplicate of the user's. Ranks poll for the others
 instead of waiting inside MPI, so that they can report what they wait for, receive an interrupt, and give up.
 A rank whose program has ended answers until those of the others have ended, too.
-
-An error of one rank becomes an error of all: ranks agree before they raise.
 
 Every point at which ranks agree is the same exchange on a communicator of this package's own: the end of a
 block that fails or succeeds on each rank by itself (`together`), and the beginning of a function that all

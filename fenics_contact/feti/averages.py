@@ -1,9 +1,4 @@
-"""Nodal values of torn fields: means of displacements, sums of forces.
-
-Nodal values of a torn displacement: the mean over the copies of each node.
-
-Nodal values of torn forces: the sum over the copies of each node.
-"""
+"""Nodal values of torn fields: means of displacements, sums of forces."""
 
 from __future__ import annotations
 

@@ -1,17 +1,4 @@
-"""The part of a torn scene that does not depend on its geometry: meshes, numbering, gluing rows.
-
-The part of a torn scene that does not depend on its geometry: meshes, numbering, compiled forms.
-
-Copies of nodes: the torn system has one copy of each node for every subdomain around it.
-
-Rows of B as sparse triplets over copies of nodes, before ranks select their own.
-
-Rows that glue subdomains together and prescribe displacements (Total FETI).
-
-Distributed dual vectors: ownership of multipliers, and the exchange of shared ones.
-
-Sums of contributions that several ranks hold of the same items.
-"""
+"""The part of a torn scene that does not depend on its geometry: meshes, numbering, gluing rows."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""From the torn system to the dual problem and back: F, d, G, e, and the displacements of a multiplier.
-
-Dirichlet preconditioner of the dual operator.
-"""
+"""From the torn system to the dual problem and back: F, d, G, e, and the displacements of a multiplier."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Sparse Cholesky factors through PETSc, and the generalised inverse of a floating subdomain.
-
-Functions of PETSc's C interface that petsc4py does not wrap.
-"""
+"""Sparse Cholesky factors through PETSc, and the generalised inverse of a floating subdomain."""
 
 from __future__ import annotations
 

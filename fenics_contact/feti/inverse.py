@@ -1,11 +1,4 @@
-"""All factored subdomains of one rank: generalised inverse, interface operators and kernel.
-
-Schur complements of subdomain matrices: one symbolic factorisation for all that share a pattern.
-
-A subdomain stored as two dense matrices on its interface: each application streams one of them once.
-
-A subdomain stored as sparse factors: each application is a forward and a backward substitution.
-"""
+"""All factored subdomains of one rank: generalised inverse, interface operators and kernel."""
 
 from __future__ import annotations
 

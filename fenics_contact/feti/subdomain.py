@@ -1,7 +1,4 @@
-"""One subdomain: its own mesh on one rank, its stiffness, load and kernel.
-
-The operators of one subdomain in the dual method: flexibility and stiffness on its interface.
-"""
+"""One subdomain: its own mesh on one rank, its stiffness, load and kernel."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The torn system of one geometry: subdomain matrices, contact points and this rank's part of B.
-
-Initial gaps: corrected for faceting, and checked against overlaps that supports prescribe.
-"""
+"""The torn system of one geometry: subdomain matrices, contact points and this rank's part of B."""
 
 from __future__ import annotations
 

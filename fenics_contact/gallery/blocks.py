@@ -1,17 +1,4 @@
-"""Blocks and rectangles of structured cells, swept solids, graded ticks.
-
-Meshes that do not fit into memory are rejected before they are built.
-
-Structured hexahedra and quadrilaterals, possibly closed into a ring, and their split into simplices.
-
-A box of structured hexahedra or tetrahedra.
-
-Solids swept from a plane mesh: every quadrilateral becomes a column of hexahedra.
-
-A rectangle of structured quadrilaterals or triangles.
-
-Ends of cells that grow away from where they are small.
-"""
+"""Blocks and rectangles of structured cells, swept solids, graded ticks."""
 
 from __future__ import annotations
 

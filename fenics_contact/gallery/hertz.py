@@ -1,12 +1,8 @@
 """The bodies of Hertz, graded towards the contact.
 
-The bodies of Hertz: half balls and half cylinders on the plane z = 0, graded towards the origin.
-
 A box of cells in the middle (the core) is surrounded on its round sides by a shell whose layers end on the
 true sphere or cylinder. Cells are well shaped everywhere, also on the rim, unlike in a single box mapped to a
 ball.
-
-The body of Hertz's line contact in two dimensions: a half disc on the line y = 0.
 """
 
 from __future__ import annotations

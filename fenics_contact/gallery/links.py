@@ -1,11 +1,4 @@
-"""Chain links that just touch, and chains of them.
-
-One chain link: a stadium-shaped ring of structured hexahedra or tetrahedra with a named crown.
-
-Two interlocked links, placed so that the smooth surfaces of their crowns just touch.
-
-A chain of interlocked links, every link rotated by 90 degrees relative to the one before.
-"""
+"""Chain links that just touch, and chains of them."""
 
 from __future__ import annotations
 

@@ -1,13 +1,9 @@
 """The ring of a chain link: proportions, section, spacing, and its mesh by gmsh.
 
-Proportions of a chain link and the lattice that its section sweeps along the stadium-shaped ring.
-
 The ring lies in the x-z plane. Its contact crown is the half circle on the +x side, with the middle of the
 inner surface (the pole) at the origin; the far crown lies on the -x side. Lattice directions: around the ring
 (in the contact crown from -z to +z), a from the inner to the outer side of the section, b along +y. They are
 right-handed.
-
-Spacing of the nodes of a ring along its three directions: finer where links touch.
 
 The nodes along a direction are concentrated by the map
 
@@ -17,8 +13,6 @@ of [-1, 1] with the contact at 0, which is smooth there: cells near the contact 
 the ends cosh κ times as large. The strength κ of the crowns comes from `LinkShape.grading`; across the wire
 and through its thickness it is chosen such that the cell at the contact is as small as along the ring.
 
-The cross-section of a link's wire: a rounded square bounded by four circular arcs.
-
 In the section's own coordinates (a, b), a points away from the ring's inside and b along the ring's axis. The
 four arcs turn by the same angle, ``roundness`` times 90 degrees: 0 would be a rectangle, 1 an ellipse-like
 oval (a disc for equal sizes) whose corner cells are flat. With the half angle φ and τ = tan(φ/2) the corners
@@ -27,8 +21,6 @@ oval (a disc for equal sizes) whose corner cells are flat. With the half angle �
     c_a + τ c_b = r_a,    c_b + τ c_a = r_b,
 
 where r_a and r_b are half the thickness and half the width: an arc over a chord of length 2c rises by τ c.
-
-The ring of a chain link in gmsh: a transfinite section swept through six pieces.
 """
 
 from __future__ import annotations

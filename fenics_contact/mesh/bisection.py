@@ -3,10 +3,6 @@
 References:
     H. D. Simon: Partitioning of unstructured problems for parallel processing. Computing Systems in
     Engineering 2 (1991) 135-148.
-
-Default number of subdomains of a body, and the default partition.
-
-Smoothing of boundaries between subdomains: protruding cells move to the neighbour.
 """
 
 from __future__ import annotations

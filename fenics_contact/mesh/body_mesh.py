@@ -1,7 +1,4 @@
-"""The mesh of one body: coordinates, cells, named surfaces; checked once, then an immutable value.
-
-Checks of mesh arrays. Each returns the array in the package's type or raises.
-"""
+"""The mesh of one body: coordinates, cells, named surfaces; checked once, then an immutable value."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Cell types with their nodes, faces and edges. Nodes are in the order of VTK.
-
-Shape functions of all cells and rules that integrate their Jacobians exactly, from basix.
-"""
+"""Cell types with their nodes, faces and edges. Nodes are in the order of VTK."""
 
 from __future__ import annotations
 

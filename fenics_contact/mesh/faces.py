@@ -6,10 +6,6 @@ them. Faces of quadratic cells list their corners first, then the midpoints of t
 corners, then the centre. Two faces are the same when they have the same corners.
 
 Cells of four nodes are tetrahedra unless ``dim=2``.
-
-Accuracy of coordinates: their rounding grows with the distance of a body from the origin.
-
-Coincident nodes: if unintended, the body is silently disconnected there.
 """
 
 from __future__ import annotations

@@ -1,7 +1,5 @@
 """Partition of any mesh by METIS.
 
-METIS of pymetis, and not of another library in the process.
-
 pymetis carries METIS inside its extension and exports its functions. The dynamic linker prefers functions of
 the same name in libraries opened with RTLD_GLOBAL, as dolfinx 0.5 opens the METIS of the system, whose
 indices have 32 bits while those of pymetis have 64: a pymetis loaded after it mixes both and crashes or never
@@ -9,8 +7,6 @@ ends. Here it is loaded so that it prefers its own functions.
 
 A library is loaded only once. If the program itself has loaded pymetis and another METIS may have taken its
 calls, the graph is partitioned in a separate process.
-
-Partition of any mesh by METIS: small interfaces between subdomains of similar size.
 
 The graph is the dual one: a vertex for every cell, an edge for every face that two cells share, weighted by
 its area; see `mesh.partition`. METIS may return a disconnected part and, when parts are small, a part

@@ -4,8 +4,6 @@ A partition is an int64 array with the subdomain 0..S-1 of every cell. A subdoma
 faces: pieces joined only by an edge or a node have zero-energy relative motions beyond the rigid body modes
 that the solver knows.
 
-Weights of faces and cells for cutting meshes into compact subdomains.
-
 Slender subdomains, however many cells thick, have soft modes that cost iterations, and so have subdomains
 with jagged boundaries. Both have more area than compact ones of the same size.
 """

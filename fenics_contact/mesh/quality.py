@@ -2,10 +2,6 @@
 
 Points with three coordinates belong to hexahedra or tetrahedra, points with two to quadrilaterals or
 triangles, for which "volume" is the area.
-
-Check that the nodes of surfaces lie on the given shapes.
-
-Detection of similarities: motions that only scale, rotate and shift.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""From a mesh file's labels to bodies: the cells of each body, and the facets on its boundary.
-
-Content of a mesh file of any format: points, cells, and labels on cells and facets.
-"""
+"""From a mesh file's labels to bodies: the cells of each body, and the facets on its boundary."""
 
 from __future__ import annotations
 

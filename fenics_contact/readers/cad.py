@@ -1,11 +1,4 @@
-"""Bodies from CAD files: which faces are which surfaces, meshes by gmsh, true shapes.
-
-The faces of a CAD model: their kinds, sizes and places.
-
-Which faces of a CAD model are which surfaces: by name, by number, or by where they lie.
-
-Bodies from CAD files, meshed by gmsh; their surfaces keep their true shapes.
-"""
+"""Bodies from CAD files: which faces are which surfaces, meshes by gmsh, true shapes."""
 
 from __future__ import annotations
 

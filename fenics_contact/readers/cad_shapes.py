@@ -1,7 +1,4 @@
-"""True shapes of a body's surfaces from the geometry of gmsh's current model, whichever kernel built it.
-
-A face or curve of gmsh's geometry as a shape that is independent of gmsh.
-"""
+"""True shapes of a body's surfaces from the geometry of gmsh's current model, whichever kernel built it."""
 
 from __future__ import annotations
 

@@ -1,11 +1,5 @@
 """Bodies from dolfinx meshes in memory and from XDMF files, by numeric tags, and the way back.
 
-Bodies of a dolfinx mesh, with the way back: fields of the bodies as Functions on that mesh.
-
-Metadata of the grids of an XDMF file, without reading the data.
-
-Bodies from XDMF files and from dolfinx meshes in memory, by numeric tags.
-
 By default every cell tag is a body and every facet tag a surface, called by its number, as text. Without cell
 tags the whole mesh is one body called "mesh".
 """

@@ -1,12 +1,8 @@
 """Bodies from gmsh: files and the model in memory; new tetrahedra behind a surface.
 
-Bodies from gmsh: from a .msh file of any version, or from the model in memory.
-
 Physical groups define bodies and surfaces. By default every physical volume (in two dimensions: physical
 surface) is a body of that name, and every physical surface (curve) a surface of each body on whose boundary
 it lies. A group without a name is named by its number, as text.
-
-New tetrahedra behind the surface of a body, by gmsh.
 """
 
 from __future__ import annotations

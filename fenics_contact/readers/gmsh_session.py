@@ -1,7 +1,4 @@
-"""A separate gmsh model that leaves the caller's gmsh, terminal and signal handlers unchanged.
-
-Elements and physical groups of gmsh's current model.
-"""
+"""A separate gmsh model that leaves the caller's gmsh, terminal and signal handlers unchanged."""
 
 from __future__ import annotations
 

@@ -1,13 +1,5 @@
 """Bodies from every mesh file that meshio reads.
 
-Element sets that an Abaqus file names with its elements: meshio may assign them wrongly.
-
-The cells of a meshio mesh that bodies can have, in the order of VTK and right-handed.
-
-Labels of a meshio mesh on cells, facets and nodes: named sets, and numbers that may have names.
-
-Bodies from every mesh file that meshio reads: Abaqus, Nastran, VTK, Exodus, MED, Medit and others.
-
 Labels of cells become bodies, labels of facets and nodes become surfaces: cell sets by name, tags (numbers,
 by their names in the file if any), node sets. `read_msh` reads gmsh's files and `read_xdmf` those of dolfinx;
 `read_mesh` delegates to them.

@@ -1,11 +1,4 @@
-"""Shapes made of others: joined, placed, or recognised from points and normals.
-
-Surfaces of several shapes: flat and round faces, fillets between them.
-
-Shapes that are rotated, scaled and moved.
-
-Recognition of planes, spheres, cylinders, cones and tori from points and normals.
-"""
+"""Shapes made of others: joined, placed, or recognised from points and normals."""
 
 from __future__ import annotations
 

@@ -1,17 +1,7 @@
 """Surfaces that are images of a rectangle: a user's parametrisation, and splines through points.
 
-Surfaces from a user's parametrisation.
-
-Feet of perpendiculars on a parametrised surface, and the derivatives of the distance there.
-
 With the foot X(u) of a point x, tangents J = ∂X/∂u, normal n, first and second fundamental forms G = JᵀJ and
 B = −n·∂²X/∂u², the distance is d = n·(x − X), its gradient n and its Hessian J G⁻¹ B (G + d B)⁻¹ Jᵀ.
-
-Surfaces that are images of a rectangle of parameters, in the plane of an interval.
-
-Grids of points in as many directions as there are rows of ticks.
-
-Free-form surfaces: splines of degree five through a grid of points.
 """
 
 from __future__ import annotations

@@ -1,25 +1,4 @@
-"""Planes, spheres, cylinders, tori, prisms and surfaces of revolution by their signed distances.
-
-The protocol of a surface's true shape, and its checked evaluation.
-
-Closest points and principal curvatures from a signed distance.
-
-Central differences with a step adapted to the position of the points.
-
-Checks of the position and size of shapes, with the class's name in messages.
-
-Prisms: a profile in the plane extruded along an axis.
-
-A plane surface.
-
-Surfaces of revolution: a profile in a half plane rotated about an axis.
-
-Round surfaces: spheres, in the plane discs, and cylinders.
-
-Shapes given by a function that returns the signed distance.
-
-Tori, such as the crowns of rings and links.
-"""
+"""Planes, spheres, cylinders, tori, prisms and surfaces of revolution by their signed distances."""
 
 from __future__ import annotations
 

@@ -1,16 +1,6 @@
 """The figures of a study, of `Errors`, for files and notebooks.
 
 They need matplotlib, an extra; only the report imports them.
-
-Runs that belong together, with their style in every figure.
-
-Error against time.
-
-Error against mesh size, with the theoretical and the measured rate.
-
-The three parts of the error: solver, law of friction, mesh.
-
-Time by phase, stacked.
 """
 
 from __future__ import annotations

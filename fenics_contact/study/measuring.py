@@ -1,9 +1,4 @@
-"""One run: solve, measure, compare with the exact discrete solution.
-
-Solve the problem of one run with its settings.
-
-The error that the certificate must bound: the distance from the exact solution of the discrete problem.
-"""
+"""One run: solve, measure, compare with the exact discrete solution."""
 
 from __future__ import annotations
 

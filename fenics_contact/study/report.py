@@ -1,7 +1,4 @@
-"""The output of a study: results, table, figures; and the page of all studies.
-
-Markdown tables of a study: the settings that an accuracy needs, and the cost of a setting.
-"""
+"""The output of a study: results, table, figures; and the page of all studies."""
 
 from __future__ import annotations
 

@@ -1,11 +1,4 @@
-"""The results of a study, as stored in `study.json`.
-
-Check that the certificate is never below the true error, and not far above it.
-
-The limit of a sequence of meshes, if it converges.
-
-Errors of every run in every quantity: relative to an exact value, an extrapolation, or the finest mesh.
-"""
+"""The results of a study, as stored in `study.json`."""
 
 from __future__ import annotations
 

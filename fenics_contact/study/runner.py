@@ -1,7 +1,4 @@
-"""Measurements in separate processes: repeated, stored when finished, resumed where they stopped.
-
-Run a study: every set of parameters that is not measured yet, each in its own process.
-"""
+"""Measurements in separate processes: repeated, stored when finished, resumed where they stopped."""
 
 from __future__ import annotations
 

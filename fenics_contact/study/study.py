@@ -1,9 +1,4 @@
-"""Settings of runs, and what a scene of a study provides.
-
-The settings of one run, and the runs of a study.
-
-What a scene must provide for a study: construction, measured quantities, and theoretical values.
-"""
+"""Settings of runs, and what a scene of a study provides."""
 
 from __future__ import annotations
 

@@ -1,13 +1,7 @@
 """Quadrature points on the intersections of slave and master facets, in the slave facets' planes.
 
-Pairs of facets that may face each other: nearest along the slave's normals, in opposite direction.
-
-Intersections of many pairs of convex polygons at once, cut into triangles; in the plane intervals.
-
 References:
     Sutherland, I. E., Hodgman, G. W.: Reentrant polygon clipping. Communications of the ACM 17 (1974).
-
-Layers of the master behind one another, closer than the size of facets: only the nearest one counts.
 """
 
 from __future__ import annotations

@@ -1,7 +1,5 @@
 """Mortar coupling of two surfaces by dual Lagrange multipliers, integrated segment by segment.
 
-Dual shape functions of partly covered slave facets, and the mortar integrals with them.
-
 On the covered part of a slave facet the dual functions are ψ = D M⁻¹ N with M = ∫ N Nᵀ and D = diag ∫ N,
 so that ∫ ψ_i N_j = δ_ij ∫ N_j and Σ ψ_i = 1. Integrals of ψ_i with master functions are then D_ii times the
 value at corner i of the master function's L² projection onto the slave functions. That projection is computed
@@ -19,8 +17,6 @@ References:
     with consistent linearization. International Journal for Numerical Methods in Engineering 83 (2010).
     Cichosz, T., Bischoff, M.: Consistent treatment of boundaries with mortar contact formulations using dual
     Lagrange multipliers. Computer Methods in Applied Mechanics and Engineering 200 (2011).
-
-Heights of true surfaces over their facets, at the quadrature points of a mortar coupling.
 """
 
 from __future__ import annotations

@@ -1,13 +1,4 @@
-"""Derivatives of the mortar coupling, and their reverse mode.
-
-Reverse mode through the dual functions of partly covered facets and the integrals with them.
-
-Reverse mode through the heights of true surfaces at the quadrature points of a mortar coupling.
-
-Reverse mode through the mortar coupling: from areas, weights, normals and gaps back to the surfaces.
-
-The derivative of each mortar weight by the nodes of both surfaces, for tangents of moving bodies.
-"""
+"""Derivatives of the mortar coupling, and their reverse mode."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Auxiliary planes: each facet's centre and mean normal, onto which facing facets are projected.
-
-Local coordinates of points on flat facets, in closed form, and the quadrature rules of simplices.
-"""
+"""Auxiliary planes: each facet's centre and mean normal, onto which facing facets are projected."""
 
 from __future__ import annotations
 

@@ -1,11 +1,4 @@
-"""Closest points on the smooth surfaces of moved bodies.
-
-Closest points on smooth patches by Newton's method.
-
-Surfaces of bodies where they lie now, with their averaged normals and the derivatives of these.
-
-Which nodes are slaves where a surface meets itself.
-"""
+"""Closest points on the smooth surfaces of moved bodies."""
 
 from __future__ import annotations
 

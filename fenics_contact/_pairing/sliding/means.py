@@ -1,9 +1,4 @@
-"""Mortar contact of bodies where they lie now: weighted means over the master, and how these move.
-
-How the weighted means of mortar contact move with the nodes, and what Newton's method needs of it.
-
-Areas that belong to contact points where bodies lie now: pressures are forces over them.
-"""
+"""Mortar contact of bodies where they lie now: weighted means over the master, and how these move."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What of a contact pair stays the same while its bodies move: nodes, facets, the weights of the patches.
-
-Nodes on the edge between two slave surfaces that slide over one master: points of one pair only.
-"""
+"""What of a contact pair stays the same while its bodies move: nodes, facets, the weights of the patches."""
 
 from __future__ import annotations
 

@@ -1,11 +1,4 @@
-"""A smooth surface through the nodes of a mesh, linear in their coordinates.
-
-Functions that turn a patch about its edges and leave the edges where they are.
-
-Basis functions of smooth patches over facets, with derivatives, as polynomials.
-
-One tangent plane along the edges of smooth patches: what the derivatives across them lack for that.
-"""
+"""A smooth surface through the nodes of a mesh, linear in their coordinates."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The contact points of moved bodies with their derivatives and slip.
-
-What is added to the gaps of bodies that move far, where their pair says what these are at first.
-"""
+"""The contact points of moved bodies with their derivatives and slip."""
 
 from __future__ import annotations
 

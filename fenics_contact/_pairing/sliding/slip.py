@@ -1,7 +1,4 @@
-"""Slip of nodes since an earlier time, whose places on the master are carried along by it.
-
-How slip depends on where the nodes stood when it began.
-"""
+"""Slip of nodes since an earlier time, whose places on the master are carried along by it."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Stiffness of contact forces whose directions and places change with the geometry, in factors.
-
-How contact points move with the nodes: on the master's surface, and with them normal and frame.
-"""
+"""Stiffness of contact forces whose directions and places change with the geometry, in factors."""
 
 from __future__ import annotations
 
