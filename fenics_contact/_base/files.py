@@ -90,23 +90,19 @@ def remove_abandoned(folder: Path) -> None:
 
 
 def replace_all(written: Sequence[Path], folder: Path) -> None:
-    """Move complete files or folders into a folder, one after the other; each survives a loss of power.
+    """Move complete files into a folder, one after the other; each survives a loss of power.
 
     The last of several refers to the others. The old one is removed first, so that it never refers to files
     of different age.
     """
     for path in written:
-        for part in (*path.rglob("*"), path) if path.is_dir() else (path,):
-            synchronise(part)
-        if path.is_file() and (folder / path.name).is_dir():
+        synchronise(path)
+        if (folder / path.name).is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), path.name)
     if len(written) > 1:
         (folder / written[-1].name).unlink(missing_ok=True)
     for path in written:
-        target = folder / path.name
-        if path.is_dir() and target.is_dir():  # unlike a file, it cannot be replaced atomically
-            shutil.rmtree(target)
-        os.replace(path, target)
+        os.replace(path, folder / path.name)
     synchronise(folder)
 
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fenics_contact import _dolfinx
 from fenics_contact._base import requirements as _requirements
 from fenics_contact._base.display import counted
 from fenics_contact._base.libraries import MPI
@@ -62,7 +61,6 @@ def gathered(comm: MPI.Comm) -> dict[str, Any]:
         "BLAS": ", ".join(libraries) or "not found",
         "PETSc packages": ", ".join(_packages()),
         "pictures": _pictures(comm),
-        "VTX files": "yes (ADIOS2)" if _dolfinx.has_vtx() else "no (dolfinx without ADIOS2)",
     }
     return {"versions": versions(), "machine": machine, "advice": list(_advice(comm, libraries))}
 

@@ -40,7 +40,7 @@ from fenics_contact._cli.view import Gallery, can_draw, draw_state
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact.errors import LoadStepError
 from fenics_contact.output.files import only_run_in
-from fenics_contact.output.paraview import ResultSeries, write_vtu, write_vtx, write_xdmf
+from fenics_contact.output.paraview import ResultSeries, write_vtu, write_xdmf
 from fenics_contact.output.result import forces_record, write_result
 from fenics_contact.results.deformed_state import DeformedState
 from fenics_contact.results.state import State
@@ -112,8 +112,6 @@ def _write(file: SceneFile, state: State) -> None:
         write_vtu(state, file.folder)
     if "xdmf" in kinds:
         write_xdmf(state, file.folder / "state.xdmf")
-    if "vtx" in kinds:
-        write_vtx(state, file.folder)
     write_result(state, file.folder, more=_origin(file), errors=state.known_errors is not None)
 
 

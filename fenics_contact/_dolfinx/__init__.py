@@ -30,7 +30,7 @@ from fenics_contact._dolfinx.numbering import (
     update_coordinates,
     vtk_cell_dofs,
 )
-from fenics_contact._dolfinx.output import has_vtx, write_vtx, write_xdmf
+from fenics_contact._dolfinx.output import write_xdmf
 from fenics_contact._dolfinx.reading import (
     MeshArrays,
     TagArrays,
@@ -72,7 +72,6 @@ __all__ = [
     "fem",
     "field_symbols",
     "global_dofs",
-    "has_vtx",
     "input_cells",
     "lagrange_degree",
     "local_mesh",
@@ -93,6 +92,5 @@ __all__ = [
     "update_coordinates",
     "version",
     "vtk_cell_dofs",
-    "write_vtx",
     "write_xdmf",
 ]

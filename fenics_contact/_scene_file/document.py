@@ -312,7 +312,7 @@ def _require_few(steps: Sequence[StepPart]) -> None:
         )
 
 
-FileKind: TypeAlias = Literal["vtu", "vtx", "xdmf"]
+FileKind: TypeAlias = Literal["vtu", "xdmf"]
 DesignFileKind: TypeAlias = Literal["csv", "stl", "step"]
 PictureKind: TypeAlias = Literal["stress", "pressure", "status", "decomposition", "error"]
 _ByRegion = Annotated[dict[str, str], Field(min_length=1)]
@@ -349,9 +349,7 @@ class OutputPart(Part):
         default=None,
         description="folder of the results, relative to where the command runs (output/NAME of the file)",
     )
-    files: list[FileKind] = Field(
-        default=["vtu"], description="files of fields, for ParaView; vtx needs ADIOS2"
-    )
+    files: list[FileKind] = Field(default=["vtu"], description="files of fields, for ParaView")
     design: list[DesignFileKind] = Field(
         default=["csv"],
         description="files of an optimised surface: a table, the body as triangles, for CAD programs",

@@ -77,7 +77,7 @@ def replacing_together(
         error: Exception | None = None
         try:
             write(hidden)
-        except (OSError, RuntimeError) as caught:  # HDF5 and ADIOS2 report a full disk in their own ways
+        except (OSError, RuntimeError) as caught:  # HDF5 reports a full disk in its own way
             error = _output_error(targets, caught)
         except Exception as caught:
             error = caught

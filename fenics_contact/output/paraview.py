@@ -1,4 +1,4 @@
-"""Files for ParaView: VTU with indices, XDMF, VTX, and series of states (PVD)."""
+"""Files for ParaView: VTU with indices, XDMF, and series of states (PVD)."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ import hashlib
 import math
 import os
 import re
-import shutil
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
@@ -280,60 +278,7 @@ def _repair(path: Path) -> None:
     path.write_text(text.replace(_UNKNOWN, _XINCLUDE), encoding="utf-8")
 
 
-@collectively("write_vtx", lambda state, *_, **__: state.torn.decomposition.comm)
-def write_vtx(
-    state: State, folder: str | Path, name: str = "state", *, value: float = 0.0
-) -> dict[str, tuple[Path, Path]]:
-    """Write displacement and von Mises stress of every body in the VTX format. Collective; all ranks write.
-
-    The format is a folder, ``.bp``, which ParaView opens as a file. One holds the displacement, another the
-    stress (as a discontinuous field), as all fields of one must have the same nodes.
-
-    Args:
-        state: The state.
-        folder: Output folder; created.
-        name: Beginning of the names: "state" gives "state_link_1_displacement.bp" and
-            "state_link_1_von_mises.bp" for a body "link 1". They are replaced when the new ones are complete.
-        value: Time that ParaView shows.
-
-    Returns:
-        Body name -> its two folders.
-
-    Raises:
-        InvalidInputError: If dolfinx was built without ADIOS2, or the name contains a folder.
-    """
-    comm = state.torn.decomposition.comm
-    with together(comm):
-        require_vtx()
-        base = checked_name(folder, name, "")
-    written = {}
-    for body, target in file_of_each(state.displacement, base.parent, name, "").items():
-        fields = (state.displacement[body], state.von_mises[body])
-        pair = [target.with_name(f"{target.name}_{field.name}.bp") for field in fields]
-        for path, field, cellwise in zip(pair, fields, (False, True), strict=True):
-            write = partial(_write_vtx, path.name, field, value, cellwise)
-            size = 8 * parallel_size(field.function_space.mesh)  # a discontinuous field has its own nodes
-            replacing_together(comm, [path], write, size=size)
-        written[body] = (pair[0], pair[1])
-    return written
-
-
-def require_vtx() -> None:
-    """Raise if ADIOS2 is missing."""
-    if not _dolfinx.has_vtx():
-        version = ".".join(map(str, _dolfinx.version()))
-        raise InvalidInputError(
-            f"VTX files need a dolfinx that was built with ADIOS2, this one ({version}) was not: use the "
-            "formats 'vtu' and 'xdmf', which every dolfinx has; dolfinx of Debian 13 and of conda-forge has "
-            "ADIOS2"
-        )
-
-
-def _write_vtx(name: str, field: object, value: float, cellwise: bool, hidden: Path) -> None:
-    _dolfinx.write_vtx(hidden / name, field, value, cellwise=cellwise)
-
-
-FORMATS = ("vtu", "xdmf", "vtx")
+FORMATS = ("vtu", "xdmf")
 
 
 class ResultSeries:
@@ -343,7 +288,6 @@ class ResultSeries:
     |---|---|
     | ``NAME.pvd``, with VTU files in the folder ``NAME/`` | always; all bodies, all fields of `write_vtu` |
     | ``NAME/NAME_0000_BODY.xdmf``, with HDF5 files | with "xdmf": displacement and von Mises stress |
-    | ``NAME/NAME_0000_BODY_FIELD.bp`` | with "vtx" (ADIOS2): one folder per state, body and field |
 
     Every member has its own mesh, so that designs may differ in shape. After each `add` all files are
     complete, and the PVD file refers to complete members only, also if a run is killed at any
@@ -412,8 +356,6 @@ class ResultSeries:
         write_vtu(state, folder, stem, cell_fields=cell_fields)
         if "xdmf" in self._formats:
             write_xdmf(state, folder / f"{stem}.xdmf")
-        if "vtx" in self._formats:
-            write_vtx(state, folder, stem, value=value)
         self._added.append(Member(value, number, label))
         with together(self._comm):
             if self._comm.rank == 0:
@@ -471,12 +413,12 @@ class ResultSeries:
         if not folder.is_dir():
             return
         named = {member.number for member in self.members}
-        pattern = re.compile(rf"{re.escape(self._name)}_(\d{{4,}})(_.*)?\.(vtm|vtu|xdmf|h5|bp)")
+        pattern = re.compile(rf"{re.escape(self._name)}_(\d{{4,}})(_.*)?\.(vtm|vtu|xdmf|h5)")
         # Index files are removed before the files to which they refer.
         for path in sorted(folder.iterdir(), key=lambda path: path.suffix not in (".vtm", ".xdmf")):
             match = pattern.fullmatch(path.name)
             if match and int(match.group(1)) not in named:
-                shutil.rmtree(path) if path.is_dir() else path.unlink()
+                path.unlink()
 
 
 def _check_formats(formats: Sequence[str]) -> None:
@@ -485,8 +427,6 @@ def _check_formats(formats: Sequence[str]) -> None:
         raise InvalidInputError(
             f"formats must be some of {list(FORMATS)}, got {formats!r}: give a tuple such as ('vtu', 'xdmf')"
         )
-    if "vtx" in formats:
-        require_vtx()
 
 
 def _finite(value: float, label: str) -> float:

@@ -151,15 +151,6 @@ def test_what_stands_in_the_way_is_named_and_stays(blocker: str, tmp_path: Path)
     assert [path.read_text() for path in tmp_path.rglob("*") if path.is_file()] == ["mine"]
 
 
-def test_a_folder_is_replaced_by_a_folder(tmp_path: Path) -> None:
-    for content in ("old", "new"):
-        with replacing(tmp_path / "a.bp") as (path,):
-            (path / "deep").mkdir(parents=True)
-            (path / "deep" / "data").write_text(content)
-    assert (tmp_path / "a.bp" / "deep" / "data").read_text() == "new"
-    assert hidden(tmp_path) == []
-
-
 def test_a_file_that_names_others_is_away_while_they_are_replaced(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,9 +12,9 @@ import pytest
 import pyvista as pv
 from mpi4py import MPI
 
-from fenics_contact import State, _dolfinx
+from fenics_contact import State
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.output import ResultSeries, write_vtx
+from fenics_contact.output import ResultSeries
 from fenics_contact.output import paraview as series
 from fenics_contact.output.paraview import Member
 from tests.contact.step_cases import sequence, shears
@@ -180,33 +180,10 @@ def test_any_label_is_kept(label: str, tmp_path: Path) -> None:
 
 def test_unknown_formats_and_names_with_folders_are_refused(tmp_path: Path) -> None:
     for formats in (("vtk",), "vtu"):
-        with pytest.raises(InvalidInputError, match=r"formats must be some of \['vtu', 'xdmf', 'vtx'\], got"):
+        with pytest.raises(InvalidInputError, match=r"formats must be some of \['vtu', 'xdmf'\], got"):
             a_series(tmp_path, formats=formats)
     with pytest.raises(InvalidInputError, match="name must be the beginning of a file's name, got 'a/b'"):
         ResultSeries(tmp_path, "a/b", MPI.COMM_SELF)
-
-
-@pytest.mark.skipif(_dolfinx.has_vtx(), reason="this dolfinx has ADIOS2")
-def test_without_adios2_the_error_names_the_formats_that_there_are(tmp_path: Path) -> None:
-    message = r"needs? a dolfinx that was built with ADIOS2, this one \(0\.\d+\) was not: .*'vtu' and 'xdmf'"
-    with pytest.raises(InvalidInputError, match=message):
-        a_series(tmp_path, formats=("vtu", "vtx"))
-    with pytest.raises(InvalidInputError, match=message):
-        write_vtx(touching_blocks(), tmp_path)
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.skipif(not _dolfinx.has_vtx(), reason="needs ADIOS2")
-def test_vtx_folders_are_there_for_every_member_body_and_field(tmp_path: Path) -> None:
-    told = a_series(tmp_path, formats=("vtu", "vtx"))
-    for value in (0, 1, 1):
-        told.add(history()[value], value)
-    folders = sorted(path.name for path in (tmp_path / "run").glob("*.bp"))
-    assert folders == [f"run_000{k}_block_{f}.bp" for k in (0, 1) for f in ("displacement", "von_mises")]
-    for name in folders:
-        assert (tmp_path / "run" / name / "data.0").stat().st_size > 1000
-    assert set(write_vtx(touching_blocks(), tmp_path / "one")) == {"lower", "upper block"}
-    assert len(list((tmp_path / "one").iterdir())) == 4, "nothing hidden is left"
 
 
 def test_what_cannot_be_written_leaves_the_members_before(
@@ -253,7 +230,7 @@ RANKS = """
     from tests.contact.step_cases import sequence, shears
 
     comm, folder = MPI.COMM_WORLD, sys.argv[1]
-    formats = ("vtu", "xdmf", "vtx") if _dolfinx.has_vtx() else ("vtu", "xdmf")
+    formats = ("vtu", "xdmf")
     steps, told = sequence(None, comm), ResultSeries(folder, "run", comm, formats=formats)
     states = [steps.advance(step) for step in shears((0.0, 0.006, 0.02))]
     for value, state in enumerate(states[:2]):
@@ -279,7 +256,5 @@ def test_two_ranks_write_the_same_series(mpirun: Callable[..., str], tmp_path: P
         near = {"rtol": 1e-4, "atol": 1e-6}
         np.testing.assert_allclose(displacement, state.gather_displacement("block"), **near)
     files = {path.suffix for path in tmp_path.rglob("run*.*")}
-    assert files - {".bp"} == {".pvd", ".vtm", ".vtu", ".xdmf", ".h5"}
-    assert (".bp" in files) is _dolfinx.has_vtx()
-    assert len(list(tmp_path.rglob("*.bp"))) in (0, 6)
+    assert files == {".pvd", ".vtm", ".vtu", ".xdmf", ".h5"}
     assert not list(tmp_path.rglob(".*")), "nothing hidden is left"
