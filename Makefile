@@ -86,8 +86,9 @@ benchmark: $(prepare) ## Measure time, memory and products; results in benchmark
 	$(python) -m benchmarks $(if $(filter quick,$(BENCH)),--quick)
 
 studies: $(prepare) ## Measure what accuracy costs in time; results in docs/studies/
-	for study in $(STUDIES); do $(launch) 1 $(python) -m fenics_contact accuracy $$study --ranks $(NP) --page \
+	for study in $(STUDIES); do $(launch) 1 $(python) -m fenics_contact accuracy $$study --ranks $(NP) \
 	  --output docs/studies/$$study --runs output/studies/$$study || exit 1; done
+	$(python) -m benchmarks.studies_page docs/studies
 
 lint: $(prepare) ## Check style (ruff) and types (mypy)
 	$(python) -m ruff check .

@@ -14,7 +14,7 @@ import typer
 from fenics_contact._cli.console import ExitCode, Terminated, console_of, write_stderr
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.output.files import only_run_in
-from fenics_contact.study.report import write_overview, write_report
+from fenics_contact.study.report import write_report
 from fenics_contact.study.runner import Settings, StudyPlan, prepare
 from fenics_contact.study.scenes import BUILT_IN, find_study
 from fenics_contact.study.study import BALANCED, DISCRETISATIONS, RunTolerance, Sweep
@@ -81,9 +81,6 @@ def accuracy(
         bool, typer.Option("--report", help="Measure nothing, write the results again.")
     ] = False,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="Write no pictures.")] = False,
-    page: Annotated[
-        bool, typer.Option("--page", help="Also write README.md of all studies beside it.")
-    ] = False,
     sizes: Annotated[list[int] | None, _several("sizes", "Meshes, larger is finer.", min=1)] = None,
     tolerances: Annotated[
         list[Any] | None, _several("tolerances", 'Numbers or "balanced".', _tolerance)
@@ -120,8 +117,6 @@ def accuracy(
             console.say(f"results of an earlier run stay in {folder}/: --report writes those of what is done")
             raise typer.Exit(status)
         words = _report(plan, folder, figures=not no_figures)
-    if page:
-        write_overview(folder.parent)
     console.say(f"{words}\nresults in {folder}/")
     if status:
         raise typer.Exit(status)

@@ -1,13 +1,14 @@
 """The figures of a study, of `Errors`, for files and notebooks.
 
-They need matplotlib, an extra; only the report imports them.
+Each takes the path of a PNG file, or none, and returns a picture that notebooks show. They need matplotlib,
+an extra; only the report imports them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -62,9 +63,14 @@ class Series:
         )  # fmt: skip
 
 
-def picture(errors: Errors, path: Path | None, draw: Callable[[Errors, BinaryIO], None]) -> Picture:
-    """Return a function's picture of a study, and write it to a PNG file if there is a path."""
-    return draw_picture(None, png_path(path), lambda paper: draw(errors, paper))
+def drawn(draw: Callable[[Errors, BinaryIO], None]) -> Callable[..., Picture]:
+    """Let a function return its picture, and write it to a PNG file if it is given a path."""
+
+    @wraps(draw)
+    def plot(errors: Errors, path: Path | None = None) -> Picture:
+        return draw_picture(None, png_path(path), lambda paper: draw(errors, paper))
+
+    return plot
 
 
 def series_of(errors: Errors) -> list[Series]:
@@ -149,19 +155,6 @@ def against(errors: Errors, quantity: str) -> str:
     return f"(against {words.get(kind, kind)})"
 
 
-def plot_accuracy(errors: Errors, path: Path | None = None) -> Picture:
-    """Draw the error of every run in every quantity over its time, and the Pareto front.
-
-    Args:
-        errors: Errors of a study's runs.
-        path: PNG file to write, None to write none.
-
-    Returns:
-        The picture, which can be used like a path to its file.
-    """
-    return picture(errors, path, _draw_all_accuracy)
-
-
 def pareto_front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
     """Return the indices of the Pareto-optimal points, by rising cost.
 
@@ -176,7 +169,9 @@ def pareto_front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
     return front
 
 
-def _draw_all_accuracy(errors: Errors, paper: BinaryIO) -> None:
+@drawn
+def plot_accuracy(errors: Errors, paper: BinaryIO) -> None:
+    """Draw the error of every run in every quantity over its time, and the Pareto front."""
     scene, ranks, runs = errors.results.scene, errors.results.ranks, errors.results.good
     quantities = [each for each in scene.quantities if any(errors.of(run, each.name) for run in runs)]
     title = f"{scene.title}: error against time on {counted(ranks, 'rank')}"
@@ -213,20 +208,9 @@ def _draw_accuracy(axes: Any, errors: Errors, quantity: QuantityFacts) -> None:
 LEGENDS = 120
 
 
-def plot_convergence(errors: Errors, path: Path | None = None) -> Picture:
-    """Draw the error of every quantity, and the estimate of the mesh's error, over the mesh size.
-
-    Args:
-        errors: Errors of a study's runs.
-        path: PNG file to write, None to write none.
-
-    Returns:
-        The picture, which can be used like a path to its file.
-    """
-    return picture(errors, path, _draw_all_convergence)
-
-
-def _draw_all_convergence(errors: Errors, paper: BinaryIO) -> None:
+@drawn
+def plot_convergence(errors: Errors, paper: BinaryIO) -> None:
+    """Draw the error of every quantity, and the estimate of the mesh's error, over the mesh size."""
     ways = [series for series in series_of(errors) if series.connected and len(series.runs) > 1]
     ways = [series for series in ways if series.name != "balanced"] if len(ways) > 1 else ways
     runs, scene = [run for series in ways for run in series.runs], errors.results.scene
@@ -285,20 +269,9 @@ PARTS = {
 }
 
 
-def plot_parts(errors: Errors, path: Path | None = None) -> Picture:
-    """Draw the parts and their shares: by mesh if balanced, by tolerance on the base's mesh.
-
-    Args:
-        errors: Errors of a study's runs.
-        path: PNG file to write, None to write none.
-
-    Returns:
-        The picture, which can be used like a path to its file.
-    """
-    return picture(errors, path, _draw_all_parts)
-
-
-def _draw_all_parts(errors: Errors, paper: BinaryIO) -> None:
+@drawn
+def plot_parts(errors: Errors, paper: BinaryIO) -> None:
+    """Draw the parts and their shares: by mesh if balanced, by tolerance on the base's mesh."""
     scene, base = errors.results.scene, errors.results.base
     meshes, varied = ([run for run in runs if run.parts] for runs in by_mesh_and_tolerance(errors))
     with sheet(paper, (WIDTH, 1000), f"{scene.title}: parts of the error") as figure:
@@ -349,20 +322,9 @@ COLOURS = dict(zip(ORDER, (SPARE, *FAMILIES[0], *FAMILIES[1]), strict=True))
 MORE = ("#aaaa00", "#666666", "#000000")
 
 
-def plot_phases(errors: Errors, path: Path | None = None) -> Picture:
-    """Draw the seconds by phase: by mesh at the balanced tolerance, by tolerance on the base's mesh.
-
-    Args:
-        errors: Errors of a study's runs.
-        path: PNG file to write, None to write none.
-
-    Returns:
-        The picture, which can be used like a path to its file.
-    """
-    return picture(errors, path, _draw_all_phases)
-
-
-def _draw_all_phases(errors: Errors, paper: BinaryIO) -> None:
+@drawn
+def plot_phases(errors: Errors, paper: BinaryIO) -> None:
+    """Draw the seconds by phase: by mesh at the balanced tolerance, by tolerance on the base's mesh."""
     results = errors.results
     meshes, varied = by_mesh_and_tolerance(errors)
     title = f"{results.scene.title}: time by phase on {counted(results.ranks, 'rank')}"

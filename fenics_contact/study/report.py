@@ -1,4 +1,4 @@
-"""The output of a study: results, table, figures; and the page of all studies."""
+"""The output of a study: results, table, figures."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from fenics_contact._base.display import counted
-from fenics_contact.errors import InvalidInputError
 from fenics_contact.output.files import write_text
 from fenics_contact.study.results import (
     CertificateCheck,
@@ -16,7 +15,6 @@ from fenics_contact.study.results import (
     Results,
     Run,
     check_certificates,
-    read_study,
     write_results,
 )
 from fenics_contact.study.study import Parameters, QuantityFacts
@@ -176,40 +174,6 @@ def _change(value: object, before: object) -> str:
 
 PICTURES = ("accuracy", "convergence", "parts", "phases")
 
-GUIDE = """\
-# What accuracy costs in time
-
-Written by `make studies`, which runs `python -m fenics_contact accuracy SCENE` for every scene; all numbers
-are from the `study.json` beside the figures. Every run is a process of its own; a time is that from the
-mesh to the state.
-
-## How to read the figures and tables
-
-**`accuracy.png`**: error against time, both logarithmic, for every quantity; further left is faster,
-further down is better. Along a line only the mesh becomes finer. The dashed line with rings is the Pareto
-front: for everything above it some other run is both faster and more accurate. Two lines on top of each
-other say that the setting in which they differ does not matter; a line far above the others, that it does.
-
-**`convergence.png`**: the same errors against the mesh size, with the slope that theory gives as a dashed
-line. The last panel shows the estimate that every state carries of its own error in energy norm. A quantity
-is compared with theory or with far finer meshes where there are such, else with the limit of the meshes
-(Richardson's extrapolation of the three finest), and where they do not converge monotonically with the last.
-
-**`parts.png`**: what the error consists of: mesh (an estimate), solver (a certificate; with Coulomb's law
-for the slip bounds of the state; true errors are marked by crosses), and law of friction (an estimate).
-Left, at the balanced tolerance, the solver's part must stay below a tenth of that of the mesh; right it is
-seen how a tolerance changes the solver's part alone.
-
-**`phases.png`**: where the time goes.
-
-**What an accuracy takes**: the fastest run that reaches it and whose finer and stricter companions all reach
-it, too: an error that passes through zero is no merit. Times that differ by less than a tenth count as
-equal. Where no run reaches it, the finest one is shown.
-
-**What a setting costs**: runs that differ from each other in one setting alone, on the finest mesh that both
-have; ratios above one are dearer.
-"""
-
 
 def write_report(folder: str | Path, results: Results, *, figures: bool = True) -> str:
     """Write ``study.json``, ``table.md`` and the figures of a study, also of an incomplete one.
@@ -234,41 +198,20 @@ def write_report(folder: str | Path, results: Results, *, figures: bool = True) 
     return _answers(errors)
 
 
-def write_overview(folder: str | Path) -> Path:
-    """Write ``README.md`` of a folder of studies, each in its own folder."""
-    target = Path(folder) / "README.md"
-    write_text(target, overview_page(Path(folder)))
-    return target
-
-
-def overview_page(folder: Path) -> str:
-    """Return the page of all studies in a folder; raises as `write_overview` does."""
-    files = sorted(folder.glob("*/study.json"))
-    if not files:
-        raise InvalidInputError(
-            f"a page of studies needs some, {folder} holds none: run a study into it first"
-        )
-    parts = [GUIDE]
-    for file in files:
-        errors, name = Errors(read_study(file)), file.parent.name
-        pictures = "\n".join(f"![{picture}]({name}/{picture}.png)" for picture in PICTURES)
-        more = f"[All {len(errors.results.runs)} runs]({name}/table.md).\n"
-        parts += [_title(errors, 2), pictures + "\n", _answers(errors), rates_table(errors)]
-        parts += [_certificates(check_certificates(errors.results)), more]
-    return "\n".join(parts)
+def findings_of(errors: Errors, level: int = 2) -> tuple[str, str, str, str]:
+    """Return title, costs, rates and certificates of a study, as Markdown."""
+    title = f"{'#' * level} {errors.results.scene.title}\n\n{errors.results.scene.about}\n"
+    check = check_certificates(errors.results)
+    return title, _answers(errors), rates_table(errors), _certificates(check)
 
 
 def table_page(errors: Errors) -> str:
     """Return ``table.md``: the findings, and every run."""
-    check = check_certificates(errors.results)
-    parts = [_title(errors, 1), _measured(errors.results), _answers(errors), "## Rates\n"]
-    parts += [rates_table(errors), "## Certificates\n", _certificates(check), "## Runs\n", _runs(errors)]
+    title, answers, rates, certificates = findings_of(errors, 1)
+    parts = [title, _measured(errors.results), answers, "## Rates\n"]
+    parts += [rates, "## Certificates\n", certificates, "## Runs\n", _runs(errors)]
     failed = [f"- {run.parameters}: {_short(run.failed)}" for run in errors.results.runs if run.failed]
     return "\n".join([*parts, "## Failed runs\n", *failed, ""] if failed else parts)
-
-
-def _title(errors: Errors, level: int) -> str:
-    return f"{'#' * level} {errors.results.scene.title}\n\n{errors.results.scene.about}\n"
 
 
 def _measured(results: Results) -> str:

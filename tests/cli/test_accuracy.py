@@ -83,10 +83,10 @@ def test_an_interrupt_from_the_keyboard_leaves_a_report_of_what_was_done(
     machine = Machine()
     machine.answers[4] = KeyboardInterrupt()
     monkeypatch.setattr(runner, "measure", machine)
-    assert main(["accuracy", str(scene), "--output", str(folder), "--quick", "--no-figures", "--page"]) == 130
+    assert main(["accuracy", str(scene), "--output", str(folder), "--quick", "--no-figures"]) == 130
     assert "interrupted: what is done is kept" in capsys.readouterr().err
     assert [run.parameters.size for run in read_study(folder).good] == [2, 3]
-    assert "## A pressed block" in (tmp_path / "README.md").read_text()
+    assert "# A pressed block" in (folder / "table.md").read_text()
     machine.answers[3] = KeyboardInterrupt()
     settings = ["--output", str(folder), "--runs", str(tmp_path / "others"), "--quick", "--no-figures"]
     assert main(["accuracy", str(scene), *settings]) == 130

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.studies_page import studies_page
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.study import Errors, read_study, write_report
-from fenics_contact.study.report import overview_page, table_page, write_overview
+from fenics_contact.study.report import table_page
 from tests.conftest import ROOT
 from tests.study.samples import results, run
 from tests.viz.states import contains, pixels
@@ -65,7 +66,7 @@ def test_results_that_are_not_there_or_not_whole_are_refused(tmp_path: Path) -> 
 def test_the_page_of_all_studies_takes_its_numbers_from_them(tmp_path: Path) -> None:
     for name in ("first", "second"):
         write_report(tmp_path / name, results(), figures=False)
-    text = write_overview(tmp_path).read_text()
+    text = studies_page(tmp_path)
     assert text.count("## A sample") == 2
     assert "![accuracy](second/accuracy.png)" in text
     assert "| peak pressure | 2 %, 1 % | 4 | hexahedron |" in text
@@ -81,12 +82,12 @@ def test_the_stored_pages_are_those_of_the_stored_results() -> None:
     assert len(found) == 3
     for file in found:
         assert file.with_name("table.md").read_text() == table_page(Errors(read_study(file)))
-    assert (folder / "README.md").read_text() == overview_page(folder)
+    assert (folder / "README.md").read_text() == studies_page(folder)
 
 
 def test_a_page_of_no_studies_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match=r"a page of studies needs some, .* holds none: run a study"):
-        write_overview(tmp_path)
+        studies_page(tmp_path)
 
 
 def test_figures_need_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
