@@ -56,7 +56,6 @@ class WeakPoints:
     """Numbers of points on a switch of the contact law, to the accuracy of the state, over all ranks.
 
     Attributes:
-        contacts: Points with neither force nor gap.
         discs: Friction discs at their bound without slip.
         edges: Closed points that project on an edge between facets; they count as inside the facet they
             project on.
@@ -96,13 +95,11 @@ class LinearisedFace:
     """Face of a state with the two bases of its linearised contact law.
 
     Attributes:
-        face: Closed, sticking and slipping points.
         tested: Z_s, test directions of the rows, shape (n_owned, n_face).
         moving: Z_u, directions along which the multiplier varies: a slipping friction force grows with its
             normal force by μ d, shape (n_owned, n_face).
         slip_direction: d at the slipping discs, zero elsewhere, shape (n_friction, dim − 1), owned.
         growing: Discs whose force grows with its normal force, shape (n_friction,), owned.
-        weak: Points on a switch.
     """
 
     face: Face
@@ -114,13 +111,7 @@ class LinearisedFace:
 
 
 def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -> LinearisedFace:
-    """Classify the contact points of a state and build both bases. Collective.
-
-    Args:
-        choice: Branch for weakly active points.
-        coupling: If False, the growth of friction with the normal force is omitted; the derivative is then
-            that of Tresca friction.
-    """
+    """Classify the contact points of a state and build both bases. Collective."""
     torn, rows = state.torn, state.rows
     layout, bound, step = torn.layout, rows.slip_bound, rows.step
     trial = rows.multiplier - step * rows.residual
@@ -188,9 +179,8 @@ def _uncertainty(comm: MPI.Comm, rows: RowValues) -> tuple[np.ndarray, np.ndarra
     It is the uncertainty of λ − ρ r due to the residuals of the state, with ρ the step: those of the
     contact law are forces already, jumps between subdomains become forces as slips and gaps do.
 
-    Returns:
-        The distance, and that below which a point of an inaccurate state is assigned to no side, shapes
-        (size,).
+    Returns the distance, and that below which a point of an inaccurate state is assigned to no side, shapes
+    (size,).
     """
     residuals = rows.residuals
     forces, jumps = residuals.natural * residuals.force_scale, residuals.gluing * residuals.gluing_scale
@@ -281,18 +271,8 @@ def solve_adjoint(
     Everything is linear in the objective, also the start and the scale of the residual: rescaling the
     objective rescales the adjoint, to rounding.
 
-    Args:
-        partials: Partial derivatives of the objective.
-        linearised: Branch of the contact law.
-        tolerance: Residual relative to that of the objective alone; what rounding leaves of the sums that it
-            is projected from is small enough, as where the objective is stationary in the state.
-        max_iterations: Largest number of F-products.
-        start: Multiplier of an adjoint to start from, owned, in any scaling; that of the same objective at a
-            less accurate state saves most products. By default the multiplier of the state.
-
-    Raises:
-        ConvergenceError: If the face does not hold every body, the objective changes along a rigid motion
-            that nothing resists, or the tolerance was not reached.
+    `start`: multiplier of an adjoint to start from, owned, in any scaling; that of the same objective at a
+    less accurate state saves most products. By default the multiplier of the state.
     """
     system = state.dual
     _require_held(system, partials.by_displacement)
@@ -412,9 +392,8 @@ def require_from_rest(state: State) -> None:
 def with_later_steps(state: State, own: Partials, by_position: np.ndarray) -> Partials:
     """Return the derivatives of a step's objective with what all later steps add. Collective.
 
-    Args:
-        by_position: Derivative of the objectives of all later steps by the relative tangential displacement
-            after this step, owned, zero in all other rows, shape (n_owned,).
+    `by_position`: derivative of the objectives of all later steps by the relative tangential displacement
+    after this step, owned, zero in all other rows, shape (n_owned,).
     """
     columns = state.torn.free.columns
     moved = -np.asarray(state.torn.decomposition.comm.allreduce(columns.T @ by_position))
@@ -431,9 +410,6 @@ def by_slip_origin(state: State, own: Partials, adjoint_multiplier: np.ndarray) 
 
     The slip B u − c enters the contact law with the adjoint's multiplier ζ and the step's own objective; the
     origin is c: the derivative is ζ − ∂J/∂(B u − c) in tangential rows.
-
-    Args:
-        own: Derivatives of the step's own objective, without those of later steps.
     """
     torn = state.torn
     tangential = torn.numbering.owned >= torn.n_equality + torn.points.count
@@ -480,9 +456,6 @@ def state_error(
 
     with the adjoint w, ζ = Z_s z and β. The error of J + δJ is of second order, as long as the face is the
     right one.
-
-    Args:
-        unbalanced: Shares βᵀ(G λ − e) of forces out of balance.
 
     References:
         R. Becker, R. Rannacher, An optimal control approach to a posteriori error estimation in finite

@@ -205,10 +205,6 @@ class DesignFunction:
     For constraints: the problem solves the state of a design when its own objective is evaluated, and this
     function costs one adjoint more. At a design whose state is not known it is solved first. Products
     with F are counted by the problem.
-
-    Attributes:
-        name: Its name.
-        objective: The objective.
     """
 
     def __init__(self, problem: SingleProblem, objective: Objective, name: str | None = None) -> None:
@@ -245,9 +241,7 @@ class DesignFunction:
         The known state, which is as accurate as its subgradient needs, is used if its effect on c is small
         enough, else it is solved to the smallest tolerance.
 
-        Args:
-            alpha: Design variables, shape (size,), [length].
-            subgradient: Largest relative error of the subgradient.
+        `alpha`: design variables, shape (size,), [length].
         """
         point = self._at_known_state(alpha)
         if point.error > value:
@@ -293,10 +287,7 @@ def with_fewest_weak_points(
     design. A point that is still on its switch far away does not depend on the design to first order: either
     branch gives the same derivative.
 
-    Args:
-        alpha: Design variables, shape (size,), [length].
-        end: A design nearby, shape (size,), [length].
-        parts: Fractions of the way at which designs are evaluated, nearest first.
+    `alpha`: design variables, shape (size,), [length]; `end`: A design nearby, shape (size,), [length].
     """
     best: Point | None = None
     refused: InvalidDesignError | None = None

@@ -58,8 +58,7 @@ def bounds_by_area(torn: TornSystem, by_bound: np.ndarray) -> np.ndarray:
 
     Tresca's bound is a traction times a nodal area, which moves with the nodes.
 
-    Args:
-        by_bound: Derivative by each frictional point's slip bound, shape (n_friction,).
+    `by_bound`: derivative by each frictional point's slip bound, shape (n_friction,).
     """
     by_area = np.zeros(torn.points.count)
     area = torn.points.area[torn.frictional]
@@ -73,9 +72,8 @@ def bounds_by_place(torn: TornSystem, normal_force: np.ndarray, by_bound: np.nda
     Friction given as a function of position changes with the place of the node: a bound μ(x) λ_N by λ_N ∇μ,
     Tresca's bound by the area times the gradient of the traction. Gradients are central differences.
 
-    Args:
-        normal_force: λ_N of the points, shape (n_points,), [force].
-        by_bound: Derivative by each frictional point's slip bound, shape (n_friction,).
+    `normal_force`: λ_N of the points, shape (n_points,), [force]; `by_bound`: derivative by each frictional
+    point's slip bound, shape (n_friction,).
     """
     points = torn.points
     result, by_all = np.zeros((points.count, torn.dim)), np.zeros(points.count)
@@ -126,12 +124,7 @@ class PointMotions:
 def point_motions(
     torn: TornSystem, points: ContactPoints, masters: Sequence[object], fields: PairedFields
 ) -> PointMotions:
-    """Return the motions of points. Collective.
-
-    Args:
-        masters: The masters of the pairs that the points number; all nodes of surfaces are included, as some
-            have no weight at any point but a derivative of it.
-    """
+    """Return the motions of points. Collective."""
     tearing, scene = torn.decomposition.tearing, torn.scene
     surfaces = [master for master in masters if isinstance(master, Surface)]
     opposite = [tearing.global_nodes(each.body, np.unique(scene.facets(each))) for each in surfaces]
@@ -146,9 +139,8 @@ def normals_pulled_back(
 ) -> np.ndarray:
     """Vector-Jacobian product of the unit normals with respect to the surface's nodes, shape (n, dim).
 
-    Args:
-        by_normals: Derivative by each nodal normal, shape (n, dim).
-        by_averaged: Direct derivative by each averaged normal, shape (n, dim).
+    `by_normals`: derivative by each nodal normal, shape (n, dim); `by_averaged`: direct derivative by each
+    averaged normal, shape (n, dim).
     """
     along = np.einsum("nd,nd->n", surface.normals, by_normals)
     by_true = by_normals - along[:, None] * surface.normals
@@ -171,12 +163,10 @@ def slopes_pulled_back(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return derivatives from those by the slopes of true surfaces, see `surfaces.relief.slopes`.
 
-    Args:
-        facet: Facets, shape (n,).
-        by_slopes: Derivative by the slopes at their corners, shape (n, corners, 2).
+    `facet`: facets, shape (n,); `by_slopes`: derivative by the slopes at their corners, shape (n, corners,
+    2).
 
-    Returns:
-        By nodes, by true normals and by averaged normals, shape (n_nodes, dim) each.
+    Derivatives by nodes, by true normals and by averaged normals, shape (n_nodes, dim) each.
     """
     by_points, by_normals, by_averaged = (np.zeros_like(surface.points) for _ in range(3))
     if surface.relief is None:
@@ -203,8 +193,7 @@ def slopes_pulled_back(
 def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarray:
     """Vector-Jacobian product of the nodal areas with respect to the surface's nodes, shape (n, dim).
 
-    Args:
-        by_areas: Derivative by each nodal area, shape (n,).
+    `by_areas`: derivative by each nodal area, shape (n,).
     """
     if surface.whole is not None:
         by_nodal = bearing_pulled_back(by_areas[surface.whole])
@@ -225,8 +214,7 @@ SurfaceDensity = Callable[[GaussPoint], tuple[np.ndarray, np.ndarray]]
 def integral_pulled_back(points: np.ndarray, facets: np.ndarray, density: SurfaceDensity) -> np.ndarray:
     """Return the derivative of an integral over facets by the nodes, shape (n_nodes, dim).
 
-    Args:
-        points: Coordinates, shape (n_nodes, dim), [length].
+    `points`: coordinates, shape (n_nodes, dim), [length].
     """
     result = np.zeros_like(points)
     for at in gauss_points(points, facets):
@@ -292,10 +280,8 @@ def frames_pulled_back(
 
     Reverse of `fenics_contact._pairing.points.tangent_frames`.
 
-    Args:
-        normal: Unit normals, shape (n, dim).
-        by_tangents: Derivative by the tangents, shape (n, dim − 1, dim).
-        axes: Axes nearest to the first tangents, shape (n, dim); `reference_axes` by default.
+    `normal`: unit normals, shape (n, dim); `by_tangents`: derivative by the tangents, shape (n, dim − 1,
+    dim); `axes`: axes nearest to the first tangents, shape (n, dim); `reference_axes` by default.
     """
     if normal.shape[1] == 2:
         return rotated_back(by_tangents[:, 0])
@@ -321,13 +307,10 @@ def projection_pulled_back(
     normals; the implicit function theorem gives ξ and r. The gap is r − h, h(ξ) the height of the true
     surface.
 
-    Args:
-        facet: Facet of each point, shape (n,).
-        local: ξ, shape (n, dim − 1).
-        gap: r − h, shape (n,), [length].
+    `facet`: facet of each point, shape (n,); `local`: ξ, shape (n, dim − 1); `gap`: r − h, shape (n,),
+    [length].
 
-    Returns:
-        Derivative by each slave point, shape (n, dim), and by each node of the master, (n_nodes, dim).
+    Returns derivative by each slave point, shape (n, dim), and by each node of the master, (n_nodes, dim).
     """
     nodes = master.facets[facet]
     corners, normals = master.points[nodes], master.normals[nodes]
@@ -356,12 +339,9 @@ def projection_pulled_back(
 def carriers(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the nodes that carry a master's motion at points and the gradients of their weights.
 
-    Args:
-        facet: Facet of each point, shape (n,).
-        local: Local coordinates on it, shape (n, dim − 1).
+    `facet`: facet of each point, shape (n,); `local`: local coordinates on it, shape (n, dim − 1).
 
-    Returns:
-        Positions among the surface's nodes, shape (n, nodes), and gradients, shape (n, nodes, dim − 1).
+    Returns positions among the surface's nodes, shape (n, nodes), and gradients, shape (n, nodes, dim − 1).
     """
     values, gradients = shape_functions(local, surface.corners)
     whole = surface.whole
@@ -402,9 +382,7 @@ def mortar_by_shape(
 ) -> np.ndarray:
     """Return the derivative by the nodes of all bodies, replicated, shape (n_nodes, dim). Collective.
 
-    Args:
-        points: Slave nodes among those of all bodies, ascending, shape (n,).
-        motions: Displacements of state and adjoint at the nodes of the master.
+    `points`: slave nodes among those of all bodies, ascending, shape (n,).
     """
     tearing, scene = torn.decomposition.tearing, torn.scene
     assert isinstance(pair.master, Surface)
@@ -434,8 +412,7 @@ def mortar_points_pulled_back(
     Gaps between true surfaces are those that linear displacements can close: combinations of gaps at the
     nodes of both, each of which is a projection.
 
-    Args:
-        comm: Communicator of the ranks that share the work, all with the same arguments.
+    `comm`: communicator of the ranks that share the work, all with the same arguments.
     """
     slave, master, coupling, gaps = points.slave, points.master, points.coupling, points.closable
     by_slave, by_master = np.zeros_like(slave.points), np.zeros_like(master.points)
@@ -524,10 +501,8 @@ def add_areas(
 ) -> None:
     """Add the derivative by the nodes through the areas on the slave surface of a pair.
 
-    Args:
-        result: By the nodes of all bodies, shape (n_nodes, dim).
-        by_area: By the areas of all points, shape (n_points,).
-        places: Where all nodes lie, shape (n_nodes, dim), [length]; undeformed by default.
+    `result`: by the nodes of all bodies, shape (n_nodes, dim); `by_area`: by the areas of all points, shape
+    (n_points,); `places`: where all nodes lie, shape (n_nodes, dim), [length]; undeformed by default.
     """
     pair = torn.scene.contacts[index]
     slave, given = torn.points.of_surface(index, by_area)
@@ -611,9 +586,8 @@ def _by_point(
 ) -> PointDerivatives:
     """Differentiate −λᵀ B w − ζᵀ B u + ζ_N g; rows −n·rel(v) and t·rel(v), rel(v) = v_s − Σ w_j v_j.
 
-    Args:
-        mine: The points to differentiate, shape (m,).
-        corners: Displacements of the corners of their master facets, shape (2, m, corners, dim).
+    `mine`: the points to differentiate, shape (m,); `corners`: displacements of the corners of their master
+    facets, shape (2, m, corners, dim).
     """
     force, friction, relative = rows.normal[:, mine], rows.friction[:, mine], rows.relative[:, mine]
     normal = np.einsum("kn,knd->nd", force, relative)

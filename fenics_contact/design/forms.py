@@ -40,9 +40,7 @@ class Density:
     """What is integrated over a body.
 
     Attributes:
-        name: Its name among compiled forms.
         integrand: Takes displacement, coordinates, stress and the constants (UFL), returns a UFL scalar.
-        constants: Number of constants.
         in_space: Whether the stress of plane bodies has the component normal to the plane, too.
     """
 
@@ -173,12 +171,7 @@ def sum_over_subdomains(
     evaluate: Callable[[Subdomain, Sequence[_dolfinx.fem.Function]], np.ndarray],
     moving: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Add up vectors of nodal derivatives over this rank's subdomains, shape (n_nodes, dim) for all bodies.
-
-    Args:
-        evaluate: Takes the subdomain and the Functions; returns a vector by dof.
-        moving: Marks of nodes of all bodies; subdomains without one of them are skipped.
-    """
+    """Add up nodal derivatives over this rank's subdomains, shape (n_nodes, dim) for all bodies."""
     tearing = torn.decomposition.tearing
     total = np.zeros((int(tearing.node_offset[-1]), torn.scene.dim))
     for subdomain, functions in subdomain_fields(torn, fields, moving):
@@ -191,11 +184,7 @@ def sum_over_subdomains(
 def subdomain_fields(
     torn: TornSystem, fields: Sequence[np.ndarray], moving: np.ndarray | None = None
 ) -> Iterator[tuple[Subdomain, list[_dolfinx.fem.Function]]]:
-    """Yield each of this rank's subdomains with the fields as Functions on it.
-
-    Args:
-        moving: Marks of nodes of all bodies; subdomains without one of them are skipped.
-    """
+    """Yield each of this rank's subdomains with the fields as Functions on it."""
     tearing = torn.decomposition.tearing
     starts = np.cumsum([0] + [subdomain.mesh.size for subdomain in torn.subdomains])
     for subdomain, start in zip(torn.subdomains, starts[:-1], strict=True):

@@ -33,8 +33,7 @@ def field_by_places(
 ) -> np.ndarray:
     """Return Σ_c g_c ∇f_c at the nodes that move, by dof of the displacement, shape (size,).
 
-    Args:
-        moving: Marks of the nodes of all bodies that move, or None for all.
+    `moving`: marks of the nodes of all bodies that move, or None for all.
     """
     mesh, dim, mesh_of_body = subdomain.mesh, torn.dim, torn.scene.bodies[subdomain.mesh.body].mesh
     nodes = np.sort(mesh.nodes)
@@ -74,7 +73,6 @@ class _Spread:
         even: a, shape (3,).
         turning: b, shape (3,).
         centre: c, shape (3,).
-        constant: α.
         linear: β, shape (3,).
         square: Γ, shape (3, 3).
     """
@@ -159,8 +157,7 @@ def work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndar
 def strain_work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndarray) -> np.ndarray:
     """Return ∂/∂X of a(u, w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim).
 
-    Args:
-        u: Torn displacement of this rank, [length].
+    `u`: torn displacement of this rank, [length].
     """
     for body in torn.scene.bodies.values():  # all ranks compile, also for bodies without a part on them
         for materials in material_sets(body):

@@ -98,11 +98,7 @@ RecordedPoint = TypeVar("RecordedPoint", bound=Recorded)
 
 
 class DesignRecord(Generic[RecordedPoint]):
-    """The first, best and last evaluated design; those of an earlier run as arrays until they are asked for.
-
-    Attributes:
-        evaluations: Number of designs evaluated.
-    """
+    """The first, best and last evaluated design; of an earlier run as arrays until they are asked for."""
 
     def __init__(
         self, build: Callable[[Stored], RecordedPoint], arrays_of: Callable[[RecordedPoint], Stored]

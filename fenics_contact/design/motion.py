@@ -72,8 +72,7 @@ class _Component:
     ) -> None:
         """Factor the matrix of the free nodes. Collective.
 
-        Args:
-            given: Marks of the nodes where it is given, shape (n_nodes,).
+        `given`: marks of the nodes where it is given, shape (n_nodes,).
         """
         self._given, self._free = _Nodes.chosen(space, given), _Nodes.chosen(space, free)
         inner = matrix.createSubMatrix(self._free.rows, self._free.rows)
@@ -121,7 +120,6 @@ class MeshMotion:
     in the surface displacement, and one factorisation serves all designs and, transposed, all gradients.
 
     Attributes:
-        moving: Nodes of the design surface.
         held: Components of nodes that do not move, shape (n_nodes, dim).
 
     References:
@@ -144,16 +142,9 @@ class MeshMotion:
     ) -> None:
         """Assemble and factor the stiffness of a mesh. Collective on the decomposition's communicator.
 
-        Args:
-            decomposition: Which rank owns which cells.
-            body: The body in its reference shape.
-            moving: Nodes of the design surface.
-            held: Components of nodes that do not move, shape (n_nodes, dim): all of them, or on a plane of
-                symmetry the one across it.
-            stiffening: χ: 0 makes all cells equally stiff.
-
-        Raises:
-            InvalidInputError: If a node is both moved and held.
+        `decomposition`: which rank owns which cells; `body`: the body in its reference shape; `held`:
+        components of nodes that do not move, shape (n_nodes, dim): all of them, or on a plane of symmetry the
+        one across it.
         """
         both = int(np.count_nonzero(held[moving].all(axis=1)))
         if both:
@@ -188,8 +179,7 @@ class MeshMotion:
     def pull_back(self, gradient: np.ndarray) -> np.ndarray:
         """Return the transpose of `extend` applied to nodal derivatives, shape (n_moving, dim). Collective.
 
-        Args:
-            gradient: Derivative by the displacement of every node, shape (n_nodes, dim), replicated.
+        `gradient`: derivative by the displacement of every node, shape (n_nodes, dim), replicated.
         """
         check_not_forked()
         result = np.array(gradient, dtype=float)
@@ -257,17 +247,14 @@ class DesignGeometry:
 
     Attributes:
         designs: The moving surfaces; α is the concatenation of their variables.
-        motions: Mesh motion of each design.
         moving: Body name -> marks of the nodes that a design moves, shape (n_nodes,).
-        size: Number of design variables.
         forms: Compiled derivatives of integrals where nodes move.
     """
 
     def __init__(self, scene: Scene, decomposition: Decomposition, designs: Sequence[SurfaceDesign]) -> None:
         """Prepare the mesh motion. Collective on the decomposition's communicator.
 
-        Args:
-            scene: The scene in its reference shape.
+        `scene`: the scene in its reference shape.
         """
         self.designs = tuple(design.on(scene) for design in designs)
         self.size = sum(design.size for design in self.designs)
@@ -281,11 +268,9 @@ class DesignGeometry:
     def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
         """Return the coordinates of the designed bodies; of the last design they are known. Collective.
 
-        Args:
-            alpha: Design variables, shape (size,), [length].
+        `alpha`: design variables, shape (size,), [length].
 
-        Returns:
-            Body name -> coordinates, shape (n_nodes, dim), [length].
+        Returns body name -> coordinates, shape (n_nodes, dim), [length].
         """
         alpha = checked_variables(alpha, self.size, self._decomposition.comm)
         if self._points is None or not np.array_equal(self._points[0], alpha):
@@ -339,14 +324,7 @@ Bind = Callable[[Subdomain, Functions, Spaces], "_dolfinx.fem.Form"]
 
 @dataclass(frozen=True, eq=False)
 class BodyIntegral:
-    """∫ of a density over one body of a state.
-
-    Attributes:
-        state: The state.
-        forms: Compiled functionals.
-        density: What is integrated.
-        body: Name of the body.
-    """
+    """∫ of a density over one body of a state."""
 
     state: State
     forms: ShapeForms

@@ -84,10 +84,9 @@ class ContactForces(Weighable):
 def on_rows(state: State, normal: np.ndarray | None, tangential: np.ndarray | None) -> np.ndarray:
     """Return values at the contact points in the owned rows of B, zero in all others, shape (n_owned,).
 
-    Args:
-        normal: Values for the normal rows, shape (n_points,), or None for zero.
-        tangential: Values for the tangential rows, in the points' tangents, shape (n_points, dim − 1), or
-            None; those of points without friction, which have no such rows, are left out.
+    `normal`: values for the normal rows, shape (n_points,), or None for zero; `tangential`: values for the
+    tangential rows, in the points' tangents, shape (n_points, dim − 1), or None; those of points without
+    friction, which have no such rows, are left out.
     """
     torn = state.torn
     result = np.zeros(len(torn.numbering.owned))

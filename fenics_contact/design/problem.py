@@ -47,10 +47,8 @@ def design_state(
 ) -> AnyState:
     """Compute the equilibrium of a design, whose surfaces may overlap before they are loaded. Collective.
 
-    Args:
-        scene: The scene in the shape of the design.
-        start: State of a neighbouring design, or None for the first one.
-        before: State of the same design after the last load step, or None.
+    `scene`: the scene in the shape of the design; `start`: state of a neighbouring design, or None for the
+    first one; `before`: state of the same design after the last load step, or None.
     """
     if scene.is_nonlinear and before is not None:
         raise InvalidInputError(

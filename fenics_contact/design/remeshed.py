@@ -40,8 +40,7 @@ def meshed(
 ) -> tuple[Scene, tuple[SurfaceDesign, ...]]:
     """Return the scene with new meshes of the designed bodies, made on rank 0, and the designs on them.
 
-    Args:
-        scene: The scene in the shape of a design.
+    `scene`: the scene in the shape of a design.
     """
     names = sorted({design.body for design in designs})
     made: dict[str, BodyMesh] = {}
@@ -133,7 +132,6 @@ class Remeshing:
 
     Attributes:
         alpha: The design in whose shape the new mesh was made, shape (size,), [length].
-        before: J there on the mesh before.
         after: J there on the new mesh: both are off by their discretisation errors.
     """
 

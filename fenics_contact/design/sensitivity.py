@@ -48,8 +48,7 @@ def by_true_areas(state: State, by_area: np.ndarray) -> dict[str, np.ndarray]:
     Areas of the undeformed slave change with the shape alone. Those of a deformed one change with the places
     x = X + u of its nodes, by mortar also with the master's: with the displacement and the shape alike.
 
-    Args:
-        by_area: Derivative by `ContactResult.area`, replicated, shape (n_points,).
+    `by_area`: derivative by `ContactResult.area`, replicated, shape (n_points,).
     """
     moved = state.equilibrium.evaluation.contact if isinstance(state, DeformedState) else None
     points = None if moved is None else moved.points
@@ -175,8 +174,7 @@ def adjoint_of(
 ) -> tuple[Adjoint, StateError]:
     """Solve the adjoint of a state and weigh its residuals with it. Collective.
 
-    Args:
-        start: Multiplier of a neighbouring adjoint, owned, or None; not used for deformed states.
+    `start`: multiplier of a neighbouring adjoint, owned, or None; not used for deformed states.
     """
     if isinstance(state, DeformedState):
         adjoint = solve_deformed_adjoint(state, partials, linearised, tolerance=tolerance)
@@ -194,8 +192,7 @@ def by_nodes(
 ) -> np.ndarray:
     """Sum the objective's own derivative, −wᵀ δ(f_int − f) and the share of contacts and ties. Collective.
 
-    Returns:
-        The derivative by the nodes of all bodies, replicated, shape (n_nodes, dim).
+    Returns the derivative by the nodes of all bodies, replicated, shape (n_nodes, dim).
     """
     torn, u, w = state.torn, state.torn_displacement, adjoint.displacement
     work = work_by_shape(forms, torn, u, w)
