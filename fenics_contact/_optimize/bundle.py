@@ -125,12 +125,9 @@ class Bundle:
     def moved(self, step: Array, change: float, locality: float, own: int = 1) -> Bundle:
         """Return the bundle seen from a new centre, whose own plane is the last one.
 
-        Args:
-            step: Move of the centre, shape (n,), scaled variables.
-            own: Number of planes at the end that were found at the new centre.
+        `step`: move of the centre, shape (n,), scaled variables.
 
-        Returns:
-            The same planes with new errors and longer distances, the centre's plane first.
+        Returns the same planes with new errors and longer distances, the centre's plane first.
         """
         errors = self.errors + change - self.gradients @ step
         distances = self.distances + np.linalg.norm(step)
@@ -148,11 +145,9 @@ class Bundle:
         plane, replaces the lightest of them: it alone preserves the predicted decrease, so that the method
         converges with any ``room`` of at least two.
 
-        Args:
-            weights: Multipliers of the planes, shape (m,), not negative, sum one.
+        `weights`: multipliers of the planes, shape (m,), not negative, sum one.
 
-        Returns:
-            The reduced bundle; row 0 stays where it is.
+        Returns the reduced bundle; row 0 stays where it is.
         """
         if self.size <= room:
             return self
@@ -234,7 +229,6 @@ class QuadraticSolution:
         point: y, shape (n,).
         multipliers: Multipliers of C y ≤ c, shape (m,), not negative.
         equality_multipliers: Multipliers of E y = e, shape (r,).
-        status: Clarabel's status.
         exact: False where only Clarabel's reduced tolerances were met.
     """
 
@@ -315,13 +309,8 @@ def shortest(
 ) -> Array:
     """Return the shortest y with E y = e and C y ≤ c, shape (n,).
 
-    Args:
-        equality_rows: E, shape (r, n).
-        equality_values: e, shape (r,).
-        rows: C, shape (m, n).
-        limits: c, shape (m,).
-        far: Distance in units of the largest violation at y = 0 beyond which a limit is moved there, as it
-            cannot matter: violations may be a rounding of the distances to other limits.
+    `equality_rows`: E, shape (r, n); `equality_values`: e, shape (r,); `rows`: C, shape (m, n); `limits`: c,
+    shape (m,).
     """
     rows, limits = unit_rows(rows, limits)
     equality_rows, equality_values = unit_rows(equality_rows, equality_values)

@@ -98,9 +98,7 @@ class StoppingTest:
 
     Attributes:
         limit: Decrease of J that is not worth a step, ε (s + \|J\|).
-        rounding: Decrease of J below floating-point resolution.
         reach: Least r, in scaled variables; a longer step extends it to its own length.
-        first_t: Initial proximal parameter.
     """
 
     limit: float

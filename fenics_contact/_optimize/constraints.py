@@ -28,13 +28,10 @@ def contradicting(rows: Array, limits: Array, equal: NDArray[np.bool_]) -> list[
     The rows with a multiplier in the least sum of violations cannot be met together; of these each one
     without which the others still contradict each other is dropped.
 
-    Args:
-        rows: C of C x ≤ c, shape (m, n).
-        limits: c, shape (m,).
-        equal: Marks of rows that hold as equations, shape (m,).
+    `rows`: C of C x ≤ c, shape (m, n); `limits`: c, shape (m,); `equal`: marks of rows that hold as
+    equations, shape (m,).
 
-    Returns:
-        Numbers in ascending order; empty where all can be met.
+    Returns numbers in ascending order; empty where all can be met.
 
     References:
         J. W. Chinneck, Feasibility and infeasibility in optimization, Springer, 2008 (elastic and deletion
@@ -255,8 +252,7 @@ def feasible_set(
 ) -> FeasibleSet:
     """Check the caller's constraints and fill in the defaults.
 
-    Returns:
-        The feasible set; the caller's arrays are copied.
+    Returns the feasible set; the caller's arrays are copied.
     """
     lower, upper = _box(n, bounds)
     given = [] if constraints is None else constraints

@@ -139,15 +139,7 @@ def fixed_rim(design: Net, width: int | Sequence[int] = 1) -> LinearConstraints:
 def joined(designs: Sequence[Net], *parts: tuple[int, LinearConstraints]) -> LinearConstraints:
     """Place constraints of single designs in the variables of all.
 
-    Args:
-        designs: All designs in the order of their variables: ``ShapeProblem.designs``.
-        parts: Number of a design and constraints of its variables.
-
-    Returns:
-        The constraints for the whole α.
-
-    Raises:
-        InvalidInputError: If a number names no design, or a part has other variables.
+    `designs`: all designs in the order of their variables: ``ShapeProblem.designs``.
     """
     ends = np.cumsum([0, *(np.prod(design.counts, dtype=int) for design in designs)])
     matrices: dict[str, list[Array]] = {"rows": [np.zeros((0, ends[-1]))], "equal": [np.zeros((0, ends[-1]))]}

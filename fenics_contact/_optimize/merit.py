@@ -72,8 +72,7 @@ def with_pieces(
 ) -> Bundle:
     """Return the bundle with the planes of other functions of which J is the largest, see `Pieced`.
 
-    Args:
-        move: The step from there to the trial point, shape (n,), scaled variables.
+    `move`: the step from there to the trial point, shape (n,), scaled variables.
     """
     for value, slope in zip(map(float, evaluation.pieces), evaluation.piece_slopes, strict=True):
         plane = merit_planes(problem, replace(evaluation, value=value, subgradient=slope))[0]
@@ -91,11 +90,7 @@ def _slopes(problem: PosedProblem, evaluation: Evaluation) -> tuple[Scaled, Arra
 def first_soft(
     planes: Sequence[Plane], locality: float, *, factor: float = 2.0
 ) -> tuple[SoftConstraint, ...]:
-    """Return the inequalities at the start, their penalty a multiple of the ratio of the gradients.
-
-    Args:
-        locality: Locality of a plane in units of the length of its gradient.
-    """
+    """Return the inequalities at the start, their penalty a multiple of the ratio of the gradients."""
     size = factor * (planes[0].steepness or 1.0)
     return tuple(
         SoftConstraint(
@@ -261,11 +256,7 @@ def restored(
 
     Every correction is the shortest one, in scaled variables, to the linearised equalities.
 
-    Args:
-        x: Point that satisfies bounds and linear constraints, shape (n,).
-
-    Returns:
-        The point and the equalities there.
+    `x`: point that satisfies bounds and linear constraints, shape (n,).
     """
     equal = problem.equalities
     if not equal:

@@ -141,10 +141,6 @@ class ConstraintValue:
     """A nonlinear constraint at the best point.
 
     Attributes:
-        name: Its name.
-        value: c(x).
-        lower: Lower limit.
-        upper: Upper limit.
         violation: How far c lies outside its limits, divided by its size; 0 inside.
         multiplier: m of the stationarity ∇J + Σ m ∇c = 0, positive at an upper limit, negative at a lower
             one: a small change δ of that limit changes the least J by about -m δ. 0 where it is inactive.
@@ -206,8 +202,7 @@ class Scaled:
 def scaled_constraints(constraints: Sequence[NonlinearConstraint], values: Array) -> Scaled:
     """Return constraints in units of their sizes.
 
-    Args:
-        values: Their values c, shape (k,).
+    `values`: their values c, shape (k,).
     """
     pairs = [constraint.excess(float(value)) for constraint, value in zip(constraints, values, strict=True)]
     excess, factors = np.array(pairs, dtype=float).reshape(-1, 2).T
@@ -236,8 +231,6 @@ class SoftConstraint:
     Attributes:
         bundle: Cutting planes of c at the centre, with their own linearisation errors.
         value: c at the centre, divided by the size of the constraint.
-        penalty: ρ, units of J.
-        first_penalty: ρ at the start.
     """
 
     bundle: Bundle
@@ -280,8 +273,7 @@ class SoftConstraint:
     def with_cut(self, plane: Plane, move: Array) -> tuple[SoftConstraint, Rise]:
         """Return the constraint with the plane of a trial point at the end, and what the point says.
 
-        Args:
-            move: The step to it, shape (n,), scaled variables.
+        `move`: the step to it, shape (n,), scaled variables.
         """
         value, slope = plane.value, float(plane.gradient @ move)
         error, length = slope - (value - self.value), float(np.linalg.norm(move))

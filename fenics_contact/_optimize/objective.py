@@ -37,10 +37,7 @@ class Inexact(Function, Protocol):
     def within(self, x: Array, value: float, subgradient: float) -> tuple[float, ArrayLike, float]:
         """Return the value, a subgradient, and the estimated error of the value.
 
-        Args:
-            x: Point, shape (n,).
-            value: Largest error of the value, units of J; inf for any.
-            subgradient: Largest error of the subgradient, relative to it.
+        `x`: point, shape (n,).
         """
 
 
@@ -74,8 +71,7 @@ class Remarked(Function, Protocol):
     def remarks(self, x: Array) -> Sequence[str]:
         """Return what to know about a point, in whole sentences; nothing if there is nothing.
 
-        Args:
-            x: Point, shape (n,).
+        `x`: point, shape (n,).
         """
 
 
@@ -99,12 +95,7 @@ class Pieced(Function, Protocol):
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Requested accuracy of an evaluation: 0 for the best possible, inf for any.
-
-    Attributes:
-        value: Largest error of J.
-        subgradient: Largest relative error of the subgradient.
-    """
+    """Requested accuracy of an evaluation: 0 for the best possible, inf for any."""
 
     value: float = 0.0
     subgradient: float = 0.0
@@ -116,11 +107,8 @@ class Evaluation:
 
     Attributes:
         x: Point, shape (n,).
-        value: J(x).
         subgradient: One subgradient, shape (n,), in the caller's variables.
-        error: Estimated error of the value.
         asked_value: Allowed error of the value, 0 for an exact function.
-        asked_subgradient: Allowed relative error of the subgradient.
         turned: Relative change of the subgradient since a less accurate evaluation of the same point: 0 for
             an exact function, inf without such an evaluation.
         doubtful: Whether it, or one of a constraint, may not be a subgradient, see `Kinked`.
@@ -156,12 +144,8 @@ def evaluate(
 ) -> Evaluation:
     """Call the function with a copy of x and check what it returns.
 
-    Args:
-        x: Point, shape (n,).
-        accuracy: Accuracy requested from an inexact function; None for the best possible.
-
-    Returns:
-        Copies of all three.
+    `x`: point, shape (n,); `accuracy`: accuracy requested from an inexact function; None for the best
+    possible.
     """
     if accuracy is None or not (isinstance(fun, Inexact) and fun.inexact):
         evaluation = _checked(fun(x.copy()), x, f"at evaluation {number}", name)
@@ -229,8 +213,7 @@ def _checked(answer: Any, x: Array, where: str, name: str = "fun") -> Evaluation
 def require_finite(needed: str, numbers: Array, where: str) -> None:
     """Refuse numbers that are not finite.
 
-    Args:
-        numbers: The numbers, of any shape.
+    `numbers`: the numbers, of any shape.
     """
     bad = np.flatnonzero(~np.isfinite(numbers))
     if bad.size:

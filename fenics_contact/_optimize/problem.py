@@ -47,13 +47,10 @@ class PosedProblem:
     """min J(x) over a feasible set, checked.
 
     Attributes:
-        fun: Value and subgradient at a point.
         start: Feasible starting point, shape (n,).
-        allowed: The feasible set.
         scale: Size of each variable, shape (n,): the method sees x/scale.
         length: Length scale of the problem in scaled variables.
         nonlinear: Nonlinear constraints, every one with a name.
-        restore: Whether the start may violate them.
     """
 
     fun: Fun
@@ -85,9 +82,6 @@ class PosedProblem:
 
         Constraints are evaluated inexactly only where the objective is, as only then the centre is evaluated
         again.
-
-        Args:
-            penalties: Weights of inequalities in the merit function by their numbers, units of J.
         """
         found = evaluate(self.fun, x, number, accuracy)
         own = []
@@ -125,11 +119,7 @@ def pose(
     *,
     restore: bool = False,
 ) -> PosedProblem:
-    """Check a problem and choose its scales; the arguments are those of `minimize`, arrays are copied.
-
-    Raises:
-        InvalidInputError: If a shape does not fit, x0 is not finite or not feasible.
-    """
+    """Check a problem and choose its scales; the arguments are those of `minimize`, arrays are copied."""
     start = np.array(x0, dtype=float)
     if start.ndim != 1 or start.size == 0:
         raise InvalidInputError(f"x0 must have shape (n,) with n ≥ 1, got {start.shape}")
@@ -189,10 +179,6 @@ class Demand:
     where that is larger, the decrease that is not worth a step. No trial that raises J then becomes the
     centre, as long as twice the share is less than the ``descent`` of the method.
 
-    Attributes:
-        value: Largest error of J.
-        subgradient: Largest relative error of the subgradient.
-
     References:
         K. C. Kiwiel, A proximal bundle method with approximate subgradient linearizations, SIAM J. Optim. 16
         (2006) 1007-1023. W. de Oliveira, C. Sagastizábal, C. Lemaréchal, Convex proximal bundle methods in
@@ -223,11 +209,7 @@ class Demand:
 
 
 def demand(worth: float, reach: float, norm: float, shares: tuple[float, float]) -> Demand:
-    """Return the accuracy that a decision needs.
-
-    Args:
-        shares: Fractions of the decrease by which the value and the step's slope may be wrong.
-    """
+    """Return the accuracy that a decision needs."""
     slope = norm * reach
     return Demand(shares[0] * worth, min(shares[1] * worth / slope if slope > 0.0 else np.inf, 1.0))
 

@@ -78,14 +78,11 @@ class Record:
 
     Attributes:
         iteration: Serious steps up to and with this one.
-        kind: Outcome of the trial point.
         value: J at the trial point; nan where it was rejected as invalid.
         best: J at the centre after this evaluation.
         predicted_decrease: Decrease of J that the model predicted.
-        t: Proximal parameter of the step.
         step_length: Length of the step in scaled variables.
         aggregate_norm: Length of the aggregate subgradient in scaled variables.
-        aggregate_error: Linearisation error of the aggregate subgradient.
         bundle_size: Cutting planes in the model that made the step.
         evaluations: Evaluations up to and with this one.
         error: Estimated error of `value`; 0 for a function that is exact or does not report it.
@@ -169,10 +166,6 @@ class MethodState:
     """Everything that the next step of the method depends on.
 
     Attributes:
-        centre: Best point with value and subgradient.
-        bundle: Cutting planes seen from it.
-        trust: Proximal parameter and trust region.
-        first_t: Initial proximal parameter.
         history: One record for each evaluation, oldest first.
         careful: Whether doubtful subgradients are replaced at once, see `fenics_contact._optimize.merit`.
         soft: Nonlinear inequalities with their cutting planes and penalties.

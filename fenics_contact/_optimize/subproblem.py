@@ -42,7 +42,6 @@ class Step:
         aggregate_norm: ‖z‖ = ‖y‖/t, length of the aggregate subgradient (with the constraints' normals).
         aggregate_error: σ = Σ λ_i β_i + Σ μ_k room_k, and Σ_ki θ_ki ρ_k (β_ki - c_k) + Σ_k ρ_k max(c_k, 0);
             w = σ + t ‖z‖².
-        t: Proximal parameter used.
         soft_weights: Multipliers θ_ki of the planes of each nonlinear inequality in units of its penalty.
         violations: Predicted max(c_k, 0) after the move.
         equality_multipliers: Multipliers of the rows of E, shape (r,).
@@ -71,9 +70,7 @@ class Model:
     """What the programme of a step knows of the problem at the centre.
 
     Attributes:
-        bundle: Cutting planes of J.
         near: Constraints around the centre, which satisfies them.
-        soft: Nonlinear inequalities with their cutting planes.
     """
 
     bundle: Bundle
@@ -98,9 +95,6 @@ def solve_step(bundle: Bundle, near: Surroundings, t: float, soft: Sequence[Soft
     the aggregate z is much shorter than that and is lost in the solver's tolerance: then the programme is
     solved again with γ = ‖z‖, without the planes that lie too deep to affect the solution, and the sharper
     result is used if the solver reports success.
-
-    Returns:
-        The step.
 
     References:
         H. Schramm and J. Zowe, SIAM J. Optim. 2 (1992) 121-152, section 2.
@@ -233,7 +227,6 @@ class Trial:
     """A trial step and the response of the objective.
 
     Attributes:
-        step: The step with its prediction.
         change: J at the trial point minus J at the centre.
         slope: g·y with the subgradient at the trial point.
         measure: Locality measure β of the trial's plane, seen from the centre.
@@ -273,13 +266,8 @@ class Trust:
     The radius only guards against steps into regions where the objective does not exist.
 
     Attributes:
-        t: Proximal parameter.
-        radius: Longest step in scaled variables.
         t_least: Below it no descent can be expected.
-        t_most: t never exceeds it.
         radius_least: Below it the design practically cannot move.
-        serious: Consecutive serious steps.
-        nulls: Consecutive null steps.
 
     References:
         H. Schramm and J. Zowe, SIAM J. Optim. 2 (1992) 121-152, inner iteration of section 3.
