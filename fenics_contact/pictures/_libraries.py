@@ -6,11 +6,7 @@ from fenics_contact._base.requirements import require_extra
 
 
 def check_libraries() -> None:
-    """Make sure that pyvista and matplotlib are installed.
-
-    Raises:
-        MissingRequirementError: One of them is not installed.
-    """
+    """Make sure that pyvista and matplotlib are installed."""
     require_extra("pictures", "viz", "pyvista", "matplotlib")
 
 

@@ -64,12 +64,7 @@ SIGNED_MAP = colormaps["PuOr"]  #: Values of both signs, with zero in its middle
 def neighbours(cells: np.ndarray, partition: np.ndarray) -> np.ndarray:
     """Count the nodes that subdomains share.
 
-    Args:
-        cells: Node numbers, (n_cells, 8 | 4).
-        partition: Subdomain of every cell, (n_cells,).
-
-    Returns:
-        Symmetric (S, S) int64 with zero diagonal.
+    `cells`: node numbers, (n_cells, 8 | 4); `partition`: subdomain of every cell, (n_cells,).
     """
     owner = np.repeat(partition, cells.shape[1])
     touched = sp.csr_matrix((np.ones(owner.size, dtype=np.int64), (owner, cells.ravel())))
@@ -85,12 +80,6 @@ def colour_subdomains(shared: np.ndarray, family: int) -> list[str]:
     Subdomains with the fewest free colours choose first (Brélaz' rule). A body uses its family of colours as
     far as possible; if a subdomain has more neighbours than there are colours, it repeats that of the
     neighbour with which it shares the fewest nodes.
-
-    Args:
-        shared: Number of nodes that subdomains share, (S, S), see `neighbours`.
-
-    Returns:
-        S colours.
 
     References:
         D. Brélaz, New methods to color the vertices of a graph, Comm. ACM 22 (1979).
@@ -177,10 +166,7 @@ def png_path(path: str | Path | None) -> Path | None:
 def draw_picture(comm: MPI.Comm | None, path: Path | None, draw: Callable[[BinaryIO], None]) -> Picture:
     """Let rank 0 draw and write; if it fails, all ranks raise. Collective on ``comm`` if given.
 
-    Args:
-        comm: Communicator, None if this rank draws for itself.
-        path: PNG file to write, or None.
-        draw: Draws the picture into a file opened for bytes.
+    `comm`: communicator, None if this rank draws for itself; `path`: PNG file to write, or None.
     """
     png = None
     with nullcontext() if comm is None else together(comm):
@@ -214,9 +200,6 @@ def rendering() -> Iterator[None]:
     """Let VTK use EGL within the block if there is no display and no other choice is set.
 
     VTK itself tries X first and warns if there is none. The environment is restored afterwards.
-
-    Raises:
-        MissingRequirementError: If this machine cannot render.
     """
     check_renderer()
     if not _chooses_egl():
@@ -240,11 +223,7 @@ def _deciding() -> tuple[str | None, ...]:
 
 
 def check_renderer() -> None:
-    """Make sure that pyvista can draw, with or without a display; takes half a second, once.
-
-    Raises:
-        MissingRequirementError: If there is neither EGL nor OSMesa nor an X server to draw with.
-    """
+    """Make sure that pyvista can draw, with or without a display; takes half a second, once."""
     if _chooses_egl():
         return
     ending = _probe(_deciding())
@@ -348,9 +327,8 @@ def frame_around(view: View, points: np.ndarray, margin: float = 0.02) -> Frame:
 def looking_along(towards: np.ndarray, horizontal: np.ndarray) -> View:
     """Return the view from a side in which a direction appears horizontal.
 
-    Args:
-        towards: From the scene to the viewer, (3,), any length.
-        horizontal: Direction that points right in the picture, not parallel to it, (3,).
+    `towards`: from the scene to the viewer, (3,), any length; `horizontal`: direction that points right in
+    the picture, not parallel to it, (3,).
     """
     towards = towards / np.linalg.norm(towards)
     right = horizontal - (horizontal @ towards) * towards
@@ -373,8 +351,7 @@ def oblique_view(points: np.ndarray) -> View:
 def face_on(normal: np.ndarray) -> View:
     """View a plane at right angles: z up if the plane is upright, else y up.
 
-    Args:
-        normal: From the plane to the viewer, (3,), any length.
+    `normal`: from the plane to the viewer, (3,), any length.
     """
     towards = normal / np.linalg.norm(normal)
     reference = np.array([0.0, 0.0, 1.0]) if abs(towards[2]) < 0.8 else np.array([0.0, 1.0, 0.0])
@@ -417,10 +394,6 @@ _STYLE = {
 @contextmanager
 def sheet(paper: BinaryIO, size: tuple[int, int], title: str) -> Iterator[Figure]:
     """Open an empty figure with automatic layout, and save it at the end.
-
-    Args:
-        paper: A file opened for bytes.
-        size: Width and height in pixels.
 
     Yields:
         The figure.
@@ -492,11 +465,7 @@ def render(
 
     The proportions of the frame are those of the image.
 
-    Returns:
-        Image, (height, width, 3) uint8, at `SUPERSAMPLING` times the resolution.
-
-    Raises:
-        MissingRequirementError: If this machine cannot render.
+    Returns image, (height, width, 3) uint8, at `SUPERSAMPLING` times the resolution.
     """
     size = [SUPERSAMPLING * width, max(2, round(SUPERSAMPLING * width / frame.proportion))]
     with rendering():

@@ -201,12 +201,10 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
 def walk(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Order the nodes of directed edges along the curve.
 
-    Args:
-        edges: Pairs of nodes, (n, 2); every node begins and ends at most one of them.
+    `edges`: pairs of nodes, (n, 2); every node begins and ends at most one of them.
 
-    Returns:
-        The nodes in order, piece by piece, and the first index of each piece, (n_pieces,). For a closed curve
-        the first node is not repeated.
+    Returns the nodes in order, piece by piece, and the first index of each piece, (n_pieces,). For a closed
+    curve the first node is not repeated.
     """
     nodes, local = np.unique(edges, return_inverse=True)
     local = local.reshape(edges.shape)

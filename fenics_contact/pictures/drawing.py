@@ -94,8 +94,7 @@ def outline(shape: SurfaceShape, points: np.ndarray) -> list[np.ndarray]:
     Of a plane the edge of the part under the bodies, of a sphere three circles, of a cylinder a circle at
     each end of the part beside the bodies and four lines between them.
 
-    Args:
-        points: All nodes of the bodies, (n, dim).
+    `points`: all nodes of the bodies, (n, dim).
     """
     if isinstance(shape, Plane):
         return [_edge(shape, points)]
@@ -124,8 +123,7 @@ def obstacle_layers(
 
     A sheet seen from its free side lies behind all bodies; seen from behind it would hide them.
 
-    Returns:
-        Layers to draw, and points that the picture should contain, (n, 3).
+    Returns layers to draw, and points that the picture should contain, (n, 3).
     """
     layers: list[Layer] = []
     held = [np.zeros((0, 3))]
@@ -238,12 +236,8 @@ def draw_field_on_bodies(
 ) -> Picture:
     """Draw a field on all bodies, with details of a contact in true deformation. Collective on ``comm``.
 
-    Args:
-        bodies: Undeformed bodies with linear cells and, if they moved, their ``displacement``.
-        path: PNG file to write, or None.
-        obstacles: Rigid obstacles to draw beside them.
-        spot: The contact of which a detail is drawn, in space two sections; None for no detail.
-        comm: Communicator, None if this rank draws for itself.
+    `path`: PNG file to write, or None; `spot`: the contact of which a detail is drawn, in space two sections;
+    None for no detail; `comm`: communicator, None if this rank draws for itself.
     """
     coloured = field.on(bodies)
     plane = all(map(is_plane, bodies.values()))

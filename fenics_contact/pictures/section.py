@@ -232,10 +232,8 @@ def draw_field(
 ) -> None:
     """Colour plane cells by nodal or cell values.
 
-    Args:
-        points: Coordinates, (n_nodes, 2).
-        cells: Node numbers, (n_cells, 3 | 4).
-        values: Shape (n_nodes,) or (n_cells,).
+    `points`: coordinates, (n_nodes, 2); `cells`: node numbers, (n_cells, 3 | 4); `values`: shape (n_nodes,)
+    or (n_cells,).
     """
     if len(values) == len(points):
         mesh, shown = refined(points, cells, values)
@@ -247,11 +245,7 @@ def draw_field(
 
 
 def refined(points: np.ndarray, cells: np.ndarray, values: np.ndarray) -> tuple[Triangulation, np.ndarray]:
-    """Cut quadrilaterals into small triangles, so that colours are bilinear and favour no diagonal.
-
-    Returns:
-        The triangulation and the values on its nodes.
-    """
+    """Cut quadrilaterals into small triangles, so that colours are bilinear and favour no diagonal."""
     if cells.shape[1] == 3:
         return Triangulation(*points.T, cells), values
     ticks = np.linspace(0.0, 1.0, int(np.clip(100 / np.sqrt(len(cells)), 2, 6)) + 1)
@@ -343,9 +337,7 @@ def strongest_contact(contact: ContactResult, places: np.ndarray) -> Spot:
 
     In space planes of symmetry count: half a contact's middle lies on the plane that halves it.
 
-    Args:
-        contact: Result on the contact points; some force must act.
-        places: Positions of the contact points, (n, dim), [length].
+    `places`: positions of the contact points, (n, dim), [length].
     """
     force, points = contact.normal_force, contact.points
     pair = int(np.argmax(np.bincount(points.pair, weights=force)))
@@ -396,10 +388,8 @@ def sections_of(spot: Spot, main: View) -> list[Section]:
 def section_frame(view: View, spot: Spot, points: np.ndarray, reach: float | None = None) -> Frame:
     """Return the frame around a contact, limited to the visible bodies.
 
-    Args:
-        spot: Centre and size of the contact.
-        points: All nodes of the bodies, (n, 3).
-        reach: Extent up and down, [length]; by default five times the radius of the contact.
+    `points`: all nodes of the bodies, (n, 3); `reach`: extent up and down, [length]; by default five times
+    the radius of the contact.
     """
     bodies = frame_around(view, points, 0.0)
     middle = view.project(spot.centre[None])[0]

@@ -66,13 +66,10 @@ class Unrolling:
     def unroll(self, points: np.ndarray, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Unroll a surface; facets that the cut runs through stay whole, and their nodes are there twice.
 
-        Args:
-            points: Nodes of the body, (n, 3).
-            facets: Facets of linear shape, (m, 3 | 4).
+        `points`: nodes of the body, (n, 3); `facets`: facets of linear shape, (m, 3 | 4).
 
-        Returns:
-            The node of every place, (k,); the places, (k, 2); facets as rows of places. The first place of a
-            node is within half a turn of the middle, if a facet is there.
+        Returns the node of every place, (k,); the places, (k, 2); facets as rows of places. The first place
+        of a node is within half a turn of the middle, if a facet is there.
         """
         angles = self.angles(points)
         around = self.angles(points[facets].mean(axis=1))
@@ -103,11 +100,8 @@ def unrolling_of(
 ) -> Unrolling | None:
     """Fit a cylinder to a surface that runs around an axis; None if it does not.
 
-    Args:
-        points: Nodes of the body, (n, 3), [length].
-        facets: Facets of linear shape, (m, 3 | 4).
-        places: Where forces act on it, (k, 3): the cut is opposite of their middle.
-        force: Their sizes, (k,).
+    `points`: nodes of the body, (n, 3), [length]; `facets`: facets of linear shape, (m, 3 | 4); `places`:
+    where forces act on it, (k, 3): the cut is opposite of their middle; `force`: their sizes, (k,).
     """
     areas = vector_areas(points, facets)
     size = np.linalg.norm(areas, axis=1)
