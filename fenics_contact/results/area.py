@@ -117,10 +117,8 @@ def _reach(pressure: np.ndarray, spread: np.ndarray, length: np.ndarray) -> np.n
 
     p = K √d and E* g = 4/3 K (L − d)^(3/2); with y = K^(−2/3): p² y³ + (3/4 E* g)^(2/3) y = L.
 
-    Args:
-        pressure: p of the closed node, shape (n,), [force / length²].
-        spread: E* g of the open node, shape (n,), [force / length].
-        length: Distance L of the nodes, shape (n,), [length].
+    `pressure`: p of the closed node, shape (n,), [force / length²]; `spread`: E* g of the open node, shape
+    (n,), [force / length]; `length`: distance L of the nodes, shape (n,), [length].
     """
     if np.isnan(spread).any():
         return np.full(len(length), 0.5)

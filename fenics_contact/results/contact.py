@@ -35,7 +35,6 @@ class RowValues:
         step: ρ of the natural map, zero on equality rows, shape (n_owned,), [force / length].
         opening: By how much the loads alone, or the next increment, open the rows, (n_owned,), [length].
         between_supports: Marks of the rows that supports alone determine, shape (n_owned,).
-        residuals: Sizes of all residuals.
     """
 
     multiplier: np.ndarray

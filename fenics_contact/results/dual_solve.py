@@ -20,13 +20,7 @@ def solve_dual(
 ) -> DualSolution:
     """Solve the dual problem of a system with the friction laws of its scene. Collective.
 
-    Args:
-        start: Earlier solution, or multiplier to start from, owned, or None.
-
-    Raises:
-        SlidingError: The load exceeds what friction can hold; names the bodies and how they move.
-        InfeasibleError: Otherwise no equilibrium exists.
-        ConvergenceError: The tolerance was not met.
+    `start`: earlier solution, or multiplier to start from, owned, or None.
     """
     tresca, coefficient = system.torn.friction
     if coefficient is not None and isinstance(solver, Smalse):

@@ -55,8 +55,7 @@ def body_mesh(decomposition: Decomposition, name: str, body: Body) -> _dolfinx.m
 def displacement_function(mesh: _dolfinx.mesh.Mesh, values: np.ndarray) -> _dolfinx.fem.Function:
     """Return the displacement as a Function on a body's mesh. Collective.
 
-    Args:
-        values: Displacement of the body's nodes, valid at least on those of this rank, shape (n_nodes, dim).
+    `values`: displacement of the body's nodes, valid at least on those of this rank, shape (n_nodes, dim).
     """
     function = _dolfinx.coefficient(mesh, "displacement")
     nodes, dofs = _dolfinx.node_dofs(function.function_space)
@@ -68,8 +67,7 @@ def displacement_function(mesh: _dolfinx.mesh.Mesh, values: np.ndarray) -> _dolf
 def nodal_function(mesh: _dolfinx.mesh.Mesh, name: str, values: np.ndarray) -> _dolfinx.fem.Function:
     """Return a scalar field on a body's mesh from its nodal values. Collective.
 
-    Args:
-        values: Nodal values of the body, on every rank, shape (at least n_nodes,).
+    `values`: nodal values of the body, on every rank, shape (at least n_nodes,).
     """
     function = _dolfinx.fem.Function(_dolfinx.scalar_space(mesh, 1), name=name)
     nodes, dofs = _dolfinx.node_dofs(function.function_space)
@@ -81,8 +79,7 @@ def nodal_function(mesh: _dolfinx.mesh.Mesh, name: str, values: np.ndarray) -> _
 def cells_of_body(mesh: _dolfinx.mesh.Mesh, cells: np.ndarray) -> np.ndarray:
     """Return the number in the body of each cell owned by this rank, shape (n_owned,).
 
-    Args:
-        cells: Node numbers of all cells of the body, shape (n_cells, nodes of a cell).
+    `cells`: node numbers of all cells of the body, shape (n_cells, nodes of a cell).
     """
     owned = mesh.topology.index_map(mesh.topology.dim).size_local
     mine = _dolfinx.cell_nodes(mesh).reshape(-1, cells.shape[1])[:owned]
@@ -97,8 +94,7 @@ def cells_of_body(mesh: _dolfinx.mesh.Mesh, cells: np.ndarray) -> np.ndarray:
 def cell_values(function: _dolfinx.fem.Function, cells: np.ndarray) -> np.ndarray:
     """Gather a cellwise constant Function in the order of a body's cells. Collective on its mesh.
 
-    Returns:
-        One value for every cell, (n_cells, ...), replicated.
+    Returns one value for every cell, (n_cells, ...), replicated.
     """
     space, shape = function.function_space, function.ufl_shape
     number = cells_of_body(space.mesh, cells)
@@ -195,8 +191,7 @@ def stress(
 def principal_stress(stress: _dolfinx.fem.Function, cells: np.ndarray) -> _dolfinx.fem.Function:
     """Return the principal stresses σ₁ ≥ σ₂ ≥ σ₃ of a cellwise stress, a Function of shape (3,). Collective.
 
-    Args:
-        cells: Node numbers of all cells of the body, shape (n_cells, nodes of a cell).
+    `cells`: node numbers of all cells of the body, shape (n_cells, nodes of a cell).
     """
     mesh = stress.function_space.mesh
     own = _dolfinx.cell_dofs(stress.function_space).ravel()[: len(cells_of_body(mesh, cells))]
@@ -290,13 +285,12 @@ def contact_fields(
 ) -> dict[str, np.ndarray]:
     """Return the contact result of a body's surfaces as fields on all its nodes.
 
-    Returns:
-        ``contact_status``, (n_nodes,) int: the value of `Status`, −1 on nodes that are not contact points;
-        and, zero on those, ``contact_pressure``, (n_nodes,), [force / length²], ``contact_force`` on the
-        slave and ``contact_slip``, (n_nodes, 3), [force] and [length]; where a body of the scene deforms much
-        ``contact_nominal_pressure``, too. At the corners of quadratic triangles pressures and slip are
-        interpolated, see `filled_at_corners`. A node that belongs to several pairs has
-        their sum, and the status of the last.
+    Returns ``contact_status``, (n_nodes,) int: the value of `Status`, −1 on nodes that are not contact
+    points; and, zero on those, ``contact_pressure``, (n_nodes,), [force / length²], ``contact_force`` on the
+    slave and ``contact_slip``, (n_nodes, 3), [force] and [length]; where a body of the scene deforms much
+    ``contact_nominal_pressure``, too. At the corners of quadratic triangles pressures and slip are
+    interpolated, see `filled_at_corners`. A node that belongs to several pairs has their sum, and the status
+    of the last.
     """
     start, end = numbers.node_offset[numbers.body_names.index(body) :][:2]
     count = int(end - start)
@@ -342,11 +336,9 @@ def most_stressed(by_material: np.ndarray) -> np.ndarray:
 
     A mean over materials would be the stress of none of them.
 
-    Args:
-        by_material: Shape (n_materials, n_nodes, 3, 3), NaN where a node has no cell of a material.
+    `by_material`: shape (n_materials, n_nodes, 3, 3), NaN where a node has no cell of a material.
 
-    Returns:
-        Shape (n_nodes, 3, 3).
+    The result has shape (n_nodes, 3, 3).
     """
     size = von_mises_of(by_material)
     chosen = np.where(np.isnan(size), -1.0, size).argmax(axis=0)
@@ -396,13 +388,11 @@ def nodal_stress(
 ) -> dict[str, np.ndarray]:
     """Return the stress of all bodies at their nodes, material by material. Collective.
 
-    Args:
-        displacement: Displacement of all nodes, valid on those of this rank, shape (n_nodes, dim), [length].
-        stresses: Mean stress of the cells of at least the bodies with nonlinear materials, by name.
+    `displacement`: displacement of all nodes, valid on those of this rank, shape (n_nodes, dim), [length];
+    `stresses`: mean stress of the cells of at least the bodies with nonlinear materials, by name.
 
-    Returns:
-        For each body, shape (n_materials, n_nodes, 3, 3), NaN where a node has no cell of the material,
-        replicated, [force / length²].
+    One value for each body, shape (n_materials, n_nodes, 3, 3), NaN where a node has no cell of the material,
+    replicated, [force / length²].
     """
     # Recovery is part of estimates, which a state with a fixed tolerance need not import.
     from fenics_contact._accuracy.recovery import find_sites, recovered_gradients
@@ -461,9 +451,8 @@ def _around_sites(
 ) -> np.ndarray:
     """Return the means of values on cells over the cells around each site, shape (n_sites, k). Collective.
 
-    Args:
-        values: On this rank's cells of the body, shape (n_owned, k).
-        number: Number in the body of each of them, shape (n_owned,).
+    `values`: on this rank's cells of the body, shape (n_owned, k); `number`: number in the body of each of
+    them, shape (n_owned,).
     """
     of_body = np.zeros((torn.scene.bodies[name].mesh.n_cells, values.shape[1] + 1))
     of_body[number] = np.pad(values, ((0, 0), (0, 1)), constant_values=1.0)

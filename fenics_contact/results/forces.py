@@ -50,9 +50,8 @@ class NodalForces:
 def nodal_forces(torn: TornSystem, multiplier: np.ndarray, displacement: np.ndarray) -> NodalForces:
     """Return the forces on all nodes. Collective.
 
-    Args:
-        multiplier: λ, owned, [force].
-        displacement: Torn displacement of this rank as the solver returned it, shape (torn_size,), [length].
+    `multiplier`: λ, owned, [force]; `displacement`: torn displacement of this rank as the solver returned it,
+    shape (torn_size,), [length].
     """
     decomposition = torn.decomposition
     contact, tie = _contact_forces(torn, multiplier), _tie_forces(torn, multiplier)
@@ -96,8 +95,7 @@ def _tie_forces(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:
 def by_node(points: ContactPoints, force: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     """Return the forces of chosen points on the nodes of slaves and masters, shape (n_nodes, dim).
 
-    Args:
-        force: Force on the slave at each of all points, shape (n, dim), [force].
+    `force`: force on the slave at each of all points, shape (n, dim), [force].
     """
     return np.asarray(points.jump[chosen].T @ force[chosen])
 
@@ -216,9 +214,8 @@ def table(
 ) -> str:
     """Return forces and moments of several resultants, one per line behind its names, with their units.
 
-    Args:
-        scales: Reference force and moment; what is rounding of these is shown as zero; by default the
-            largest components.
+    `scales`: reference force and moment; what is rounding of these is shown as zero; by default the largest
+    components.
     """
     if not resultants:
         return "none"
@@ -268,11 +265,7 @@ def moment_of(force: np.ndarray, arm: np.ndarray) -> np.ndarray:
 
 
 def point_of(given: GivenVector | np.ndarray, dim: int) -> np.ndarray:
-    """Return a point as an array, shape (dim,).
-
-    Raises:
-        InvalidInputError: If it does not have ``dim`` finite coordinates.
-    """
+    """Return a point as an array, shape (dim,)."""
     point = np.asarray(given, dtype=np.float64)
     if point.shape != (dim,) or not np.isfinite(point).all():
         raise InvalidInputError(
@@ -321,8 +314,7 @@ def support_shares(scene: Scene, numbers: NodeNumbers) -> list[np.ndarray]:
     A component that several supports prescribe at a node is shared by the areas that belong to the node on
     their surfaces: the forces of an even pressure on both. The parts sum to one.
 
-    Returns:
-        For each support the parts, shape (n_nodes, dim), zero where it holds nothing.
+    Returns the parts of each support, shape (n_nodes, dim), zero where it holds nothing.
     """
     areas = []
     for support in scene.supports:
@@ -411,8 +403,7 @@ def rounding_force(torn: TornSystem, displacement: np.ndarray) -> float:
 
     Collective.
 
-    Args:
-        displacement: u of this rank, torn, shape (torn_size,), [length].
+    `displacement`: u of this rank, torn, shape (torn_size,), [length].
     """
     comm = torn.decomposition.comm
     stiff = max((float(part.stiffness.diagonal().max()) for part in torn.subdomains), default=0.0)
@@ -425,8 +416,7 @@ def force_balance(
 ) -> Balance:
     """Return the balance of all forces, about a point or the middle of the box around all bodies.
 
-    Args:
-        least: A force below which bodies count as free of forces, [force].
+    `least`: A force below which bodies count as free of forces, [force].
     """
     point = _middle(forces.places) if about is None else point_of(about, torn.dim)
     parts = _parts(torn, forces)

@@ -118,11 +118,7 @@ class LinearState(State):
 
 
 def as_linear(state: State, what: str) -> LinearState:
-    """Return a state as that of linear materials, which something needs.
-
-    Raises:
-        InvalidInputError: If it has others.
-    """
+    """Return a state as that of linear materials, which something needs."""
     if isinstance(state, LinearState):
         return state
     raise InvalidInputError(
@@ -147,9 +143,8 @@ def _geometry_error(
     system. It is not a bound: the error of the facets' normals is left out, which matters where their gaps
     happen to be right, as between mirrored bodies by mortar.
 
-    Returns:
-        Distance in energy norm, [√(force · length)], and change of the largest contact pressure, relative to
-        that of the better geometry; zeros where shapes are known and used, and between flat surfaces.
+    Returns distance in energy norm, [√(force · length)], and change of the largest contact pressure, relative
+    to that of the better geometry; zeros where shapes are known and used, and between flat surfaces.
     """
     torn = system.torn
     if not isinstance(system, DualSystem) or not isinstance(solution, DualSolution) or not torn.points.count:

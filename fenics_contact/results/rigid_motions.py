@@ -48,8 +48,7 @@ def unheld_motions(system: DualSystem) -> tuple[UnheldMotion, ...]:
 def rigid_motions(torn: TornSystem, fields: sp.spmatrix) -> tuple[UnheldMotion, ...]:
     """Return rigid displacements of bodies as motions. Collective.
 
-    Args:
-        fields: Torn displacements of this rank, one a column, shape (torn_size, n).
+    `fields`: torn displacements of this rank, one a column, shape (torn_size, n).
     """
     count, coefficients, fields = fields.shape[1], [], sp.csr_matrix(fields)
     starts = np.cumsum([0] + [part.mesh.size for part in torn.subdomains])
@@ -116,8 +115,7 @@ class RigidMotion:
 def rigid_motion(scene: Scene, support: RigidSurface, displacement: np.ndarray) -> RigidMotion:
     """Return the motion of a rigid surface.
 
-    Args:
-        displacement: Displacement of the nodes of its body, shape (n_nodes, dim), [length].
+    `displacement`: displacement of the nodes of its body, shape (n_nodes, dim), [length].
     """
     body, where = scene.bodies[support.body], Surface(support.body, support.surface)
     if body.deforms_much:  # all of it is prescribed

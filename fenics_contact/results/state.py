@@ -104,11 +104,7 @@ def compute_energies(
 ) -> Energies:
     """Compute all energies. Collective.
 
-    Args:
-        displacement: Torn displacement of this rank, [length].
-        multiplier: λ, owned, [force].
-        rigid: Rigid motions R α in the displacement: they cause no strain, but forces that are slightly out
-            of balance do work on them.
+    `displacement`: torn displacement of this rank, [length]; `multiplier`: λ, owned, [force].
     """
     internal = torn.load - torn.force(multiplier)  # = K u
     strained = 0.5 * internal @ (displacement - rigid)
@@ -155,11 +151,7 @@ Tolerance: TypeAlias = "float | BalancedTolerance | None"
 
 
 def checked_tolerance(tolerance: object) -> float | BalancedTolerance | None:
-    """Return a valid tolerance.
-
-    Raises:
-        InvalidInputError: If it is neither a number between 0 and 1 nor `BalancedTolerance`.
-    """
+    """Return a valid tolerance."""
     if tolerance is None:
         return None
     if isinstance(tolerance, float | int | np.floating):
