@@ -44,14 +44,9 @@ def solve_balanced(
 ) -> Rounds:
     """Tighten the tolerance until the solver's error is a share of the mesh's. Collective.
 
-    Args:
-        start: Multiplier to start from, owned, or None.
+    `start`: multiplier to start from, owned, or None.
 
-    Returns:
-        The rounds; the last one holds the solution.
-
-    Raises:
-        ConvergenceError: If the solver fails before its residuals are below 1e-6; carries the history.
+    Returns the rounds; the last one holds the solution.
     """
     rounds = Rounds(system, timer)
     tolerance, earlier = balanced.loosest, start
@@ -76,11 +71,7 @@ class Rounds:
     """The rounds of a balanced solve: the last solution, its errors, and the history of all.
 
     Attributes:
-        last: The last solution.
         displacement: Torn displacement of the last solution on this rank, [length].
-        errors: The solver's error in it.
-        estimate: Discretisation error.
-        history: Steps of all rounds.
     """
 
     last: DualSolution

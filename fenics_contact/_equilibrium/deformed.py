@@ -42,11 +42,7 @@ if TYPE_CHECKING:
 
 
 class DeformedEquilibria:
-    """Successive equilibria of a scene with nonlinear materials, on the subdomains of one decomposition.
-
-    Attributes:
-        scene: The scene whose meshes they have.
-    """
+    """Successive equilibria of a scene with nonlinear materials, on the subdomains of one decomposition."""
 
     def __init__(
         self,
@@ -56,11 +52,7 @@ class DeformedEquilibria:
         timer: PhaseTimer,
         known: DeformedEquilibria | None = None,
     ) -> None:
-        """Prepare the forms of all materials. Collective.
-
-        Raises:
-            InvalidInputError: If the scene has a rigid surface that is free to move.
-        """
+        """Prepare the forms of all materials. Collective."""
         _require_prescribed(scene)
         self.scene, self._steps = scene, steps or AutomaticSteps()
         self._decomposition, self._timer = decomposition, timer
@@ -124,11 +116,7 @@ class DeformedEquilibria:
         return _state_after(path, before, timer, steps)
 
     def restored(self, stored: Stored, scene: Scene) -> DeformedState:
-        """Build a state from what `stored_deformed` returned, with one factorisation. Collective.
-
-        Raises:
-            InvalidInputError: If the arrays are those of another system.
-        """
+        """Build a state from what `stored_deformed` returned, with one factorisation. Collective."""
         timer, equations = self._timer, self._equations
         with timer.phase("assemble"):
             load = whole = self._loading(scene, float(stored["times"][1]))
@@ -252,8 +240,7 @@ def _energies(evaluation: ResidualState, rubbed: float) -> Energies:
 
     The work of pressures that follow their surfaces depends on the way: then it is not known.
 
-    Args:
-        rubbed: Work of friction before the last step of histories, [force · length].
+    `rubbed`: work of friction before the last step of histories, [force · length].
     """
     stored = [np.nan if response.energy is None else response.energy for response in evaluation.responses]
     strain = float(evaluation.torn.numbering.comm.allreduce(float(np.sum(stored))))
@@ -270,12 +257,11 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
     below the tolerance: they are spread inside subdomains by tangents at the equilibrium, before by those of
     the last Newton step.
 
-    Returns:
-        ``displacement`` of all copies of the nodes, shape (n_copies, dim), ``multiplier`` λ of all rows, the
-        ``history`` of materials of each body, with the time and the largest displacement, before the step of
-        histories, the work of friction before it (``rubbed``), and the ``parts`` and ``snaps``; of moved
-        bodies the facets that nodes touch, where, and the slip; else ``origin`` and ``slid``,
-        from which slip is measured. All replicated.
+    Returns ``displacement`` of all copies of the nodes, shape (n_copies, dim), ``multiplier`` λ of all rows,
+    the ``history`` of materials of each body, with the time and the largest displacement, before the step of
+    histories, the work of friction before it (``rubbed``), and the ``parts`` and ``snaps``; of moved bodies
+    the facets that nodes touch, where, and the slip; else ``origin`` and ``slid``, from which slip is
+    measured. All replicated.
     """
     decomposition, evaluation = state.torn.decomposition, state.equilibrium.evaluation
     comm, tearing, at = decomposition.comm, decomposition.tearing, evaluation.at
@@ -308,11 +294,7 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
 def stored_configuration(
     stored: Stored, load: Loading, contact: Contact, decomposition: Decomposition
 ) -> tuple[Configuration, Loading]:
-    """Return the configuration of a stored state, with its contact points, and its load. Collective.
-
-    Raises:
-        InvalidInputError: If the arrays are those of another system.
-    """
+    """Return the configuration of a stored state, with its contact points, and its load. Collective."""
     tearing = decomposition.tearing
     count, given = len(tearing.copy_subdomain), stored["displacement"].shape
     if given != (count, tearing.dim):

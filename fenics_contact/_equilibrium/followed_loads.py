@@ -28,10 +28,6 @@ class FollowedLoads:
     state without any force is an equilibrium, too, and Newton's method may jump there, or end where nothing
     is left to hold the body. Then equilibria with parts of the change are found one after the other, each
     with slip measured from the start of the load step.
-
-    Attributes:
-        before: The system of the last load.
-        timer: Collects the wall time.
     """
 
     before: DualSystem

@@ -527,11 +527,7 @@ def solve_scene(
 
 
 def _require_obstacles_at(scene: Scene, time: float) -> None:
-    """Refuse obstacles that have moved by a time where bodies with small displacements do not see it.
-
-    Raises:
-        InvalidInputError: They have.
-    """
+    """Refuse obstacles that have moved by a time where bodies with small displacements do not see it."""
     if scene.deforms_much:
         return
     for pair in scene.contacts:

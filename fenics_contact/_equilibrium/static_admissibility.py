@@ -40,9 +40,6 @@ def check_held(torn: TornSystem) -> None:
     the dual problem is infeasible: there is a rigid motion along which the load does more work than friction
     takes. If that takes all friction but a fraction `MARGIN`, forces exist, but the amount of sliding along
     that motion is undetermined.
-
-    Raises:
-        InfeasibleError: Names the body and the motion, and whether it is only just held.
     """
     comm = torn.numbering.comm
     with together(comm):
@@ -202,11 +199,9 @@ class _Balance:
 
         The smallest distance, unlike feasibility, is well determined also where forces only just suffice.
 
-        Args:
-            speed: Sliding speeds s for the associated law to be freed of lift-off, shape (n_friction,).
+        `speed`: sliding speeds s for the associated law to be freed of lift-off, shape (n_friction,).
 
-        Returns:
-            None if the load is balanced, else the direction of what is left.
+        Returns None if the load is balanced, else the direction of what is left.
         """
         import clarabel  # only needed if some loaded body floats
 
@@ -267,7 +262,6 @@ class _Motion:
     Attributes:
         bodies: Coefficients of the modes of each body, shape (n_bodies, n_modes).
         pressed: Normal forces meanwhile, relative to the load, shape (n_contact,).
-        rubs: Whether friction acts against it.
         slides: Whether more friction would: something slides that is pressed.
     """
 
@@ -374,11 +368,7 @@ def require_resisted(motions: tuple[UnheldMotion, ...], torn: TornSystem, prescr
 
     Stress would drive it, if only by rounding. Bodies at which nothing happens may stay until they are met.
 
-    Args:
-        prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
-
-    Raises:
-        InfeasibleError: With the bodies and their motions.
+    `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
     """
     if not motions:
         return

@@ -37,11 +37,10 @@ KIND = "load history"
 def stored_state(state: State) -> dict[str, np.ndarray]:
     """Return the arrays from which a state can be rebuilt, on any number of ranks. Collective.
 
-    Returns:
-        ``multiplier`` λ and ``origin``, from which slip is measured, of all rows in their order, shape
-        (n_rows,), ``slid``, the same for points without friction, and ``motion``, the coefficients α of the
-        rigid motions; all replicated. Empty for a state that was computed without multipliers. Of bodies with
-        nonlinear materials what `stored_deformed` returns.
+    Returns ``multiplier`` λ and ``origin``, from which slip is measured, of all rows in their order, shape
+    (n_rows,), ``slid``, the same for points without friction, and ``motion``, the coefficients α of the rigid
+    motions; all replicated. Empty for a state that was computed without multipliers. Of bodies with nonlinear
+    materials what `stored_deformed` returns.
     """
     if isinstance(state.solution, DirectSolution):
         return {}
@@ -63,11 +62,7 @@ class StepCheckpoint:
     """Reads the states of completed steps and writes new ones; does nothing without a checkpoint."""
 
     def __init__(self, checkpoint: Checkpoint | None, problem: ContactProblem) -> None:
-        """Read the file if it exists. Collective.
-
-        Raises:
-            InvalidInputError: If the file is not a checkpoint of this problem; says what to do.
-        """
+        """Read the file if it exists. Collective."""
         self._checkpoint, self._comm = checkpoint, problem.comm
         self._arrays: dict[str, np.ndarray] = {}
         self._fingerprint: dict[str, str] = {}
@@ -93,11 +88,7 @@ class StepCheckpoint:
         scene: Scene,
         problem: ContactProblem,
     ) -> AnyState | None:
-        """Return the state after the next step if it is stored, else None. Collective.
-
-        Raises:
-            InvalidInputError: If the stored step is a different one.
-        """
+        """Return the state after the next step if it is stored, else None. Collective."""
         if self._here >= self._stored:
             return None
         names = [name for name in self._arrays if name.startswith(self._prefix)]
@@ -114,11 +105,7 @@ class StepCheckpoint:
         return problem.state
 
     def keep(self, step: LoadStep, state: AnyState) -> None:
-        """Add the state after a step and write it if that is due. Collective.
-
-        Raises:
-            CheckpointError: If it cannot be written; the file is then unchanged.
-        """
+        """Add the state after a step and write it if that is due. Collective."""
         if self._checkpoint is None:
             return
         self._arrays[f"{self._prefix}step"] = np.array(json.dumps(described(step, "step")))

@@ -54,12 +54,7 @@ class ContactWarnings:
         self._outlines: dict[str, tuple[BodyMesh, Outline]] = {}
 
     def warn(self, state: State, *, design: bool = False) -> None:
-        """Warn of what is doubtful about a state. Collective.
-
-        Args:
-            design: Whether it is that of a design: surfaces may overlap before they are loaded, and designs
-                differ little from the first one, which is judged alone.
-        """
+        """Warn of what is doubtful about a state. Collective."""
         if isinstance(state, LinearState):
             if design and self._points is not None:
                 return
@@ -193,8 +188,7 @@ class _Gradients:
     def rotation(self, displacement: np.ndarray) -> float:
         """Return the root mean square of the rotations of cells, in radians.
 
-        Args:
-            displacement: Of the nodes, shape (n_nodes, dim), [length].
+        `displacement`: of the nodes, shape (n_nodes, dim), [length].
         """
         gradient = np.einsum("nkd,nke->nde", self.inverse, displacement[self.corners])
         square = ((gradient - gradient.transpose(0, 2, 1)) ** 2).sum(axis=(1, 2)) / 8.0
@@ -204,8 +198,7 @@ class _Gradients:
 def rotation_of(mesh: BodyMesh, displacement: np.ndarray) -> float:
     """Return by how much the cells of a body turn, as a root mean square, in radians.
 
-    Args:
-        displacement: Of the nodes, shape (n_nodes, dim), [length].
+    `displacement`: of the nodes, shape (n_nodes, dim), [length].
     """
     return _Gradients.of(mesh).rotation(displacement)
 
@@ -318,8 +311,7 @@ def _coarse_peak(state: State, number: int, pressed_in: np.ndarray) -> list[tupl
     So it is of round bodies. Contact that ends where a surface ends, or between planes that lift off each
     other, has no peak that more points would resolve.
 
-    Args:
-        pressed_in: How far its force presses each contact point in, shape (n,), [length].
+    `pressed_in`: how far its force presses each contact point in, shape (n,), [length].
     """
     contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
     mine = contact.on_pair(number)
@@ -370,8 +362,7 @@ def _words_of_peak(pair: ContactPair, count: int, steps: int) -> str:
 def _passing_nodes(state: State, number: int, moved: float) -> list[tuple[int, str, str]]:
     """Return the doubt about a pair whose master passes between the nodes of its slave. Collective.
 
-    Args:
-        moved: How far its surfaces move against each other, [length].
+    `moved`: how far its surfaces move against each other, [length].
     """
     pair = state.scene.contacts[number]
     if pair.by_mortar or not isinstance(pair.master, Surface) or pair.within_body:
