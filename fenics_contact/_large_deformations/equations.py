@@ -126,15 +126,12 @@ class ResidualState:
     """The equations at a configuration, under a load.
 
     Attributes:
-        equations: Internal forces, and contact.
-        load: What acts.
         at: The configuration; its history and its time are those before the load step.
         responses: Internal forces and tangents of this rank's subdomains.
         external: f(u) of this rank, torn, [force].
         softening: −∂f/∂u of this rank, torn; None where all loads are dead.
         unbalanced: f(u) − f_int(u) − Bᵀλ of this rank, torn, [force].
         constraint_residual: c − B u, owned, [length]: gaps, minus the slip, and openings of glued rows.
-        residuals: Their size, relative.
         least_jacobian: Smallest det F of all bodies; 1 where none is strained much.
     """
 
@@ -210,8 +207,7 @@ class ResidualState:
     def passed_on(self, moved: Vector) -> Vector:
         """Return what neighbours and supports take of the unsymmetric part of the loads' growth. Collective.
 
-        Returns:
-            Change of multipliers, owned, zero but in gluing rows and those of supports, [force].
+        Returns change of multipliers, owned, zero but in gluing rows and those of supports, [force].
         """
         torn = self.torn
         taken = np.zeros(len(self.constraint_residual))
@@ -226,11 +222,7 @@ class ResidualState:
         return taken
 
     def linearised(self, timer: PhaseTimer, known: Linearisation | None) -> Linearisation:
-        """Factor the tangents. Collective.
-
-        Raises:
-            ConvergenceError: If the tangents are not finite, or have no factors.
-        """
+        """Factor the tangents. Collective."""
         self._require_finite_tangents()
         uneven = None
         if self.softening is not None:
@@ -260,7 +252,6 @@ class Linearisation:
 
     Attributes:
         system: The factored system; rows of turning forces come after all others.
-        further: The rows of turning forces.
     """
 
     system: TangentSystem
@@ -294,8 +285,6 @@ class Equations:
     """Internal forces of the bodies of a scene, whose meshes and numbering do not change, and their contact.
 
     Attributes:
-        decomposition: The subdomains.
-        rigid_start: Moves bodies as their supports do.
         contact: How contact points are found: at undeformed places unless some body deforms much.
     """
 

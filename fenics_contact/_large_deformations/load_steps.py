@@ -70,7 +70,6 @@ class Snap:
         fraction: Part of the load step at which it took place, in (0, 1].
         way: Largest distance by which a node moved, [length].
         dissipated: Work against the drag, to first order in the steps of the motion, [force · length].
-        stages: Their number.
     """
 
     fraction: float
@@ -91,8 +90,6 @@ class Snapping:
 
     Attributes:
         effort: That of all stages, those that failed included.
-        dissipated: As in `Snap`.
-        stages: As there.
     """
 
     def __init__(
@@ -109,11 +106,7 @@ class Snapping:
     def to_rest(
         self, at: Configuration, torn: TornSystem, known: Linearisation | None
     ) -> NonlinearEquilibrium:
-        """Return the equilibrium where bodies come to rest. Collective.
-
-        Raises:
-            ConvergenceError: They do not; with the history.
-        """
+        """Return the equilibrium where bodies come to rest. Collective."""
         exact, loose = self._newton, replace(self._newton, max_steps=MANY, tolerance=LOOSE)
         size, tried, in_a_row = FIRST, np.inf, 0
         for _ in range(MOST):
@@ -178,15 +171,12 @@ class Path:
     """The equilibria from one load to the next.
 
     Attributes:
-        load: What acts at the end.
-        end: The last equilibrium.
         begun: Contact points at the start; None where they are not known.
         start: These in material coordinates of the master, of others where they were first found; None where
             contact is that of the undeformed bodies.
         fractions: Parts of the load at which equilibria were found, the last one being 1.
         since: The part from which slip and the histories of materials are one step up to the end: 0, unless
             parts are steps of their own or bodies snapped.
-        snaps: Where bodies snapped.
         rubbed: Work of friction before the last step of histories, zero where the whole load is one,
             [force · length].
         effort: That of all parts, those that were cut included.

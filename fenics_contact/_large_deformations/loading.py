@@ -29,9 +29,7 @@ class Loading:
         torn: The system with loads and supports; pressures that follow their surfaces act as on undeformed
             ones.
         prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
-        time: The time, for obstacles that move.
         following: Pressures that follow their surfaces, each with the part of them that acts.
-        turned: Surfaces that turn as rigid pieces.
         course: Loads and supports that are functions of time; None without any.
         drag: A viscous medium; None without any.
     """
@@ -109,9 +107,8 @@ class Loading:
     def at(self, displacement: Vector) -> tuple[Vector, sp.csr_matrix | None]:
         """Return the forces on deformed bodies, and the stiffness of those that follow their surfaces.
 
-        Returns:
-            Forces of this rank, torn, shape (torn_size,), [force]; less their growth with u, shape
-            (torn_size, torn_size), None where all are dead.
+        Returns forces of this rank, torn, shape (torn_size,), [force]; less their growth with u, shape
+        (torn_size, torn_size), None where all are dead.
         """
         force, softening = self.torn.load, None
         for weight, pressures in self.following:
@@ -144,12 +141,7 @@ class Drag:
 
 
 class LoadHistory(Protocol):
-    """Loads and supports that are functions of time.
-
-    Attributes:
-        loads: Whether loads are.
-        supports: Whether supports are.
-    """
+    """Loads and supports that are functions of time."""
 
     loads: bool
     supports: bool
@@ -164,7 +156,6 @@ class TurnedSurface:
     """A surface that turns as a rigid piece by a large angle.
 
     Attributes:
-        surface: Where, and about which point.
         motion: U, [length], then θ, in radians.
         nodes: Its nodes, of those of all bodies, shape (n,).
         points: Their undeformed coordinates, shape (n, dim), [length].
@@ -302,8 +293,7 @@ class RigidStart:
         Supports hold whole nodes of such a body, and these move from one load to the other like those of a
         rigid body, whose motion they determine.
 
-        Returns:
-            That of this rank, torn; None if no body moves like that.
+        Returns that of this rank, torn; None if no body moves like that.
         """
         copy, block = self._decomposition.held
         node, result = self._decomposition.tearing.copy_node[copy], None

@@ -60,8 +60,6 @@ class Effort:
     """What Newton's method has taken.
 
     Attributes:
-        history: One line for each Newton step.
-        products: Applications of F.
         factorisations: Factored tangents, counting all subdomains as one.
     """
 
@@ -90,7 +88,6 @@ class NonlinearEquilibrium:
     Attributes:
         evaluation: The equations there; all residuals are below the tolerance.
         linearisation: The last one, from a little before.
-        effort: What it has taken.
     """
 
     evaluation: ResidualState
@@ -259,11 +256,7 @@ class _Run:
         return state
 
     def terminate(self, state: _State) -> NonlinearEquilibrium | None:
-        """Return the equilibrium, None if a further step is needed. Collective.
-
-        Raises:
-            ConvergenceError: Steps are used up, or residuals grow without bound.
-        """
+        """Return the equilibrium, None if a further step is needed. Collective."""
         residuals, method, history = state.evaluation.residuals, self.method, state.history
         if state.near is not None and residuals.within(method.tolerance):
             return NonlinearEquilibrium(state.evaluation, state.near, state.effort)

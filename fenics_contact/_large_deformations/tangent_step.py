@@ -86,8 +86,6 @@ class TangentStep:
         multiplier: λ + δλ, owned.
         motions: β, shape (m,), replicated.
         face: The face on which it was taken.
-        products: Applications of F.
-        stop: Why the Krylov method ended.
     """
 
     multiplier: Vector
@@ -108,11 +106,8 @@ def tangent_step(
 ) -> TangentStep | None:
     """Solve the face that the natural map selects; None where it does not hold every body. Collective.
 
-    Args:
-        step: ρ of the natural map, owned; zero on equality rows.
-        forcing: Residual of the linear system relative to that of its start.
-        floor: A residual that is small enough, [length].
-        margin: Discs inside their slip bound by less than this part of it count as slipping.
+    `step`: ρ of the natural map, owned; zero on equality rows; `floor`: A residual that is small enough,
+    [length].
     """
     factor = None if tangent.problem.scaling is None else tangent.problem.scaling.factor
     at = tangent.scaled()
@@ -163,13 +158,8 @@ def tangent_adjoint(
 
     It is (Zᵀ F W + κ) z − (G Z)ᵀβ = Zᵀ d under G W z + S β = e, with the bases of `tangent_step` swapped.
 
-    Args:
-        coupling: Growth of slipping forces with their normal forces, shape (n_owned, n_face).
-        load: e, shape (m,), replicated.
-        tolerance: Residual of the linear system relative to that of its start.
-
-    Returns:
-        W z as multiplier, β as motions.
+    `coupling`: growth of slipping forces with their normal forces, shape (n_owned, n_face); `load`: e, shape
+    (m,), replicated.
     """
     problem = tangent.problem
     factor = 1.0 if problem.scaling is None else problem.scaling.factor
