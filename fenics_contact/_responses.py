@@ -75,6 +75,7 @@ class Response(ABC):
     """A function of named numbers.
 
     Attributes:
+        nominal: Parameter to its default value.
         evaluations: Number of answers so far, failed ones included.
         products: Products with the dual operator so far.
     """
@@ -106,7 +107,15 @@ class Response(ABC):
     def __call__(self, parameters: Parameters | None = None, **named: float) -> Answer:
         """Evaluate at a set of parameters; the others keep their nominal values. Collective.
 
-        `parameters`: all of them in their order, shape (n_parameters,), or a mapping from names.
+        Args:
+            parameters: All of them in their order, shape (n_parameters,), or a mapping from names.
+            **named: Some by name, which override the others.
+
+        Raises:
+            InvalidInputError: If a name is unknown, the shape does not fit or a number is not finite.
+            InvalidDesignError: If the design does not exist (``failures="raise"``).
+            InfeasibleError: If there is no equilibrium (``failures="raise"``).
+            ConvergenceError: If the solver fails (``failures="raise"``).
         """
         with together(self.comm):
             values = self._values(parameters, named)
@@ -126,9 +135,11 @@ class Response(ABC):
     def table(self, samples: ArrayLike) -> np.ndarray:
         """Evaluate at many sets of parameters, in their order. Collective.
 
-        `samples`: one row per set, shape (n, n_parameters).
+        Args:
+            samples: One row per set, shape (n, n_parameters).
 
-        The result has shape (n, n_quantities).
+        Returns:
+            Shape (n, n_quantities).
         """
         rows = np.array(samples, dtype=float)
         if rows.ndim != 2:
@@ -196,9 +207,22 @@ class SceneResponse(Response):
     ) -> None:
         """Prepare; nothing is built before the first answer.
 
-        `build`: takes the parameters by name, returns the scene, the same on every rank; `quantities`: name
-        to a function of the state, called by all ranks together; `tolerance`: relative residual of every
-        state; None for that of the solver, see `ContactProblem.number`.
+        Args:
+            build: Takes the parameters by name, returns the scene, the same on every rank.
+            nominal: Parameter to its default value.
+            quantities: Name to a function of the state, called by all ranks together.
+            comm: Communicator over which the subdomains are spread.
+            partitions: As for `solve_scene`.
+            solver: As for `solve_scene`.
+            tolerance: Relative residual of every state; None for that of the solver, see
+                `ContactProblem.number`.
+            failures: Whether a state that does not exist or does not converge raises, or makes all quantities
+                nan with the reason in `Answer.failure`. Other errors always raise.
+            warm: Whether a state starts from the one before; answers then depend on the order of evaluation,
+                within the tolerance.
+
+        Raises:
+            InvalidInputError: If there is no parameter or no quantity.
         """
         super().__init__(nominal, comm, failures)
         if not quantities:
@@ -255,7 +279,13 @@ class DesignResponse(Response):
         *,
         failures: Failures = "raise",
     ) -> None:
-        """Wrap the problem."""
+        """Wrap the problem.
+
+        Args:
+            problem: The design problem.
+            quantities: Further quantities of the state, in addition to "objective".
+            failures: As for `SceneResponse`.
+        """
         super().__init__({f"alpha {k}": 0.0 for k in range(problem.size)}, problem.comm, failures)
         self.problem, self._of_state = problem, dict(quantities or {})
 

@@ -111,6 +111,7 @@ class Response:
 
     Attributes:
         force: Internal force f(u), by dof, shape (dim n,), [force].
+        tangent: Assembles `stiffness`.
         energy: Stored energy, [force · length]; None where materials dissipate.
         least_jacobian: Smallest det F at a Gauss point; 0 or less is an inverted cell.
         history: Internal variables at the end of the step, shape (n_cells, n_gauss, k); None without any.

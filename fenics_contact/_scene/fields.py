@@ -190,7 +190,11 @@ class SampledField:
             )
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
-        """Evaluate at points, shape (n, dim) -> (n,), or (n, dim) for a vector."""
+        """Evaluate at points, shape (n, dim) -> (n,), or (n, dim) for a vector.
+
+        Raises:
+            InvalidInputError: If one is farther than ``reach`` from all given ones, or in another space.
+        """
         known, values = self._in_space(points.shape[1])
         self._refuse_far(points, known)
         if len(points) == 0 or len(known) == 1:

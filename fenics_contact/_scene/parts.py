@@ -196,14 +196,16 @@ class SceneParts:
     def fixed(self, body: str, supports: Sequence[AnySupport] | None = None) -> np.ndarray:
         """Return which components of a body's nodes supports prescribe, shape (n_nodes, dim).
 
-        `supports`: those that count, all by default.
+        Args:
+            supports: Those that count, all by default.
         """
         return ~np.isnan(self.prescribed(body, supports))
 
     def prescribed(self, body: str, supports: Sequence[AnySupport] | None = None) -> np.ndarray:
         """Return what supports prescribe at the nodes of a body, NaN where free, (n_nodes, dim), [length].
 
-        `supports`: those that count, all by default; where they disagree the last one.
+        Args:
+            supports: Those that count, all by default; where they disagree the last one.
         """
         values = np.full(self.bodies[body].mesh.points.shape, np.nan)
         for support in self.supports if supports is None else supports:
@@ -250,7 +252,11 @@ class SceneParts:
     def moved(self, points: Mapping[str, np.ndarray]) -> Self:
         """Return the scene with new coordinates for some bodies; topology and names stay.
 
-        `points`: body name -> coordinates, shape (n_nodes, dim), [length].
+        Args:
+            points: Body name -> coordinates, shape (n_nodes, dim), [length].
+
+        Raises:
+            InvalidInputError: If a body is unknown, a coordinate is not finite or a cell is inverted.
         """
         for name in points:
             self._require(name, None, "moved")
@@ -259,7 +265,11 @@ class SceneParts:
     def reshaped(self, points: Mapping[str, np.ndarray]) -> Self:
         """Return the scene with slightly changed coordinates; surfaces follow, see `BodyMesh.reshaped`.
 
-        `points`: body name -> coordinates, shape (n_nodes, dim), [length].
+        Args:
+            points: Body name -> coordinates, shape (n_nodes, dim), [length].
+
+        Raises:
+            InvalidInputError: As `moved`.
         """
         for name in points:
             self._require(name, None, "reshaped")

@@ -313,7 +313,11 @@ class DualSystem:
     ) -> None:
         """Factor the subdomains and assemble d, G, e. Collective.
 
-        `kind`: how the subdomains are stored; the cost model chooses by default.
+        Args:
+            torn: The torn system.
+            timer: Collects the wall time.
+            kind: How the subdomains are stored; the cost model chooses by default.
+            previous: System of another geometry; the factors of unchanged subdomains are reused.
         """
         timer = timer or PhaseTimer()
         comm = torn.numbering.comm

@@ -87,7 +87,11 @@ class HistoryMaterial(Elasticity):
     mean_dilatation: bool = False
 
     def __init_subclass__(cls, **given: Any) -> None:
-        """Reject a model that replaces the checks of what it returns."""
+        """Reject a model that replaces the checks of what it returns.
+
+        Raises:
+            InvalidInputError: If it has an `answer` of its own.
+        """
         super().__init_subclass__(**given)
         if "answer" in vars(cls):
             raise InvalidInputError(

@@ -309,7 +309,18 @@ class ResultSeries:
     def __init__(
         self, folder: str | Path, name: str, comm: MPI.Comm, *, formats: Sequence[str] = ("vtu",)
     ) -> None:
-        """Read existing members; nothing is written yet. Collective on ``comm``."""
+        """Read existing members; nothing is written yet. Collective on ``comm``.
+
+        Args:
+            folder: Output folder; created with the first member.
+            name: Name of the series, the beginning of all file names.
+            comm: Communicator of the states.
+            formats: Any of "vtu", "xdmf" and "vtx"; VTU files are always written.
+
+        Raises:
+            InvalidInputError: If the name contains a folder, a format is unknown or unavailable, or a PVD
+                file of that name does not belong to a series.
+        """
         inherited: list[Member] = []
         with together(comm):
             self.path = checked_name(folder, name, ".pvd")

@@ -246,7 +246,11 @@ class Parametric(Patch):
     samples: int = 64
 
     def __post_init__(self) -> None:
-        """Reject an empty range, and an invalid position."""
+        """Reject an empty range, and an invalid position.
+
+        Raises:
+            InvalidInputError: If the range is empty, or the samples are not finite points.
+        """
         count = len(self.lower)
         numbers = count == len(self.upper) and np.isfinite([*self.lower, *self.upper]).all()
         if count not in (1, 2) or not numbers or not np.less(self.lower, self.upper).all():

@@ -45,7 +45,11 @@ class Profile(Patch):
     flipped: bool = False
 
     def __post_init__(self) -> None:
-        """Reject points that do not define a curve."""
+        """Reject points that do not define a curve.
+
+        Raises:
+            InvalidInputError: If they are too few, not in the plane, or consecutive ones coincide.
+        """
         known = all(len(point) == 2 for point in self.points) and np.isfinite(self.points).all()
         if len(self.points) < 3 or not known or not self._lengths.all():
             raise InvalidInputError(
