@@ -9,23 +9,8 @@ import numpy as np
 import typer
 
 from fenics_contact._base.display import force_units
-from fenics_contact._base.progress import show_progress
-from fenics_contact._cli.console import Console, ExitCode, console_of, facts
-from fenics_contact._cli.options import (
-    DryOption,
-    OutputOption,
-    PicturesOption,
-    PythonOption,
-    ResumeOption,
-    SceneArgument,
-    SetOption,
-    ToleranceOption,
-    checkpoint_of,
-    read,
-    resumable,
-    show_outputs,
-    show_plan,
-)
+from fenics_contact._cli.console import Console, ExitCode, facts
+from fenics_contact._cli.options import checkpoint_of, forget, resumable, scene_command
 from fenics_contact._cli.view import Gallery, can_draw, draw_state
 from fenics_contact._optimize.result import Result
 from fenics_contact._scene_file.building import ShapeTask
@@ -44,7 +29,8 @@ _MILLIMETRES = {"µm": 1e-3, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in
 
 
 def check_design_files(file: SceneFile) -> None:
-    """Refuse kinds of files that the scene cannot have, before anything is solved."""
+    """Refuse a file without a design, and kinds of files that the scene cannot have, before solving."""
+    file.require_design()
     kinds, length = file.document.output.design, file.document.units.length
     if "stl" in kinds and file.scene.dim == 2:
         raise InvalidInputError('output.design must be "csv" or "step" for a plane scene, got "stl"')
@@ -92,43 +78,26 @@ def add_to(app: typer.Typer) -> None:
     app.command("optimize", short_help="optimise the contact shape of a scene file")(optimize)
 
 
-def optimize(
-    context: typer.Context,
-    scene: SceneArgument,
-    output: OutputOption = None,
-    tolerance: ToleranceOption = None,
-    settings: SetOption = None,
-    pictures: PicturesOption = True,
-    resume: ResumeOption = None,
-    dry_run: DryOption = False,
-    python: PythonOption = True,
-) -> None:
+def _optimize(console: Console, file: SceneFile, resume: bool | None, pictures: bool) -> None:
     """Optimise the contact shape described by the [design] of a scene file."""
-    console = console_of(context)
-    with show_progress(console.comm):
-        file = read(console, scene, output, tolerance, settings, python)
-        file.require_design()
-        check_design_files(file)
-        show_plan(console, file, sensitivity=True)
-        console.say()
-        if dry_run:
-            show_outputs(console, file, draws=pictures)
-            return
-        task = file.shape_task()
-        words = file.document.design.objective_in_words  # type: ignore[union-attr]
-        console.say(f"{task.problem.size} design variables, objective {words}")
-        with only_run_in(file.folder, console.comm):
-            result, written = _minimised(console, file, task, resume)
-            console.show(facts(_facts(file, task, result)))
-            gallery = Gallery()
-            if pictures and can_draw(console, file, gallery):
-                _draw(console, file, task, result, gallery)
+    task = file.shape_task()
+    words = file.document.design.objective_in_words  # type: ignore[union-attr]
+    console.say(f"{task.problem.size} design variables, objective {words}")
+    with only_run_in(file.folder, console.comm):
+        result, written = _minimised(console, file, task, resume)
+        console.show(facts(_facts(file, task, result)))
+        gallery = Gallery()
+        if pictures and can_draw(console, file, gallery):
+            _draw(console, file, task, result, gallery)
     names = ", ".join(["result.json", *(path.name for path in (*written, *gallery.drawn))])
     console.say(f"results in {file.folder}/: {names}")
     if not result.reason.success:
         console.say(f"not converged: {result.reason.value}")
         raise typer.Exit(int(ExitCode.NOT_CONVERGED))
     gallery.require_all()
+
+
+optimize = scene_command(_optimize, check=check_design_files, sensitivity=True)
 
 
 def _minimised(
@@ -146,8 +115,8 @@ def _minimised(
     written = [] if series is None else [series.path]
     written += write_design_files(console, file, task.problem, result.x)
     # A run that stopped at a limit can continue from its checkpoint with a larger one.
-    if checkpoint is not None and result.reason.success and console.comm.rank == 0:
-        Path(checkpoint.path).unlink(missing_ok=True)
+    if result.reason.success:
+        forget(console, checkpoint)
     return result, written
 
 

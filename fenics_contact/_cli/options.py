@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, TypeAlias
@@ -11,64 +11,102 @@ from typing import Annotated, TypeAlias
 import typer
 
 from fenics_contact._base.checkpoint import Checkpoint, interruptible
-from fenics_contact._base.progress import is_visible
-from fenics_contact._cli.console import Console, facts, write_stderr
+from fenics_contact._base.progress import is_visible, show_progress
+from fenics_contact._cli.console import Console, console_of, facts, write_stderr
 from fenics_contact._scene_file.reading import SceneFile, read_scene_file
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
 
-SceneArgument: TypeAlias = Annotated[
-    Path, typer.Argument(metavar="SCENE.toml", help="The scene file.", show_default=False)
-]
-OutputOption: TypeAlias = Annotated[
-    Path | None,
-    typer.Option("--output", "-o", help="Folder of the results instead of the file's.", show_default=False),
-]
-ToleranceOption: TypeAlias = Annotated[
-    str | None,
-    typer.Option(
-        "--tolerance", help='Relative residual, or "balanced", instead of the file\'s.', show_default=False
-    ),
-]
-SetOption: TypeAlias = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Another value for a key of the file, such as contacts.0.friction.coefficient=0.2; repeatable.",
-        show_default=False,
-    ),
-]
-PicturesOption: TypeAlias = Annotated[
-    bool, typer.Option("--pictures/--no-pictures", help="Draw the pictures that the file requests.")
-]
-ResumeOption: TypeAlias = Annotated[
-    bool | None,
-    typer.Option(
-        "--resume/--fresh",
-        help="Require a checkpoint, or start anew; by default continue from one if it exists.",
-        show_default=False,
-    ),
-]
-DryOption: TypeAlias = Annotated[
-    bool,
-    typer.Option(
-        "--dry-run",
-        help="Only report what would be built and written. Python files that the scene names are run.",
-    ),
-]
-PythonOption: TypeAlias = Annotated[
-    bool,
-    typer.Option("--python/--no-python", help='Run Python files that the scene names ("file.py:Name").'),
-]
+Command: TypeAlias = Callable[..., None]
 
 
-def read(
+def scene_command(
+    compute: Callable[[Console, SceneFile, bool | None, bool], None],
+    *,
+    check: Callable[[SceneFile], None] = lambda file: None,
+    sensitivity: bool = False,
+) -> Command:
+    """Return the command that reads a scene file, checks it, prints its plan and computes.
+
+    ``compute`` takes whether to resume, and whether to draw; its docstring is that of the command.
+    """
+
+    def command(
+        context: typer.Context,
+        scene: Annotated[
+            Path, typer.Argument(metavar="SCENE.toml", help="The scene file.", show_default=False)
+        ],
+        output: Annotated[
+            Path | None,
+            typer.Option(
+                "--output", "-o", help="Folder of the results instead of the file's.", show_default=False
+            ),
+        ] = None,
+        tolerance: Annotated[
+            str | None,
+            typer.Option(
+                "--tolerance",
+                help='Relative residual, or "balanced", instead of the file\'s.',
+                show_default=False,
+            ),
+        ] = None,
+        settings: Annotated[
+            list[str] | None,
+            typer.Option(
+                "--set",
+                metavar="KEY=VALUE",
+                help="Another value for a key of the file, such as contacts.0.friction.coefficient=0.2; "
+                "repeatable.",
+                show_default=False,
+            ),
+        ] = None,
+        pictures: Annotated[
+            bool, typer.Option("--pictures/--no-pictures", help="Draw the pictures that the file requests.")
+        ] = True,
+        resume: Annotated[
+            bool | None,
+            typer.Option(
+                "--resume/--fresh",
+                help="Require a checkpoint, or start anew; by default continue from one if it exists.",
+                show_default=False,
+            ),
+        ] = None,
+        dry_run: Annotated[
+            bool,
+            typer.Option(
+                "--dry-run",
+                help="Only report what would be built and written. Python files that the scene names are "
+                "run.",
+            ),
+        ] = False,
+        python: Annotated[
+            bool,
+            typer.Option(
+                "--python/--no-python", help='Run Python files that the scene names ("file.py:Name").'
+            ),
+        ] = True,
+    ) -> None:
+        console = console_of(context)
+        with show_progress(console.comm):
+            file = _read(console, scene, output, tolerance, settings, python)
+            check(file)
+            _show_plan(console, file, sensitivity=sensitivity)
+            console.say()
+            if dry_run:
+                _show_outputs(console, file, draws=pictures)
+            else:
+                compute(console, file, resume, pictures)
+
+    command.__doc__ = compute.__doc__
+    return command
+
+
+def _read(
     console: Console,
     scene: Path,
     output: Path | None,
     tolerance: str | None,
     settings: list[str] | None,
-    python: bool = True,
+    python: bool,
 ) -> SceneFile:
     """Read a scene file with the values that options override. Collective."""
     overrides = list(settings or ())
@@ -88,7 +126,13 @@ def checkpoint_of(file: SceneFile, resume: bool | None) -> Checkpoint | None:
     return Checkpoint(file.folder / "checkpoint.npz", resume=resume, comm=file.comm)
 
 
-def show_plan(console: Console, file: SceneFile, *, sensitivity: bool = False) -> None:
+def forget(console: Console, checkpoint: Checkpoint | None) -> None:
+    """Remove the checkpoint of a complete run: the next one starts anew."""
+    if checkpoint is not None and console.comm.rank == 0:
+        Path(checkpoint.path).unlink(missing_ok=True)
+
+
+def _show_plan(console: Console, file: SceneFile, *, sensitivity: bool) -> None:
     """Print the plan of a scene. Collective."""
     plan = file.scene.plan(file.partitions, sensitivity=sensitivity)
     rows = {line[:15].strip(): line[16:] for line in str(plan).splitlines()}
@@ -98,7 +142,7 @@ def show_plan(console: Console, file: SceneFile, *, sensitivity: bool = False) -
     console.show(facts(rows))
 
 
-def show_outputs(console: Console, file: SceneFile, *, draws: bool) -> None:
+def _show_outputs(console: Console, file: SceneFile, *, draws: bool) -> None:
     """Report what a run would write."""
     output = file.document.output
     pictures = f", pictures of {', '.join(output.pictures)}" if draws and output.pictures else ""

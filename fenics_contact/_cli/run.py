@@ -4,38 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import typer
 
-from fenics_contact._base.checkpoint import Checkpoint
-from fenics_contact._base.progress import show_progress
 from fenics_contact._cli.console import (
     Console,
-    console_of,
     facts,
     forces_table,
     state_facts,
     step_row,
     step_table,
 )
-from fenics_contact._cli.options import (
-    DryOption,
-    OutputOption,
-    PicturesOption,
-    PythonOption,
-    ResumeOption,
-    SceneArgument,
-    SetOption,
-    ToleranceOption,
-    checkpoint_of,
-    read,
-    resumable,
-    show_outputs,
-    show_plan,
-)
+from fenics_contact._cli.options import checkpoint_of, forget, resumable, scene_command
 from fenics_contact._cli.view import Gallery, can_draw, draw_state
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact.errors import LoadStepError
@@ -54,34 +36,19 @@ def add_to(app: typer.Typer) -> None:
     app.command("run", short_help="solve a scene file, or go through its load steps")(run)
 
 
-def run(
-    context: typer.Context,
-    scene: SceneArgument,
-    output: OutputOption = None,
-    tolerance: ToleranceOption = None,
-    settings: SetOption = None,
-    pictures: PicturesOption = True,
-    resume: ResumeOption = None,
-    dry_run: DryOption = False,
-    python: PythonOption = True,
-) -> None:
+def _run(console: Console, file: SceneFile, resume: bool | None, pictures: bool) -> None:
     """Compute the equilibrium of a scene file, or its load steps."""
-    console = console_of(context)
-    with show_progress(console.comm):
-        file = read(console, scene, output, tolerance, settings, python)
-        show_plan(console, file)
-        console.say()
-        if dry_run:
-            show_outputs(console, file, draws=pictures)
-            return
-        with only_run_in(file.folder, console.comm):
-            states = _through_steps(console, file, resume) if file.steps else _at_once(console, file)
-            gallery = Gallery()
-            if pictures and _wanted(file) and can_draw(console, file, gallery):
-                draw_state(console, file, states, gallery)
+    with only_run_in(file.folder, console.comm):
+        states = _through_steps(console, file, resume) if file.steps else _at_once(console, file)
+        gallery = Gallery()
+        if pictures and file.document.output.pictures and can_draw(console, file, gallery):
+            draw_state(console, file, states, gallery)
     names = ", ".join(["result.json", *_files(file), *(path.name for path in gallery.drawn)])
     console.say(f"results in {file.folder}/: {names}")
     gallery.require_all()
+
+
+run = scene_command(_run)
 
 
 def _files(file: SceneFile) -> list[str]:
@@ -90,10 +57,6 @@ def _files(file: SceneFile) -> list[str]:
     if file.steps:
         return ["history.pvd"] if kinds else []
     return ["state.vtm"] if "vtu" in kinds else []
-
-
-def _wanted(file: SceneFile) -> bool:
-    return bool(file.document.output.pictures)
 
 
 def _at_once(console: Console, file: SceneFile) -> dict[str, State]:
@@ -167,14 +130,8 @@ def _through_steps(console: Console, file: SceneFile, resume: bool | None) -> di
     _show(console, file, state, f"{file.title}: after the last step")
     more = {**_origin(file), "steps": _steps(rows, file)}
     write_result(state, file.folder, more=more, errors=state.known_errors is not None)
-    _done(console, checkpoint)
+    forget(console, checkpoint)
     return drawn
-
-
-def _done(console: Console, checkpoint: Checkpoint | None) -> None:
-    """Remove the checkpoint of a complete run: the next one starts anew."""
-    if checkpoint is not None and console.comm.rank == 0:
-        Path(checkpoint.path).unlink(missing_ok=True)
 
 
 def _origin(file: SceneFile) -> dict[str, Any]:
