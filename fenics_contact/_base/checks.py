@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import importlib.util
 import inspect
 import re
 import reprlib
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
 from pathlib import Path
-from types import NoneType, UnionType
+from types import ModuleType, NoneType, UnionType
 from typing import Any, Literal, TypeAlias, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import scene_file_code
 
 #: Largest number of cells in a row, and of any other count: more is a typing error.
 MOST = 1_000_000
@@ -240,6 +243,20 @@ def require_file(path: Path, what: str = "a file") -> None:
     except OSError as error:
         reason = f"it cannot be looked at: {error.strerror or error}"
     raise InvalidInputError(f"there must be {what} '{path}', {reason}: check the name and folder")
+
+
+def run_file(path: Path) -> ModuleType:
+    """Run a Python file of the user's own as a module."""
+    require_file(path, "a Python file")
+    name = f"_fenics_contact_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses of the file are looked up there
+    with scene_file_code(f"the Python file '{path}'"):
+        spec.loader.exec_module(module)
+    return module
 
 
 #: A vector given by a user.

@@ -121,7 +121,7 @@ class Builder:
             for number, part in enumerate(getattr(document, key)):
                 with self._at(key, number):
                     one = self._made(part, dim)
-                    _refuse(empty, {key: (one,)})
+                    replace(empty, **{key: (one,)})  # rejects what does not suit the bodies
                     built[key].append(one)
                     with self._at(key, number, *_FORMULAS.get(key, ())):
                         check_formulas(one, bodies)
@@ -164,11 +164,6 @@ class Builder:
         with together(self._comm):
             if self._mistakes:
                 raise SceneFileError(self._source.name, self._mistakes)
-
-
-def _refuse(empty: Scene, part: dict[str, Any]) -> None:
-    """Reject a part that does not suit the bodies of a scene."""
-    replace(empty, **part)
 
 
 AnyDocument = TypeVar("AnyDocument", bound=BaseModel)
@@ -274,7 +269,12 @@ def shape_task(
     alone = ShapeProblem(contact, moving, objective, tolerance=adaptive)
     problem = _over_steps(alone, design, steps)
     lower, upper = (
-        np.concatenate([np.full(move.size, getattr(part, side)) for move, part in _paired(moving, design)])
+        np.concatenate(
+            [
+                np.full(move.size, getattr(part, side))
+                for move, part in zip(moving, design.surfaces, strict=True)
+            ]
+        )
         for side in ("lower", "upper")
     )
     start = np.zeros(problem.size) if design.start is None else _fitting("start", design.start, problem.size)
@@ -297,10 +297,6 @@ def _over_steps(
     if design.over_steps is None:
         return LoadPath(problem, steps)
     return LoadPath(problem, steps, dict.fromkeys(design.over_steps, problem.objective))
-
-
-def _paired(moving: tuple[SurfaceDesign, ...], design: DesignPart) -> Any:
-    return zip(moving, design.surfaces, strict=True)
 
 
 def _objective(name: Any, source: Source) -> Objective:

@@ -112,10 +112,6 @@ _KEY = re.compile(rf"{_PART}(?:[ \t]*\.[ \t]*{_PART})*")
 _BARE_KEY = re.compile(rf"{_BARE}(?:\.{_BARE})*")
 #: Multi-line strings come first: they begin like the others.
 _STRING = re.compile(rf"\"{{3}}(?:[^\\]|\\.)*?\"{{3,5}}|'{{3}}.*?'{{3,5}}|{_BASIC}|{_LITERAL}", re.DOTALL)
-_STRING_OR_COMMENT = re.compile(rf"{_STRING.pattern}|#[^\n]*", re.DOTALL)
-#: Most names of a dotted key.
-DEEPEST = 32
-_PARTS, _DEEP = re.compile(r"[A-Za-z0-9_ \t-]+"), re.compile(rf"\.{{{DEEPEST},}}")
 _NUMBER_OR_DATE = re.compile(r"[^,\]}#\n]*")
 _OPEN_HEAD, _CLOSED_HEAD = re.compile(r"\[+[ \t]*"), re.compile(r"[ \t]*\]+")
 _EQUALS = re.compile(r"[ \t]*=[ \t]*")
@@ -126,16 +122,6 @@ _BLANK_OR_COMMA = re.compile(r"(?:[ \t\r\n,]|#[^\n]*)*")
 def lines_of(text: str) -> dict[Path, int]:
     """Return the line, from 1, on which every key, table and entry of a list begins."""
     return _Scanner(text).lines
-
-
-def too_deep(text: str) -> int | None:
-    """Return the line of the first key with more than `DEEPEST` names, None without any.
-
-    Parsers take a time that grows with the square of their number.
-    """
-    bare = _STRING_OR_COMMENT.sub(lambda match: "\n" * match.group().count("\n"), text)
-    run = _DEEP.search(_PARTS.sub("", bare))  # what is left of a key are its dots
-    return None if run is None else run.string.count("\n", 0, run.start()) + 1
 
 
 def nearest(lines: Mapping[Path, int], path: Path) -> int:
@@ -370,12 +356,6 @@ def parse(text: str, name: str, folder: FilePath) -> Source:
             "the editor save the file as UTF-8 without BOM"
         )
         raise SceneFileError(name, [Mistake((), 1, "line 1", words)])
-    if (line := too_deep(text)) is not None:
-        words = (
-            f"must have keys of at most {DEEPEST} names between dots, got "
-            f"{shortened(text.splitlines()[line - 1].strip())!r}: no key of a scene file is as deep"
-        )
-        raise SceneFileError(name, [Mistake((), line, f"line {line}", words)])
     try:
         return Source(name, folder, tomllib.loads(text), text)
     except (ValueError, RecursionError) as error:

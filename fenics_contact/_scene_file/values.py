@@ -6,10 +6,8 @@ Formulas in x, y, z and t as text, evaluated at points; only arithmetic is accep
 from __future__ import annotations
 
 import ast
-import importlib.util
 import math
 import os
-import sys
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -31,7 +29,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError, ValidationError
 
-from fenics_contact._base.checks import MOST, require_file
+from fenics_contact._base.checks import MOST, run_file
 from fenics_contact._scene.fields import OfPosition
 from fenics_contact._scene_file.source import shortened
 from fenics_contact.errors import InvalidInputError
@@ -308,19 +306,12 @@ def load(reference: str, folder: Path) -> Any:
     """Return the object of a name in a Python file; the file is run."""
     file, _, name = reference.rpartition(":")
     path = folder / file
-    require_file(path, "a Python file")
-    module_name = f"_fenics_contact_scene_{path.stem}"
-    spec = importlib.util.spec_from_file_location(module_name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[module_name] = module  # dataclasses of the file are looked up there
+    module = run_file(path)
     with scene_file_code(f"the Python file '{path}'"):
-        spec.loader.exec_module(module)
         loaded = getattr(module, name, _NOTHING)
     if loaded is _NOTHING:
         known = sorted(
-            key for key, value in vars(module).items() if getattr(value, "__module__", "") == module_name
+            key for key, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__
         )
         raise InvalidInputError(f"'{path}' must define {name!r}, it defines {known}: use one of them")
     return loaded

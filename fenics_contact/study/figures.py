@@ -223,13 +223,11 @@ def plot_convergence(errors: Errors, paper: BinaryIO) -> None:
             _draw_convergence(axes, errors, ways, partial(errors.of, quantity=quantity.name), quantity.rate)
             axes.set_ylabel("relative error")
             axes.set_title(f"{quantity.name}\n{against(errors, quantity.name)}", fontsize="medium")
-        _draw_convergence(drawn[-1], errors, ways, _estimate, scene.energy_rate)
+        _draw_convergence(
+            drawn[-1], errors, ways, lambda run: (run.parts or {}).get("discretisation"), scene.energy_rate
+        )
         drawn[-1].set_ylabel("error over energy norm")
         drawn[-1].set_title("estimated error of the displacement")
-
-
-def _estimate(run: Run) -> float | None:
-    return (run.parts or {}).get("discretisation")
 
 
 def _draw_convergence(

@@ -30,7 +30,7 @@ from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.results.linear_state import LinearState, as_linear
 from fenics_contact.results.state import State
 from fenics_contact.study.scenes import find_study
-from fenics_contact.study.study import Outcome, Parameters, Problem, Quantity, Value, parameters_from
+from fenics_contact.study.study import Outcome, Parameters, Problem, Quantity, Value
 from fenics_contact.study.worker import peak_memory
 
 
@@ -171,7 +171,7 @@ def measured(
     comm: MPI.Comm, scene: str, parameters: Mapping[str, Any], *, verify: bool = False
 ) -> dict[str, Any]:
     """Run once and return all measurements. Collective."""
-    study, settings = find_study(scene), parameters_from(parameters)
+    study, settings = find_study(scene), Parameters(**parameters)
     _dolfinx.release()  # loads dolfinx, which is not part of a run's time
     comm.Barrier()
     began, timer = perf_counter(), PhaseTimer()

@@ -210,7 +210,8 @@ def table_page(errors: Errors) -> str:
     title, answers, rates, certificates = findings_of(errors, 1)
     parts = [title, _measured(errors.results), answers, "## Rates\n"]
     parts += [rates, "## Certificates\n", certificates, "## Runs\n", _runs(errors)]
-    failed = [f"- {run.parameters}: {_short(run.failed)}" for run in errors.results.runs if run.failed]
+    reasons = {run.parameters: " ".join(run.failed.split()) for run in errors.results.runs if run.failed}
+    failed = [f"- {parameters}: {reason[:300]}" for parameters, reason in reasons.items()]
     return "\n".join([*parts, "## Failed runs\n", *failed, ""] if failed else parts)
 
 
@@ -280,10 +281,6 @@ def _row(errors: Errors, run: Run, names: list[str]) -> tuple[str, ...]:
         f"{run.seconds:.2f}", "" if run.memory is None else f"{run.memory / 2**20:.0f}",
         *("" if value is None else f"{value:.1e}" for value in relative),
     )  # fmt: skip
-
-
-def _short(reason: str) -> str:
-    return " ".join(reason.split())[:300]
 
 
 def _number(value: float | None) -> str:

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.output.files import write_json
-from fenics_contact.study.study import Parameters, QuantityFacts, SceneFacts, parameters_from
+from fenics_contact.study.study import Parameters, QuantityFacts, SceneFacts
 
 
 @dataclass(frozen=True)
@@ -119,8 +119,11 @@ def read_study(folder: str | Path) -> Results:
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
         scene = _scene(data["scene"])
-        runs = tuple(_run(run) for run in data["runs"])
-        return Results(scene, int(data["ranks"]), runs, parameters_from(data["base"]), data["versions"])
+        runs = tuple(
+            Run(**{**run, "parameters": Parameters(**run["parameters"]), "spread": tuple(run["spread"])})
+            for run in data["runs"]
+        )
+        return Results(scene, int(data["ranks"]), runs, Parameters(**data["base"]), data["versions"])
     except FileNotFoundError:
         raise InvalidInputError(
             f"a study's results are in {path}, which does not exist: run the study first"
@@ -136,10 +139,6 @@ def _scene(data: Mapping[str, Any]) -> SceneFacts:
     quantities = tuple(QuantityFacts(**{**q, "phases": tuple(q["phases"])}) for q in data["quantities"])
     spacing = {int(size): float(h) for size, h in data["spacing"].items()}
     return SceneFacts(**known, spacing=spacing, quantities=quantities)
-
-
-def _run(data: Mapping[str, Any]) -> Run:
-    return Run(**{**data, "parameters": parameters_from(data["parameters"]), "spread": tuple(data["spread"])})
 
 
 #: Largest accepted ratio of a certificate to the true error.

@@ -92,11 +92,6 @@ class Parameters:
         return self.size, 0.0 if isinstance(self.tolerance, str) else -self.tolerance
 
 
-def parameters_from(data: Mapping[str, Any]) -> Parameters:
-    """Return the settings that `Parameters.as_dict` wrote."""
-    return Parameters(**data)
-
-
 def _require(name: str, given: object, holds: bool, allowed: str) -> None:
     if not holds:
         raise InvalidInputError(f"{name} must be {allowed}, got {given!r}: choose one of these")

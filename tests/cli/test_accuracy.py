@@ -25,7 +25,7 @@ from tests.study.samples import BLOCK, Machine
             ["accuracy", "hertzz"],
             r"a study is one of ['hertz', 'cattaneo_mindlin', 'chain_links'] or a Python",
         ),
-        (["accuracy", "nowhere.py"], "there must be a Python file with a study 'nowhere.py', there is none"),
+        (["accuracy", "nowhere.py"], "there must be a Python file 'nowhere.py', there is none"),
         (["accuracy", "hertz", "--cells", "cube"], "cell must be one of ['hexahedron', "),
         (
             ["accuracy", "hertz", "--report", "--output", "/nowhere"],

@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import read_scene_file
-from fenics_contact._scene_file.source import SceneFileError, parse
+from fenics_contact._scene_file.source import SceneFileError
 from fenics_contact.errors import InvalidInputError
 from tests.conftest import ROOT
 from tests.scene_file.mistakes import MISTAKES, page, said
@@ -244,20 +244,3 @@ def test_all_ranks_report_the_same_mistake(mpirun: Callable[..., str]) -> None:
     assert lines[0].startswith("scene.toml, line 42: must be TOML, got '[solver'")
     assert "friction.coefficient must be a number of at least 0, a formula" in lines[1]
     assert "loads.0.surface must be a surface of the body 'upper'" in lines[2]
-
-
-def test_dotted_keys_of_thousands_of_names_are_refused_before_they_are_parsed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Parsers take a time that grows with the square of their number."""
-    monkeypatch.setattr("tomllib.loads", lambda text: pytest.fail("parsed"))
-    deep = "a." * 20_000 + "b"
-    for text in (f"{deep} = 1", f"[[{deep}]]", f"x = {{ {deep.replace('.', ' . ')} = 1 }}"):
-        with pytest.raises(SceneFileError, match="line 3: must have keys of at most 32 names between"):
-            parse(f'# {deep}\ny = "{deep}"\n{text}\n', "deep.toml", tmp_path)
-
-
-def test_many_dots_in_strings_comments_and_numbers_are_no_deep_keys(tmp_path: Path) -> None:
-    dots = "." * 100
-    text = f"a = \"{dots}\" # {dots}\nb = [{', '.join(['0.5'] * 100)}]\nc.d.e = '''{dots}\n{dots}'''\n"
-    assert parse(text, "dots.toml", tmp_path).data["c"]["d"]["e"] == f"{dots}\n{dots}"

@@ -9,7 +9,6 @@ import pytest
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.study import BALANCED, Parameters, Sweep
-from fenics_contact.study.study import parameters_from
 
 
 @pytest.mark.parametrize(
@@ -31,7 +30,7 @@ def test_a_setting_that_no_scene_knows_is_refused(name: str, value: Any, allowed
 
 def test_settings_survive_json() -> None:
     for given in (Parameters(3), Parameters(2, "tetrahedron", "mortar", 1e-3, "fixed point", 8)):
-        assert parameters_from(json.loads(json.dumps(given.as_dict()))) == given
+        assert Parameters(**json.loads(json.dumps(given.as_dict()))) == given
 
 
 def test_settings_are_told_in_a_few_words() -> None:

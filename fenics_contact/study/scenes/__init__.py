@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
-import sys
 from pathlib import Path
 
-from fenics_contact._base.checks import require_file
+from fenics_contact._base.checks import run_file
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.errors.kinds import scene_file_code
 from fenics_contact.study.study import StudyScene
 
 #: Names of the built-in studies.
@@ -19,7 +16,7 @@ BUILT_IN = ("hertz", "cattaneo_mindlin", "chain_links")
 def find_study(name: str) -> StudyScene:
     """Return the built-in study of a name, or the one that a Python file defines as ``study``."""
     if name.endswith(".py"):
-        return _from_file(Path(name))
+        return _checked(getattr(run_file(Path(name)), "study", None), name)
     if name not in BUILT_IN:
         raise InvalidInputError(
             f"a study is one of {list(BUILT_IN)} or a Python file, got {name!r}: use one of the names, or "
@@ -32,19 +29,6 @@ def find_study(name: str) -> StudyScene:
 def scene_file(name: str) -> Path | None:
     """Return the file that defines a study of the user's own, None for a built-in one."""
     return Path(name) if name.endswith(".py") else None
-
-
-def _from_file(path: Path) -> StudyScene:
-    require_file(path, "a Python file with a study")
-    module_name = f"_fenics_contact_study_{path.stem}"
-    spec = importlib.util.spec_from_file_location(module_name, path)
-    if spec is None or spec.loader is None:
-        raise InvalidInputError(f"{str(path)!r} cannot be read as Python: give a file that ends in '.py'")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[module_name] = module  # dataclasses of the file are looked up there
-    with scene_file_code(f"the Python file '{path}'"):
-        spec.loader.exec_module(module)
-    return _checked(getattr(module, "study", None), str(path))
 
 
 def _checked(study: object, name: str) -> StudyScene:
