@@ -72,9 +72,8 @@ def read_mesh(path: Path, name: str, inline: bool) -> dolfinx.mesh.Mesh:
         unused = np.setdiff1d(np.arange(n_nodes), used)
         if unused.size:
             raise InvalidInputError(
-                f"every node must belong to a cell, {unused.size} of {n_nodes} in grid '{name}' of "
-                f"file '{path}' "
-                f"do not, first node {unused[0]}: remove them (meshio: mesh.remove_orphaned_nodes())"
+                f"every node must belong to a cell, {unused.size} of {n_nodes} in grid '{name}' of file "
+                f"'{path}' do not, first node {unused[0]}: remove them (meshio: mesh.remove_orphaned_nodes())"
             )
         return file.read_mesh(name=name)
 
@@ -104,9 +103,8 @@ def _check_points(mesh: dolfinx.mesh.Mesh, points: np.ndarray, path: Path) -> No
     own[mesh.geometry.input_global_indices] = mesh.geometry.x[:, : mesh.geometry.dim]
     if own.shape != points.shape or not np.allclose(own, points, rtol=0.0, atol=1e-8 * np.abs(own).max()):
         raise InvalidInputError(
-            f"the facets of file '{path}' must be on the nodes of the mesh, they are on {len(points)} "
-            f"nodes of "
-            f"their own, the mesh has {len(own)}: write both files with all nodes, in the same order"
+            f"the facets of file '{path}' must be on the nodes of the mesh, they are on {len(points)} nodes "
+            f"of their own, the mesh has {len(own)}: write both files with all nodes, in the same order"
         )
 
 

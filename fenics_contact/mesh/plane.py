@@ -82,9 +82,8 @@ def turned_right_handed(points: np.ndarray, cells: np.ndarray, source: str) -> n
         face = flat[one[np.argmax(same)]]
         place = ", ".join(f"{x:.6g}" for x in points[face].mean(axis=0))
         raise InvalidInputError(
-            f"cells that share a face must lie on its two sides, {np.count_nonzero(same)} faces of "
-            f"{source} have both on one side, first at ({place}): a cell there is flipped over or "
-            f"there twice; "
-            "mesh again"
+            f"cells that share a face must lie on its two sides, {np.count_nonzero(same)} faces of {source} "
+            f"have both on one side, first at ({place}): a cell there is flipped over or there twice; mesh "
+            "again"
         )
     return turned

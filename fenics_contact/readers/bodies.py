@@ -254,9 +254,8 @@ def _check_none_inside(
     if inside:
         raise InvalidInputError(
             f"a surface must lie on the boundary of a body, {inside} facets of '{surface}' of {mesh.source} "
-            f"lie inside body '{name}': make bodies of the parts on its two sides, or leave the "
-            f"surface out with "
-            "surfaces=[...]"
+            f"lie inside body '{name}': make bodies of the parts on its two sides, or leave the surface out "
+            "with surfaces=[...]"
         )
 
 
@@ -288,7 +287,6 @@ def _check_facets_belong(mesh: TaggedMesh, surfaces: Facets) -> None:
                 place = ", ".join(f"{x:.6g}" for x in mesh.points[block[lost[0]]].mean(axis=0))
                 raise InvalidInputError(
                     f"a surface must consist of faces of cells, {lost.size} of {len(block)} facets of "
-                    f"'{name}' of {mesh.source} are none, first at ({place}): mesh bodies and "
-                    f"surfaces together, or "
-                    "leave the surface out with surfaces=[...]"
+                    f"'{name}' of {mesh.source} are none, first at ({place}): mesh bodies and surfaces "
+                    "together, or leave the surface out with surfaces=[...]"
                 )

@@ -249,9 +249,8 @@ def _grid(node: ElementTree.Element, topology: ElementTree.Element) -> Grid:
 def _check_topology(grid: Grid, path: Path) -> None:
     if grid.topology == "mixed":
         raise InvalidInputError(
-            f"a body must have cells of one type, grid '{grid.name}' of file '{path}' is mixed: write "
-            f"cells and "
-            "facets to files of their own (facet_file=...), and cells of one type only"
+            f"a body must have cells of one type, grid '{grid.name}' of file '{path}' is mixed: write cells "
+            "and facets to files of their own (facet_file=...), and cells of one type only"
         )
     if "_" in grid.topology and grid.topology not in _QUADRATIC:  # Hexahedron_20, Hexahedron_64
         raise InvalidInputError(
@@ -413,8 +412,7 @@ def _read(path: Path, facet_path: Path, names: tuple[str | None, str | None, str
     except RuntimeError as reason:  # dolfinx raises no other class
         raise InvalidInputError(
             f"file '{path}' must be an XDMF file that dolfinx can read, with its HDF5 file beside it, "
-            f"dolfinx says: "
-            f"{reason}: write it again"
+            f"dolfinx says: {reason}: write it again"
         ) from reason
 
 
@@ -433,9 +431,8 @@ def _tagged_mesh(
         )
     if arrays.cell_type not in CELL_TYPES:
         raise InvalidInputError(
-            f"cells must be tetrahedra or hexahedra (in two dimensions triangles or quadrilaterals), "
-            f"{source} has "
-            f"cells of type '{arrays.cell_type}': mesh it with others"
+            "cells must be tetrahedra or hexahedra (in two dimensions triangles or quadrilaterals), "
+            f"{source} has cells of type '{arrays.cell_type}': mesh it with others"
         )
     points = arrays.points
     if arrays.dim == 2:
@@ -459,9 +456,8 @@ def _groups(arrays: MeshArrays, tagged: TagArrays | None, source: str) -> dict[L
     left = np.setdiff1d(np.arange(n_cells), tagged.entities)
     if left.size:
         raise InvalidInputError(
-            f"every cell must have a tag, which says what body it is, {left.size} of {n_cells} cells "
-            f"of {source} "
-            f"have none, first cell {left[0]}: give the rest a tag of its own"
+            f"every cell must have a tag, which says what body it is, {left.size} of {n_cells} cells of "
+            f"{source} have none, first cell {left[0]}: give the rest a tag of its own"
         )
     return {
         int(tag): {arrays.cell_type: np.sort(tagged.entities[tagged.values == tag])}
