@@ -148,14 +148,8 @@ class CoarseSpace:
     ) -> None:
         """Store this rank's columns.
 
-        Args:
-            comm: Communicator over which the multipliers are distributed.
-            G: This rank's columns, sparse, shape (m, n_owned).
-            e: Right side, shape (m,), the same on every rank.
-            gram: The matrix G G^T as `gram_matrix` returns it, if known already.
-
-        Raises:
-            InvalidInputError: The shapes of G and e disagree.
+        `G`: this rank's columns, sparse, shape (m, n_owned); `e`: right side, shape (m,), the same on every
+        rank.
         """
         self.comm = comm
         self.matrix = sp.csr_matrix(G, dtype=np.float64)
@@ -238,10 +232,8 @@ class CoarseSpace:
     ) -> CoarseSpace:
         """Return the coarse space G Z of a face with dofs y, multiplier = fixed + Z y.
 
-        Args:
-            Z: This rank's restriction, sparse, shape (n_owned, n_face).
-            load: Right side for the face, e - G fixed, shape (m,), replicated; e itself by default.
-            gram: The matrix G Z Z^T G^T as `gram_matrix` returns it, where known.
+        `Z`: this rank's restriction, sparse, shape (n_owned, n_face); `load`: right side for the face, e - G
+        fixed, shape (m,), replicated; e itself by default.
         """
         return CoarseSpace(self.comm, self.matrix @ Z, self.load if load is None else load, gram=gram)
 

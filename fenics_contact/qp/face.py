@@ -151,11 +151,8 @@ def face_basis(
 ) -> sp.csr_matrix:
     """Return Z of a face: its columns are orthonormal, shape (size, n_face), owned rows and columns.
 
-    Args:
-        closed: Contacts whose normal row is free, shape (n_contact,).
-        stick: Discs of which both rows are free, shape (n_friction,).
-        sliding: Discs that are free across a direction; in two dimensions none.
-        direction: Unit vectors of these discs, shape (n_friction, t).
+    `closed`: contacts whose normal row is free, shape (n_contact,); `stick`: discs of which both rows are
+    free, shape (n_friction,); `direction`: unit vectors of these discs, shape (n_friction, t).
     """
     single = np.concatenate([layout.equality, layout.normal[closed], layout.tangential[stick].ravel()])
     across = turning_discs(layout, sliding)
@@ -175,11 +172,8 @@ def classify(
     Contacts with w_N > 0 are closed. Discs with ‖w_T‖ < Ψ stick, the others slip along ŵ = w_T/‖w_T‖, and
     those with Ψ = 0 are pinned.
 
-    Args:
-        layout: Positions of normal and tangential multipliers.
-        slip_bound: Ψ, shape (n_friction,), owned.
-        residual: r = F λ − d − Gᵀα, owned.
-        step: ρ, positive, the same for the components of one disc, shape (size,), owned.
+    `slip_bound`: Ψ, shape (n_friction,), owned; `residual`: r = F λ − d − Gᵀα, owned; `step`: ρ, positive,
+    the same for the components of one disc, shape (size,), owned.
     """
     trial = multiplier - step * residual
     tangential = trial[layout.tangential]

@@ -97,9 +97,6 @@ class FrictionAlone:
 
         If even `WEDGED` times the slip bounds of the forces without friction cannot balance the load,
         friction is taken to hold nothing, as where supports keep the surfaces apart. That is not a proof.
-
-        Raises:
-            InfeasibleError: Friction does not suffice.
         """
         if self._forces is None:
             return
@@ -119,9 +116,6 @@ class FrictionAlone:
         the slip bounds of these forces that motion is another one, and so on. If friction then bears less
         than the load, bodies accelerate. Forces of the last load may hold bodies where they were driven in.
         They are computed ``times`` times at most, until friction bears the same to ``settled``.
-
-        Raises:
-            SlidingError: They do.
         """
         layout, before = self.problem.layout, np.inf
         forces = self._forces if start is None or self._forces is None else start
@@ -335,12 +329,7 @@ class _Run:
         return _State(self.steps.init(first), first, self.start.memory)
 
     def terminate(self, state: _State) -> DualSolution | None:
-        """Return the certified solution, None if a further step is needed. Collective.
-
-        Raises:
-            InfeasibleError: As in `FaceNewton.run`.
-            ConvergenceError: Steps or products are used up, or rescues are in vain.
-        """
+        """Return the certified solution, None if a further step is needed. Collective."""
         parameters, products = self.parameters, self.start.operator.products
         if state.answer is not None:
             return state.answer.solution(state.history, products, state.memory)
@@ -350,12 +339,7 @@ class _Run:
         return None
 
     def step(self, state: _State) -> _State:
-        """Take a Newton step; without progress a rescue follows. Collective.
-
-        Raises:
-            InfeasibleError: All contacts stay open, and some body moves that only they could hold, or
-                friction is far from sufficient.
-        """
+        """Take a Newton step; without progress a rescue follows. Collective."""
         # (a)-(d) Forcing term, face, linear system, damped step: see `FaceSteps.step`.
         newton, line = self.steps.step(state.newton, len(state.history), state.care)
         history = (*state.history, line)
@@ -383,11 +367,7 @@ class _Run:
         return self._rescued(state) if stuck else state
 
     def _rescued(self, state: _State) -> _State:
-        """Continue from the best iterate improved by a rescue. Collective.
-
-        Raises:
-            InfeasibleError: Friction is far from sufficient, or everything slides and goes on to do so.
-        """
+        """Continue from the best iterate improved by a rescue. Collective."""
         if self.parameters.doubts and state.rescues + 1 == DOUBT:
             self.friction_alone.require_enough()
         if self.parameters.doubts and state.rescues == 1 and slides(state.history):

@@ -203,13 +203,8 @@ class CoupledSystem:
     ) -> CoupledSystem | None:
         """Join both bases; None where the face does not hold every body. Collective.
 
-        Args:
-            system: The symmetric system of the face.
-            tested: W, shape (n_owned, n_face).
-            moving: Z, shape (n_owned, n_face).
-            curvature: κ, by default that of the face.
-            damped: Whether to move offsets that κ holds in place less: for systems that must be solved to the
-                last digits, also near switches of the contact law.
+        `tested`: W, shape (n_owned, n_face); `moving`: Z, shape (n_owned, n_face); `curvature`: κ, by default
+        that of the face.
         """
         oblique = ObliqueProjector.build(sp.csr_matrix(coarse.matrix @ tested), coarse.restricted(moving))
         if oblique is None:
@@ -297,8 +292,7 @@ def growing_basis(
 def couple(system: FaceSystem, coarse: CoarseSpace, growth: Vector, multiplier: Vector) -> CoupledFace | None:
     """Add the growth of friction to a face system. Collective.
 
-    Returns:
-        The coupled face; None where no disc grows, or where the face does not hold every body.
+    Returns the coupled face; None where no disc grows, or where the face does not hold every body.
     """
     moving, fixed = growing_basis(system.comm, system.face, growth, multiplier)
     if moving is None:

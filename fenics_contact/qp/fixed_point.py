@@ -73,9 +73,8 @@ class SlipBoundSequence:
     def advance(self, bound: Vector, image: Vector, residual: float) -> tuple[Vector, str]:
         """Return the next slip bound and a note on the decision. Collective.
 
-        Args:
-            bound: Ψ of the last Tresca problem, shape (n_friction,), owned.
-            image: The slip bound that belongs to its solution, shape (n_friction,), owned.
+        `bound`: Ψ of the last Tresca problem, shape (n_friction,), owned; `image`: the slip bound that
+        belongs to its solution, shape (n_friction,), owned.
         """
         self._bounds = [*self._bounds[1 - MEMORY :], bound]
         period, change = self._returned(image)

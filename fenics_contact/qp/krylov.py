@@ -80,15 +80,10 @@ def projected_cg(
     in the second, the norm of the residual in the third. Conjugation against all previous directions is two
     matrix–vector products.
 
-    Args:
-        system: The face, its operator, coarse space and preconditioner.
-        gradient: g = Zᵀ(F λ − d) + κ y at the starting point, shape (n_face,), owned.
-        weights: Positive weights of the stopping norm ‖weights · P_F(g + A δ)‖, shape (n_face,), owned.
-        tolerance: Stop when that norm is at most this.
-        max_iterations: Largest number of operator applications.
+    `gradient`: g = Zᵀ(F λ − d) + κ y at the starting point, shape (n_face,), owned; `weights`: positive
+    weights of the stopping norm ‖weights · P_F(g + A δ)‖, shape (n_face,), owned.
 
-    Returns:
-        The step and why the iteration ended; nothing is raised, the caller decides what a failure means.
+    Returns the step and why the iteration ended; nothing is raised, the caller decides what a failure means.
 
     References:
         C. Farhat, F.-X. Roux, A method of finite element tearing and interconnecting and its parallel
@@ -173,15 +168,10 @@ def projected_gmres(
     Right preconditioned, without restart, in the norm ‖weights · r‖ of the projected residual, which is
     minimised and compared with the tolerance.
 
-    Args:
-        coupled: The face with its test and trial bases.
-        gradient: g = Wᵀ(F λ − d) + κ y at the starting point, shape (n_face,), owned.
-        weights: Positive weights, shape (n_face,), owned.
-        tolerance: Stop when the weighted norm is at most this.
-        max_iterations: Largest number of operator applications.
+    `gradient`: g = Wᵀ(F λ − d) + κ y at the starting point, shape (n_face,), owned; `weights`: positive
+    weights, shape (n_face,), owned.
 
-    Returns:
-        The step in face coordinates (the multiplier moves by Z δ) and why the iteration ended.
+    Returns the step in face coordinates (the multiplier moves by Z δ) and why the iteration ended.
 
     References:
         Y. Saad, Iterative Methods for Sparse Linear Systems, 2nd ed. (2003), algorithms 6.9 and 9.5.

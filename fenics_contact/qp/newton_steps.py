@@ -89,10 +89,8 @@ class Forcing:
     def by_prediction(self, residuals: Residuals, mismatch: float | None, care: float) -> float:
         """Return the weighted residual at which a face is solved, by choice 1.
 
-        Args:
-            mismatch: Difference of the last residual from the one that its face predicted, relative to the
-                residual before; None if the face has changed.
-            care: Factor on the relative tolerance, at most one.
+        `mismatch`: difference of the last residual from the one that its face predicted, relative to the
+        residual before; None if the face has changed.
         """
         term = self.largest if mismatch is None else min(self.largest, mismatch)
         wanted = min(self.loosest, care * term * residuals.worst)
@@ -127,11 +125,7 @@ def damp(
     Where the active set alternates between two faces the solution lies between them. The way to the right
     face may lead over a worse one: a full step is taken if it improves on either of the last two points.
 
-    Args:
-        full: The end of the step.
-        at: Returns the point at a fraction of it.
-        measured: Returns the residuals by which points are compared.
-        earlier: Those of the last two points, None without.
+    `earlier`: those of the last two points, None without.
     """
     end = measured(full)
     if any(old is not None and not end.is_worse_than(old) for old in earlier):

@@ -14,8 +14,7 @@ Vector = npt.NDArray[np.float64]
 def global_sum(comm: MPI.Comm, *parts: npt.ArrayLike) -> Vector:
     """Sum arrays over all ranks, joined in one message. Collective on ``comm``.
 
-    Returns:
-        The sums, flattened and concatenated in the order given, the same on every rank.
+    Returns the sums, flattened and concatenated in the order given, the same on every rank.
     """
     local = np.concatenate([np.ravel(np.asarray(part, dtype=np.float64)) for part in parts])
     if comm.size == 1:

@@ -167,8 +167,7 @@ def largest_eigenvalue(
     above the eigenvalue it belongs to. Iterated until the two agree to ``accuracy``; the upper one is
     returned, because a fixed step length 1.9/‖A‖ must not be too long.
 
-    Returns:
-        The estimate, the same on every rank; 0 for an operator that maps the start to zero.
+    Returns the estimate, the same on every rank; 0 for an operator that maps the start to zero.
     """
     start = np.random.default_rng(comm.rank).standard_normal(size)
     basis: list[Vector] = [np.asarray(start / (_norm(comm, start) or 1.0), dtype=np.float64)]

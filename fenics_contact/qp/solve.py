@@ -54,11 +54,6 @@ def find_equilibrium(
     Minimises ½‖Q z − λ₀‖² over the admissible set by accelerated projected gradients, Q = I − P. At
     distance g = Q z − λ₀ with optimality error s = z − P_Λ(z − g), any equilibrium y satisfies ‖g‖² ≤ ‖s‖(‖y
     − z‖ + ‖g‖). Once that would need a force 10⁷ times the load's, none exists.
-
-    Args:
-        problem: Coarse space, layout and law are used: Tresca's bounds or Coulomb's cones.
-        tolerance: Relative error of equilibrium at which a multiplier is accepted.
-        max_iterations: Number of cheap iterations after which to stop undecided.
     """
     coarse, law = problem.coarse, problem.law
     target = coarse.particular()
@@ -84,11 +79,7 @@ def find_equilibrium(
 
 
 def require_equilibrium(problem: DualProblem) -> Equilibrium:
-    """Return an admissible multiplier near equilibrium, or reject the problem. Collective.
-
-    Raises:
-        InfeasibleError: It is proven that none exists.
-    """
+    """Return an admissible multiplier near equilibrium, or reject the problem. Collective."""
     equilibrium = find_equilibrium(problem)
     if equilibrium.motion is not None:
         size = np.abs(equilibrium.motion)
@@ -108,9 +99,7 @@ def may_grip(problem: DualProblem, multiplier: Vector) -> bool:
     remain, as in a wedge or a taper, unless it is proven that no admissible ones balance each other, those of
     a block on its floor for one.
 
-    Args:
-        problem: Coarse space, layout and law are used; its load e is taken to be zero.
-        multiplier: Forces of the last load, owned; only the sum of the normal ones counts.
+    `multiplier`: forces of the last load, owned; only the sum of the normal ones counts.
     """
     coarse, layout, comm = problem.coarse, problem.layout, problem.comm
     if global_max(comm, float(problem.law.growth.max(initial=0.0))) == 0.0:
