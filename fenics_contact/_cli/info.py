@@ -12,7 +12,7 @@ import typer
 from fenics_contact._base import requirements as _requirements
 from fenics_contact._base.display import counted
 from fenics_contact._base.libraries import MPI
-from fenics_contact._cli.console import Console, console_of, facts
+from fenics_contact._cli.console import console_of, facts
 from fenics_contact.errors import MissingRequirementError
 from fenics_contact.output.files import json_text
 from fenics_contact.output.result import versions
@@ -105,6 +105,3 @@ def _advice(comm: MPI.Comm, libraries: list[str]) -> Iterator[str]:
         yield (
             "several ranks, and BLAS may use threads on top: set OPENBLAS_NUM_THREADS=1 and OMP_NUM_THREADS=1"
         )
-
-
-__all__ = ["Console", "add_to", "gathered", "loaded_blas"]

@@ -8,7 +8,13 @@ of VTK. Triangles and quadrilaterals lie in the plane: their points have two coo
 components.
 """
 
-from fenics_contact._dolfinx.assembly import assemble_csr, assemble_matrix, assemble_scalar, assemble_vector
+from fenics_contact._dolfinx.assembly import (
+    assemble_csr,
+    assemble_matrix,
+    assemble_scalar,
+    assemble_vector,
+    write_xdmf,
+)
 from fenics_contact._dolfinx.cells import CELL_TYPES, degree, dimension, facet_vertices, shape
 from fenics_contact._dolfinx.forms import CompiledForm
 from fenics_contact._dolfinx.loading import fem, mesh, release, version
@@ -30,7 +36,6 @@ from fenics_contact._dolfinx.numbering import (
     update_coordinates,
     vtk_cell_dofs,
 )
-from fenics_contact._dolfinx.output import write_xdmf
 from fenics_contact._dolfinx.reading import (
     MeshArrays,
     TagArrays,

@@ -1,6 +1,9 @@
-"""Assembly of bound forms."""
+"""Assembly of bound forms, and files of fields."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -34,3 +37,11 @@ def assemble_vector(form: dolfinx.fem.Form) -> np.ndarray:
 def assemble_scalar(form: dolfinx.fem.Form) -> float:
     """Assemble a functional on this rank's cells (no communication)."""
     return float(dolfinx.fem.assemble_scalar(form))
+
+
+def write_xdmf(path: Path, mesh: dolfinx.mesh.Mesh, functions: Sequence[dolfinx.fem.Function]) -> None:
+    """Write fields on one mesh to an XDMF file (with its HDF5 file). Collective on the mesh."""
+    with dolfinx.io.XDMFFile(mesh.comm, str(path), "w") as file:
+        file.write_mesh(mesh)
+        for function in functions:
+            file.write_function(function)

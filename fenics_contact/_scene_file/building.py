@@ -121,7 +121,8 @@ class Builder:
             for number, part in enumerate(getattr(document, key)):
                 with self._at(key, number):
                     one = self._made(part, dim)
-                    replace(empty, **{key: (one,)})  # rejects what does not suit the bodies
+                    alone: dict[str, Any] = {key: (one,)}
+                    replace(empty, **alone)  # rejects what does not suit the bodies
                     built[key].append(one)
                     with self._at(key, number, *_FORMULAS.get(key, ())):
                         check_formulas(one, bodies)
@@ -269,12 +270,7 @@ def shape_task(
     alone = ShapeProblem(contact, moving, objective, tolerance=adaptive)
     problem = _over_steps(alone, design, steps)
     lower, upper = (
-        np.concatenate(
-            [
-                np.full(move.size, getattr(part, side))
-                for move, part in zip(moving, design.surfaces, strict=True)
-            ]
-        )
+        np.repeat([getattr(part, side) for part in design.surfaces], [move.size for move in moving])
         for side in ("lower", "upper")
     )
     start = np.zeros(problem.size) if design.start is None else _fitting("start", design.start, problem.size)
