@@ -27,7 +27,6 @@ class GramInverse:
     complement. For any generalised inverse G^T S^- G is the same projector.
 
     Attributes:
-        rank: Number of independent rows.
         null_space: Columns z with S z = 0, shape (m, m - rank): motions that no multiplier resists.
     """
 
@@ -79,7 +78,6 @@ class SparseGramInverse:
     that is singular to rounding.
 
     Attributes:
-        rank: Number of independent rows.
         null_space: Columns z with S z = 0, shape (m, m - rank): motions that no multiplier resists.
     """
 

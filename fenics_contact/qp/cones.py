@@ -158,7 +158,6 @@ class TrescaLaw:
     """Slip bounds that do not depend on the multiplier.
 
     Attributes:
-        layout: Positions of the multipliers.
         slip_bound: Ψ, shape (n_friction,), owned.
     """
 
@@ -194,12 +193,8 @@ class CoulombLaw:
     With both parts it is the Mohr-Coulomb law, or Tresca's on some discs and Coulomb's on others.
 
     Attributes:
-        layout: Positions of the multipliers.
         friction_coefficient: μ per friction disc, shape (n_friction,), owned.
         given: Ψ₀ per friction disc, shape (n_friction,), owned, or one number for all, [force].
-
-    Raises:
-        InvalidInputError: A coefficient or given bound is negative or not finite, or their number is wrong.
     """
 
     layout: ContactLayout

@@ -82,12 +82,7 @@ class SlidingError(InfeasibleError):
 
 @dataclass(frozen=True, eq=False)
 class FrictionAlone:
-    """Test whether friction can hold what nothing else holds; used where a solver makes no progress.
-
-    Attributes:
-        problem: The unsolved problem.
-        solve: Solves it without friction.
-    """
+    """Test whether friction can hold what nothing else holds; used where a solver makes no progress."""
 
     problem: DualProblem
     solve: Callable[[DualProblem, Start], DualSolution]

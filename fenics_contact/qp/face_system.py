@@ -21,9 +21,7 @@ class FaceSystem:
 
     Attributes:
         comm: Communicator of the ranks.
-        face: Which multipliers are free.
         operator: F, owned to owned, collective.
-        coarse: G Z and its right side.
         preconditioner: Approximation of F⁻¹, owned to owned, or None.
         patience: Iterations without progress after which an inner solver gives up.
     """
@@ -109,7 +107,6 @@ class ObliqueProjector:
     Attributes:
         tested: G_s, this rank's columns on the test basis, shape (m, n_face).
         moving: Coarse space of G_u on the moving basis.
-        inverse: (G_u G_sᵀ)⁻¹.
     """
 
     tested: sp.csr_matrix
@@ -152,7 +149,6 @@ class DampedEquilibrium:
 
     Attributes:
         damping: D, that of the face down to `LEAST_DAMPING`, shape (n_face,), owned.
-        coarse: G Z D.
     """
 
     damping: Vector
@@ -251,7 +247,6 @@ class CoupledFace:
     """A Newton step with growing friction: λ = fixed + Z_u y.
 
     Attributes:
-        coupled: Its linear system.
         coarse: Equilibrium of all multipliers, G λ = e.
         fixed: The part of the multiplier that does not grow, owned.
     """

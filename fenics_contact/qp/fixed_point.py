@@ -46,12 +46,7 @@ class Damping:
 
 
 class SlipBoundSequence:
-    """Chooses slip bounds from the record of earlier ones.
-
-    Attributes:
-        fraction: θ of the next step.
-        exhausted: Whether the smallest θ failed too.
-    """
+    """Chooses slip bounds from the record of earlier ones."""
 
     def __init__(self, comm: MPI.Comm, damping: Damping) -> None:
         """Begin with the first θ and an empty record."""

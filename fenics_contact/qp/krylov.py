@@ -36,9 +36,7 @@ class FaceStep:
         step: δ on the face with G Z δ = 0, shape (n_face,), owned.
         product: F Z δ, owned, updated by recursion.
         residual: P_F (g + (Zᵀ F Z + κ) δ), shape (n_face,), owned, updated by recursion.
-        iterations: Number of operator applications.
         measure: Weighted norm of `residual`, the quantity compared with the tolerance.
-        stop: Why the iteration ended.
     """
 
     step: Vector
@@ -201,14 +199,7 @@ Kept: TypeAlias = tuple[Vector, ...]
 
 @dataclass(frozen=True, eq=False)
 class Krylov:
-    """The outcome of GMRES: factors of the directions, and what was kept of each.
-
-    Attributes:
-        factors: One for each direction, replicated.
-        kept: The vectors of every direction.
-        residual: Norm of the residual, by recursion.
-        stop: Why the iteration ended.
-    """
+    """The outcome of GMRES: factors of the directions, and what was kept of each."""
 
     factors: Vector
     kept: tuple[Kept, ...]

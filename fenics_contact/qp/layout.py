@@ -25,9 +25,6 @@ class ContactLayout:
             three dimensions and 1 in two.
         friction_of: For each friction disc the index into `normal` of its contact, shape (n_friction,).
 
-    Raises:
-        InvalidInputError: A position is out of range or used twice, or the shapes disagree.
-
     Example:
         >>> layout = ContactLayout.build(5, normal=[2], tangential=[[3, 4]])
         >>> layout.equality

@@ -256,9 +256,7 @@ class FaceState:
     """The data passed from one Newton step to the next.
 
     Attributes:
-        iterate: Start of the next step.
         step: ρ of the natural map, 0 on equality rows, owned.
-        faces: The last faces, latest first.
         mismatch: Difference of the last residual from the one that its face predicted, relative to the
             residual before it.
         before: Residuals before the last step, None before the first.

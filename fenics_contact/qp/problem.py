@@ -263,11 +263,7 @@ class _ScaledRows:
 
 
 class CountedOperator:
-    """The dual operator together with the number of times it was applied.
-
-    Attributes:
-        products: Applications of F so far.
-    """
+    """The dual operator together with the number of times it was applied."""
 
     def __init__(self, operator: Operator, report: Report | None = None) -> None:
         """Wrap ``operator``."""

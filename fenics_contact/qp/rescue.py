@@ -57,10 +57,8 @@ class ProximalPoint:
     centre λ̄ then moves to the spring forces.
 
     Attributes:
-        original: The problem without springs.
         problem: The problem with springs: F + D, d + D λ̄, D instead of the diagonal of F, and Tresca's law
             with the slip bound of the centre.
-        operator: F + D, counted.
         stiffness: 1/D in units of 1/diag F: the larger, the nearer to the problem without springs.
         shift: D, 0 on equality rows, owned.
 
@@ -166,8 +164,6 @@ class Rescued:
     Attributes:
         iterate: The improved iterate, with its residuals under the law of the problem.
         line: Its line of history, without number and reason.
-        memory: Estimates from SMALSE.
-        reached: Whether the residual met its target.
     """
 
     iterate: Iterate

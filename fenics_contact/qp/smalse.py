@@ -48,8 +48,6 @@ class BoundedQuadratic:
         comm: Communicator of the ranks.
         operator: A, symmetric positive semidefinite, owned to owned, collective.
         rhs: b, owned.
-        feasible: Half lines and discs.
-        norm: Upper estimate of ‖A‖.
     """
 
     comm: MPI.Comm
@@ -74,8 +72,6 @@ class BoundedMinimum:
     Attributes:
         x: The iterate, in the set, owned.
         gradient: A x − b there, owned, updated by recursion within a sequence of CG steps.
-        projected: Norm of the projected gradient.
-        iterations: Steps of all kinds.
         reached: Whether the projected gradient met the target.
     """
 
@@ -199,9 +195,6 @@ class AugmentedLagrangian:
 
     λ₀ = Gᵀ(G Gᵀ)⁻¹e, Q = I − P, and v in range(Gᵀ) is the multiplier of Q λ = λ₀, which is equivalent to G λ
     = e. Where that holds, L and ½ λᵀF λ − dᵀλ differ by a factor and a constant.
-
-    Attributes:
-        norm: Upper estimate of ‖PFP‖.
     """
 
     def __init__(self, problem: DualProblem, start: Start) -> None:
@@ -339,9 +332,6 @@ class SmalseState:
         multiplier: λ in Λ(Ψ), in equilibrium up to the penalty, owned.
         residual: ‖PFP‖ times the gradient of the Lagrangian: F λ − d − Gᵀα up to F times the equilibrium
             error, owned.
-        residuals: Measured with `residual`.
-        memory: Norm estimate and current M.
-        iterations: MPGP steps of this outer iteration.
     """
 
     multiplier: Vector
