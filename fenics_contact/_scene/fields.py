@@ -307,7 +307,7 @@ def _table(path: Path) -> dict[str, np.ndarray]:
         lines = [line for line in path.read_text(encoding="utf-8-sig").splitlines() if line.strip()]
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidInputError(f"the field '{path}' must be readable text: {error}") from error
-    while len(lines) > 1 and lines[0].startswith("#") and not _is_number(lines[1]):
+    while len(lines) > 1 and lines[0].startswith("#") and lines[1].lstrip()[0] not in "+-.0123456789":
         del lines[0]  # a remark before the line of names
     mark = next((mark for mark in ",;\t" if lines and mark in lines[0]), None)
     rows = [line.split() for line in lines] if mark is None else list(csv.reader(lines, delimiter=mark))
@@ -319,10 +319,6 @@ def _table(path: Path) -> dict[str, np.ndarray]:
             f"{', '.join(names) or 'nothing'}: write a line such as x, y, z, pressure"
         )
     return dict(zip(named, _numbers(path, rows[1:], len(named)).T, strict=True))
-
-
-def _is_number(line: str) -> bool:
-    return line.lstrip()[0] in "+-.0123456789"
 
 
 def _numbers(path: Path, rows: Sequence[Sequence[str]], count: int) -> np.ndarray:
