@@ -70,13 +70,7 @@ class DeformedEquilibria:
         *,
         overlap: bool = False,
     ) -> DeformedState:
-        """Compute the equilibrium of a scene. Collective.
-
-        Raises:
-            InvalidInputError: If the tolerance is no number, or time runs backwards and materials remember.
-            InfeasibleError: If nothing holds some body.
-            LoadStepError: If the load cannot be followed; has the last equilibrium.
-        """
+        """Compute the equilibrium of a scene. Collective."""
         steps = self._steps
         if tolerance is not None:
             if not isinstance(tolerance, float):

@@ -370,11 +370,7 @@ class MeshFile(Placed):
     )
 
     def shapes(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
-        """Read the file on rank 0. Collective.
-
-        Raises:
-            InvalidInputError: If it is missing, of unknown format, or lacks the requested groups.
-        """
+        """Read the file on rank 0. Collective."""
         return {name: Shaped(mesh) for name, mesh in self._read(folder / self.file, comm).items()}
 
     def _read(self, path: Path, comm: MPI.Comm) -> Mapping[str, BodyMesh]:

@@ -84,9 +84,6 @@ class Expression:
         text: The formula, for instance ``"0.1 * (1 - x**2)"``; where(condition, a, b) chooses.
         time: Value of t in it, None without one.
 
-    Raises:
-        InvalidInputError: If the text contains anything but arithmetic.
-
     Example:
         >>> Expression("2 * x + y")(np.array([[1.0, 0.5]]))
         array([2.5])

@@ -64,11 +64,7 @@ class DirectSystem:
             self._factor = Factor(free) if len(self._free) else None
 
     def solve(self) -> DirectSolution:
-        """Return the displacement under the present load, refined once.
-
-        Raises:
-            ConvergenceError: The residual indicates that more than `WRONG` of the displacement is rounding.
-        """
+        """Return the displacement under the present load, refined once."""
         (body,) = self.torn.subdomains
         stiffness, load, free = body.stiffness, self.torn.load, self._free
         displacement = np.zeros(body.mesh.size)
