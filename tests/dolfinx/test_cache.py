@@ -71,6 +71,15 @@ def test_what_a_killed_compiler_left_is_compiled_again(
     assert not caplog.text
 
 
+def test_a_form_that_was_loaded_is_not_looked_up_again(cache: Path) -> None:
+    compile_volume()
+    compile_volume()
+    for file in cache.iterdir():
+        file.unlink()
+    compile_volume()
+    assert not list(cache.iterdir())
+
+
 def test_a_compilation_that_is_stopped_leaves_nothing(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def stopped(*arguments: object, **options: object) -> None:
         raise KeyboardInterrupt
