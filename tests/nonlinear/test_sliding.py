@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 import pytest
@@ -33,8 +34,10 @@ from tests.nonlinear.ironing import WAY, ironing
 from tests.nonlinear.scenes import RUBBER, pressed, rounded
 
 
-def ironed(friction: float, pieces: int, quarter: bool = False) -> Sequence[DeformedState]:
-    scenes = [ironing(friction, way, quarter) for way in WAY]
+@cache
+def ironed(pieces: int, quarter: bool = False) -> Sequence[DeformedState]:
+    """States with friction, until the die slides."""
+    scenes = [ironing(0.3, way, quarter) for way in WAY[:3]]
     parts = {
         "block": box_partition(ironing(0.0, WAY[0]).bodies["block"].mesh, (2 * pieces, pieces)),
         "die": box_partition(ironing(0.0, WAY[0]).bodies["die"].mesh, (pieces, pieces)),
@@ -51,7 +54,7 @@ def force(state: DeformedState) -> np.ndarray:
 
 
 def test_ironing_is_the_same_however_bodies_are_cut() -> None:
-    torn, whole = ironed(0.3, 2), ironed(0.3, 1)
+    torn, whole = ironed(2), ironed(1)
     for one, other in zip(torn, whole, strict=True):
         assert np.abs(force(one) - force(other)).max() < 1e-7 * np.abs(force(other)).max()
         moved = other.gather_displacement("block")
@@ -65,7 +68,7 @@ def test_ironing_is_the_same_however_bodies_are_cut() -> None:
 
 
 def test_ironing_turned_in_the_plane_gives_the_turned_answer() -> None:
-    upright, turn = ironed(0.3, 1)[-1], ironed(0.3, 1, quarter=True)[-1]
+    upright, turn = ironed(1)[-1], ironed(1, quarter=True)[-1]
     x, y = force(upright)
     assert np.abs(force(turn) - [-y, x]).max() < 1e-8 * np.abs(y)
     normal = upright.contact.normal_force

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -77,15 +76,27 @@ def pressed(pressure: float) -> LoadStep:
     return LoadStep(f"{pressure}", [Pressure("arch", "y1", pressure, dead=True)])
 
 
-def followed(steps: AutomaticSteps, pressures: Sequence[float]) -> Sequence[State]:
+def followed(
+    steps: AutomaticSteps, pressures: Sequence[float], checkpoint: Checkpoint | None = None
+) -> Sequence[State]:
     scene, parts = Scene({"arch": arch()}, crown(None)), {"arch": box_partition(arch().mesh, (2, 1))}
     problem = ContactProblem(scene, MPI.COMM_SELF, partitions=parts, steps=steps)
-    return solve_steps(problem, [pressed(p) for p in pressures])
+    return solve_steps(problem, [pressed(p) for p in pressures], checkpoint=checkpoint)
 
 
-def test_an_arch_that_snaps_rests_where_a_finger_pushes_it() -> None:
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Checkpoint:
+    return Checkpoint(tmp_path_factory.mktemp("arch") / "arch.npz")
+
+
+@pytest.fixture(scope="module")
+def at_rest(file: Checkpoint) -> Sequence[State]:
+    return followed(SNAPPING, (LARGEST, BEYOND), file)
+
+
+def test_an_arch_that_snaps_rests_where_a_finger_pushes_it(at_rest: Sequence[State]) -> None:
     """Held by a finger there is no snap: it is pushed through, loaded, and released."""
-    before, after = followed(SNAPPING, (LARGEST, BEYOND))
+    before, after = at_rest
     assert isinstance(before, DeformedState)
     assert isinstance(after, DeformedState)
     (snap,) = after.snaps
@@ -114,7 +125,7 @@ def test_an_arch_that_snaps_rests_where_a_finger_pushes_it() -> None:
 
 def test_without_leave_to_snap_the_path_ends() -> None:
     with pytest.raises(LoadStepError, match=r"^load step '.+': the load can .* let bodies snap") as caught:
-        followed(replace(SNAPPING, snaps=False), (LARGEST, BEYOND))
+        followed(replace(SNAPPING, snaps=False, smallest=1.0 / 8), (LARGEST, BEYOND))
     assert caught.value.history
 
 
@@ -129,11 +140,9 @@ def test_bodies_that_find_no_rest_end_the_path(monkeypatch: pytest.MonkeyPatch) 
     assert len(caught.value.history) > 10
 
 
-def test_a_checkpoint_keeps_where_bodies_snapped(tmp_path: Path) -> None:
-    problem = ContactProblem(Scene({"arch": arch()}, crown(None)), MPI.COMM_SELF, steps=SNAPPING)
-    steps = [pressed(LARGEST), pressed(BEYOND)]
-    first = solve_steps(problem, steps, checkpoint=Checkpoint(tmp_path / "arch.npz"))[-1]
-    read = solve_steps(problem, steps, checkpoint=Checkpoint(tmp_path / "arch.npz"))[-1]
+def test_a_checkpoint_keeps_where_bodies_snapped(at_rest: Sequence[State], file: Checkpoint) -> None:
+    first, read = at_rest[-1], followed(SNAPPING, (LARGEST, BEYOND), file)[-1]
+    assert read.solution.reason == "read from a checkpoint"
     assert isinstance(first, DeformedState)
     assert isinstance(read, DeformedState)
     assert read.snaps == first.snaps

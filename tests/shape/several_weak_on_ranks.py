@@ -1,4 +1,4 @@
-"""A minimisation from a design with several weak points: ``several_weak_on_ranks.py [CHECKPOINT]``."""
+"""Minimisations from a design with several weak points, anew and from each ``CHECKPOINT`` given."""
 
 from __future__ import annotations
 
@@ -11,6 +11,6 @@ from mpi4py import MPI
 from tests.shape.several_weak import collect
 
 if __name__ == "__main__":
-    answer = collect(MPI.COMM_WORLD, Path(sys.argv[1]) if len(sys.argv) > 1 else None)
+    answer = [collect(MPI.COMM_WORLD, path) for path in (None, *map(Path, sys.argv[1:]))]
     if MPI.COMM_WORLD.rank == 0:
         sys.stdout.write(json.dumps(answer))
