@@ -115,8 +115,7 @@ def numbers(state: State) -> dict[str, list[float]]:
 
 
 def main(comm: MPI.Comm) -> None:
-    found = numbers(solved(SCENES[sys.argv[1]](), comm))
-    everywhere = comm.allgather(found)
+    everywhere = {name: comm.allgather(numbers(solved(SCENES[name](), comm))) for name in sys.argv[1:]}
     if comm.rank == 0:
         sys.stdout.write(json.dumps(everywhere))
 

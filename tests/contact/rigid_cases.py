@@ -124,7 +124,7 @@ def shaft(cells: int, *, order: int = 1) -> BodyMesh:
 
 
 def main(comm: MPI.Comm) -> None:
-    everywhere = comm.allgather(numbers(solved(SCENES[sys.argv[1]](), comm)))
+    everywhere = {name: comm.allgather(numbers(solved(SCENES[name](), comm))) for name in sys.argv[1:]}
     if comm.rank == 0:
         sys.stdout.write(json.dumps(everywhere))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -126,19 +127,19 @@ def solved(scene: Scene, comm: MPI.Comm, parts: int = 2) -> State:
     return solve_scene(scene, comm, partitions=cut, tolerance=1e-11)
 
 
-def main(comm: MPI.Comm) -> None:
-    state = solved(SCENES[sys.argv[1]](), comm)
+def figures(case: str, comm: MPI.Comm) -> dict[str, Any]:
+    state = solved(SCENES[case](), comm)
     (name,) = state.scene.bodies
-    found = {
+    return {
         "cells": state.gather_stress(name).ravel().tolist(),
         "nodes": np.nan_to_num(state.gather_nodal_stress(name), nan=-7.0).ravel().tolist(),
         "principal": float(
             comm.allreduce(state.principal_stress[name].x.array.max(initial=-np.inf), MPI.MAX)
         ),
     }
-    if comm.rank == 0:
-        sys.stdout.write(json.dumps(found))
 
 
 if __name__ == "__main__":
-    main(MPI.COMM_WORLD)
+    answer = {case: figures(case, MPI.COMM_WORLD) for case in sys.argv[1:]}
+    if MPI.COMM_WORLD.rank == 0:
+        sys.stdout.write(json.dumps(answer))

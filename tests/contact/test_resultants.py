@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,6 +30,7 @@ from fenics_contact.feti.direct import DirectSystem
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, Material, NeoHooke, PlaneStrain, PlaneStress
 from fenics_contact.mesh import quadratic
+from tests.conftest import run_on_ranks
 from tests.contact.bedded import FORCE, Bedded, pushed
 from tests.contact.resultant_cases import BESIDE, GIVEN, MOMENT, SCENES, numbers, solved
 from tests.hard.invariants import Whole
@@ -136,9 +137,14 @@ def test_friction_across_a_gap_is_told_as_its_moment() -> None:
     )
 
 
+@pytest.fixture(scope="module")
+def on_two_ranks() -> dict[str, Any]:
+    return json.loads(run_on_ranks(SCRIPT, 2, "dragged", "tied", "turned"))
+
+
 @pytest.mark.parametrize("name", ["dragged", "tied", "turned"])
-def test_numbers_are_the_same_on_two_ranks(name: str, mpirun: Callable[..., str]) -> None:
-    alone, ranks = numbers(solved(SCENES[name](), COMM)), json.loads(mpirun(SCRIPT, 2, name))
+def test_numbers_are_the_same_on_two_ranks(name: str, on_two_ranks: dict[str, Any]) -> None:
+    alone, ranks = numbers(solved(SCENES[name](), COMM)), on_two_ranks[name]
     assert len(ranks) == 2
     assert ranks[0] == ranks[1]
     for what, values in alone.items():

@@ -47,14 +47,19 @@ def whole() -> dict[str, Any]:
     }
 
 
-@pytest.fixture
-def interrupted(tmp_path: Path) -> Path:
-    """The checkpoint of a run that ended after some steps."""
-    path = tmp_path / "steps.npz"
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("stored") / "steps.npz"
     history = sequence(Checkpoint(path), MPI.COMM_SELF)
     for step in shears()[:DONE]:
         history.advance(step)
     return path
+
+
+@pytest.fixture
+def interrupted(stored: Path, tmp_path: Path) -> Path:
+    """The checkpoint of a run that ended after some steps."""
+    return Path(shutil.copy(stored, tmp_path))
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

@@ -48,7 +48,7 @@ def test_a_compressed_cube() -> None:
 
 def test_a_pressed_and_dragged_block() -> None:
     mesh = rounded(6)
-    scenes = [pressed(mesh, 0.1), *(pressed(mesh, 0.1, 0.04 * k) for k in range(1, 15))]
+    scenes = [pressed(mesh, 0.1), *(pressed(mesh, 0.1, 0.08 * k) for k in range(1, 8))]
     states, reference = histories(scenes, 2)
     assert error(states[-1], reference) < 1e-8
     last = states[-1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -97,6 +98,7 @@ def quarter(around: int, through: int) -> tuple[BodyMesh, np.ndarray]:
     return replace(mesh, points=moved), np.column_stack([r, angle])
 
 
+@cache
 def inflated(
     around: int,
     through: int,

@@ -14,7 +14,7 @@ from tests.pairing.mortar_on_ranks import collect, message_for_a_folded_facet
 SCRIPT = Path(__file__).with_name("mortar_on_ranks.py")
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("ranks", [3])
 def test_coupling_and_errors_do_not_depend_on_the_number_of_ranks(ranks: int, tmp_path: Path) -> None:
     run_on_ranks(SCRIPT, ranks, tmp_path / "numbers.npz", timeout=60)
     with np.load(tmp_path / "numbers.npz") as stored:
