@@ -58,7 +58,7 @@ test-hard: $(prepare) ## Run the hard cases; writes docs/hard_cases.md
 	$(launch) 1 $(python) -m pytest tests/hard -m hard --hard-table docs/hard_cases.md
 
 test-claims: $(prepare) ## Run what claims rest on: effectivity under contact, certificates, hard cases once, demos, four ranks, the site, mutants
-	$(launch) 1 $(python) -m pytest -n $(JOBS) -m claim
+	$(launch) 1 $(python) -m pytest -n $(JOBS) --dist worksteal -m claim
 
 mutants: $(prepare) ## Make mistakes in a copy of the package, which the quick tests must find
 	$(launch) 1 $(python) -m pytest tests/mutants -m slow

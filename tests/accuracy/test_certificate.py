@@ -41,7 +41,7 @@ def test_the_bound_is_above_the_error_and_near_it(name: str) -> None:
     [
         (name, tolerance)
         for name, case in CASES.items()
-        for tolerance in (1e-1, 3e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+        for tolerance in (1e-1, 1e-3, 1e-5, 1e-8)
         if tolerance >= 1e3 * case.finest
     ],
 )

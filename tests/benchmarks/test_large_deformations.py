@@ -185,7 +185,7 @@ def test_round_dies_have_the_forces_that_getfem_finds_to_one_percent(
         assert apart[1] < 0.5 * apart[0], "the finer, the closer"
 
 
-@pytest.mark.parametrize("die", DIES)
+@pytest.mark.parametrize("die", ["stiff", pytest.param("equal", marks=pytest.mark.claim)])
 def test_round_dies_are_drawn_as_the_record_says(record: dict[str, Any], die: str) -> None:
     stored = round_dies(record, die, ROUNDED[0])
     found = rounded.measured(MPI.COMM_SELF, ROUNDED[0], die, "node")
@@ -219,7 +219,7 @@ def test_a_twisted_half_sphere_has_the_published_moments_to_three_percent(record
 
 @pytest.mark.claim
 def test_a_half_sphere_is_twisted_as_the_record_says(record: dict[str, Any]) -> None:
-    coarse, last = record["twisting"][0], 30
+    coarse, last = record["twisting"][0], 10
     found = twisting.measured(MPI.COMM_SELF, coarse["columns"], last)
     stored = [step for step in coarse["steps"] if step["angle"] <= last]
     for name in ("force", "moment"):

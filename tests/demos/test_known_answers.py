@@ -63,12 +63,19 @@ DEMOS: dict[str, tuple[dict[str, float | list[float]], set[str]]] = {
 
 #: Many states.
 SLOW = {"uncertain_friction"}
+#: One in the plane and one in space run alone, too; `test_reliefs` has two more, the slow tests all.
+ALONE = {"punch_2d", "hertz_sphere"}
+CLAIMS = {*((name, 2) for name in DEMOS if name not in SLOW), *((name, 1) for name in ALONE)}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize(
-    "name", [name if name in SLOW else pytest.param(name, marks=pytest.mark.claim) for name in DEMOS]
+    ("name", "ranks"),
+    [
+        pytest.param(name, ranks, marks=[pytest.mark.claim] if (name, ranks) in CLAIMS else [])
+        for name in DEMOS
+        for ranks in (1, 2)
+    ],
 )
 def test_a_demo_finds_its_number_on_one_rank_and_on_two(
     name: str, ranks: int, demo: Callable[..., Any]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -64,19 +65,20 @@ class Copy:
 
     @property
     def environment(self) -> dict[str, str]:
-        """The environment of a process that shall use the copy; compiled files would outlive a mutation."""
-        return clean_environment() | {"PYTHONPATH": str(self.folder), "PYTHONDONTWRITEBYTECODE": "1"}
+        """The environment of a process that shall use the copy and keep what it compiles."""
+        return clean_environment() | {"PYTHONPATH": str(self.folder), "PYTHONDONTWRITEBYTECODE": ""}
 
     @contextmanager
     def mutated(self, mutation: Mutation) -> Iterator[None]:
-        """Make a mistake for as long as the block runs."""
+        """Make a mistake for as long as the block runs; the time of the file has it compiled anew."""
         path = self.folder / "fenics_contact" / mutation.file
-        right = path.read_text(encoding="utf-8")
+        right, known = path.read_text(encoding="utf-8"), path.stat()
         path.write_text(replaced(mutation, right), encoding="utf-8")
         try:
             yield
         finally:
             path.write_text(right, encoding="utf-8")
+            os.utime(path, ns=(known.st_atime_ns, known.st_mtime_ns))
 
     def run(self, tests: Sequence[str]) -> Run:
         """Run tests until one fails. The exit status tells a failed test from tests that were not found."""
