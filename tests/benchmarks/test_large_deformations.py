@@ -185,7 +185,8 @@ def test_round_dies_have_the_forces_that_getfem_finds_to_one_percent(
         assert apart[1] < 0.5 * apart[0], "the finer, the closer"
 
 
-@pytest.mark.parametrize("die", ["stiff", pytest.param("equal", marks=pytest.mark.claim)])
+@pytest.mark.claim
+@pytest.mark.parametrize("die", DIES)
 def test_round_dies_are_drawn_as_the_record_says(record: dict[str, Any], die: str) -> None:
     stored = round_dies(record, die, ROUNDED[0])
     found = rounded.measured(MPI.COMM_SELF, ROUNDED[0], die, "node")

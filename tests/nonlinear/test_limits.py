@@ -139,8 +139,8 @@ def test_a_body_that_turns_with_its_support_has_no_stress(count: int) -> None:
 
 def two_blocks(rotation: np.ndarray, push: tuple[float, float, float]) -> Scene:
     """A small stiff block with a round underside on a large soft one."""
-    low = block((0, 0, 0), (2, 2, 1), (5, 5, 3))
-    high = block((0.53, 0.57, 1), (1.53, 1.57, 1.6), (4, 4, 3))
+    low = block((0, 0, 0), (2, 2, 1), (4, 4, 2))
+    high = block((0.53, 0.57, 1), (1.53, 1.57, 1.6), (3, 3, 2))
     x, y, z = high.points.T
     bulge = 0.2 * ((x - 1.03) ** 2 + (y - 1.07) ** 2) * (1.6 - z) / 0.6
     high = replace(high, points=np.column_stack([x, y, z + bulge]))
