@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from pydantic import AfterValidator, Discriminator, Field, NonNegativeFloat, PositiveFloat, PositiveInt, Tag
+from pydantic import AfterValidator, Discriminator, Field, NonNegativeFloat, PositiveFloat, Tag
 from scipy.spatial.transform import Rotation
 
-from fenics_contact._base.checks import MOST, STEEPEST
-from fenics_contact._scene_file.part import Part, keys_of
+from fenics_contact._base.checks import STEEPEST
+from fenics_contact._scene_file.part import Part, keys_of, table_of
 from fenics_contact._scene_file.values import (
     MARK,
     Pair,
@@ -45,25 +45,11 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
 
-@keys_of(cad.InBox)
-class InBox(Part):
-    """The faces of a CAD file that lie wholly in a box along the axes."""
-
-    faces: Literal["in_box"]
-
-
-@keys_of(cad.OnPlane)
-class OnPlane(Part):
-    """The plane faces of a CAD file that lie in a plane; of a plane part, the straight edges on a line."""
-
-    faces: Literal["on_plane"]
-
-
-@keys_of(cad.OnCylinder)
-class OnCylinder(Part):
-    """The faces of a CAD file on a cylinder; of a plane part, the arcs of a circle."""
-
-    faces: Literal["on_cylinder"]
+FACE_CHOICES = (
+    table_of(cad.InBox, faces="in_box"),
+    table_of(cad.OnPlane, faces="on_plane"),
+    table_of(cad.OnCylinder, faces="on_cylinder"),
+)
 
 
 def _either(kind: type, this: Any, other: Any) -> Any:
@@ -76,7 +62,7 @@ _LABEL = Annotated[
     str | int,
     with_message("the name or number of a group or face, a list of them, or a table that chooses faces"),
 ]
-_ONE: Any = _either(dict, Annotated[Any, one_of("faces", InBox, OnPlane, OnCylinder)], _LABEL)
+_ONE: Any = _either(dict, Annotated[Any, one_of("faces", *FACE_CHOICES)], _LABEL)
 _SEVERAL = Annotated[list[Annotated[Any, Read(_ONE)]], Field(min_length=1, strict=False)]
 _LIST = Annotated[
     list[str | int],
@@ -124,8 +110,6 @@ class IsotropicMaterial(_Material):
     model: Literal["isotropic", "plane_strain", "plane_stress"] = Field(
         "isotropic", description="isotropic for bodies in space, the others for plane bodies"
     )
-    young_modulus: PositiveFloat
-    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
 
     def build(self, folder: Path) -> Material:
         """Return the material."""
@@ -147,67 +131,22 @@ class OrthotropicMaterial(_Material):
         return self.made(orientation=orthotropic_module.material_axes(self.axis_1, self.axis_2))
 
 
-@keys_of(orthotropic_module.OrthotropicPlaneStress)
-class OrthotropicPlate(_Material):
-    """A thin orthotropic plate without stress normal to it, for plane bodies."""
-
-    model: Literal["orthotropic_plane_stress"]
-    shear_modulus: PositiveFloat
-
-
-class _Isotropic(_Material):
-    young_modulus: PositiveFloat
-    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
-
-
-class _VonMisesMetal(_Isotropic):
-    yield_stress: PositiveFloat
-    saturation_rate: NonNegativeFloat = 0.0
-
-
-@keys_of(plastic_module.J2Plasticity)
-class J2Material(_VonMisesMetal):
-    """Elastic-plastic metals in small strain: von Mises' yield function with hardening."""
-
-    model: Literal["j2_plasticity"]
-    kinematic_hardening: NonNegativeFloat = 0.0
-
-
-@keys_of(plastic_module.FinitePlasticity)
-class FinitePlasticityMaterial(_VonMisesMetal):
-    """Elastic-plastic metals in large deformations: von Mises' yield function with hardening."""
-
-    model: Literal["finite_plasticity"]
-
-
-@keys_of(hyperelastic.NeoHooke)
-class NeoHookeMaterial(_Isotropic):
-    """Neo-Hookean elasticity for large deformations, in the plane in plane strain."""
-
-    model: Literal["neo_hooke"]
-
-
-@keys_of(hyperelastic.StVenantKirchhoff)
-class StVenantKirchhoffMaterial(_Isotropic):
-    """Small strains under large rotations, in the plane in plane strain."""
-
-    model: Literal["st_venant_kirchhoff"]
-
-
-@keys_of(hyperelastic.MooneyRivlin)
-class MooneyRivlinMaterial(_Material):
-    """Rubber under moderate strains, in the plane in plane strain."""
-
-    model: Literal["mooney_rivlin"]
-    bulk_modulus: PositiveFloat
-
-
-@keys_of(hyperelastic.Ogden)
-class OgdenMaterial(_Material):
-    """Rubber under large strains, in the plane in plane strain."""
-
-    model: Literal["ogden"]
-    bulk_modulus: PositiveFloat
+MATERIALS = (
+    IsotropicMaterial,
+    OrthotropicMaterial,
+    table_of(
+        orthotropic_module.OrthotropicPlaneStress,
+        _Material,
+        model="orthotropic_plane_stress",
+        poisson_ratio=float,
+    ),
+    table_of(plastic_module.J2Plasticity, _Material, model="j2_plasticity"),
+    table_of(plastic_module.FinitePlasticity, _Material, model="finite_plasticity"),
+    table_of(hyperelastic.NeoHooke, _Material, model="neo_hooke"),
+    table_of(hyperelastic.StVenantKirchhoff, _Material, model="st_venant_kirchhoff"),
+    table_of(hyperelastic.MooneyRivlin, _Material, model="mooney_rivlin"),
+    table_of(hyperelastic.Ogden, _Material, model="ogden"),
+)
 
 
 def _frozen(value: Any) -> Any:
@@ -242,15 +181,7 @@ AnyMaterial: TypeAlias = Annotated[
     Any,
     one_of(
         "model",
-        IsotropicMaterial,
-        OrthotropicMaterial,
-        OrthotropicPlate,
-        J2Material,
-        FinitePlasticityMaterial,
-        NeoHookeMaterial,
-        StVenantKirchhoffMaterial,
-        MooneyRivlinMaterial,
-        OgdenMaterial,
+        *MATERIALS,
         default="isotropic",
         other=OwnMaterial,
         when=lambda table: is_reference(table.get("model")),
@@ -402,61 +333,8 @@ class MeshFile(Placed):
 
 
 SolidCell: TypeAlias = Literal["hexahedron", "tetrahedron"]
-Grading: TypeAlias = Annotated[float, Field(ge=0, le=STEEPEST)]
-
-
-@keys_of(blocks.block)
-class BlockMesh(Placed):
-    """A box of hexahedra or tetrahedra with surfaces x0, x1, y0, y1, z0, z1."""
-
-    shape: Literal["block"]
-    lower: Triple
-    upper: Triple
-    grading: Triple
-    cell: SolidCell
-
-
-@keys_of(blocks.rectangle)
-class RectangleMesh(Placed):
-    """A rectangle of quadrilaterals or triangles with surfaces x0, x1, y0, y1."""
-
-    shape: Literal["rectangle"]
-    lower: Pair
-    upper: Pair
-    grading: Pair
-    cell: Literal["quadrilateral", "triangle"]
-
-
-class _Hertz(Placed):
-    radius: PositiveFloat
-    n: Annotated[int, Field(ge=2)]
-    grading: Grading
-
-
-@keys_of(hertz.hemisphere)
-class HemisphereMesh(_Hertz):
-    """The lower half of a ball on the plane z = 0; surfaces contact, side, top and the cuts x0, y0."""
-
-    shape: Literal["hemisphere"]
-    symmetry: Literal["xy", "x", ""]
-
-
-@keys_of(hertz.half_cylinder)
-class HalfCylinderMesh(_Hertz):
-    """The lower half of a cylinder along y on the plane z = 0; surfaces contact, side, top, y0, y1, x0."""
-
-    shape: Literal["half_cylinder"]
-    length: PositiveFloat
-    n_length: PositiveInt
-    symmetry: Literal["x", ""]
-
-
-@keys_of(hertz.half_disc)
-class HalfDiscMesh(_Hertz):
-    """The lower half of a disc on the line y = 0, plane; surfaces contact, side, top and the cut x0."""
-
-    shape: Literal["half_disc"]
-    symmetry: Literal["x", ""]
+_Grading: TypeAlias = Annotated[float, Field(ge=0, le=STEEPEST)]
+_FromTwo: TypeAlias = Annotated[int, Field(ge=2)]
 
 
 def _plate(
@@ -468,14 +346,14 @@ def _plate(
     n: int,
     n_radial: int | None = None,
 ) -> BodyMesh:
-    """Mesh a drilled plate with layers of equal height.
+    """Mesh half a drilled strip; surfaces bottom, top, hole, x0, x1, y0, y1.
 
     Args:
         hole: Radius of the hole, [length].
         half_width: The strip reaches from y = 0 to this, [length].
         ends: x of both ends, at or beyond the square around the hole, [length].
         heights: z of bottom and top, [length].
-        n_layers: Cells through the thickness.
+        n_layers: Cells through the thickness, of equal height.
         n: Cells along an eighth of the hole.
         n_radial: Cells from the hole to the square around it; n unless given.
     """
@@ -483,40 +361,9 @@ def _plate(
     return bolted.drilled_plate(hole, half_width, ends, levels, n, n_radial=n_radial)
 
 
-@keys_of(_plate)
-class DrilledPlateMesh(Placed):
-    """Half a strip with a round hole at the z-axis; surfaces bottom, top, hole, x0, x1, y0, y1."""
-
-    shape: Literal["drilled_plate"]
-    hole: PositiveFloat
-    half_width: PositiveFloat
-    n_layers: Annotated[int, Field(ge=1, le=MOST)]
-    n: PositiveInt
-    n_radial: PositiveInt | None
-
-
-@keys_of(bolted.bolt)
-class BoltMesh(Placed):
-    """Half a bolt along the z-axis with head and nut; surfaces head, nut, shank, side, top, bottom, y0."""
-
-    shape: Literal["bolt"]
-    shank: PositiveFloat
-    head: PositiveFloat
-    head_height: PositiveFloat
-    n: PositiveInt
-    n_radial: PositiveInt | None
-
-
 class _Links(Placed):
-    inner_radius: PositiveFloat
-    straight: PositiveFloat
-    thickness: PositiveFloat
-    width: PositiveFloat
-    roundness: Annotated[float, Field(gt=0, le=1)]
-    n_around: Annotated[int, Field(ge=12)]
-    n_a: PositiveInt
-    n_b: Annotated[int, Field(ge=2)]
-    grading: Grading
+    n_b: _FromTwo
+    grading: _Grading
     cell: SolidCell
 
     def shapes(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
@@ -562,13 +409,49 @@ class ChainMesh(_Links):
         return {str(number): link for number, link in enumerate(chain.links, 1)}
 
 
+MESHES = (
+    table_of(blocks.block, Placed, shape="block", lower=Triple, upper=Triple, grading=Triple, cell=SolidCell),
+    table_of(
+        blocks.rectangle,
+        Placed,
+        shape="rectangle",
+        lower=Pair,
+        upper=Pair,
+        grading=Pair,
+        cell=Literal["quadrilateral", "triangle"],
+    ),
+    table_of(
+        hertz.hemisphere,
+        Placed,
+        shape="hemisphere",
+        n=_FromTwo,
+        grading=_Grading,
+        symmetry=Literal["xy", "x", ""],
+    ),
+    table_of(
+        hertz.half_cylinder,
+        Placed,
+        shape="half_cylinder",
+        n=_FromTwo,
+        grading=_Grading,
+        symmetry=Literal["x", ""],
+    ),
+    table_of(
+        hertz.half_disc, Placed, shape="half_disc", n=_FromTwo, grading=_Grading, symmetry=Literal["x", ""]
+    ),
+    table_of(_plate, Placed, shape="drilled_plate"),
+    table_of(bolted.bolt, Placed, shape="bolt"),
+    LinkMesh,
+    TwoLinksMesh,
+    ChainMesh,
+)
+
 Mesh: TypeAlias = Annotated[
     Any,
     one_of(
         "shape",
-        BlockMesh, RectangleMesh, HemisphereMesh, HalfCylinderMesh, HalfDiscMesh, DrilledPlateMesh, BoltMesh,
-        LinkMesh, TwoLinksMesh, ChainMesh,
+        *MESHES,
         other=MeshFile,
         when=lambda table: "file" in table and "shape" not in table,
     ),
-]  # fmt: skip
+]

@@ -24,7 +24,7 @@ from fenics_contact._scene.obstacles import DistanceObstacle
 from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.supports import Support
 from fenics_contact._scene_file.bodies import Shaped
-from fenics_contact._scene_file.part import Part, keys_of
+from fenics_contact._scene_file.part import Part, keys_of, table_of
 from fenics_contact._scene_file.values import (
     MARK,
     Line,
@@ -42,9 +42,6 @@ from fenics_contact.design.objective import Objective
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery.links import DesignSurface
 from fenics_contact.gallery.side import side_of
-
-_Exponent: TypeAlias = Annotated[float, Field(ge=2, le=100)]
-_Pair: TypeAlias = Annotated[int, Field(ge=0)] | None
 
 
 class ObjectivePart(Part):
@@ -65,93 +62,31 @@ class ObjectivePart(Part):
         return kind if self.weight == 1.0 else f"{self.weight:g} {kind}"
 
 
-@keys_of(objectives_module.TotalPotential)
-class TotalPotentialPart(ObjectivePart):
-    """½ uᵀK u − fᵀu."""
-
-    kind: Literal["total_potential"]
-
-
-@keys_of(objectives_module.StrainEnergy)
-class StrainEnergyPart(ObjectivePart):
-    """½ uᵀK u."""
-
-    kind: Literal["strain_energy"]
-
-
-@keys_of(objectives_module.LargestPressure)
-class LargestPressurePart(ObjectivePart):
-    """The largest pressure of a slave node."""
-
-    kind: Literal["largest_pressure"]
-    pair: _Pair
-
-
-@keys_of(objectives_module.PressureNorm)
-class PressureNormPart(ObjectivePart):
-    """A smooth bound of the largest pressure."""
-
-    kind: Literal["pressure_norm"]
-    pair: _Pair
-    p: _Exponent
-
-
-@keys_of(objectives_module.PressureUnevenness)
-class PressureUnevennessPart(ObjectivePart):
-    """The square of the relative standard deviation of the pressure over the slave surface."""
-
-    kind: Literal["pressure_unevenness"]
-    pair: _Pair
-
-
-@keys_of(objectives_module.ContactArea)
-class ContactAreaPart(ObjectivePart):
-    """The area in contact, smooth; a negative weight enlarges it."""
-
-    kind: Literal["contact_area"]
-    pair: _Pair
-
-
-@keys_of(objectives_module.FrictionWork)
-class FrictionWorkPart(ObjectivePart):
-    """The work dissipated by friction."""
-
-    kind: Literal["friction_work"]
-    pair: _Pair
-
-
-@keys_of(objectives_module.LargestStress)
-class LargestStressPart(ObjectivePart):
-    """A smooth bound of the largest von Mises stress of a body."""
-
-    kind: Literal["largest_stress"]
-    p: _Exponent
-
-
-@keys_of(objectives_module.Movement)
-class MovementPart(ObjectivePart):
-    """The mean displacement of a surface along a direction, or that of a node."""
-
-    kind: Literal["movement"]
-    at: Annotated[str | int, with_message("the name of a surface in quotes, or the number of a node")]
-    direction: Vector
-
-
 #: Objectives that need no more than their names.
 _ALONE = (
-    TotalPotentialPart,
-    StrainEnergyPart,
-    LargestPressurePart,
-    PressureNormPart,
-    PressureUnevennessPart,
-    ContactAreaPart,
-    FrictionWorkPart,
+    table_of(objectives_module.TotalPotential, ObjectivePart, kind="total_potential"),
+    table_of(objectives_module.StrainEnergy, ObjectivePart, kind="strain_energy"),
+    table_of(objectives_module.LargestPressure, ObjectivePart, kind="largest_pressure"),
+    table_of(objectives_module.PressureNorm, ObjectivePart, kind="pressure_norm"),
+    table_of(objectives_module.PressureUnevenness, ObjectivePart, kind="pressure_unevenness"),
+    table_of(objectives_module.ContactArea, ObjectivePart, kind="contact_area"),
+    table_of(objectives_module.FrictionWork, ObjectivePart, kind="friction_work"),
+)
+_OTHERS = (
+    table_of(objectives_module.LargestStress, ObjectivePart, kind="largest_stress"),
+    table_of(
+        objectives_module.Movement,
+        ObjectivePart,
+        kind="movement",
+        at=Annotated[str | int, with_message("the name of a surface in quotes, or the number of a node")],
+        direction=Vector,
+    ),
 )
 #: By their names.
 BY_NAME: dict[str, type[ObjectivePart]] = {
     get_args(part.model_fields["kind"].annotation)[0]: part for part in _ALONE
 }
-_TABLE: Any = Annotated[Any, one_of("kind", *_ALONE, LargestStressPart, MovementPart)]
+_TABLE: Any = Annotated[Any, one_of("kind", *_ALONE, *_OTHERS)]
 
 
 class LargestPart(ObjectivePart):
@@ -165,7 +100,7 @@ class LargestPart(ObjectivePart):
         return objective_module.Maximum(tuple(part.objective for part in self.objectives))
 
 
-_ANY: Any = Annotated[Any, one_of("kind", *_ALONE, LargestStressPart, MovementPart, LargestPart)]
+_ANY: Any = Annotated[Any, one_of("kind", *_ALONE, *_OTHERS, LargestPart)]
 
 
 def _form(value: Any) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
-from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
+from pydantic import AfterValidator, Field
 from scipy.spatial.transform import Rotation
 
 from fenics_contact._scene import automatic, loads, pairs
@@ -15,7 +15,7 @@ from fenics_contact._scene.loads import Load
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
 from fenics_contact._scene.supports import RigidSurface, Support
-from fenics_contact._scene_file.part import Part, keys_of
+from fenics_contact._scene_file.part import Part, keys_of, table_of
 from fenics_contact._scene_file.values import (
     FREE,
     Components,
@@ -96,45 +96,29 @@ class SurfaceOfBody(Part):
         return self.name
 
 
-@keys_of(obstacles_module.RigidPlane)
-class Plane(ObstaclePart):
-    """A rigid half space, in the plane a half plane."""
-
-    obstacle: Literal["plane"]
-
-
-@keys_of(obstacles_module.RigidSphere)
-class Sphere(ObstaclePart):
-    """A rigid ball, in the plane a disc."""
-
-    obstacle: Literal["sphere"]
-    radius: PositiveFloat
-
-
-@keys_of(obstacles_module.RigidCylinder)
-class Cylinder(ObstaclePart):
-    """A rigid endless round bar."""
-
-    obstacle: Literal["cylinder"]
-    point: Triple
-    axis: Triple
-    radius: PositiveFloat
-
-
 def _function(value: float | Expression) -> Expression:
     return value if isinstance(value, Expression) else Expression(repr(value))
 
 
-@keys_of(obstacles_module.DistanceObstacle, only=["function"])
-class Distance(ObstaclePart):
-    """A rigid obstacle given by its signed distance."""
-
-    obstacle: Literal["distance"]
-    function: Annotated[Scalar, AfterValidator(_function)] = Field(
-        alias="formula",
-        description="signed distance, negative inside, as a formula in x, y, z whose gradient has length "
-        "one, [length]",
-    )
+OBSTACLES = (
+    table_of(obstacles_module.RigidPlane, ObstaclePart, obstacle="plane"),
+    table_of(obstacles_module.RigidSphere, ObstaclePart, obstacle="sphere"),
+    table_of(obstacles_module.RigidCylinder, ObstaclePart, obstacle="cylinder", point=Triple, axis=Triple),
+    table_of(
+        obstacles_module.DistanceObstacle,
+        ObstaclePart,
+        only=["function"],
+        obstacle="distance",
+        function=(
+            Annotated[Scalar, AfterValidator(_function)],
+            Field(
+                alias="formula",
+                description="signed distance, negative inside, [length], as a formula in x, y, z whose "
+                "gradient has length one",
+            ),
+        ),
+    ),
+)
 
 
 class NoFriction(Part):
@@ -146,32 +130,25 @@ class NoFriction(Part):
         """Return None."""
 
 
-@keys_of(pairs.Coulomb)
-class CoulombFriction(Part):
-    """Coulomb's law: the friction force is at most the coefficient times the normal force."""
-
-    law: Literal["coulomb"]
-    friction_coefficient: NotNegativeField = Field(alias="coefficient")
-
-
-@keys_of(pairs.Tresca)
-class TrescaFriction(Part):
-    """Friction with a bound that does not depend on the pressure."""
-
-    law: Literal["tresca"]
-    traction: NotNegativeField
+FRICTION_LAWS = (
+    NoFriction,
+    table_of(
+        pairs.Coulomb, law="coulomb", friction_coefficient=(NotNegativeField, Field(alias="coefficient"))
+    ),
+    table_of(pairs.Tresca, law="tresca", traction=NotNegativeField),
+)
 
 
 Master: TypeAlias = Annotated[
     Any,
     one_of(
         "obstacle",
-        Plane, Sphere, Cylinder, Distance,
+        *OBSTACLES,
         other=SurfaceOfBody,
         when=lambda table: "obstacle" not in table,
     ),
-]  # fmt: skip
-AnyFriction: TypeAlias = Annotated[Any, one_of("law", NoFriction, CoulombFriction, TrescaFriction)]
+]
+AnyFriction: TypeAlias = Annotated[Any, one_of("law", *FRICTION_LAWS)]
 
 
 @keys_of(ContactPair, without={"reason"})
@@ -189,7 +166,6 @@ class ContactPart(Part):
         description="overlap in place of the measured gap, [length], given like gap; 'measured' takes the "
         "one that the geometry has, which counts as a mistake otherwise"
     )
-    adjust: NonNegativeFloat | None
 
 
 @keys_of(automatic.AutomaticContact)
@@ -197,7 +173,6 @@ class AutomaticPart(Part):
     """Contact wherever boundaries of different bodies face each other, or those of a body that folds."""
 
     friction: AnyFriction | None
-    distance: PositiveFloat | None
 
 
 @keys_of(Tie, without={"reason"})
@@ -229,20 +204,6 @@ class _Load(_Named):
         return self.made(**{self.changed: value})
 
 
-@keys_of(loads.Traction)
-class TractionLoad(_Load):
-    """Force a reference area on a surface."""
-
-    kind: Literal["traction"]
-
-
-@keys_of(loads.TotalForce)
-class TotalForceLoad(_Load):
-    """A resultant, spread over a surface."""
-
-    kind: Literal["total_force"]
-
-
 @keys_of(loads.TotalForce, without=("value", "at"))
 class TotalMomentLoad(_Load):
     """A moment, spread over a surface."""
@@ -259,27 +220,12 @@ class TotalMomentLoad(_Load):
         return self.made(value=(0.0,) * dim, moment=moment)
 
 
-@keys_of(loads.Pressure)
-class PressureLoad(_Load):
-    """Pressure, normal to the surface; positive presses on the body."""
-
-    kind: Literal["pressure"]
-
-
-@keys_of(loads.BodyForce)
-class BodyForceLoad(_Load):
-    """Force a volume."""
-
-    kind: Literal["body_force"]
-
-
 @keys_of(loads.gravity)
 class GravityLoad(_Load):
     """Weight of a body."""
 
     changed: ClassVar[str] = "acceleration"
     kind: Literal["gravity"]
-    density: PositiveFloat
 
 
 @keys_of(loads.ThermalStrain)
@@ -342,16 +288,13 @@ class RigidPart(_Named):
 AnySupportPart: TypeAlias = Annotated[
     Any, one_of("kind", RigidPart, other=SupportPart, when=lambda part: "kind" not in part)
 ]
-AnyLoad: TypeAlias = Annotated[
-    Any,
-    one_of(
-        "kind",
-        TractionLoad,
-        TotalForceLoad,
-        TotalMomentLoad,
-        PressureLoad,
-        BodyForceLoad,
-        GravityLoad,
-        ThermalLoad,
-    ),
-]
+LOADS = (
+    table_of(loads.Traction, _Load, kind="traction"),
+    table_of(loads.TotalForce, _Load, kind="total_force"),
+    TotalMomentLoad,
+    table_of(loads.Pressure, _Load, kind="pressure"),
+    table_of(loads.BodyForce, _Load, kind="body_force"),
+    GravityLoad,
+    ThermalLoad,
+)
+AnyLoad: TypeAlias = Annotated[Any, one_of("kind", *LOADS)]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Collection, Sequence
-from typing import Annotated, Any, ClassVar, TypeVar, get_type_hints
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, create_model, model_validator
 from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
 
-from fenics_contact._base.checks import GivenVector, meaning
+from fenics_contact._base.checks import MOST, GivenVector, meaning
 from fenics_contact._scene.fields import ScalarValue, VectorValue
 from fenics_contact._scene_file.values import (
     CountPair,
@@ -40,6 +40,21 @@ IN_FILES: list[tuple[Any, Any, str]] = [
     (ScalarValue, ScalarField, _FORMULAS),
     (VectorValue, VectorOrFormulas, _FORMULAS),
 ]
+#: Limits of arguments, by their names.
+LIMITS = {
+    **dict.fromkeys(
+        ("young_modulus", "yield_stress", "bulk_modulus", "shear_modulus", "density",
+         "radius", "inner_radius", "length", "straight", "thickness", "width", "hole", "half_width", "shank",
+         "head", "head_height", "distance", "n", "n_length", "n_radial", "n_a"),
+        Field(gt=0),
+    ),
+    **dict.fromkeys(("saturation_rate", "kinematic_hardening", "adjust", "pair"), Field(ge=0)),
+    "poisson_ratio": Field(gt=-1, lt=0.5),
+    "roundness": Field(gt=0, le=1),
+    "n_around": Field(ge=12),
+    "n_layers": Field(ge=1, le=MOST),
+    "p": Field(ge=2, le=100),
+}  # fmt: skip
 Table = TypeVar("Table", bound="type[Part]")
 
 
@@ -100,7 +115,8 @@ def keys_of(
         fields: dict[str, Any] = {}
         for name, argument in inspect.signature(of).parameters.items():
             if name not in without and (not only or name in only):
-                fields[name] = _field(own.get(name), hints[name], argument, meaning(of, name))
+                words = meaning(of, name)
+                fields[name] = _field(own.get(name), hints[name], argument, words, LIMITS.get(name))
         derived: Any = create_model(
             table.__name__, __base__=table, __doc__=table.__doc__, __module__=table.__module__, **fields
         )
@@ -110,14 +126,32 @@ def keys_of(
     return derive
 
 
-def _field(own: FieldInfo | None, hint: Any, argument: inspect.Parameter, words: str) -> tuple[Any, Any]:
+def table_of(of: Any, base: Any = Part, *, only: Collection[str] = (), **own: Any) -> Any:
+    """Return a table with the arguments of a class or function as keys, and its summary; see `keys_of`.
+
+    `own`: other types of keys, alone or with their `Field`. A text is the only value of a key; the first such
+    text names the table.
+    """
+    name = next((value for value in own.values() if isinstance(value, str)), of.__name__)
+    fields: dict[str, Any] = {
+        key: value if isinstance(value, tuple) else (Literal[value] if isinstance(value, str) else value, ...)
+        for key, value in own.items()
+    }
+    words = (of.__doc__ or "").partition("\n")[0]
+    table = create_model(name, __base__=base, __doc__=words, __module__=base.__module__, **fields)
+    return keys_of(of, only=only)(table)
+
+
+def _field(
+    own: FieldInfo | None, hint: Any, argument: inspect.Parameter, words: str, limit: FieldInfo | None
+) -> tuple[Any, Any]:
     """Return type and field data of a key, the table's own if there are any."""
     default = ... if argument.default is argument.empty else argument.default
     matches = ((read, beside) for declared, read, beside in IN_FILES if declared == hint)
     kind, beside = next(matches, (hint, ""))
     words += beside
     if own is None:
-        return kind, Field(default, description=words)
+        return Annotated[kind, limit] if limit else kind, Field(default, description=words)
     kind = Annotated[(own.annotation, *own.metadata)] if own.metadata else own.annotation
     default = default if own.is_required() else own.default
     return kind, Field(default, description=own.description or words, alias=own.alias)

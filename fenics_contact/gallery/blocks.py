@@ -163,7 +163,7 @@ def block(
     *,
     grading: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> BodyMesh:
-    """Mesh the box between two corners.
+    """Mesh the box between two corners, with surfaces x0, x1, y0, y1, z0 and z1.
 
     Args:
         lower: Lower corner, (3,), [length].
@@ -378,7 +378,7 @@ def rectangle(
     *,
     grading: Sequence[float] = (0.0, 0.0),
 ) -> BodyMesh:
-    """Mesh the rectangle between two corners.
+    """Mesh the rectangle between two corners, with surfaces x0, x1, y0 and y1.
 
     Args:
         lower: Lower left corner, (2,), [length].

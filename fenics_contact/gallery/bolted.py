@@ -80,7 +80,7 @@ def bolt(
     n_radial: int | None = None,
     layers: tuple[int, int] = (4, 2),
 ) -> BodyMesh:
-    """Mesh half a bolt along the z-axis with a round head above and a round nut below, in one piece.
+    """Mesh half a bolt along z, in one piece; surfaces head, nut, shank, side, top, bottom, y0.
 
     Args:
         shank: Radius of the shank, [length].

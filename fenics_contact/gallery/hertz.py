@@ -66,7 +66,7 @@ class _Frame:
 
 
 def hemisphere(radius: float, n: int, *, symmetry: str = "xy", grading: float = 3.0) -> BodyMesh:
-    """Mesh the lower half of a ball that rests on the plane z = 0 at the origin.
+    """Mesh the lower half of a ball on the plane z = 0; surfaces contact, side, top and the cuts x0, y0.
 
     Doubling ``n`` halves every cell in the body's own coordinates, so that errors fall at clean rates.
 
@@ -95,7 +95,7 @@ def hemisphere(radius: float, n: int, *, symmetry: str = "xy", grading: float = 
 def half_cylinder(
     radius: float, length: float, n: int, n_length: int = 1, *, symmetry: str = "x", grading: float = 3.0
 ) -> BodyMesh:
-    """Mesh the lower half of a cylinder along y that rests on the plane z = 0 along the y axis.
+    """Mesh the lower half of a cylinder along y on the plane z = 0; surfaces contact, side, top, y0, y1, x0.
 
     Args:
         radius: Radius, [length]; the flat top lies at z = radius.
@@ -174,7 +174,7 @@ def _check(radius: float, n: int, grading: float, symmetry: str, known: tuple[st
 
 
 def half_disc(radius: float, n: int, *, symmetry: str = "x", grading: float = 3.0) -> BodyMesh:
-    """Mesh the lower half of a disc that rests on the line y = 0 at the origin.
+    """Mesh the lower half of a disc on the line y = 0; surfaces contact, side, top and the cut x0.
 
     It is the end of a `half_cylinder`, which has the same cells.
 

@@ -9,10 +9,11 @@ import pytest
 from pydantic import Field, PositiveFloat, ValidationError
 
 from fenics_contact import Coulomb
-from fenics_contact._scene_file.model import CoulombFriction
-from fenics_contact._scene_file.part import Part, keys_of
+from fenics_contact._scene_file.model import FRICTION_LAWS
+from fenics_contact._scene_file.part import Part, keys_of, table_of
 from fenics_contact._scene_file.validation import json_schema
 from fenics_contact.gallery import LinkShape
+from fenics_contact.materials import NeoHooke
 
 
 @dataclass
@@ -67,8 +68,17 @@ def test_an_error_knows_the_keys_and_what_the_wrong_one_means() -> None:
 
 
 def test_a_law_of_friction_is_built_by_its_own_arguments() -> None:
-    part = CoulombFriction.model_validate({"law": "coulomb", "coefficient": 0.25})
+    _, coulomb, _ = FRICTION_LAWS
+    part = coulomb.model_validate({"law": "coulomb", "coefficient": 0.25})
     assert part.made() == Coulomb(0.25)
+
+
+def test_a_table_has_the_summary_of_its_class_and_the_limits_of_its_arguments() -> None:
+    schema = table_of(NeoHooke, model="neo_hooke").model_json_schema()
+    assert schema["description"].startswith("Compressible neo-Hookean elasticity")
+    assert schema["properties"]["model"]["const"] == "neo_hooke"
+    assert schema["properties"]["young_modulus"]["exclusiveMinimum"] == 0
+    assert schema["properties"]["poisson_ratio"]["exclusiveMaximum"] == 0.5
 
 
 def test_every_key_of_a_scene_file_is_described() -> None:
