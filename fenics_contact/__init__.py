@@ -37,6 +37,7 @@ known by formula), `qp` (dual solvers) and `feti` (subdomains).
 
 from __future__ import annotations
 
+import ast
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -110,49 +111,20 @@ requirements.check()  # checks that they exist; nothing is loaded or started bef
 
 __version__ = "0.2.0.dev0"
 
-#: Where the public names are defined.
-_HOMES = {
-    "_base.checkpoint": "Checkpoint Interrupted interruptible",
-    "_base.files": "CheckpointError",
-    "_base.launching": "clean_environment",
-    "_base.progress": "PhaseTimer show_progress",
-    "_equilibrium.problem": "ContactProblem solve_scene",
-    "_equilibrium.steps": "LoadSequence solve_steps",
-    "_fem.model_checks": "check_history_material check_hyperelastic",
-    "_large_deformations.load_steps": "AutomaticSteps",
-    "_large_deformations.newton": "TangentNewton",
-    "_optimize.bundle_trust": "minimize",
-    "_page.page": "result_page",
-    "_scene.automatic": "AutomaticContact",
-    "_scene.body": "Body",
-    "_scene.fields": "SampledField Ufl read_field",
-    "_scene.loads": "BodyForce Pressure ThermalStrain TotalForce Traction gravity",
-    "_scene.obstacles": "DistanceObstacle MovingObstacle RigidCylinder RigidPlane RigidSphere",
-    "_scene.pairs": "ContactPair Coulomb Surface Tie Tresca",
-    "_scene.scene": "LoadStep Scene",
-    "_scene.supports": "RigidSurface Support",
-    "_scene_file.reading": "read_scene_file",
-    "design.design": "SurfaceDesign",
-    "design.problem": "ShapeProblem",
-    "mesh.body_mesh": "BodyMesh",
-    "mesh.partition": "box_partition",
-    "output.paraview": "write_vtu",
-    "output.result": "write_result",
-    "qp.fixed_point": "FixedPoint",
-    "readers.cad": "read_cad",
-    "readers.meshio": "read_mesh",
-    "_responses": "DesignResponse SceneResponse served",
-    "results.area": "contact_area",
-    "results.contact": "Status",
-    "results.deformed_state": "DeformedState NewtonSteps",
-    "results.linear_state": "LinearState",
-    "results.state": "State Tolerance",
-}
 #: Public modules.
 _ROOMS = (
     "design errors feti gallery materials mesh output pictures qp readers results shapes study theory".split()
 )
-_HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
+
+
+def _read_homes() -> dict[str, str]:
+    """Return the module of each name that the imports for type checkers list; so names are listed once."""
+    tree = ast.parse(__spec__.loader.get_source(__name__))  # type: ignore[union-attr]
+    statements = [each for each in ast.walk(tree) if isinstance(each, ast.ImportFrom)]
+    return {name.asname: str(each.module) for each in statements for name in each.names if name.asname}
+
+
+_HOME = _read_homes()
 
 __all__ = [*_HOME, *_ROOMS, "__version__"]
 
@@ -160,7 +132,7 @@ __all__ = [*_HOME, *_ROOMS, "__version__"]
 def __getattr__(name: str) -> Any:
     """Load a public name, or a public module, on first use."""
     if name in _HOME:
-        value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+        value = getattr(import_module(_HOME[name]), name)
     elif name in _ROOMS:
         return import_module(f"{__name__}.{name}")
     else:
