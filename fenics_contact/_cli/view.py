@@ -16,7 +16,6 @@ from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact._scene_file.source import suggestion
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, agree, together
 from fenics_contact.output.reading import FIELD_FILES, fields_of_result, read_result, stored_fields
-from fenics_contact.results.linear_state import as_linear
 from fenics_contact.results.state import State
 
 
@@ -79,9 +78,7 @@ def draw_state(
                 case "decomposition":
                     viz.plot_decomposition(file.scene, file.partitions, path, comm=file.comm)
                 case "error":
-                    errors = as_linear(state, "errors").estimate_errors(geometry=False)
-                    parts = {body: errors.by_cell(body) for body in state.scene.bodies}
-                    viz.plot_error(state, path, parts, **words)
+                    viz.plot_error(state, path, **words)
         except InvalidInputError as error:
             console.say(f"no picture {path.name}: {error}")
             gallery.missing.append(path.name)

@@ -132,24 +132,31 @@ class Response:
         return self.tangent()
 
 
+@dataclass(frozen=True, eq=False)
+class MaterialStep:
+    """What materials remember of a load step's start, and what led to a displacement.
+
+    Attributes:
+        history: Internal variables at the start, for materials that have some, shape (n_cells, n_gauss, k) by
+            the mesh's cells; None for an unloaded body.
+        duration: Time since the start, for materials that creep.
+        origin: Displacement at the start of the Newton step, None where there was none: tangents of mean
+            dilatations have the pressures that this step foresaw.
+    """
+
+    history: np.ndarray | None = None
+    duration: float = np.nan
+    origin: np.ndarray | None = None
+
+
+FROM_REST = MaterialStep()
+
+
 class Mechanics(Protocol):
     """Internal forces and tangent of one mesh with nonlinear materials."""
 
-    def at(
-        self,
-        displacement: np.ndarray,
-        history: np.ndarray | None = None,
-        duration: float = np.nan,
-        origin: np.ndarray | None = None,
-    ) -> Response:
-        """Return the response to a displacement.
-
-        `displacement`: by dof of the mesh's space, block after block, shape (dim n,), [length]; `history`:
-        internal variables at the start of the step, for materials that have some, shape (n_cells, n_gauss, k)
-        by the mesh's cells; None for an unloaded body; `origin`: displacement at the start of the Newton step
-        that led here, None where there was none: tangents of mean dilatations have the pressures that this
-        step foresaw.
-        """
+    def at(self, displacement: np.ndarray, step: MaterialStep = FROM_REST) -> Response:
+        """Return the response to a displacement, by dof block after block, shape (dim n,), [length]."""
 
     def least_jacobian(self, displacement: np.ndarray) -> float:
         """Return the smallest det F at a Gauss point, which takes no assembly."""
@@ -190,15 +197,9 @@ class HistoryMechanics:
         """Shape of a history: cells, Gauss points of a cell, internal variables."""
         return *self._gauss.shape, self._size
 
-    def at(
-        self,
-        displacement: np.ndarray,
-        history: np.ndarray | None = None,
-        duration: float = np.nan,
-        origin: np.ndarray | None = None,
-    ) -> Response:
+    def at(self, displacement: np.ndarray, step: MaterialStep = FROM_REST) -> Response:
         """Evaluate the materials and assemble; see `Mechanics.at`."""
-        before, gradient = self._before(history), self._gauss.gradient(displacement)
+        before, gradient = self._before(step.history), self._gauss.gradient(displacement)
         after, stress = before.copy(), np.full(gradient.shape, np.nan)
         force, entries = np.zeros(displacement.size), np.zeros(self._gauss.entries)
         for material, cells in self._parts:
@@ -210,14 +211,14 @@ class HistoryMechanics:
                 means = self._gauss.mean_strain(cells, material.moduli)
             given = gradient[cells] if means is None else means.averaged(gradient[cells])
             end = material.answer(
-                given.reshape(-1, 3, 3), before[cells, :, :size].reshape(-1, size), duration
+                given.reshape(-1, 3, 3), before[cells, :, :size].reshape(-1, size), step.duration
             )
             after[cells, :, :size] = end.history.reshape(*shape, size)
             nominal = end.stress.reshape(*shape, 3, 3)
             stress[cells] = cauchy(nominal, gradient[cells]) if material.finite else nominal
             force += self._gauss.force(nominal if means is None else means.averaged(nominal), cells)
             entries += self._gauss.stiffness(end.tangent.reshape(*shape, 3, 3, 3, 3), cells, means)
-        rest = None if self._others is None else self._others.at(displacement, origin=origin)
+        rest = None if self._others is None else self._others.at(displacement, step)
         return Response(
             force=force if rest is None else force + rest.force,
             tangent=lambda: self._gauss.assembled(entries, None if rest is None else rest.stiffness),
@@ -278,20 +279,14 @@ class HyperelasticMechanics:
         if have_mean_energy(parts.materials):
             self._mean = MeanDilatation(templates, parts, cell_type, fields, self._dilatation)
 
-    def at(
-        self,
-        displacement: np.ndarray,
-        history: np.ndarray | None = None,
-        duration: float = np.nan,
-        origin: np.ndarray | None = None,
-    ) -> Response:
+    def at(self, displacement: np.ndarray, step: MaterialStep = FROM_REST) -> Response:
         """Assemble; see `Mechanics.at`."""
         _dolfinx.update_coordinates(self._mesh, self._points)
         self._displacement.x.array[:] = displacement
         if self._mean is not None:
             self._mean.follow(displacement)
         force, energy = _dolfinx.assemble_vector(self._force), _dolfinx.assemble_scalar(self._energy)
-        tangent = partial(self._stiffness, displacement.copy(), origin)
+        tangent = partial(self._stiffness, displacement.copy(), step.origin)
         return Response(force, tangent, energy, self.least_jacobian(displacement))
 
     def _stiffness(self, displacement: np.ndarray, origin: np.ndarray | None) -> sp.csr_matrix:
@@ -337,13 +332,7 @@ class LinearMechanics:
         indptr, indices, data = _dolfinx.assemble_csr(stiffness)
         self._stiffness = sp.csr_matrix((data, indices, indptr), shape=(points.size,) * 2)
 
-    def at(
-        self,
-        displacement: np.ndarray,
-        history: np.ndarray | None = None,
-        duration: float = np.nan,
-        origin: np.ndarray | None = None,
-    ) -> Response:
+    def at(self, displacement: np.ndarray, step: MaterialStep = FROM_REST) -> Response:
         """Return K u and K; see `Mechanics.at`."""
         force = self._stiffness @ displacement
         return Response(force, lambda: self._stiffness, float(force @ displacement) / 2, 1.0)

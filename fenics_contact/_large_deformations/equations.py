@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from fenics_contact._base.display import displayed
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._fem.composition import composition
-from fenics_contact._fem.mechanics import Mechanics, Response
+from fenics_contact._fem.mechanics import MaterialStep, Mechanics, Response
 from fenics_contact._large_deformations.loading import Loading, RigidStart
 from fenics_contact._large_deformations.moving_contact import (
     NO_ROWS,
@@ -322,7 +322,8 @@ class Equations:
         sizes = [mesh.size for mesh in self.decomposition.meshes]
         with together(self.decomposition.comm):
             pairs = zip(self._mechanics, sizes, strict=True)
-            at_rest = [m.at(np.zeros(size), duration=1.0).stiffness.diagonal() for m, size in pairs]
+            step = MaterialStep(duration=1.0)
+            at_rest = [m.at(np.zeros(size), step).stiffness.diagonal() for m, size in pairs]
         return np.concatenate([np.zeros(0), *at_rest])
 
     def at_rest(self) -> Configuration:
@@ -359,9 +360,10 @@ class Equations:
         with together(comm):
             each = zip(self._mechanics, self.decomposition.parts, at.history, strict=True)
             duration = load.time - at.time
+            before = (None if origin is None else origin[part] for part in self.decomposition.parts)
             responses = tuple(
-                m.at(at.displacement[part], history, duration, None if origin is None else origin[part])
-                for m, part, history in each
+                m.at(at.displacement[part], MaterialStep(history, duration, start))
+                for (m, part, history), start in zip(each, before, strict=True)
             )
             external, softening = load.at(at.displacement)
         internal = np.concatenate([np.zeros(0), *(response.force for response in responses)])

@@ -131,8 +131,26 @@ class Isotropic(Elasticity):
         return () if self.thermal_expansion is None else (self.thermal_expansion,)
 
 
+class LameModel(Isotropic):
+    """Isotropic models with σ = λ tr(ε) I + 2 G ε − ΔT (3λ + 2G) α I, in space and in the plane."""
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """First Lamé parameter and shear modulus, [force / length²], and α where it was given."""
+        return (*lame(self.young_modulus, self.poisson_ratio), *self.expansion)
+
+    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return σ(u) with ``parameters`` = (λ, G, ...)."""
+        return parameters[0] * ufl.div(u) * ufl.Identity(len(u)) + 2 * parameters[1] * strain(u)
+
+    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return (3λ + 2G) α I."""
+        lame_parameter, shear, expansion = parameters
+        return (3 * lame_parameter + 2 * shear) * expansion * ufl.Identity(self.dims[0])
+
+
 @dataclass(frozen=True)
-class IsotropicElasticity(Isotropic):
+class IsotropicElasticity(LameModel):
     """Small-strain isotropic linear elasticity in space, σ = λ tr(ε) I + 2 G ε − ΔT (3λ + 2G) α I.
 
     Attributes:
@@ -146,23 +164,9 @@ class IsotropicElasticity(Isotropic):
         """Bodies in space; in the plane use `PlaneStrain` or `PlaneStress`."""
         return (3,)
 
-    @property
-    def parameters(self) -> tuple[float, ...]:
-        """First Lamé parameter and shear modulus, [force / length²], and α where it was given."""
-        return (*lame(self.young_modulus, self.poisson_ratio), *self.expansion)
-
-    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
-        """Return σ(u) with ``parameters`` = (λ, G, ...)."""
-        return parameters[0] * ufl.div(u) * ufl.Identity(3) + 2 * parameters[1] * strain(u)
-
-    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
-        """Return (3λ + 2G) α I."""
-        lame_parameter, shear, expansion = parameters
-        return (3 * lame_parameter + 2 * shear) * expansion * ufl.Identity(3)
-
 
 @dataclass(frozen=True)
-class PlaneStrain(Isotropic):
+class PlaneStrain(LameModel):
     """A slice of a long body that cannot strain along its length, σ = λ tr(ε) I + 2 G ε − ΔT (3λ + 2G) α I.
 
     Attributes:
@@ -176,22 +180,9 @@ class PlaneStrain(Isotropic):
         """Plane bodies."""
         return (2,)
 
-    @property
-    def parameters(self) -> tuple[float, ...]:
-        """First Lamé parameter and shear modulus, [force / length²], and α where it was given."""
-        return (*lame(self.young_modulus, self.poisson_ratio), *self.expansion)
-
-    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
-        """Return σ(u) in the plane."""
-        return parameters[0] * ufl.div(u) * ufl.Identity(2) + 2 * parameters[1] * strain(u)
-
     def transverse_stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return λ tr(ε)."""
         return parameters[0] * ufl.div(u)
-
-    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
-        """Return (3λ + 2G) α I."""
-        return self.transverse_thermal_stress(parameters) * ufl.Identity(2)
 
     def transverse_thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return (3λ + 2G) α."""

@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import LogNorm, Normalize
 
-from fenics_contact._accuracy.discretisation import discretisation_error
 from fenics_contact._base.display import counted
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError
@@ -75,6 +74,7 @@ from fenics_contact.pictures.unrolled import (
     pressure_bar,
 )
 from fenics_contact.results.fields import in_space
+from fenics_contact.results.linear_state import as_linear
 from fenics_contact.results.multi_block import body_grid
 from fenics_contact.results.state import State
 
@@ -344,15 +344,15 @@ def plot_error(
     Args:
         state: The state.
         by_cell: Body name -> part of each cell relative to that norm, shape (n_cells,); estimated unless
-            given, see `accuracy.discretisation_error`.
+            given, see `LinearState.estimate_errors`.
         clim: Range of the colours, positive; up to the largest part and down to a ten thousandth of it, or
             the smallest, unless given. Give two pictures the same range to compare them.
         sections: Whether to draw the sections, if a contact carries force.
         reach: How far sections reach up and down from the contact's middle, [length]; chosen unless given.
 
     Raises:
-        InvalidInputError: If the number of parts is not that of the cells, or an option or the name of the
-            file cannot be used.
+        InvalidInputError: If the number of parts is not that of the cells, materials are nonlinear and none
+            are given, or an option or the name of the file cannot be used.
     """
     target = png_path(path)
     checked_reach(reach)
@@ -360,9 +360,8 @@ def plot_error(
     if given is not None and given[0] <= 0:
         raise InvalidInputError(f"clim of a logarithmic scale must be positive, got {clim}: try (1e-5, 1e-2)")
     if by_cell is None:
-        estimate = discretisation_error(state.torn, state.conforming_displacement)
-        size = np.sqrt(2 * state.energies.strain) or np.inf  # a body at rest has no error
-        by_cell = {name: estimate.by_cell(name) / size for name in state.scene.bodies}
+        errors = as_linear(state, "errors").estimate_errors(geometry=False)
+        by_cell = {name: errors.by_cell(name) for name in state.scene.bodies}
     parts = {name: _checked(name, body.mesh.n_cells, by_cell) for name, body in state.scene.bodies.items()}
     every = np.concatenate(list(parts.values()))
     total, top = float(np.linalg.norm(every)), float(every.max()) or 1.0

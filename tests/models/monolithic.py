@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse.linalg as spla
 
-from fenics_contact._fem.mechanics import Response
+from fenics_contact._fem.mechanics import MaterialStep, Response
 from tests.models.deformed import Patch
 
 
@@ -49,7 +49,7 @@ def equilibrium(
         change[dof] = value - u[dof]
     residuals: list[float] = []
     for _ in range(25):
-        found = patch.mechanics.at(u, history)
+        found = patch.mechanics.at(u, MaterialStep(history))
         rest = load - found.force - found.stiffness @ change
         size = max(np.abs(found.force).max(), np.abs(load).max(), np.abs(rest).max())
         residuals.append(float(np.abs(rest[free]).max(initial=0.0) / size))

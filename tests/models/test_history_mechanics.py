@@ -12,7 +12,7 @@ from fenics_contact import Body, Scene
 from fenics_contact._fem.composition import composition
 from fenics_contact._fem.forms import FormLibrary
 from fenics_contact._fem.kinematics import GaussPoints
-from fenics_contact._fem.mechanics import History, Mechanics, Response
+from fenics_contact._fem.mechanics import History, MaterialStep, Mechanics, Response
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.subdomain import SubdomainMesh, cut_out
 from fenics_contact.materials import (
@@ -34,7 +34,7 @@ BY_PROJECTIONS = (*BY_MEANS, "quadrilateral9", "hexahedron27")
 
 
 def answer(patch: Patch, u: np.ndarray, history: np.ndarray | None = None) -> Response:
-    return patch.mechanics.at(np.asarray(u).ravel(), history)
+    return patch.mechanics.at(np.asarray(u).ravel(), MaterialStep(history))
 
 
 @pytest.mark.parametrize(
@@ -177,7 +177,7 @@ def test_the_history_does_not_depend_on_the_subdomains(cell: str) -> None:
             (
                 mesh.body,
                 mesh.cells,
-                mechanics.at(field[mesh.nodes].ravel(), start.on("body", mesh.cells)).history,
+                mechanics.at(field[mesh.nodes].ravel(), MaterialStep(start.on("body", mesh.cells))).history,
             )
             for mesh, mechanics in parts
         ]
@@ -202,7 +202,7 @@ def test_a_history_of_something_else_is_refused() -> None:
         history.require(Scene({"other": body}))
     patch = patch_of(body)
     with pytest.raises(InvalidInputError, match=r"must have shape \(2, 8, 7\).*got \(3, 8, 7\)"):
-        patch.mechanics.at(np.zeros(patch.mesh.size), np.zeros((3, 8, 7)))
+        patch.mechanics.at(np.zeros(patch.mesh.size), MaterialStep(np.zeros((3, 8, 7))))
 
 
 def test_bodies_without_memory_have_no_history() -> None:

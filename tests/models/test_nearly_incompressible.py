@@ -7,6 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import Body, BodyMesh, ContactProblem, Scene, Support, box_partition
+from fenics_contact._fem.mechanics import MaterialStep
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import (
@@ -191,5 +192,5 @@ def test_tangents_of_cells_that_turn_far_in_one_step_are_finite() -> None:
     patch = patch_of(Body(skew_patch("quadrilateral"), NeoHooke(10.0, 0.499, mean_dilatation=True)))
     c, s = np.cos(2 * np.pi / 3), np.sin(2 * np.pi / 3)
     turned = patch.deformed(np.array([[c, -s], [s, c]])).ravel()
-    found = patch.mechanics.at(turned, origin=np.zeros_like(turned)).stiffness
+    found = patch.mechanics.at(turned, MaterialStep(origin=np.zeros_like(turned))).stiffness
     np.testing.assert_allclose(found.toarray(), patch.at(turned).stiffness.toarray(), rtol=1e-12)

@@ -21,7 +21,7 @@ from fenics_contact import (
     TangentNewton,
     solve_scene,
 )
-from fenics_contact._fem.mechanics import HyperelasticMechanics
+from fenics_contact._fem.mechanics import HyperelasticMechanics, MaterialStep
 from fenics_contact._large_deformations import newton
 from fenics_contact._large_deformations.tangent_step import tangent_step
 from fenics_contact.errors import InvalidInputError
@@ -108,8 +108,10 @@ def test_tangents_of_mean_dilatations_have_the_pressures_that_a_step_foresaw() -
     patch = patch_of(Body(block((0, 0, 0), (1, 1, 1), (2, 2, 2)), RUBBER))
     mechanics = patch.mechanics
     step = 0.03 * np.random.default_rng(1).standard_normal(patch.mesh.size)
-    plain, foreseen = (mechanics.at(step, origin=origin).stiffness for origin in (None, 0.0 * step))
-    again = mechanics.at(step, origin=step).stiffness
+    plain, foreseen = (
+        mechanics.at(step, MaterialStep(origin=origin)).stiffness for origin in (None, 0.0 * step)
+    )
+    again = mechanics.at(step, MaterialStep(origin=step)).stiffness
     assert abs(again - plain).max() < 1e-12 * abs(plain).max()
     assert abs(foreseen - plain).max() > 1e-3 * abs(plain).max()
 

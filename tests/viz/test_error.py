@@ -10,6 +10,7 @@ import pytest
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.pictures import plot_error
 from fenics_contact.pictures.canvas import ERROR_MAP
+from tests.viz.moving_states import pressed_by_a_lid
 from tests.viz.plane_states import flat_pad, plane_block
 from tests.viz.states import contains, painted, pixels
 
@@ -64,3 +65,8 @@ def test_what_cannot_be_drawn_is_refused(
     with pytest.raises(InvalidInputError, match=message):
         plot_error(plane_block(), tmp_path / "error.png", by_cell, **options)
     assert not list(tmp_path.iterdir())
+
+
+def test_nonlinear_materials_need_parts_that_are_given(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="errors need small strains and linear materials"):
+        plot_error(pressed_by_a_lid(), tmp_path / "error.png")
