@@ -76,7 +76,7 @@ def draw_state(
                 case "status":
                     viz.plot_contact_status(states, path, **words)
                 case "decomposition":
-                    viz.plot_decomposition(file.scene, file.partitions, path, comm=file.comm)
+                    viz.plot_decomposition(file.scene, file.partitions, path, comm=file.comm, **words)
                 case "error":
                     viz.plot_error(state, path, **words)
         except InvalidInputError as error:

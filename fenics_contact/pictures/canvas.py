@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import matplotlib as mpl
 import numpy as np
 import pyvista as pv
-import scipy.sparse as sp
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -59,45 +58,6 @@ STRESS_MAP = ListedColormap(colormaps["magma_r"](np.linspace(0.04, 0.82, 256)), 
 ERROR_MAP = colormaps["viridis_r"]
 PRESSURE_MAP = colormaps["YlGnBu"]  #: Sizes other than stresses.
 SIGNED_MAP = colormaps["PuOr"]  #: Values of both signs, with zero in its middle.
-
-
-def neighbours(cells: np.ndarray, partition: np.ndarray) -> np.ndarray:
-    """Count the nodes that subdomains share.
-
-    `cells`: node numbers, (n_cells, 8 | 4); `partition`: subdomain of every cell, (n_cells,).
-    """
-    owner = np.repeat(partition, cells.shape[1])
-    touched = sp.csr_matrix((np.ones(owner.size, dtype=np.int64), (owner, cells.ravel())))
-    touched.data[:] = 1
-    shared = (touched @ touched.T).toarray()
-    np.fill_diagonal(shared, 0)
-    return np.asarray(shared)
-
-
-def colour_subdomains(shared: np.ndarray, family: int) -> list[str]:
-    """Choose a colour for each subdomain so that neighbours differ.
-
-    Subdomains with the fewest free colours choose first (Brélaz' rule). A body uses its family of colours as
-    far as possible; if a subdomain has more neighbours than there are colours, it repeats that of the
-    neighbour with which it shares the fewest nodes.
-
-    References:
-        D. Brélaz, New methods to color the vertices of a graph, Comm. ACM 22 (1979).
-    """
-    own, other = FAMILIES[family % 2], FAMILIES[(family + 1) % 2]
-    palette = [*own, SPARE, *other]
-    count = len(shared)
-    chosen = np.full(count, -1)
-    # Nodes shared with neighbours of each colour; where zero, the colour is free.
-    taken = np.zeros((count, len(palette)), dtype=np.int64)
-    degree = np.count_nonzero(shared, axis=1)
-    for _ in range(count):
-        urgency = np.count_nonzero(taken, axis=1) * (count + 1) + degree
-        subdomain = int(np.argmax(np.where(chosen < 0, urgency, -1)))
-        colour = int(np.argmin(taken[subdomain]))
-        chosen[subdomain] = colour
-        taken[:, colour] += shared[:, subdomain]
-    return [palette[colour] for colour in chosen]
 
 
 #: Largest width on the screen, in its own units.

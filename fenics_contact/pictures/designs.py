@@ -282,8 +282,6 @@ def _outlined(title: str, faces: dict[str, pv.DataSet], view: View, frame: Frame
 OPACITY = 0.75
 #: Fraction of the width for each of the two pictures.
 PART = 0.45
-#: Straight pieces of a bar of the net between two control points.
-PIECES = 8
 
 #: Before and after: of nodes in their order, (m_s, m_t, 3) or (m_s, 2), of control points likewise.
 _Pair = tuple[np.ndarray, np.ndarray]
@@ -427,35 +425,10 @@ def _surface_layer(grid: np.ndarray, moved: np.ndarray, clim: tuple[float, float
 def _net_layers(grid: np.ndarray, net: np.ndarray, colour: str, thickness: float) -> list[Layer]:
     look = {"color": colour, "ambient": 0.5, "diffuse": 0.6}
     size = float(np.ptp(grid.reshape(-1, 3), axis=0).max())
-    tubes = [pv.lines_from_points(bar).tube(radius=0.005 * thickness * size) for bar in _bars(grid, net)]
+    bars = [bar for bar in (*net, *np.swapaxes(net, 0, 1)) if len(bar) > 1]
+    tubes = [pv.lines_from_points(bar).tube(radius=0.005 * thickness * size) for bar in bars]
     points = balls(net.reshape(-1, 3), 0.014 * thickness * size)
     return [Layer(mesh, look) for mesh in (*tubes, points)]
-
-
-def _bars(grid: np.ndarray, net: np.ndarray) -> list[np.ndarray]:
-    """Return the bars of a net as polylines that follow the surface instead of cutting through it.
-
-    Control point (i, j) belongs to the surface's parameters (i / (n_s - 1), j / (n_t - 1)). The offset of a
-    bar from the surface is linear along the bar, so that it ends at its control points.
-    """
-    fine = [np.linspace(0, count - 1, PIECES * (count - 1) + 1) for count in net.shape[:2]]
-    stations = zip(fine, net.shape[:2], grid.shape[:2], strict=True)
-    rows, columns = (_hats(_parameters(x, count) * (nodes - 1), nodes) for x, count, nodes in stations)
-    surface = np.einsum("ri,cj,ijd->rcd", rows, columns, grid)
-    rows, columns = (_hats(x, count) for x, count in zip(fine, net.shape[:2], strict=True))
-    points = surface + np.einsum("ri,cj,ijd->rcd", rows, columns, net - surface[::PIECES, ::PIECES])
-    bars = [*points[::PIECES], *np.swapaxes(points, 0, 1)[::PIECES]]
-    return [bar for bar in bars if len(bar) > 1]
-
-
-def _parameters(places: np.ndarray, count: int) -> np.ndarray:
-    """Return the surface's parameters of control points; a single one lies in the middle."""
-    return places / (count - 1) if count > 1 else np.full(len(places), 0.5)
-
-
-def _hats(places: np.ndarray, count: int) -> np.ndarray:
-    """Return the piecewise linear hat functions of 0 .. count - 1 at some points, (n, count)."""
-    return np.maximum(0.0, 1.0 - np.abs(places[:, None] - np.arange(count)))
 
 
 KINDS = ("start", "serious", "null", "rejected", "refined")

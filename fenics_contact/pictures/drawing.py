@@ -261,7 +261,8 @@ def _draw(parts: Sequence[_Part], paper: BinaryIO, field: ColouredField) -> None
         panels = figure.subplot_mosaic(names, width_ratios=wide, height_ratios=high)
         for number, part in enumerate(parts):
             part.draw(panels[str(number)])
-        field.add_bar(figure, panels.values())
+        if field.label:
+            field.add_bar(figure, panels.values())
 
 
 def _in_plane(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 import pyvista as pv
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import LogNorm, Normalize
@@ -15,33 +16,23 @@ from matplotlib.colors import LogNorm, Normalize
 from fenics_contact._base.display import counted
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.pictures.canvas import (
     ERROR_MAP,
     GREY,
-    IN_PLANE,
     INK,
     PALE,
     PRESSURE_MAP,
     SIGNED_MAP,
     STRESS_MAP,
-    Frame,
-    Layer,
     Picture,
     Units,
     checked_range,
     checked_reach,
-    colour_subdomains,
     draw_picture,
-    frame_around,
     headline,
-    neighbours,
     nice_number,
-    oblique_view,
     png_path,
-    render,
     sheet,
-    show_image,
     symbols_of,
     written,
 )
@@ -52,9 +43,7 @@ from fenics_contact.pictures.section import (
     Spot,
     component,
     contact_places,
-    draw_cell_edges,
     draw_field,
-    draw_outline,
     drawn_bodies,
     field_entries,
     lengths,
@@ -88,10 +77,12 @@ def plot_decomposition(
     path: str | Path | None = None,
     *,
     explode: float = 0.0,
+    title: str = "",
+    units: Units | None = None,
     width: int = 1600,
     comm: MPI.Comm | None = None,
 ) -> Picture:
-    """Draw the subdomains of all bodies; neighbours have different colours.
+    """Draw the subdomains of all bodies in twenty colours by turns.
 
     Args:
         scene: The bodies.
@@ -111,71 +102,31 @@ def plot_decomposition(
                 f"partitions[{name!r}] must have shape ({body.mesh.n_cells},), one subdomain per cell, got "
                 f"{shape}: pass the partitions that the scene was cut with"
             )
-    count = sum(np.unique(partitions[name]).size for name in scene.bodies)
-    cells = sum(body.mesh.n_cells for body in scene.bodies.values())
-    bodies = counted(len(scene.bodies), "body", "bodies")
-    title = f"{counted(count, 'subdomain')} of {bodies}, {written(cells)} cells"
-    parts = [_linear(body.mesh, partitions[name]) for name, body in scene.bodies.items()]
-    points = in_space(np.concatenate([mesh.points for mesh, _ in parts]))
-    plane = scene.dim == 2
-    view = IN_PLANE if plane else oblique_view(points)
-    frame = frame_around(view, points, 0.03 if plane else 0.02)
-    height = float(np.clip((0.85 if plane else 1.0) / frame.proportion + 0.08, 0.2, 1.2))
-
-    def draw(paper: BinaryIO) -> None:
-        with sheet(paper, (width, round(height * width)), title) as figure:
-            axes = figure.subplots()
-            if plane:
-                for family, (mesh, partition) in enumerate(parts):
-                    _draw_plane_body(axes, mesh, partition, family, explode, frame)
-                frame.fit(axes)
-                axes.set_axis_off()
-            else:
-                layers = [
-                    layer for family, part in enumerate(parts) for layer in _layers(*part, family, explode)
-                ]
-                show_image(axes, render(layers, view, frame, width), frame)
-
-    return draw_picture(comm, target, draw)
+    bodies: dict[str, pv.UnstructuredGrid] = {}
+    count = 0
+    for name, body in scene.bodies.items():
+        mesh, numbers = body.mesh.linear, np.unique(partitions[name], return_inverse=True)[1]
+        grid = body_grid(mesh, in_space(mesh.points))
+        grid.cell_data["subdomain"] = count + np.repeat(numbers, mesh.n_cells // body.mesh.n_cells)
+        bodies[name] = _shrunk(grid, 1.0 - explode) if explode else grid
+        count += int(numbers.max()) + 1
+    total = written(sum(body.mesh.n_cells for body in scene.bodies.values()))
+    facts = f"{counted(count, 'subdomain')} of {counted(len(bodies), 'body', 'bodies')}, {total} cells"
+    colours = colormaps["tab20"]
+    values = {name: np.asarray(body["subdomain"]) % colours.N for name, body in bodies.items()}
+    norm = Normalize(-0.5, colours.N - 0.5)
+    words, named = headline(title, facts), units or Units()
+    field = ColouredField(values, colours, norm, "", words, 1.0, None, named, width)
+    return draw_field_on_bodies(bodies, field, target, obstacles=[], comm=comm)
 
 
-def _linear(mesh: BodyMesh, partition: np.ndarray) -> tuple[BodyMesh, np.ndarray]:
-    """Return the linear cells to draw and the subdomain of each."""
-    return mesh.linear, np.repeat(np.asarray(partition), mesh.linear.n_cells // mesh.n_cells)
-
-
-def _draw_plane_body(
-    axes: Axes, mesh: BodyMesh, partition: np.ndarray, family: int, explode: float, frame: Frame
-) -> None:
-    colours = colour_subdomains(neighbours(mesh.cells, partition), family)
-    for number in np.unique(partition):
-        cells = mesh.cells[partition == number]
-        centre = mesh.points[np.unique(cells)].mean(axis=0)
-        points = centre + (1.0 - explode) * (mesh.points - centre)
-        # Faces with borders in their own colour: otherwise the white background shows between them.
-        axes.add_collection(PolyCollection(points[cells], color=colours[number], linewidths=0.4))
-        draw_outline(axes, points, cells, width=2.0)
-    if not explode:
-        draw_cell_edges(axes, mesh.points, mesh.cells, frame)
-
-
-def _layers(mesh: BodyMesh, partition: np.ndarray, family: int, explode: float) -> list[Layer]:
-    """Draw the subdomains of a body, neighbours in different colours, and the seams between them."""
-    colours, layers = colour_subdomains(neighbours(mesh.cells, partition), family), []
-    grid = body_grid(mesh, mesh.points)
-    grid.cell_data["subdomain"] = partition
-    skin = grid.extract_surface(algorithm=None)
-    look = {"show_edges": True, "edge_color": INK, "edge_opacity": 0.25, "ambient": 0.5, "diffuse": 0.55}
-    for number in np.unique(partition):
-        piece: pv.PolyData = grid.extract_cells(partition == number).extract_surface(algorithm=None)
-        centre = piece.points.mean(axis=0)
-        piece.points = centre + (1.0 - explode) * (piece.points - centre)
-        layers.append(Layer(piece, {"color": colours[number], "line_width": 1, **look}))
-        seen = skin.extract_cells(skin["subdomain"] == number)
-        if not explode and 0 < seen.n_cells < skin.n_cells:
-            seam = seen.extract_feature_edges(feature_edges=False, manifold_edges=False)
-            layers.append(Layer(seam, {"color": INK, "line_width": 4, "lighting": False}))
-    return layers
+def _shrunk(grid: pv.UnstructuredGrid, factor: float) -> pv.UnstructuredGrid:
+    """Return the subdomains of a body, each scaled about its centre."""
+    parts = list(grid.split_values(scalars="subdomain"))
+    for part in parts:
+        centre = part.points.mean(axis=0)
+        part.points = centre + factor * (part.points - centre)
+    return pv.merge(parts, merge_points=False)
 
 
 #: Apparent size of the largest displacement relative to the bodies.

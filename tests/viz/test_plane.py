@@ -132,13 +132,13 @@ def test_contact_pictures_show_pressure_and_with_friction_its_traction(tmp_path:
     assert not contains(smooth, "#e3e6e8", 0.01)
 
 
-def test_plane_subdomains_have_the_colours_of_their_bodies(tmp_path: Path) -> None:
+def test_plane_subdomains_have_colours_of_their_own(tmp_path: Path) -> None:
     first, second = rectangle((0, 0), (2, 1), (4, 2)), rectangle((2.2, 0), (4, 1), (4, 2))
     material = PlaneStrain(1.0, 0.3)
     scene = Scene({"first": Body(first, material), "second": Body(second, material)})
     halves = {"first": np.repeat([0, 1], 4), "second": np.zeros(8, dtype=int)}
     whole = pixels(plot_decomposition(scene, halves, tmp_path / "parts.png", width=SMALL))
     exploded = pixels(plot_decomposition(scene, halves, tmp_path / "exploded.png", width=SMALL, explode=0.3))
-    for colour in ("#77aadd", "#44bb99", "#ee8866"):
+    for colour in ("#1f77b4", "#aec7e8", "#ff7f0e"):
         assert contains(whole, colour)
     assert painted(exploded) < painted(whole) - 0.05
