@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import os
-import signal
 import subprocess
 import sys
 import textwrap
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 
 import hypothesis
 import pytest
 
+from tests.waiting_ranks import LAUNCH as LAUNCH
+from tests.waiting_ranks import WaitingRanks, kill_session
+
 ROOT = Path(__file__).resolve().parents[1]
-LAUNCH = ROOT / "scripts" / "launch.sh"
 
 
 def read_environment(path: Path) -> dict[str, str]:
@@ -46,6 +47,8 @@ def pytest_collection_finish() -> None:
     """Exempt what the imports left behind from garbage collection, which makes it cheap after each test."""
     gc.collect()
     gc.freeze()
+    for ranks in (1, 2):
+        waiting_ranks(ranks)  # they fit tests that find the environment of now
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -60,15 +63,6 @@ def collected_garbage() -> Iterator[None]:
     """Destroy what a test leaves behind at one moment on all ranks: PETSc's destructors are collective."""
     yield
     gc.collect()
-
-
-def _kill_session(leader: int) -> None:
-    """Kill a process and all its descendants; mpirun gives every rank a process group of its own."""
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            with contextlib.suppress(ProcessLookupError, PermissionError):
-                if os.getsid(int(entry.name)) == leader:
-                    os.kill(int(entry.name), signal.SIGKILL)
 
 
 def launch(ranks: object, *arguments: object, timeout: float = 120.0) -> subprocess.CompletedProcess[str]:
@@ -89,7 +83,7 @@ def launch(ranks: object, *arguments: object, timeout: float = 120.0) -> subproc
     try:
         stdout, stderr = process.communicate(timeout=timeout)
     except subprocess.TimeoutExpired:
-        _kill_session(process.pid)
+        kill_session(process.pid)
         stdout, stderr = process.communicate()
         raise subprocess.TimeoutExpired(command, timeout, stdout, stderr) from None
     return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
@@ -104,7 +98,21 @@ def lost_by_mpirun(end: subprocess.CompletedProcess[str]) -> bool:
     return end.returncode == 1 and not end.stdout and not "".join(words).strip()
 
 
-def run_on_ranks(script: Path, ranks: int, *arguments: object, timeout: float = 120.0) -> str:
+@cache
+def waiting_ranks(ranks: int) -> WaitingRanks:
+    """Return the ranks that run the scripts of this session."""
+    return WaitingRanks(ranks)
+
+
+def pytest_unconfigure() -> None:
+    """End the ranks that wait."""
+    for ranks in (1, 2):
+        waiting_ranks(ranks).end()
+
+
+def run_on_ranks(
+    script: Path, ranks: int, *arguments: object, timeout: float = 120.0, fresh: bool = False
+) -> str:
     """Run a Python script under mpirun and return what it wrote to stdout.
 
     A run that mpirun lost is started once more.
@@ -114,15 +122,22 @@ def run_on_ranks(script: Path, ranks: int, *arguments: object, timeout: float = 
         ranks: Number of MPI ranks; 1 runs it without mpirun.
         *arguments: What the script finds in ``sys.argv[1:]``.
         timeout: Seconds after which all ranks are killed.
+        fresh: Whether it needs new processes; one or two ranks otherwise run several scripts of the session.
 
     Raises:
         pytest.fail.Exception: It ended with an error or not in time; all its output is in the message.
     """
+
+    def start() -> subprocess.CompletedProcess[str]:
+        if fresh or ranks > 2 or not waiting_ranks(ranks).fit():
+            return launch(ranks, script, *arguments, timeout=timeout)
+        return waiting_ranks(ranks)(script, [*map(str, arguments)], timeout)
+
     end: subprocess.CompletedProcess[str] | subprocess.TimeoutExpired
     try:
-        end = launch(ranks, script, *arguments, timeout=timeout)
+        end = start()
         if lost_by_mpirun(end):
-            end = launch(ranks, script, *arguments, timeout=timeout)
+            end = start()
         ending = f"ended with exit status {end.returncode}"
         if end.returncode == 0:
             return end.stdout
@@ -134,17 +149,19 @@ def run_on_ranks(script: Path, ranks: int, *arguments: object, timeout: float = 
 
 @pytest.fixture
 def mpirun(tmp_path: Path) -> Callable[..., str]:
-    """Return ``mpirun(script, ranks, *arguments, timeout=120.0)``, which runs a script on several ranks.
+    """Return ``mpirun(script, ranks, *arguments, timeout=120.0, fresh=False)``, which runs a script on ranks.
 
     ``script`` is a path (also as text that ends in ".py") or Python code (indented as the test is); the
     answer is its stdout. See `run_on_ranks`.
     """
 
-    def run(script: Path | str, ranks: int, *arguments: object, timeout: float = 120.0) -> str:
+    def run(
+        script: Path | str, ranks: int, *arguments: object, timeout: float = 120.0, fresh: bool = False
+    ) -> str:
         path = Path(script)
         if isinstance(script, str) and not script.endswith(".py"):
             path = tmp_path / "script.py"
             path.write_text(textwrap.dedent(script))
-        return run_on_ranks(path, ranks, *arguments, timeout=timeout)
+        return run_on_ranks(path, ranks, *arguments, timeout=timeout, fresh=fresh)
 
     return run

@@ -41,7 +41,7 @@ def assert_goes_on(kind: str, path: Path, ranks: int = 1) -> None:
     if ranks == 1:
         found = RUNS[kind][1](Checkpoint(path, resume=True))
     else:
-        found = json.loads(run_on_ranks(SCRIPT, ranks, kind, path, "none"))
+        found = json.loads(run_on_ranks(SCRIPT, ranks, kind, path, "none", fresh=True))
     exact = np.array(whole["answer"])
     assert np.abs(exact).max() > 0.0
     assert np.array(found["answer"]) == pytest.approx(exact, rel=1e-7, abs=1e-9 * np.abs(exact).max())

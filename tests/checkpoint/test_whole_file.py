@@ -25,7 +25,7 @@ def stored(path: Path, **arrays: object) -> Checkpoint:
 
 
 def test_a_writer_killed_at_any_moment_leaves_a_whole_file(tmp_path: Path) -> None:
-    found = json.loads(run_on_ranks(HERE / "killed_writer.py", 1, tmp_path, 60, 1))
+    found = json.loads(run_on_ranks(HERE / "killed_writer.py", 1, tmp_path, 60, 1, fresh=True))
     steps = found["steps"]
     assert found["whole"] == len(steps) - 1 >= 60
     assert steps == sorted(steps), "a step that was written is never lost"
@@ -35,7 +35,7 @@ def test_a_writer_killed_at_any_moment_leaves_a_whole_file(tmp_path: Path) -> No
 
 
 def test_a_file_that_may_not_grow_any_more_leaves_the_old_checkpoint(tmp_path: Path) -> None:
-    found = json.loads(run_on_ranks(HERE / "full_disk.py", 1, tmp_path, 40_000))
+    found = json.loads(run_on_ranks(HERE / "full_disk.py", 1, tmp_path, 40_000, fresh=True))
     assert found["failed"] > 2
     assert found["kept"] == found["failed"] - 1
     assert found["others"] == []

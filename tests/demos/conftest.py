@@ -26,7 +26,7 @@ def demo(
     def run(
         name: str, *arguments: object, ranks: int = 1, timeout: float = 120.0
     ) -> tuple[dict[str, Any], Path, str]:
-        printed = mpirun(DEMOS / f"demo_{name}.py", ranks, *arguments, timeout=timeout)
+        printed = mpirun(DEMOS / f"demo_{name}.py", ranks, *arguments, timeout=timeout, fresh=True)
         (output,) = (tmp_path / "output").iterdir()
         return read_result(output), output, printed
 

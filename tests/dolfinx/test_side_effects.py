@@ -58,7 +58,7 @@ def test_the_commands_of_the_compiler_are_not_logged(
     mpirun: Callable[..., str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert mpirun(COMPILED, 1).strip() == "WARNING:root:said"
+    assert mpirun(COMPILED, 1, fresh=True).strip() == "WARNING:root:said"
     assert list(tmp_path.rglob("*.so")), "nothing was compiled"
 
 
@@ -76,4 +76,4 @@ def test_what_the_compiler_says_is_shown_if_it_fails(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("own", [False, True])
 def test_loader_logging_and_warnings_are_as_before(mpirun: Callable[..., str], own: bool) -> None:
-    assert mpirun(CODE.replace("{own}", str(own)), 1) == "untouched"
+    assert mpirun(CODE.replace("{own}", str(own)), 1, fresh=True) == "untouched"

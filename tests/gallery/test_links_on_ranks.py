@@ -36,6 +36,6 @@ def test_all_ranks_hold_the_same_bits(mpirun: Callable[..., str]) -> None:
 
 
 def test_an_error_of_gmsh_stops_all_ranks(mpirun: Callable[..., str]) -> None:
-    lines = mpirun(CODE, 2, "broken").splitlines()
+    lines = mpirun(CODE, 2, "broken", fresh=True).splitlines()
     assert lines[0] == "ValueError: gmsh is unwell"
     assert re.fullmatch(r"RemoteError: ValueError: gmsh is unwell \(.*\) \(met on rank 0\)", lines[1])

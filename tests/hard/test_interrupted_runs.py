@@ -78,7 +78,9 @@ def test_a_run_that_is_killed_again_and_again_ends_with_the_answer_of_one_that_i
 
 def test_a_writer_killed_hundreds_of_times_always_leaves_a_whole_file(tmp_path: Path, record: Record) -> None:
     kills = 300
-    found = json.loads(run_on_ranks(CHECKPOINTS / "killed_writer.py", 1, tmp_path, kills, 7, timeout=600.0))
+    found = json.loads(
+        run_on_ranks(CHECKPOINTS / "killed_writer.py", 1, tmp_path, kills, 7, timeout=600.0, fresh=True)
+    )
     assert found["whole"] == len(found["steps"]) - 1 >= kills
     assert found["steps"] == sorted(found["steps"])
     assert found["partial"] > 20
@@ -99,7 +101,7 @@ def on_a_small_disk(folder: Path) -> dict[str, object]:
     )
     if end.returncode == 0:
         return {"disk": "a disk of 256 kB", **json.loads(end.stdout)}
-    limited = run_on_ranks(script, 1, folder, 120_000)
+    limited = run_on_ranks(script, 1, folder, 120_000, fresh=True)
     return {"disk": "files of at most 120 kB", **json.loads(limited)}
 
 

@@ -31,6 +31,6 @@ def test_importing_every_module_starts_nothing(mpirun: Callable[..., str]) -> No
     assert not MPI.Is_initialized()
     sys.stdout.write(f"{{len(names)}} {{'fenics_contact.feti.factor' in sys.modules}}")
     """
-    count, deep = mpirun(script, 1).split()
+    count, deep = mpirun(script, 1, fresh=True).split()
     assert int(count) > 200
     assert deep == "True"

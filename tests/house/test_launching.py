@@ -30,7 +30,7 @@ HARMLESS = ("HFI_NO_BACKTRACE", "IPATH_NO_BACKTRACE", "PSM2_DEVICES", "PMIX_MCA_
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_ranks_start_from_a_process_that_uses_mpi(ranks: int, mpirun: Callable[..., str]) -> None:
-    assert mpirun(STARTING, ranks, timeout=60.0).split() == ["0", "1", "0", "2", "2"]
+    assert mpirun(STARTING, ranks, timeout=60.0, fresh=True).split() == ["0", "1", "0", "2", "2"]
 
 
 def test_all_that_mpi_writes_into_the_environment_is_known(mpirun: Callable[..., str]) -> None:
@@ -45,7 +45,7 @@ def test_all_that_mpi_writes_into_the_environment_is_known(mpirun: Callable[...,
         from mpi4py import MPI
         sys.stdout.write(" ".join(line.partition("=")[0] for line in environment() - before))
     """
-    written = [name for name in mpirun(script, 1).split() if not name.startswith(HARMLESS)]
+    written = [name for name in mpirun(script, 1, fresh=True).split() if not name.startswith(HARMLESS)]
     assert sorted(written) == sorted(traces(written))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -19,9 +20,12 @@ RANKS = """
 """
 
 
+@pytest.mark.parametrize("fresh", [False, True])
 @pytest.mark.parametrize("ranks", [1, 2, 4])
-def test_code_runs_on_that_many_ranks_with_its_arguments(mpirun: Callable[..., str], ranks: int) -> None:
-    lines = mpirun(RANKS, ranks, "a", 3).splitlines()
+def test_code_runs_on_that_many_ranks_with_its_arguments(
+    mpirun: Callable[..., str], ranks: int, fresh: bool
+) -> None:
+    lines = mpirun(RANKS, ranks, "a", 3, fresh=fresh).splitlines()
     assert sorted(lines) == [f"rank {rank} of {ranks} ['a', '3']" for rank in range(ranks)]
 
 
@@ -38,7 +42,39 @@ def test_mpirun_itself_is_quiet() -> None:
 
 def test_ranks_start_beside_a_process_that_uses_mpi_itself(mpirun: Callable[..., str]) -> None:
     assert MPI.Is_initialized()
-    assert sorted(mpirun(RANKS, 2).splitlines()) == ["rank 0 of 2 []", "rank 1 of 2 []"]
+    assert sorted(mpirun(RANKS, 2, fresh=True).splitlines()) == ["rank 0 of 2 []", "rank 1 of 2 []"]
+
+
+PID = "import os, sys; sys.stdout.write(f'{os.getpid()} ')\n"
+
+
+@pytest.mark.parametrize(
+    ("script", "alike"),
+    [
+        ("", True),
+        ("import sys; sys.exit()", True),
+        ("import os; os.environ['ELSEWHERE'] = '1'", False),
+        ("import logging; logging.getLogger('fenics_contact').setLevel(10)", False),
+        ("raise SystemExit(3)", False),
+    ],
+)
+def test_ranks_run_the_next_script_unless_one_has_failed_or_changed_them(
+    mpirun: Callable[..., str], script: str, alike: bool
+) -> None:
+    before = mpirun(PID, 2)
+    with pytest.raises(pytest.fail.Exception, match="status 3") if "3" in script else nullcontext():
+        mpirun(script, 2)
+    assert (sorted(mpirun(PID, 2).split()) == sorted(before.split())) is alike
+
+
+def test_ranks_that_wait_run_nothing_in_another_environment(
+    mpirun: Callable[..., str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("ELSEWHERE", "1")
+    assert mpirun("import os, sys; sys.stdout.write(os.environ['ELSEWHERE'])", 2) == "11"
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    assert mpirun("import os, sys; sys.stdout.write(os.getcwd())", 1) == str(tmp_path)
 
 
 @pytest.mark.parametrize("ranks", ["0", "-1", "two", ""])
@@ -65,10 +101,10 @@ def test_a_failure_on_one_rank_fails_with_the_output_shown(mpirun: Callable[...,
     assert "ValueError: rank one is unwell" in message
 
 
+@pytest.mark.parametrize("fresh", [False, True])
 @pytest.mark.parametrize(("word", "runs"), [("", 2), ("unwell", 1)])
-@pytest.mark.parametrize("ranks", [1, 2])
 def test_a_run_that_ends_without_a_word_is_started_once_more(
-    mpirun: Callable[..., str], tmp_path: Path, ranks: int, word: str, runs: int
+    mpirun: Callable[..., str], tmp_path: Path, word: str, runs: int, fresh: bool
 ) -> None:
     code = """
         import os, pathlib, sys
@@ -82,11 +118,12 @@ def test_a_run_that_ends_without_a_word_is_started_once_more(
         MPI.COMM_WORLD.Barrier()
     """
     with pytest.raises(pytest.fail.Exception, match="ended with exit status 1"):
-        mpirun(code, ranks, tmp_path, word)
+        mpirun(code, 2, tmp_path, word, fresh=fresh)
     assert (tmp_path / "count").read_text() == runs * "."
 
 
-def test_ranks_that_hang_are_killed(mpirun: Callable[..., str], tmp_path: Path) -> None:
+@pytest.mark.parametrize("fresh", [False, True])
+def test_ranks_that_hang_are_killed(mpirun: Callable[..., str], tmp_path: Path, fresh: bool) -> None:
     code = """
         import os, pathlib, sys, time
         from mpi4py import MPI
@@ -95,7 +132,7 @@ def test_ranks_that_hang_are_killed(mpirun: Callable[..., str], tmp_path: Path) 
         time.sleep(600)
     """
     with pytest.raises(pytest.fail.Exception, match="did not end within 5 s and was killed"):
-        mpirun(code, 2, tmp_path, timeout=5)
+        mpirun(code, 2, tmp_path, timeout=5, fresh=fresh)
     pids = [int(path.read_text()) for path in tmp_path.glob("*.pid")]
     assert len(pids) == 2
     time.sleep(0.2)

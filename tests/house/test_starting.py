@@ -43,7 +43,7 @@ def test_ranks_of_which_some_work_do_not_wait_for_others(mpirun: Callable[..., s
         world.Barrier()
         sys.stdout.write(f"{found / ENERGY} {solve(world).energies.strain / ENERGY}\\n")
     """
-    ratios = [float(ratio) for ratio in mpirun(script, 3, timeout=60.0).split()]
+    ratios = [float(ratio) for ratio in mpirun(script, 3, timeout=60.0, fresh=True).split()]
     assert ratios == pytest.approx(6 * [1.0], rel=1e-5)
 
 
@@ -57,7 +57,7 @@ def test_a_rank_that_worked_alone_works_with_others(mpirun: Callable[..., str]) 
             sys.stdout.write(f"{solve(MPI.COMM_SELF).energies.strain / ENERGY}\\n")
         sys.stdout.write(f"{solve(MPI.COMM_WORLD).energies.strain / ENERGY}\\n")
     """
-    ratios = [float(ratio) for ratio in mpirun(script, 2, timeout=60.0).split()]
+    ratios = [float(ratio) for ratio in mpirun(script, 2, timeout=60.0, fresh=True).split()]
     assert ratios == pytest.approx(3 * [1.0], rel=1e-5)
 
 
@@ -76,7 +76,7 @@ def test_processes_forked_before_anything_is_computed_compute(
     for _ in range(2):
         sys.stdout.write("%s %s\\n" % in_fork(energy))
     """
-    lines = [line.split() for line in mpirun(script, 1).splitlines()]
+    lines = [line.split() for line in mpirun(script, 1, fresh=True).splitlines()]
     assert [words[0] for words in lines] == ["returned"] * 2, lines
     assert [float(words[1]) for words in lines] == pytest.approx(2 * [1.0], rel=1e-5)
 
@@ -104,7 +104,7 @@ def test_processes_forked_after_a_solve_refuse_to_compute(mpirun: Callable[..., 
     ):
         sys.stdout.write("%s: %s\\n" % in_fork(task))
     """
-    lines = mpirun(script, 1).splitlines()
+    lines = mpirun(script, 1, fresh=True).splitlines()
     assert len(lines) == 5
     for line in lines:
         assert line.startswith("ForkedProcessError: computing needs a process that starts"), lines

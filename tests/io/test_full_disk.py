@@ -34,7 +34,7 @@ def on_a_small_disk(folder: Path) -> dict[str, Any] | None:
 def test_a_full_disk_leaves_all_files_as_they_were(tmp_path: Path) -> None:
     found = on_a_small_disk(tmp_path)
     if found is None:
-        found = json.loads(run_on_ranks(SCRIPT, 1, tmp_path, 3000))
+        found = json.loads(run_on_ranks(SCRIPT, 1, tmp_path, 3000, fresh=True))
     assert set(found["said"]) >= {"vtu", "json", "series"}
     for name, said in found["said"].items():
         assert "could not be written to the folder" in said, name

@@ -75,7 +75,7 @@ KILLED = """
 
 def test_what_a_killed_writer_has_left_is_removed_by_the_next_one(mpirun: Any, tmp_path: Path) -> None:
     with pytest.raises(pytest.fail.Exception, match=r"exit status (-9|137)"):
-        mpirun(KILLED, 1, tmp_path / "folder")
+        mpirun(KILLED, 1, tmp_path / "folder", fresh=True)
     folder = tmp_path / "folder"
     assert len(hidden(folder)) == 1, "the killed one has left nothing: nothing was tested"
     with replacing(folder / "another") as (path,):

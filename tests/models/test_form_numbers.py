@@ -55,5 +55,5 @@ def test_forms_do_not_depend_on_the_number_of_constants_made_before(
 
 
 def test_ranks_that_made_different_numbers_of_constants_write_the_same_forms(mpirun) -> None:
-    one, two = mpirun(APART, 2).split()
+    one, two = mpirun(APART, 2, fresh=True).split()
     assert float(one) == float(two) > 0.0

@@ -50,7 +50,7 @@ def test_a_notebook_is_a_script_too(
     name: str, mpirun: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(ROOT if name.startswith("05") else tmp_path)
-    printed = mpirun(FOLDER / f"{name}.py", 1, timeout=300.0)
+    printed = mpirun(FOLDER / f"{name}.py", 1, timeout=300.0, fresh=True)
     wanted = [
         output.text.splitlines()[0]
         for cell in stored(name).cells

@@ -19,7 +19,7 @@ ALL = [*DECISIVE, "petsc4py.PETSc", "gmsh", "pyvista"]
 
 @pytest.mark.parametrize("modules", [DECISIVE, pytest.param(ALL, marks=pytest.mark.slow)], ids=len)
 def test_libraries_are_imported_in_any_order(modules: list[str], mpirun: Callable[..., str]) -> None:
-    lines = mpirun(WALK, 1, *modules, timeout=3600.0).splitlines()
+    lines = mpirun(WALK, 1, *modules, timeout=3600.0, fresh=True).splitlines()
     assert [line for line in lines if line.startswith("failed")] == []
     assert len(set(lines)) == math.factorial(len(modules))
     assert {line.partition(" ")[0] for line in lines} == {cut()}
@@ -46,7 +46,7 @@ def solve_after(imports: str, mpirun: Callable[..., str]) -> None:
         sys.stdout.write(f"{{state.energies.strain}}\\n")
     """
     energy = 0.5 * 100.0 * (0.01 / 0.3) ** 2 * 0.7 * 0.5 * 0.3
-    energies = [float(found) for found in mpirun(script, 2).split()]
+    energies = [float(found) for found in mpirun(script, 2, fresh=True).split()]
     assert energies == pytest.approx(2 * [energy], rel=1e-4)
 
 

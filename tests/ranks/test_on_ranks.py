@@ -133,7 +133,7 @@ Found = dict[str, list[dict[str, Any]]]
 
 def found_on(ranks: int, *cases: str) -> Found:
     """Run cases and return what each rank has met."""
-    lines = run_on_ranks(SCRIPT, ranks, *cases, timeout=600.0).splitlines()
+    lines = run_on_ranks(SCRIPT, ranks, *cases, timeout=600.0, fresh=True).splitlines()
     return dict(json.loads(line) for line in lines if line.startswith('["'))
 
 

@@ -299,4 +299,4 @@ def test_a_scene_is_made_without_what_its_plan_computes(mpirun: Callable[..., st
         make()
         sys.stdout.write(f"{sum('fenics_contact._scene.' + name in sys.modules for name in names)} ")
     """
-    assert mpirun(script, 1).split() == ["0", "2"]
+    assert mpirun(script, 1, fresh=True).split() == ["0", "2"]
