@@ -107,7 +107,7 @@ output = Path("output") / ("chain_links" if published else f"chain_links_{aim}")
 force = 80e3  # N
 timer = PhaseTimer()
 with timer.phase("mesh"):
-    links = gallery.two_links(SIZES[size], comm=comm)
+    links = gallery.two_links(SIZES[size])
 
 steel = materials.IsotropicElasticity(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
 friction_coefficient = 0.3

@@ -45,7 +45,7 @@ output = Path("output/five_links")
 # Wire of 16 mm, pitch 48 mm. `chain` turns the links and moves each along the axis until its crown touches
 # the one before. Links need not be alike.
 
-links = gallery.chain([gallery.LinkShape(n_around=36, n_a=5, n_b=14)] * 5, comm=comm)
+links = gallery.chain([gallery.LinkShape(n_around=36, n_a=5, n_b=14)] * 5)
 names = [f"link {number}" for number in range(1, len(links.links) + 1)]
 
 # ## Scene

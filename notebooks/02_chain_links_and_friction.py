@@ -41,7 +41,7 @@
 # %% [markdown]
 # ## Links
 #
-# Wire of 16 mm, inner width of 19.2 mm. gmsh builds the links; the second one is turned by 90° and moved
+# Wire of 16 mm, inner width of 19.2 mm. The second link is turned by 90° and moved
 # until it just touches the first. Along the ring the cells are about as long as across the wire: contact by
 # nodes does best where the facets on both sides are of one size.
 

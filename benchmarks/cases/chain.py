@@ -47,7 +47,7 @@ def cold_state(
     comm.Barrier()
     start, meshing = perf_counter(), PhaseTimer()
     with meshing.phase("mesh"):
-        scene = chain(graded_links(cells, comm), friction_coefficient)
+        scene = chain(graded_links(cells), friction_coefficient)
 
     def cut(mesh: BodyMesh) -> np.ndarray:
         return box_partition(mesh, boxes) if parts is None else bisection_partition(mesh, parts)

@@ -40,7 +40,7 @@ def chain_shape_problem(
     """
     cells, boxes = SIZES[size]
     if cells not in _links:
-        _links[cells] = graded_links(cells, comm)
+        _links[cells] = graded_links(cells)
     links = _links[cells]
     scene = chain(links, friction)
     partitions = {name: box_partition(body.mesh, boxes) for name, body in scene.bodies.items()}

@@ -266,7 +266,7 @@ def _largest(contact: ContactResult) -> tuple[float, np.ndarray, np.ndarray]:
 
 def chain_gradient() -> Figures:
     """Two graded links under 80 kN, with the gradients of their energy and of their largest force."""
-    links = graded_links((18, 3, 6), COMM)
+    links = graded_links((18, 3, 6))
     state = ContactProblem(chain(links), COMM).solve(design=True)
     design, contact = SurfaceDesign("link 1", links.first.crown), ContactProblem.following(state)
     points = [

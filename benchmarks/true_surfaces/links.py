@@ -33,7 +33,7 @@ def measured(
 ) -> dict[str, Any]:
     """Solve the chain on one mesh. Collective."""
     shape = LinkShape(n_around=round(48 * size), n_a=round(8 * size), n_b=round(20 * size), grading=grading)
-    scene = chain(two_links(shape, comm=comm))
+    scene = chain(two_links(shape))
     pairs = [replace(pair, geometry=geometry, discretisation=discretisation) for pair in scene.contacts]
     scene = replace(scene, contacts=pairs)
     boxes = (8, 1, 2) if size < 2 else (16, 2, 4)

@@ -367,12 +367,12 @@ class _Links(Placed):
     cell: SolidCell
 
     def shapes(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
-        """Return the links by the names that `part` takes. Collective."""
-        return {name: Shaped(link.mesh, link.crown) for name, link in self.links_of(comm).items()}
+        """Return the links by the names that `part` takes."""
+        return {name: Shaped(link.mesh, link.crown) for name, link in self.links_of().items()}
 
-    def links_of(self, comm: MPI.Comm) -> Mapping[str, Link]:
-        """Return the links, a single one unless it is overridden. Collective."""
-        return {"": links_module.chain_link(self.made(), comm)}
+    def links_of(self) -> Mapping[str, Link]:
+        """Return the links, a single one unless it is overridden."""
+        return {"": links_module.chain_link(self.made())}
 
 
 @keys_of(LinkShape)
@@ -389,9 +389,9 @@ class TwoLinksMesh(_Links):
     shape: Literal["two_links"]
     gap: NonNegativeFloat = Field(0.0, description="clearance along the pull axis, [length]")
 
-    def links_of(self, comm: MPI.Comm) -> Mapping[str, Link]:
-        """Return both links. Collective."""
-        links = links_module.two_links(self.made(), gap=self.gap, comm=comm)
+    def links_of(self) -> Mapping[str, Link]:
+        """Return both links."""
+        links = links_module.two_links(self.made(), gap=self.gap)
         return {"first": links.first, "second": links.second}
 
 
@@ -403,9 +403,9 @@ class ChainMesh(_Links):
     links: Annotated[int, Field(ge=2, le=10_000, description="number of links")]
     gap: NonNegativeFloat = Field(0.0, description="clearance between neighbours, [length]")
 
-    def links_of(self, comm: MPI.Comm) -> Mapping[str, Link]:
-        """Return all links. Collective."""
-        chain = links_module.chain([self.made()] * self.links, gap=self.gap, comm=comm)
+    def links_of(self) -> Mapping[str, Link]:
+        """Return all links."""
+        chain = links_module.chain([self.made()] * self.links, gap=self.gap)
         return {str(number): link for number, link in enumerate(chain.links, 1)}
 
 

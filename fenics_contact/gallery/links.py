@@ -5,29 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from fenics_contact._base.checks import check_numbers
 from fenics_contact._base.display import displayed
-from fenics_contact.errors import FenicsContactError, InvalidInputError, together
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery.blocks import require_room, split_hexahedra, structured_cells
 from fenics_contact.gallery.ring import (
     LinkShape,
+    crown_facets,
     crown_indices,
     crown_shapes,
     drawn_together,
-    mesh_ring,
     ring_lattice,
     stations,
 )
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import orient
-
-if TYPE_CHECKING:
-    from mpi4py import MPI
 
 
 @displayed
@@ -82,68 +77,30 @@ class Link:
         )
 
 
-def chain_link(shape: LinkShape | None = None, comm: MPI.Comm | None = None) -> Link:
-    """Build a chain link with gmsh.
+def chain_link(shape: LinkShape | None = None) -> Link:
+    """Build a chain link.
 
     The ring lies in the x-z plane, the middle of the contact crown's inner side at the origin and the link on
     the -x side of its contact crown, see `Link`. The same shape gives bitwise the same mesh.
 
     Args:
         shape: Proportions and mesh size; `LinkShape()` unless given.
-        comm: If given, gmsh runs on rank 0 only and all ranks receive the mesh.
-
-    Returns:
-        The link, replicated.
 
     Raises:
         InvalidInputError: If the shape cannot be meshed without inverted cells.
-        MissingRequirementError: If gmsh cannot be imported.
-
-    Note:
-        Collective on ``comm`` if given.
     """
     shape = LinkShape() if shape is None else shape
-    require_room(shape.n_around, shape.n_a, shape.n_b)
-    if comm is None:
-        points, facets = _lattice_from_gmsh(shape)
-    else:
-        built: tuple[np.ndarray, dict[str, np.ndarray]] | None = None
-        with together(comm):
-            built = _lattice_from_gmsh(shape) if comm.rank == 0 else None
-        points, facets = comm.bcast(built, root=0)
-    cells, grid = structured_cells((shape.n_around, shape.n_a, shape.n_b), closed=True)
-    surfaces = {name: orient(cells, facets[name]) for name in sorted(facets)}
+    counts = shape.n_around, shape.n_a, shape.n_b
+    require_room(*counts)
+    cells, grid = structured_cells(counts, closed=True)
+    surfaces = {
+        name: orient(cells, crown_facets(shape, far)) for name, far in (("contact", False), ("grip", True))
+    }
+    points = ring_lattice(shape).reshape(-1, 3)
     mesh = BodyMesh(points, cells, surfaces, grid, shapes=crown_shapes(shape))
     if shape.cell == "tetrahedron":
         mesh = split_hexahedra(mesh, _mirrored(grid, shape))
     return Link(shape, mesh, _crown(shape))
-
-
-def _lattice_from_gmsh(shape: LinkShape) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Mesh with gmsh and renumber the nodes in the order of the structured lattice.
-
-    gmsh divides an arc into equal pieces to about nine digits, slightly different between versions; the
-    returned coordinates are those of the lattice, graded if the link is. For equal pieces gmsh's are checked
-    against them.
-
-    Returns:
-        Coordinates, (n_nodes, 3), and facets by name, (n_facets, 4), in the numbering of `structured_cells`.
-    """
-    points, cells, facets = mesh_ring(shape)
-    lattice = ring_lattice(shape, shape.spacing.uniform).reshape(-1, 3)
-    used = np.unique(cells)
-    distance, place = cKDTree(lattice).query(points[used])
-    expected, _ = structured_cells((shape.n_around, shape.n_a, shape.n_b), closed=True)
-    number = np.full(points.shape[0], -1, dtype=np.int64)
-    number[used] = place
-    complete = np.array_equal(np.sort(place), np.arange(lattice.shape[0]))
-    if not (complete and distance.max() < 1e-6 * shape.thickness and _same_cells(number[cells], expected)):
-        raise FenicsContactError(
-            f"gmsh must return the ring's lattice of {lattice.shape[0]} nodes and {expected.shape[0]} "
-            f"hexahedra, got {used.size} nodes, {cells.shape[0]} hexahedra, nodes off by up to "
-            f"{distance.max():.3g}: please report this shape and the version of gmsh"
-        )
-    return ring_lattice(shape).reshape(-1, 3), {name: number[nodes] for name, nodes in facets.items()}
 
 
 def _mirrored(grid: np.ndarray, shape: LinkShape) -> np.ndarray:
@@ -155,14 +112,6 @@ def _mirrored(grid: np.ndarray, shape: LinkShape) -> np.ndarray:
     from_middle = (grid[:, 0] - shape.n_around // 16) % shape.n_around
     upper = 2 * grid[:, 1:] + 1 > [shape.n_a, shape.n_b]
     return np.column_stack([from_middle >= shape.n_around // 2, upper])
-
-
-def _same_cells(cells: np.ndarray, expected: np.ndarray) -> bool:
-    """Compare two lists of cells as sets of node sets, in any order."""
-    if cells.shape != expected.shape:
-        return False
-    ours, theirs = np.sort(cells, axis=1), np.sort(expected, axis=1)
-    return np.array_equal(ours[np.lexsort(ours.T[::-1])], theirs[np.lexsort(theirs.T[::-1])])
 
 
 def _crown(shape: LinkShape) -> DesignSurface:
@@ -207,7 +156,6 @@ def two_links(
     other: LinkShape | None = None,
     *,
     gap: float = 0.0,
-    comm: MPI.Comm | None = None,
 ) -> TwoLinks:
     """Build two interlocked links, the second rotated by 90 degrees about the pull axis.
 
@@ -224,21 +172,17 @@ def two_links(
         shape: Link 1; `LinkShape()` unless given.
         other: Link 2; as link 1 unless given.
         gap: Clearance of the smooth crowns along the pull axis, not below zero.
-        comm: As in `chain_link`.
 
     Raises:
         InvalidInputError: If the links do not fit into each other, cannot touch at one spot, or would
             penetrate.
-
-    Note:
-        Collective on ``comm`` if given.
     """
     shape = LinkShape() if shape is None else shape
     other = shape if other is None else other
     check_fit(shape, other)
     check_gap(gap)
-    first = chain_link(shape, comm)
-    second = first if other == shape else chain_link(other, comm)
+    first = chain_link(shape)
+    second = first if other == shape else chain_link(other)
     return TwoLinks(first, second.placed(_TURN, -gap * PULL_AXIS))
 
 
@@ -292,7 +236,7 @@ class Chain:
         return tuple((k, k + 1) for k in range(len(self.links) - 1))
 
 
-def chain(shapes: Sequence[LinkShape], *, gap: float = 0.0, comm: MPI.Comm | None = None) -> Chain:
+def chain(shapes: Sequence[LinkShape], *, gap: float = 0.0) -> Chain:
     """Build a straight chain of links.
 
     Neighbours are placed as by `two_links`: each touches the one before at one point.
@@ -300,14 +244,10 @@ def chain(shapes: Sequence[LinkShape], *, gap: float = 0.0, comm: MPI.Comm | Non
     Args:
         shapes: The links in their order; equal shapes are meshed once.
         gap: Clearance between neighbours' smooth crowns along the chain, not below zero.
-        comm: As in `chain_link`.
 
     Raises:
         InvalidInputError: If there are fewer than two links, or neighbours do not fit into each other,
             cannot touch at one spot or would penetrate.
-
-    Note:
-        Collective on ``comm`` if given.
 
     Example:
         >>> five = chain([LinkShape(n_around=24, n_a=2, n_b=6)] * 5)
@@ -324,7 +264,7 @@ def chain(shapes: Sequence[LinkShape], *, gap: float = 0.0, comm: MPI.Comm | Non
     longest = max(shapes, key=lambda shape: shape.n_around)
     require_room(len(shapes) * longest.n_around, longest.n_a, longest.n_b)
     check_gap(gap)
-    built = {shape: chain_link(shape, comm) for shape in dict.fromkeys(shapes)}
+    built = {shape: chain_link(shape) for shape in dict.fromkeys(shapes)}
     links, pole = [built[shapes[0]]], 0.0
     for number, shape in enumerate(shapes[1:], 1):
         pole += shape.opening - gap

@@ -1,4 +1,4 @@
-"""The ring of a chain link: proportions, section, spacing, and its mesh by gmsh.
+"""The ring of a chain link: proportions, section, spacing, and its lattice.
 
 The ring lies in the x-z plane. Its contact crown is the half circle on the +x side, with the middle of the
 inner surface (the pole) at the origin; the far crown lies on the -x side. Lattice directions: around the ring
@@ -26,7 +26,6 @@ where r_a and r_b are half the thickness and half the width: an arc over a chord
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
 from scipy.optimize import brentq
@@ -34,7 +33,6 @@ from scipy.optimize import brentq
 from fenics_contact._base.checks import check_count, check_grading, check_numbers
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery.blocks import check_cell_type
-from fenics_contact.readers.gmsh_session import gmsh_model
 from fenics_contact.shapes.simple import Torus
 
 
@@ -54,11 +52,6 @@ class Spacing:
     along: float = 0.0
     across: float = 0.0
     through: float = 0.0
-
-    @property
-    def uniform(self) -> Spacing:
-        """The same numbers of cells, but uniform."""
-        return Spacing(self.quarter, self.leg)
 
 
 def drawn_together(places: np.ndarray, spot: float, strength: float) -> np.ndarray:
@@ -181,12 +174,6 @@ class WireSection:
         return (1 - u) * inner + u * outer + (1 - v) * left[:, None] + v * right[:, None] - corners
 
 
-#: Largest ratio of two sizes of a link: gmsh does not mesh others.
-ALIKE = 1000
-#: Smallest roundness of its section, below which gmsh treats its arcs as straight lines.
-FLATTEST = 1e-6
-
-
 @dataclass(frozen=True, kw_only=True)
 class LinkShape:
     """Proportions and mesh size of one chain link.
@@ -226,8 +213,8 @@ class LinkShape:
 
     def __post_init__(self) -> None:
         """Reject sizes that do not form a ring."""
-        given = {name: getattr(self, name) for name in ("inner_radius", "straight", "thickness", "width")}
-        check_numbers(**given)
+        sizes = ("inner_radius", "straight", "thickness", "width")
+        check_numbers(**{name: getattr(self, name) for name in sizes})
         for name in ("inner_radius", "straight"):
             if getattr(self, name) <= 0.0:
                 raise InvalidInputError(
@@ -245,16 +232,6 @@ class LinkShape:
         check_cell_type(self.cell)
         check_grading(self.grading)
         _ = self.section
-        sizes = [float(size) for size in given.values()]
-        if max(sizes) > ALIKE * min(sizes):
-            raise InvalidInputError(
-                f"inner_radius, straight, thickness and width must differ by less than a factor of {ALIKE}, "
-                f"got {sizes}: give them in one unit of length"
-            )
-        if self.roundness < FLATTEST:
-            raise InvalidInputError(
-                f"roundness must be at least {FLATTEST:g}, got {self.roundness}: 0.01 is a square to the eye"
-            )
 
     @property
     def section(self) -> WireSection:
@@ -316,15 +293,13 @@ def crown_start(shape: LinkShape) -> int:
     return shape.n_around // 16 - shape.spacing.quarter
 
 
-def stations(shape: LinkShape, spacing: Spacing | None = None) -> tuple[np.ndarray, np.ndarray]:
+def stations(shape: LinkShape) -> tuple[np.ndarray, np.ndarray]:
     """Place the section around the ring.
-
-    `spacing`: of the nodes; the link's own unless given.
 
     Returns points of the wire's centre line, (n_around, 3), and the unit direction a of the section there,
     (n_around, 3).
     """
-    spacing = shape.spacing if spacing is None else spacing
+    spacing = shape.spacing
     turning, n_leg = 2 * spacing.quarter, spacing.leg
     angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, turning + 1)
     half_turn = drawn_together(angles, 0.0, spacing.along)[:-1]
@@ -342,15 +317,10 @@ def stations(shape: LinkShape, spacing: Spacing | None = None) -> tuple[np.ndarr
     return np.roll(line, start, axis=0), np.roll(outward, start, axis=0)
 
 
-def ring_lattice(shape: LinkShape, spacing: Spacing | None = None) -> np.ndarray:
-    """Sweep the section's lattice around the ring.
-
-    `spacing`: of the nodes; the link's own unless given.
-
-    Returns points, (n_around, n_a + 1, n_b + 1, 3).
-    """
-    spacing = shape.spacing if spacing is None else spacing
-    line, outward = stations(shape, spacing)
+def ring_lattice(shape: LinkShape) -> np.ndarray:
+    """Sweep the section's lattice around the ring; points, (n_around, n_a + 1, n_b + 1, 3)."""
+    spacing = shape.spacing
+    line, outward = stations(shape)
     section = shape.section.lattice(shape.n_a, shape.n_b, spacing.through, spacing.across)
     across = np.array([0.0, 1.0, 0.0])
     return np.asarray(
@@ -358,9 +328,19 @@ def ring_lattice(shape: LinkShape, spacing: Spacing | None = None) -> np.ndarray
     )
 
 
-def crown_indices(shape: LinkShape) -> np.ndarray:
-    """Indices around the ring of the contact crown's nodes, from -z to +z; (n_crown + 1,)."""
-    return (crown_start(shape) + np.arange(2 * shape.spacing.quarter + 1)) % shape.n_around
+def crown_indices(shape: LinkShape, far: bool = False) -> np.ndarray:
+    """Indices around the ring of a crown's nodes, of the contact crown from -z to +z; (n_crown + 1,)."""
+    start = crown_start(shape) + far * (shape.n_around // 2)
+    return (start + np.arange(2 * shape.spacing.quarter + 1)) % shape.n_around
+
+
+def crown_facets(shape: LinkShape, far: bool) -> np.ndarray:
+    """Return the inner side of a crown, of one quarter turn after the other, (n_facets, 4)."""
+    first = crown_indices(shape, far) * (shape.n_a + 1) * (shape.n_b + 1)
+    nodes = first[:, None] + np.arange(shape.n_b + 1)
+    corners = nodes[:-1, :-1], nodes[:-1, 1:], nodes[1:, 1:], nodes[1:, :-1]
+    facets = np.stack(corners, axis=-1).reshape(2, -1, shape.n_b, 4)
+    return facets.swapaxes(1, 2).reshape(-1, 4)
 
 
 def crown_shapes(shape: LinkShape) -> dict[str, Torus]:
@@ -371,95 +351,3 @@ def crown_shapes(shape: LinkShape) -> dict[str, Torus]:
         name: Torus((middle, 0.0, 0.0), (0.0, 1.0, 0.0), shape.inner_radius + tube, tube)
         for name, middle in middles.items()
     }
-
-
-_HEXAHEDRON, _QUADRILATERAL = 5, 3
-
-
-def mesh_ring(shape: LinkShape) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Mesh the ring with hexahedra that are uniform on each piece.
-
-    The geometry has six volumes with the physical name "volume"; the inner side of the crown at the origin is
-    named "contact", that of the far crown "grip". Surfaces are read back by these names.
-
-    Returns:
-        Coordinates, (n_nodes, 3); cells, (n_cells, 8); facets by name, (n_facets, 4); all in gmsh's order.
-    """
-    with gmsh_model("fenics_contact chain link") as gmsh:
-        _build_ring(gmsh, shape)
-        gmsh.model.mesh.generate(3)
-        tags, coordinates, _ = gmsh.model.mesh.getNodes()
-        row = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
-        row[tags.astype(np.int64)] = np.arange(tags.size)
-        groups = {
-            gmsh.model.getPhysicalName(dim, tag): (dim, tag) for dim, tag in gmsh.model.getPhysicalGroups()
-        }
-        cells = row[_elements(gmsh, *groups.pop("volume"), _HEXAHEDRON)]
-        facets = {name: row[_elements(gmsh, *group, _QUADRILATERAL)] for name, group in groups.items()}
-    return coordinates.reshape(-1, 3), cells, facets
-
-
-def _elements(gmsh: ModuleType, dim: int, tag: int, kind: int) -> np.ndarray:
-    """Node tags of the elements of one kind in a physical group, (n, 8 | 4)."""
-    per_element = 8 if kind == _HEXAHEDRON else 4
-    entities = gmsh.model.getEntitiesForPhysicalGroup(dim, tag)
-    nodes = [gmsh.model.mesh.getElementsByType(kind, int(entity))[1] for entity in entities]
-    return np.concatenate(nodes).astype(np.int64).reshape(-1, per_element)
-
-
-def _build_ring(gmsh: ModuleType, shape: LinkShape) -> None:
-    """Sweep the section from the foot of the contact crown once around and name the volume and surfaces."""
-    geo, spacing = gmsh.model.geo, shape.spacing
-    near, far = -shape.inner_radius, -shape.inner_radius - shape.straight
-
-    def turn(face: int, centre: float) -> list[tuple[int, int]]:
-        return list(
-            geo.revolve(
-                [(2, face)], centre, 0, 0, 0, -1, 0, np.pi / 2, numElements=[spacing.quarter], recombine=True
-            )
-        )
-
-    def leg(face: int, length: float) -> list[tuple[int, int]]:
-        return list(geo.extrude([(2, face)], length, 0, 0, numElements=[spacing.leg], recombine=True))
-
-    face = _build_section(gmsh, shape)
-    volumes, inner = [], []
-    for sweep, argument in (
-        (turn, near),
-        (turn, near),
-        (leg, -shape.straight),
-        (turn, far),
-        (turn, far),
-        (leg, shape.straight),
-    ):
-        (_, face), (_, volume), (_, side), *_ = sweep(face, argument)
-        volumes.append(volume)
-        inner.append(side)
-    geo.removeAllDuplicates()  # closes the ring: the last face is the first one
-    geo.synchronize()
-    for dim, tags, name in ((3, volumes, "volume"), (2, inner[:2], "contact"), (2, inner[3:5], "grip")):
-        gmsh.model.setPhysicalName(dim, gmsh.model.addPhysicalGroup(dim, tags), name)
-
-
-def _build_section(gmsh: ModuleType, shape: LinkShape) -> int:
-    """Build the section at the foot of the contact crown (direction a is -z there) and return its tag.
-
-    The first curve is the one on the ring's inside.
-    """
-    geo, section = gmsh.model.geo, shape.section
-    c_a, c_b = section.corner
-    beyond_a = section.crown_radius - section.thickness / 2.0
-    beyond_b = section.flank_radius - section.width / 2.0
-
-    def point(a: float, b: float) -> int:
-        return int(geo.addPoint(-shape.inner_radius, b, -shape.centre_radius - a))
-
-    corners = [point(-c_a, -c_b), point(-c_a, c_b), point(c_a, c_b), point(c_a, -c_b)]
-    centres = [point(beyond_a, 0.0), point(0.0, -beyond_b), point(-beyond_a, 0.0), point(0.0, beyond_b)]
-    arcs = [geo.addCircleArc(corners[k], centres[k], corners[(k + 1) % 4]) for k in range(4)]
-    for k, arc in enumerate(arcs):
-        geo.mesh.setTransfiniteCurve(arc, (shape.n_a if k % 2 else shape.n_b) + 1)
-    face = geo.addPlaneSurface([geo.addCurveLoop(arcs)])
-    geo.mesh.setTransfiniteSurface(face)
-    geo.mesh.setRecombine(2, face)
-    return int(face)

@@ -26,7 +26,7 @@ DEFAULT, METIS, METIS_GRADED = 1.15, 1.5, 2.2
 def links(counts: tuple[int, int, int], grading: float) -> Scene:
     around, through, across = counts
     shape = LinkShape(n_around=around, n_a=through, n_b=across, grading=grading)
-    return chain(two_links(shape, comm=MPI.COMM_SELF))
+    return chain(two_links(shape))
 
 
 def products(scene: Scene, cut: Callable[[BodyMesh], np.ndarray]) -> int:

@@ -34,7 +34,7 @@ STEEL = IsotropicElasticity(2.1e5, 0.3)
 
 @pytest.fixture(scope="module")
 def state() -> AnyState:
-    links = two_links(LinkShape(n_around=24, n_a=4, n_b=12), comm=MPI.COMM_SELF)
+    links = two_links(LinkShape(n_around=24, n_a=4, n_b=12))
     held, pulled = links.first.mesh, links.second.mesh
     scene = Scene(
         {"held": Body(held, STEEL), "pulled": Body(pulled, STEEL)},

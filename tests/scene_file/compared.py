@@ -82,7 +82,7 @@ def hertz(comm: MPI.Comm) -> Sequence[State]:
 
 def chain_scene(comm: MPI.Comm) -> tuple[Scene, SurfaceDesign]:
     """The scene of chain_links.toml with fewer cells, and its design."""
-    links = two_links(LinkShape(n_around=36, n_a=4, n_b=10), comm=comm)
+    links = two_links(LinkShape(n_around=36, n_a=4, n_b=10))
     scene = Scene(
         {"link 1": Body(links.first.mesh, STEEL), "link 2": Body(links.second.mesh, STEEL)},
         supports=[Support("link 1", "grip")],

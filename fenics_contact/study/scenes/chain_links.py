@@ -34,11 +34,11 @@ ENERGY, PEAK, FINER = -20260.0, 4350.0, "meshes of up to 1.6 million unknowns"
 GRIP = 0.5
 
 
-def graded_links(cells: tuple[int, int, int], comm: MPI.Comm, cell: str = "hexahedron") -> TwoLinks:
-    """Mesh the links with gmsh as in the demo, given the numbers of cells around, through and across."""
+def graded_links(cells: tuple[int, int, int], cell: str = "hexahedron") -> TwoLinks:
+    """Mesh the links as in the demo, given the numbers of cells around, through and across."""
     around, through, across = cells
     shape = LinkShape(n_around=around, n_a=through, n_b=across, grading=GRADING, cell=cell)
-    return two_links(shape, comm=comm)
+    return two_links(shape)
 
 
 def chain(links: TwoLinks, friction_coefficient: float = FRICTION) -> Scene:
@@ -59,9 +59,9 @@ def chain(links: TwoLinks, friction_coefficient: float = FRICTION) -> Scene:
 
 
 def build(parameters: Parameters, comm: MPI.Comm) -> Problem:
-    """Mesh the links with gmsh and return the scene with its design."""
+    """Mesh the links and return the scene with its design."""
     around, through, across = (parameters.size * count for count in CELLS)
-    links = graded_links((around, through, across), comm, parameters.cell)
+    links = graded_links((around, through, across), parameters.cell)
     scene = chain(links)
     pairs = [replace(pair, discretisation=parameters.discretisation) for pair in scene.contacts]
     return Problem(replace(scene, contacts=pairs), design=SurfaceDesign("link 1", links.first.crown))
