@@ -10,6 +10,7 @@ import numpy as np
 import scipy.optimize
 from mpi4py import MPI
 
+from benchmarks.graph_partition import graph_partition
 from fenics_contact import (
     Body,
     BodyMesh,
@@ -48,7 +49,7 @@ from fenics_contact.design import (
 )
 from fenics_contact.gallery import DesignSurface, block, box_lattice, hemisphere, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke, OrthotropicElasticity, PlaneStrain
-from fenics_contact.mesh import bisection_partition, graph_partition, quadratic
+from fenics_contact.mesh import bisection_partition, quadratic
 from fenics_contact.qp import DualSolver, FaceNewton, Smalse
 from fenics_contact.results import BalancedTolerance, ContactResult
 from fenics_contact.results.deformed_state import AnyState

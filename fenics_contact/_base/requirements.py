@@ -67,7 +67,6 @@ _NUMERICAL = [
     Requirement("clarabel", "0.11"),
 ]
 _GMSH = Requirement("gmsh", "4.8", f"{_APT} python3-gmsh", "python-gmsh")
-_PYMETIS = Requirement("pymetis", "2025.2")
 
 
 def check() -> None:
@@ -120,17 +119,6 @@ def check_gmsh() -> None:
     module = _load(_GMSH, "gmsh")
     if _GMSH.version() is None:  # Debian 12 installs it without metadata
         _check_version(_GMSH, module.__version__)
-
-
-def load_pymetis() -> ModuleType:
-    """Check and return pymetis, which only the partition of graphs needs."""
-    _check_installed(_PYMETIS)
-    return _load(_PYMETIS, "pymetis")
-
-
-def pymetis_error(ending: str) -> MissingRequirementError:
-    """Return the error of an installed pymetis that does not run."""
-    return _PYMETIS.error(f"{_PYMETIS.version() or 'one'} that {ending}")
 
 
 def _check_installed(requirement: Requirement) -> None:

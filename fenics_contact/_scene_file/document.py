@@ -35,8 +35,8 @@ from fenics_contact._scene_file.values import (
 )
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.hyperelastic import is_nonlinear
-from fenics_contact.mesh.metis import graph_partition
-from fenics_contact.mesh.partition import box_partition
+from fenics_contact.mesh.bisection import bisection_partition
+from fenics_contact.mesh.partition import box_partition, check_one_piece
 from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG
 from fenics_contact.qp.smalse import Smalse
 from fenics_contact.qp.solve import DualSolver
@@ -178,7 +178,8 @@ class SolverPart(Part):
             if isinstance(cut, tuple):
                 parts[name] = box_partition(body.mesh, cut)
             elif cut is not None:
-                parts[name] = graph_partition(body.mesh, cut, name)
+                check_one_piece(body.mesh, name)
+                parts[name] = bisection_partition(body.mesh, cut)
         return parts
 
 

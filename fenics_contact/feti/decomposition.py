@@ -411,7 +411,7 @@ def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> Non
     if not isinstance(partitions, Mapping):
         raise InvalidInputError(
             f"partitions must give the subdomain of each cell by the names of bodies, got {partitions!r}: "
-            "leave them out, or cut bodies by graph_partition or box_partition of fenics_contact.mesh"
+            "leave them out, or cut bodies by bisection_partition or box_partition of fenics_contact.mesh"
         )
     for name, body in scene.bodies.items():
         if name not in partitions:
@@ -424,7 +424,7 @@ def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> Non
             given = partition.shape if isinstance(partition, np.ndarray) else repr(partition)
             raise InvalidInputError(
                 f"the partition of body {name!r} must have shape ({body.mesh.n_cells},), one "
-                f"subdomain per cell, got {given}: graph_partition or box_partition of "
+                f"subdomain per cell, got {given}: bisection_partition or box_partition of "
                 "fenics_contact.mesh cuts a mesh into a number of subdomains"
             )
         check_face_connected(body.mesh, partition)

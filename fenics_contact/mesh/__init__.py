@@ -3,7 +3,6 @@
 from fenics_contact.mesh.bisection import bisection_partition
 from fenics_contact.mesh.cell_types import CellType
 from fenics_contact.mesh.faces import boundary_faces, merge_duplicate_nodes
-from fenics_contact.mesh.metis import graph_partition
 from fenics_contact.mesh.quadratic import quadratic
 from fenics_contact.mesh.quadratic_nodes import in_vtk_order
 from fenics_contact.mesh.quality import scaled_jacobian
@@ -12,7 +11,6 @@ __all__ = [
     "CellType",
     "bisection_partition",
     "boundary_faces",
-    "graph_partition",
     "in_vtk_order",
     "merge_duplicate_nodes",
     "quadratic",

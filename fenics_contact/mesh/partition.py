@@ -41,8 +41,8 @@ def box_partition(mesh: BodyMesh, boxes: tuple[int, ...]) -> np.ndarray:
     """
     if mesh.grid is None:
         raise InvalidInputError(
-            "box_partition needs a structured mesh, this one has grid None: use `graph_partition(mesh, "
-            "parts)`"
+            "box_partition needs a structured mesh, this one has grid None: use "
+            "`bisection_partition(mesh, parts)`"
         )
     if not isinstance(boxes, Sequence | np.ndarray) or np.shape(boxes) != (mesh.dim,):
         number = {2: "two", 3: "three"}[mesh.dim]
@@ -170,28 +170,6 @@ def _checked_partition(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
             "renumber"
         )
     return array.astype(np.int64)
-
-
-def combine(partitions: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Number the subdomains of several bodies consecutively.
-
-    Returns the same with offsets, so that no number occurs in two bodies.
-    """
-    sizes = [int(np.max(p)) + 1 for p in partitions]
-    offsets = np.concatenate([[0], np.cumsum(sizes)])
-    return [np.asarray(p) + offset for p, offset in zip(partitions, offsets, strict=False)]
-
-
-def torn_node_counts(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
-    """Count the nodes of every subdomain, a node once for each subdomain that it belongs to.
-
-    `partition`: (n_cells,) subdomain numbers.
-
-    Returns (S,) node counts; their sum times the dimension is the number of torn displacements.
-    """
-    owner = np.repeat(partition, mesh.cells.shape[1])
-    pairs = np.unique(owner * mesh.n_nodes + mesh.cells.ravel())
-    return np.bincount(pairs // mesh.n_nodes)
 
 
 def face_areas(mesh: BodyMesh) -> tuple[np.ndarray, np.ndarray]:

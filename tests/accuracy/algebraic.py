@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 from mpi4py import MPI
 
+from benchmarks.graph_partition import graph_partition
 from fenics_contact import (
     Body,
     ContactPair,
@@ -28,7 +29,7 @@ from fenics_contact._accuracy.certificate import Certificate, certify
 from fenics_contact._accuracy.state_errors import friction_error
 from fenics_contact.gallery import block, hemisphere, rectangle
 from fenics_contact.materials import PlaneStress
-from fenics_contact.mesh import bisection_partition, graph_partition, quadratic
+from fenics_contact.mesh import bisection_partition, quadratic
 from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG, solve
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.results.dual_solve import solve_dual

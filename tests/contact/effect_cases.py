@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from benchmarks.graph_partition import graph_partition
 from fenics_contact import (
     Body,
     ContactPair,
@@ -31,7 +32,7 @@ from fenics_contact import (
 )
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
-from fenics_contact.mesh import graph_partition, quadratic
+from fenics_contact.mesh import quadratic
 from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG
 from tests.contact.gallery import two_blocks
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
+from benchmarks.graph_partition import graph_partition
 from fenics_contact import (
     Body,
     ContactPair,
@@ -24,7 +25,7 @@ from fenics_contact import (
 )
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStress
-from fenics_contact.mesh import graph_partition, quadratic
+from fenics_contact.mesh import quadratic
 
 SOFT, STIFF = IsotropicElasticity(70.0, 0.3), IsotropicElasticity(2100.0, 0.2)
 

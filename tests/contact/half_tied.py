@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from mpi4py import MPI
 
+from benchmarks.graph_partition import graph_partition
 from fenics_contact import (
     Body,
     ContactPair,
@@ -21,7 +22,6 @@ from fenics_contact import (
 from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import PlaneStrain
-from fenics_contact.mesh import graph_partition
 
 MATERIAL = PlaneStrain(1.0, 0.3)
 TOP, TIED, FREE = Surface("up", "y0"), Surface("low", "tied"), Surface("low", "free")

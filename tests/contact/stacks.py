@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from benchmarks.graph_partition import graph_partition
 from fenics_contact import Body, ContactPair, Coulomb, Scene, Support, Surface, Traction, Tresca
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
-from fenics_contact.mesh import graph_partition
 
 RUBBER = IsotropicElasticity(100.0, 0.3)
 

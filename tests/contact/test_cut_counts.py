@@ -9,9 +9,9 @@ import pytest
 from mpi4py import MPI
 
 from benchmarks.cases.scenes import block_mesh, block_on_plane
+from benchmarks.graph_partition import graph_partition
 from fenics_contact import BodyMesh, Scene, box_partition, solve_scene
 from fenics_contact.gallery import LinkShape, two_links
-from fenics_contact.mesh import graph_partition
 from fenics_contact.mesh.bisection import default_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.study.scenes.chain_links import chain

@@ -299,7 +299,7 @@ NEVER = {
     *(f"fenics_contact.{room}" for room in ("design", "_optimize", "pictures", "output", "study")),
     "fenics_contact._large_deformations", "fenics_contact.results.deformed_state",
     "fenics_contact._fem.mechanics", "fenics_contact._fem.kinematics",
-    "fenics_contact._pairing.sliding", "pyvista", "matplotlib", "vtk", "vtkmodules", "gmsh", "pymetis",
+    "fenics_contact._pairing.sliding", "pyvista", "matplotlib", "vtk", "vtkmodules", "gmsh",
     "meshio",
 }  # fmt: skip
 AT_NEED = {"fenics_contact._pairing.mortar", "fenics_contact._accuracy", "clarabel"}

@@ -10,6 +10,7 @@ import pytest
 from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
+from benchmarks.graph_partition import graph_partition
 from fenics_contact import (
     Body,
     BodyForce,
@@ -31,7 +32,6 @@ from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
-from fenics_contact.mesh import graph_partition
 from fenics_contact.qp import FaceNewton
 from tests.contact.gallery import (
     FLOOR,

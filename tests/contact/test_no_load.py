@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from benchmarks.graph_partition import graph_partition
 from fenics_contact import Body, ContactPair, Coulomb, Pressure, Scene, Support, Surface, solve_scene
 from fenics_contact._pairing.search import without_rounding
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
-from fenics_contact.mesh import graph_partition
 from fenics_contact.qp import FaceNewton, Smalse
 
 STEEL = IsotropicElasticity(2.1e5, 0.3)

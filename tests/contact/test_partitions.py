@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from benchmarks.graph_partition import graph_partition
 from fenics_contact import (
     Body,
     BodyForce,
@@ -24,7 +25,6 @@ from fenics_contact import (
 )
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
-from fenics_contact.mesh import graph_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.readers import from_gmsh_model
 from tests.contact.checks import assert_solved

@@ -154,7 +154,7 @@ def test_unheld_motions_are_the_same_on_any_number_of_ranks(mpirun) -> None:
         import numpy as np
         from mpi4py import MPI
         from fenics_contact import solve_scene
-        from fenics_contact.mesh import graph_partition
+        from benchmarks.graph_partition import graph_partition
         from tests.contact.stacks import cut, turned_stack
         scene = turned_stack()
         state = solve_scene(scene, MPI.COMM_WORLD, partitions=cut(scene, 4), tolerance=1e-9)

@@ -15,7 +15,8 @@ from fenics_contact.gallery import Link, LinkShape, chain_link
 from fenics_contact.gallery.ring import WireSection
 from fenics_contact.mesh import boundary_faces, scaled_jacobian
 from fenics_contact.mesh.faces import vector_areas
-from fenics_contact.mesh.partition import check_face_connected, torn_node_counts
+from fenics_contact.mesh.partition import check_face_connected
+from tests.partition.counts import torn_node_counts
 
 CELLS = ["hexahedron", "tetrahedron"]
 

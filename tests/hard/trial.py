@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from benchmarks.graph_partition import graph_partition
 from fenics_contact import (
     ContactProblem,
     LoadStep,
@@ -22,7 +23,7 @@ from fenics_contact import (
     solve_steps,
 )
 from fenics_contact.errors import ConvergenceError
-from fenics_contact.mesh import bisection_partition, graph_partition
+from fenics_contact.mesh import bisection_partition
 from fenics_contact.qp import DualSolver, FaceNewton
 from fenics_contact.qp.solution import SolverStep
 from tests.hard.transform import in_units, steps_in_units

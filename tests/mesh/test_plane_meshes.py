@@ -12,8 +12,9 @@ from fenics_contact.gallery.blocks import split_hexahedra, split_quadrilaterals,
 from fenics_contact.mesh import bisection_partition, boundary_faces, scaled_jacobian
 from fenics_contact.mesh.cell_types import CELL_TYPES, QUADRILATERAL
 from fenics_contact.mesh.faces import cell_faces, neighbours, orient, vector_areas
-from fenics_contact.mesh.partition import check_face_connected, torn_node_counts
+from fenics_contact.mesh.partition import check_face_connected
 from fenics_contact.mesh.quality import jacobian_ratio, jacobians, volume
+from tests.partition.counts import torn_node_counts
 
 CELLS = ["quadrilateral", "triangle"]
 NORMALS = {"x0": [-3, 0], "x1": [3, 0], "y0": [0, -2], "y1": [0, 2]}

@@ -1,8 +1,7 @@
-"""METIS's subdomains hang together through faces, whatever METIS returns; their number suits the mesh."""
+"""Subdomains are connected through faces, also those of METIS; their number suits the mesh."""
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable
 
 import numpy as np
@@ -10,19 +9,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.graph_partition import graph_partition, smoothed
 from fenics_contact import BodyMesh, box_partition
-from fenics_contact.errors import InvalidInputError, MissingRequirementError
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, chain_link, half_disc, hemisphere, rectangle
-from fenics_contact.mesh import graph_partition
-from fenics_contact.mesh.bisection import default_partition, smoothed, target_parts
+from fenics_contact.mesh import bisection_partition
+from fenics_contact.mesh.bisection import default_partition, target_parts
 from fenics_contact.mesh.partition import (
     cell_weights,
     check_face_connected,
     check_one_piece,
     face_areas,
     merge_pieces,
-    torn_node_counts,
 )
+from tests.partition.counts import torn_node_counts
 
 SMALL = {
     "tetrahedron": block((0, 0, 0), (2, 2, 1), (2, 2, 1), "tetrahedron"),
@@ -105,21 +105,15 @@ def test_parts_that_metis_leaves_empty_are_filled(empty: list[int], monkeypatch:
     def metis(graph: object, vertices: np.ndarray, parts: int) -> np.ndarray:
         return full[np.arange(mesh.n_cells) % full.size]
 
-    module = importlib.import_module("fenics_contact.mesh.metis")
-    monkeypatch.setattr(module, "part_graph", metis)
+    monkeypatch.setattr("benchmarks.graph_partition.part_graph", metis)
     partition = graph_partition(mesh, 4)
     check_face_connected(mesh, partition)
     assert np.unique(partition).tolist() == [0, 1, 2, 3]
 
 
-def test_more_parts_than_cells_are_refused() -> None:
-    with pytest.raises(InvalidInputError, match="parts must be at most the 20 cells, got 21: take fewer"):
-        graph_partition(SMALL["quadrilateral"], 21)
-
-
 def test_a_count_that_is_none_is_refused() -> None:
     with pytest.raises(InvalidInputError, match="parts must be an integer of at least 1, got 0"):
-        graph_partition(SMALL["quadrilateral"], 0)
+        bisection_partition(SMALL["quadrilateral"], 0)
 
 
 def two_bricks() -> BodyMesh:
@@ -128,21 +122,14 @@ def two_bricks() -> BodyMesh:
     return BodyMesh(np.vstack([one.points, other.points]), np.vstack([one.cells, other.cells + one.n_nodes]))
 
 
-@pytest.mark.parametrize(
-    "cut",
-    [
-        lambda mesh, body: graph_partition(mesh, 2, body),
-        lambda mesh, body: default_partition(mesh, body=body),
-    ],
-)
-def test_a_body_in_separate_parts_is_named(cut: Callable[[BodyMesh, str], object]) -> None:
+def test_a_body_in_separate_parts_is_named() -> None:
     message = r"body 'rail' must be connected .* consists of 2 parts, the largest of 4 and 2 cells: join"
     with pytest.raises(InvalidInputError, match=message):
-        cut(two_bricks(), "rail")
+        default_partition(two_bricks(), body="rail")
     with pytest.raises(
         InvalidInputError, match="a mesh must be connected through faces to be cut, it consists"
     ):
-        cut(two_bricks(), "")
+        default_partition(two_bricks())
 
 
 def test_a_body_that_hangs_by_an_edge_is_in_two_parts() -> None:
@@ -153,23 +140,13 @@ def test_a_body_that_hangs_by_an_edge_is_in_two_parts() -> None:
     check_one_piece(mesh)
 
 
-def test_a_missing_pymetis_is_reported_with_the_way_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    find_spec = importlib.util.find_spec
-    monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name: None if name == "pymetis" else find_spec(name)
-    )
-    assert not graph_partition(SMALL["triangle"], 1).any(), "one part needs no METIS"
-    with pytest.raises(MissingRequirementError, match=r"needs pymetis .* found none\. .*pip install pymetis"):
-        graph_partition(SMALL["triangle"], 2)
-
-
 def test_all_ranks_get_the_same_subdomains(mpirun: Callable[..., str]) -> None:
     script = """
         import hashlib
         from mpi4py import MPI
-        from fenics_contact.mesh import graph_partition
+        from fenics_contact.mesh import bisection_partition
         from fenics_contact.gallery import hemisphere
-        partition = graph_partition(hemisphere(1.0, 8), 11)
+        partition = bisection_partition(hemisphere(1.0, 8), 11)
         hashes = MPI.COMM_WORLD.gather(hashlib.sha256(partition.tobytes()).hexdigest())
         if hashes:
             print(*hashes)

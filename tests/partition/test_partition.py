@@ -9,7 +9,8 @@ from fenics_contact import BodyMesh, box_partition
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, hemisphere
 from fenics_contact.mesh import bisection_partition
-from fenics_contact.mesh.partition import check_face_connected, combine, merge_pieces, torn_node_counts
+from fenics_contact.mesh.partition import check_face_connected, merge_pieces
+from tests.partition.counts import torn_node_counts
 
 CELLS = ["hexahedron", "tetrahedron"]
 
@@ -63,7 +64,7 @@ def test_two_numbers_are_no_box(brick: BodyMesh) -> None:
 
 def test_boxes_of_an_unstructured_mesh_are_refused() -> None:
     with pytest.raises(
-        InvalidInputError, match="needs a structured mesh, this one has grid None: use `graph"
+        InvalidInputError, match="needs a structured mesh, this one has grid None: use `bisection"
     ):
         box_partition(hemisphere(1.0, 2), (1, 1, 1))
 
@@ -144,8 +145,3 @@ def test_an_array_that_is_no_partition_is_refused(
 ) -> None:
     with pytest.raises(InvalidInputError, match=message):
         check_face_connected(brick, partition)
-
-
-def test_combined_partitions_share_no_number(brick: BodyMesh) -> None:
-    first, second = combine([box_partition(brick, (2, 1, 1)), box_partition(brick, (1, 3, 1))])
-    assert (np.unique(first).tolist(), np.unique(second).tolist()) == ([0, 1], [2, 3, 4])

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.graph_partition import graph_partition
 from fenics_contact import (
     Body,
     BodyMesh,
@@ -33,7 +34,7 @@ from fenics_contact._scene.loads import Load
 from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact._scene.supports import AnySupport
 from fenics_contact.gallery import rectangle
-from fenics_contact.mesh import bisection_partition, graph_partition
+from fenics_contact.mesh import bisection_partition
 from tests.random_scenes.deformed_parts import (
     any_material,
     friction_law,

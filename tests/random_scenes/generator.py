@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.graph_partition import graph_partition
 from fenics_contact import (
     Body,
     BodyForce,
@@ -29,7 +30,7 @@ from fenics_contact import (
 )
 from fenics_contact._scene.loads import Load
 from fenics_contact.materials.elastic import can_expand
-from fenics_contact.mesh import bisection_partition, graph_partition
+from fenics_contact.mesh import bisection_partition
 from tests.hard.transform import in_units
 from tests.random_scenes.arrangements import ARRANGEMENTS, Arrangement
 from tests.random_scenes.bodies import body, with_surface
