@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -12,53 +11,16 @@ import numpy as np
 from fenics_contact._base.checks import checked
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.automatic import AutomaticContact
-from fenics_contact._scene.body import Body
 from fenics_contact._scene.loads import Load
 from fenics_contact._scene.parts import SceneParts, with_discretisation
 from fenics_contact._scene.supports import AnySupport
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
-from fenics_contact.materials.elastic import Material
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.bisection import default_partition
-from fenics_contact.mesh.body_mesh import BodyMesh
 
 if TYPE_CHECKING:
     from fenics_contact._scene.plan import Effect, Plan
-
-
-OfBody = Material | Mapping[str, Material]
-"""A material, or a mapping from region to material."""
-
-
-def bodies_from(
-    meshes: Mapping[str, BodyMesh], materials: Material | Mapping[str, OfBody]
-) -> dict[str, Body]:
-    """Give the meshes of a file their materials.
-
-    Example:
-        >>> meshes = read_msh("chain.msh")  # doctest: +SKIP
-        >>> of = {"link *": steel, "pin": {"core": steel, "coat": zinc}}  # doctest: +SKIP
-        >>> bodies = bodies_from(meshes, of)  # doctest: +SKIP
-    """
-    if not isinstance(materials, Mapping):
-        return {name: Body(mesh, materials) for name, mesh in meshes.items()}
-    chosen = {}
-    for name in meshes:
-        fitting = [key for key in materials if key == name] or [k for k in materials if fnmatchcase(name, k)]
-        if not fitting:
-            raise InvalidInputError(
-                f"every body must have a material, {name!r} has none of {list(materials)}: name it, or give "
-                "a pattern such as 'link *' or '*'"
-            )
-        chosen[name] = fitting[0]
-    for key in materials:
-        if key not in chosen.values():
-            raise InvalidInputError(
-                f"materials must be those of bodies, {key!r} matches none of {list(meshes)}: check its "
-                "spelling, or leave it out"
-            )
-    return {name: Body(mesh, materials[chosen[name]]) for name, mesh in meshes.items()}
 
 
 @displayed

@@ -83,19 +83,6 @@ def closest_points(shape: SurfaceShape, points: np.ndarray) -> np.ndarray:
     return closest
 
 
-def principal_curvatures(shape: SurfaceShape, points: np.ndarray) -> np.ndarray:
-    """Return the principal curvatures of a surface, positive where its body is convex.
-
-    `shape`: the shape; `points`: points of the surface, shape (n, dim), [length]; elsewhere the parallel
-    surface through the point is meant.
-
-    The result has shape (n, dim − 1), ascending, [1 / length].
-    """
-    tangents = tangent_bases(evaluate_shape(shape, "normals", points))
-    bend = evaluate_shape(shape, "curvatures", points)
-    return np.asarray(np.linalg.eigvalsh(tangents @ bend @ np.swapaxes(tangents, 1, 2)))
-
-
 def tangent_bases(normals: np.ndarray) -> np.ndarray:
     """Return an orthonormal basis of the plane normal to each unit normal, (n, dim) -> (n, dim − 1, dim).
 

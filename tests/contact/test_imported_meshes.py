@@ -23,7 +23,6 @@ from fenics_contact import (
     read_mesh,
     solve_scene,
 )
-from fenics_contact._scene.scene import bodies_from
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
@@ -87,7 +86,12 @@ def test_bodies_of_an_abaqus_file_press_on_each_other_where_they_are_near(tmp_pa
     meshes, pairs = near_surfaces(read_mesh(tmp_path / "press.inp"), 0.01)
     contacts = [ContactPair(Surface(b, f"near {a}"), Surface(a, f"near {b}"), Coulomb(0.5)) for a, b in pairs]
     loads = [Traction("tool", "pushed", (0.2, 0.0, -1.0))]
-    scene = Scene(bodies_from(meshes, {"t*": STEEL}), [Support("table", "held")], loads, contacts)
+    scene = Scene(
+        {name: Body(mesh, STEEL) for name, mesh in meshes.items()},
+        [Support("table", "held")],
+        loads,
+        contacts,
+    )
     state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)
     np.testing.assert_allclose(state.contact.force.sum(axis=0), [-0.2, 0.0, 1.0], atol=1e-5)
 

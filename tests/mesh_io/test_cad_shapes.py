@@ -18,7 +18,8 @@ from fenics_contact.readers import OnCylinder, from_gmsh_model, gmsh_model
 from fenics_contact.readers.cad_shapes import cad_shapes
 from fenics_contact.shapes import Cylinder, Plane, Revolved, Sphere, SurfaceShape, Torus
 from fenics_contact.shapes.combined import Joined
-from fenics_contact.shapes.simple import closest_points, principal_curvatures
+from fenics_contact.shapes.simple import closest_points
+from tests.surface_shapes.curvatures import principal_curvatures
 
 OFF = (0.1, -0.2, 0.3)
 

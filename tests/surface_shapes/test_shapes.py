@@ -23,7 +23,8 @@ from fenics_contact.shapes import (
 )
 from fenics_contact.shapes.combined import Joined, Placed, placed, simplified
 from fenics_contact.shapes.parametric import tensor_grid
-from fenics_contact.shapes.simple import closest_points, evaluate_shape, principal_curvatures
+from fenics_contact.shapes.simple import closest_points, evaluate_shape
+from tests.surface_shapes.curvatures import principal_curvatures
 
 AXIS = (1.0, 2.0, -1.0)
 CENTRE = (0.1, -0.2, 0.3)
