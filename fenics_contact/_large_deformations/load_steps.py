@@ -41,25 +41,6 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger(__name__)
 
-#: First α.
-FIRST = 0.01
-#: Factor on α after a stage that failed.
-MORE = 4.0
-#: Factors on α after the first stages in a row that did not, and after later ones.
-LESS, MUCH_LESS = 0.8, 0.5
-#: Number of those first ones.
-CAREFUL = 3
-#: Tolerance of stages, which need not be exact.
-LOOSE = 1e-4
-#: Newton steps after which a stage counts as failed.
-MANY = 12
-#: Drag, relative to all forces, below which an equilibrium is tried.
-LITTLE = 3e-3
-#: Factor on the tolerance where bodies do not move at it, and on the drag before the next trial.
-TENTH = 0.1
-#: Most stages, those that fail included.
-MOST = 200
-
 
 @displayed
 @dataclass(frozen=True)
@@ -85,12 +66,44 @@ class Snap:
         )
 
 
+@dataclass(frozen=True)
+class Stages:
+    """Stages of a snap: how the drag α, relative to the stiffness of bodies, falls from one to the next.
+
+    Attributes:
+        first: First α.
+        more: Factor on α after a stage that failed.
+        less: The same after each of the first ``careful`` stages in a row that did not,
+        much_less: and after later ones.
+        careful: Number of those first ones.
+        tolerance: Tolerance of stages, which need not be exact.
+        tighter: Factor on it where bodies do not move at it, and on the drag before the next trial.
+        max_steps: Newton steps after which a stage counts as failed.
+        little: Drag, relative to all forces, below which an equilibrium is tried.
+        most: Largest number of stages, those that fail included.
+    """
+
+    first: float = 0.01
+    more: float = 4.0
+    less: float = 0.8
+    much_less: float = 0.5
+    careful: int = 3
+    tolerance: float = 1e-4
+    tighter: float = 0.1
+    max_steps: int = 12
+    little: float = 3e-3
+    most: int = 200
+
+
 class Snapping:
     """One such motion.
 
     Attributes:
+        by: How its drag falls.
         effort: That of all stages, those that failed included.
     """
+
+    by = Stages()
 
     def __init__(
         self,
@@ -107,27 +120,28 @@ class Snapping:
         self, at: Configuration, torn: TornSystem, known: Linearisation | None
     ) -> NonlinearEquilibrium:
         """Return the equilibrium where bodies come to rest. Collective."""
-        exact, loose = self._newton, replace(self._newton, max_steps=MANY, tolerance=LOOSE)
-        size, tried, in_a_row = FIRST, np.inf, 0
-        for _ in range(MOST):
+        by, exact = self.by, self._newton
+        loose = replace(exact, max_steps=by.max_steps, tolerance=by.tolerance)
+        size, tried, in_a_row = by.first, np.inf, 0
+        for _ in range(by.most):
             drag = Drag(size * self._equations.diagonal, at.displacement)
             load = self._load(at, torn)
             found = self._tried(loose, replace(load, drag=drag), at, known)
             if found is None:
-                size, in_a_row = MORE * size, 0
+                size, in_a_row = by.more * size, 0
                 continue
             if not found.effort.history and loose.tolerance > exact.tolerance:
-                loose = replace(loose, tolerance=max(TENTH * loose.tolerance, exact.tolerance))
+                loose = replace(loose, tolerance=max(by.tighter * loose.tolerance, exact.tolerance))
                 continue
             self.stages, in_a_row = self.stages + 1, in_a_row + 1
             part = self._dragged(drag, at, found)
             at, torn, known = found.configuration, found.evaluation.torn, found.linearisation
-            if part < min(LITTLE, TENTH * tried):
+            if part < min(by.little, by.tighter * tried):
                 tried = part
                 end = self._tried(exact, self._load(at, torn), at, known)
                 if end is not None:
                     return end
-            size *= LESS if in_a_row <= CAREFUL else MUCH_LESS
+            size *= by.less if in_a_row <= by.careful else by.much_less
         raise ConvergenceError(
             f"bodies that snap must come to rest, but after {self.stages} stages they still move, the drag "
             f"being {size:.1e} of their stiffness: take smaller load steps, or hold them better",
@@ -157,12 +171,6 @@ class Snapping:
         part = float(np.sqrt(square)) / residuals.force_scale
         safe_log(_LOG.info, "stage %d of a snap: drag %.1e of the forces", self.stages, part)
         return part
-
-
-#: Newton steps of an easy load step: the next one is twice as long.
-EASY = 6
-#: Smallest part of a load step that is tried before bodies may snap.
-SNAPPING = 1.0 / 16
 
 
 @displayed
@@ -227,6 +235,8 @@ class AutomaticSteps:
         finer_history: Whether each part is a step of its own for slip and the histories of materials. A path
             that turns within a load step is then followed more closely, and results depend on the parts, see
             `DeformedState.fractions`; more load steps do the same for certain.
+        easy: Newton steps of an easy part: the next one is twice as long.
+        smallest_before_snap: Smallest part of a load step that is tried before bodies may snap.
     """
 
     newton: TangentNewton = field(default_factory=TangentNewton)
@@ -234,6 +244,8 @@ class AutomaticSteps:
     smallest: float = 1.0 / 256
     snaps: bool = False
     finer_history: bool = False
+    easy: int = 6
+    smallest_before_snap: float = 1.0 / 16
 
     def __post_init__(self) -> None:
         """Check the parts.
@@ -278,7 +290,7 @@ class AutomaticSteps:
         at = start if start.contact else start.on(equations.contact.at(first, start.displacement, None))
         stepper = _LoadStepper(self, equations, first, target, at, timer, known)
         part, longest = self.first, equations.contact.longest_part(first, target)
-        smallest = max(self.smallest, SNAPPING) if self.snaps else self.smallest
+        smallest = max(self.smallest, self.smallest_before_snap) if self.snaps else self.smallest
         while stepper.reached < 1.0:
             left = 1.0 - stepper.reached
             part = left / np.ceil(left / min(part, longest) - 1e-9)
@@ -301,7 +313,7 @@ class AutomaticSteps:
                     steps = stepper.snap(fraction)
                 except ConvergenceError as unrest:
                     raise stepper.ends(f"{failure}; {unrest}") from unrest
-            part *= 2.0 if steps <= EASY else 1.0
+            part *= 2.0 if steps <= self.easy else 1.0
         return stepper.path()
 
 

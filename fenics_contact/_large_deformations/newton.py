@@ -28,22 +28,6 @@ from fenics_contact.qp.newton_steps import Damped, Forcing, damp, run_newton
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 from fenics_contact.qp.solution import Residuals, SolverStep
 
-#: Least factor on the residual of linear systems, see `TangentNewton.care`.
-LEAST_CARE = 1e-3
-#: Errors at contact below this part of the forces out of balance say nothing of the active set.
-HIDDEN = 1e-2
-#: Residual below which a step without progress is reason enough for that care.
-NEAR = 1e-2
-#: Part of the slip bound within which a disc counts as slipping at the start of a load step.
-SLIPPED = 1e-6
-#: Residual of a linear system that is small enough, relative to the tolerance of the step.
-FINE = 1e-4
-#: Residual of contact problems that are solved as a whole, at the start of a history.
-NESTED = 1e-2
-#: Friction short of its bound by less than this part of the largest one counts as slipping.
-SLIDING = 1e-2
-#: Relative residual where supports take bodies above which they are pressed rather than drawn.
-PRESSED = 0.5
 #: What to do where closed contacts and supports leave some body free to move.
 HOLD = (
     "give each body that slides or turns freely a support in that direction, or its contacts friction; take "
@@ -133,6 +117,14 @@ class TangentNewton:
             the natural map becomes more cautious.
         caution: Factor on ρ of the natural map then.
         room: Part of the smallest det F that a step must leave.
+        near: Residual below which a first step without progress is reason enough for care.
+        least_care: Least factor by care, so that linear systems are not solved beyond rounding.
+        fine: Residual of a linear system that is always small enough, relative to `tolerance`.
+        hidden: Errors at contact below this part of the forces out of balance do not shorten a step: they do
+            not depend on the active set then.
+        slipped: Part of the slip bound within which a disc counts as slipping at the start of a load step:
+            what slipped in the last one mostly goes on.
+        nested: Tolerance of contact problems that are solved as a whole, at the start of a history.
 
     References:
         S. C. Eisenstat, H. F. Walker, Choosing the forcing terms in an inexact Newton method, SIAM J. Sci.
@@ -147,6 +139,12 @@ class TangentNewton:
     patience: int = 4
     caution: float = 0.2
     room: float = 0.2
+    near: float = 1e-2
+    least_care: float = 1e-3
+    fine: float = 1e-4
+    hidden: float = 1e-2
+    slipped: float = 1e-6
+    nested: float = 1e-2
 
     def __post_init__(self) -> None:
         """Check the numbers.
@@ -154,7 +152,8 @@ class TangentNewton:
         Raises:
             InvalidInputError: If one is not between 0 and 1, or a count is not positive.
         """
-        for name in ("tolerance", "forcing", "care", "caution", "room"):
+        ratios = ("tolerance", "forcing", "care", "caution", "room")
+        for name in (*ratios, "near", "least_care", "fine", "hidden", "slipped", "nested"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise InvalidInputError(
                     f"{name} of TangentNewton must lie between 0 and 1, got {getattr(self, name)!r}: it is a "
@@ -204,8 +203,8 @@ class _Pace:
     def after(self, method: TangentNewton, worst: float) -> _Pace:
         """Return the pace of the next step, given the residual at its start."""
         last, care = self.late[-1] if self.late else None, self.care
-        if last and (self.stalls or worst < NEAR):
-            care = 1.0 if worst < 0.5 * last else max(method.care * care, LEAST_CARE)
+        if last and (self.stalls or worst < method.near):
+            care = 1.0 if worst < 0.5 * last else max(method.care * care, method.least_care)
         rule = Forcing(method.forcing, np.inf, method.tolerance)
         forcing = rule.by_reduction(worst, last, self.forcing, care)
         late = (*self.late, worst)[-method.patience - 1 :]
@@ -334,9 +333,9 @@ class _Run:
         assert near is not None
         step = np.concatenate([evaluation.at.natural_step(state.pace.caution), np.zeros(near.further.count)])
         if state.history or evaluation.torn.points.count == 0 or self._forces_known(evaluation):
-            floor = FINE * method.tolerance * evaluation.residuals.gluing_scale
+            floor = method.fine * method.tolerance * evaluation.residuals.gluing_scale
             # What slipped in the last load step will mostly go on: its forces are at the bound.
-            margin = 0.0 if state.history else SLIPPED
+            margin = 0.0 if state.history else method.slipped
             problem, forcing = near.problem(evaluation), state.pace.forcing
             taken = tangent_step(problem, step, forcing, floor, method.max_products, margin=margin)
             if taken is not None:
@@ -357,8 +356,8 @@ class _Run:
     def _whole(self, evaluation: ResidualState) -> FaceNewton:
         """Return the solver of contact as a whole: where forces are known a failure cuts the load step."""
         if not self._forces_known(evaluation):
-            return FaceNewton(NESTED)
-        return FaceNewton(NESTED, max_products=self.method.max_products, doubts=False)
+            return FaceNewton(self.method.nested)
+        return FaceNewton(self.method.nested, max_products=self.method.max_products, doubts=False)
 
     def _damped(self, state: _State, moved: Vector, change: Vector) -> Damped[ResidualState]:
         """Return the end of a step as long as cells allow, or a better point of it. Collective.
@@ -375,7 +374,7 @@ class _Run:
                 return start.evaluate(at.displacement + part * moved, at.multiplier + part * change, caution)
 
         full, before = after(1.0), start.residuals
-        if full.residuals.natural <= max(before.natural, HIDDEN * full.residuals.coarse):
+        if full.residuals.natural <= max(before.natural, self.method.hidden * full.residuals.coarse):
             return Damped(full, longest)
         earlier = (None if old is None else old.at_rows for old in (before, state.before))
         found = damp(full, after, lambda each: each.residuals.at_rows, earlier)
@@ -411,13 +410,17 @@ class _Run:
 
 
 def starts(
-    evaluated: Callable[[Configuration], ResidualState], at: Configuration, moved: Vector | None
+    evaluated: Callable[[Configuration], ResidualState],
+    at: Configuration,
+    moved: Vector | None,
+    pressed: float = 0.5,
 ) -> tuple[ResidualState, Configuration | None]:
     """Return the equations where Newton's method starts, and where else if its first step fails. Collective.
 
     Bodies that touch nothing, there as here, start where their supports take them as rigid ones. So do bodies
     that slide: with their forces, on surfaces that are found where they come to lie, they are in equilibrium
-    but for what lies under them. Where points stick or are pressed, the tangent knows better where bodies go.
+    but for what lies under them. Where points stick or are pressed, as a relative residual above ``pressed``
+    shows, the tangent knows better where bodies go.
     """
     contact = at.contact
     touching = contact is not None and _acts(contact.torn, at.multiplier)
@@ -428,7 +431,7 @@ def starts(
     except ConvergenceError:
         return evaluated(at), None
     if touching:
-        return (there, at) if there.residuals.worst < PRESSED else (evaluated(at), None)
+        return (there, at) if there.residuals.worst < pressed else (evaluated(at), None)
     if _acts(there.torn, there.torn.law.feasible(there.at.multiplier).project(-there.constraint_residual)):
         return evaluated(at), None
     return there, None
@@ -440,9 +443,9 @@ def _acts(torn: TornSystem, forces: Vector) -> bool:
     return global_sum(torn.numbering.comm, np.count_nonzero(forces[touching]))[0] > 0.0
 
 
-def _slides(torn: TornSystem, multiplier: Vector) -> bool:
-    """Return whether all friction is at its bound. Collective."""
+def _slides(torn: TornSystem, multiplier: Vector, short: float = 1e-2) -> bool:
+    """Return whether all friction is at its bound, but for ``short`` of the largest bound. Collective."""
     comm, bound = torn.numbering.comm, torn.law.bound(multiplier)
     friction = np.linalg.norm(multiplier[torn.layout.tangential], axis=1)
     largest = global_max(comm, float(bound.max(initial=0.0)))
-    return global_max(comm, float((bound - friction).max(initial=0.0))) <= SLIDING * largest
+    return global_max(comm, float((bound - friction).max(initial=0.0))) <= short * largest

@@ -37,16 +37,13 @@ from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.kernels import rigid_body_modes
 from fenics_contact.qp.coarse import CoarseSpace
 
-#: Largest residual of a solution with factors that are used, relative to its right side.
-WRONG = 1e-8
-#: Further memory that MUMPS may take where its estimate was too small, in percent.
-ROOM = (100, 400)
-
 
 class RefillableFactor(Factor):
     """Cholesky factors that may take other matrices with the same pattern."""
 
     positive = True
+    #: Largest residual of a solution with factors that are used, relative to its right side.
+    accuracy = 1e-8
 
     def __init__(self, matrix: sp.csr_matrix) -> None:
         """Factor ``matrix``, shape (n, n)."""
@@ -74,15 +71,15 @@ class RefillableFactor(Factor):
         """Return whether a solution satisfies its equations: without pivoting it may not."""
         right = np.random.default_rng(0).standard_normal(self.size)
         self.solve(right, solution := np.empty_like(right))
-        return bool(np.linalg.norm(matrix @ solution - right) <= WRONG * np.linalg.norm(right))
+        return bool(np.linalg.norm(matrix @ solution - right) <= self.accuracy * np.linalg.norm(right))
 
 
 class IndefiniteFactor(RefillableFactor):
     """LDLᵀ factors of a sparse symmetric matrix on one rank, by MUMPS, with the number of negative pivots."""
 
     positive = False
-    #: Further memory of each analysis, in percent; MUMPS's own first.
-    _memory: tuple[int | None, ...] = (None, *ROOM)
+    #: Further memory of each analysis, in percent; MUMPS's own first, more where that was too small.
+    _memory: tuple[int | None, ...] = (None, 100, 400)
 
     @property
     def negative(self) -> int:
@@ -132,18 +129,6 @@ def mostly_positive(matrix: sp.csr_matrix, unused: RefillableFactor | None) -> R
     return unused if unused.fits(matrix) else with_inertia(matrix, None)
 
 
-#: Fixing nodes relative to the cube root of the number of nodes: held at its corners alone, a body under
-#: stress buckles around them.
-SPREAD = 4.0
-#: Motions softer than this fraction of the softest one without stress are held by columns of their own: these
-#: by a multiple of their negative stiffness, and by a fraction of a typical entry of the stiffness at least.
-SOFT, GRIP, LEAST_GRIP = 0.5, 3.0, 0.1
-#: New vectors in the search for soft motions, and iterations of the first search and of later ones.
-PROBES, FIRST_SWEEPS, SWEEPS = 4, 6, 2
-#: Accuracy of eigenvectors, and restarts of the search for them: any columns will do.
-ROUGH, RESTARTS = 1e-2, 20
-
-
 class TangentOperator(FactoredOperator):
     """K_ρ⁻¹ with K_ρ = K + C Cᵀ, and a Schur complement on the interface, for a symmetric tangent K.
 
@@ -164,6 +149,18 @@ class TangentOperator(FactoredOperator):
     _searched: np.ndarray
     _softest: float
     _released: tuple[RefillableFactor | None, RefillableFactor | None] = (None, None)
+    #: Motions softer than this fraction of the softest one without stress are held by columns of their own,
+    soft = 0.5
+    #: by this multiple of their negative stiffness,
+    grip = 3.0
+    #: and by this fraction of a typical entry of the stiffness at least.
+    least_grip = 0.1
+    #: New vectors in the search for soft motions,
+    probes = 4
+    #: iterations of the first search,
+    first_sweeps = 6
+    #: and of later ones, which start from what was found before.
+    later_sweeps = 2
 
     def __init__(self, subdomain: Subdomain, interface: np.ndarray, earlier: TangentOperator | None) -> None:
         """Factor a subdomain."""
@@ -200,18 +197,18 @@ class TangentOperator(FactoredOperator):
         self, held: sp.csr_matrix, factor: IndefiniteFactor, earlier: TangentOperator | None, typical: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return motions that need columns of their own, shape (n, k), and the stiffness of each."""
-        probes = np.random.default_rng(0).standard_normal((factor.size, PROBES))
-        sweeps = SWEEPS
+        probes = np.random.default_rng(0).standard_normal((factor.size, self.probes))
+        sweeps = self.later_sweeps
         if earlier is not None:
             probes, self._softest = np.hstack([earlier._searched, probes]), earlier._softest
         else:
-            sweeps = FIRST_SWEEPS
+            sweeps = self.first_sweeps
         values, vectors = _softest(held, factor, probes, sweeps)
         if earlier is None:
             self._softest = float(np.abs(values).min())
-        soft = values < SOFT * self._softest
+        soft = values < self.soft * self._softest
         self._searched = vectors[:, soft]
-        return self._searched, GRIP * np.maximum(-values[soft], 0.0) + LEAST_GRIP * typical
+        return self._searched, self.grip * np.maximum(-values[soft], 0.0) + self.least_grip * typical
 
     def _forces(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         here, inside = super()._forces(displacement)
@@ -223,9 +220,13 @@ class TangentOperator(FactoredOperator):
         return super()._forces_from_inside(displacement) + self._at_interface @ moved
 
 
-def _well_spread(points: np.ndarray) -> np.ndarray:
-    """Return the dofs of nodes by which a subdomain is held, ascending, shape (n_dofs,)."""
-    return fixing_dofs(points, max(FIXING_NODES, round(SPREAD * len(points) ** (1.0 / 3.0))))
+def _well_spread(points: np.ndarray, spread: float = 4.0) -> np.ndarray:
+    """Return the dofs of nodes by which a subdomain is held, ascending, shape (n_dofs,).
+
+    Their number is ``spread`` times the cube root of that of all nodes: held at its corners alone, a body
+    under stress buckles around them.
+    """
+    return fixing_dofs(points, max(FIXING_NODES, round(spread * len(points) ** (1.0 / 3.0))))
 
 
 class _Updated:
@@ -284,9 +285,12 @@ def _negative(held: sp.csr_matrix, factor: IndefiniteFactor, start: np.ndarray) 
 
 
 def _lowest(operator: sp.csr_matrix | LinearOperator, count: int, start: np.ndarray) -> np.ndarray:
-    """Return those approximate eigenvectors of the lowest eigenvalues that are found soon, shape (n, k)."""
+    """Return those approximate eigenvectors of the lowest eigenvalues that are found soon, shape (n, k).
+
+    Any columns will do, so that two digits and few restarts suffice.
+    """
     try:
-        return np.asarray(eigsh(operator, count, which="SA", v0=start, tol=ROUGH, maxiter=RESTARTS)[1])
+        return np.asarray(eigsh(operator, count, which="SA", v0=start, tol=1e-2, maxiter=20)[1])
     except ArpackNoConvergence as found:
         return np.asarray(found.eigenvectors)
 

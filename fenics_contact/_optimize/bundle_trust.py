@@ -85,9 +85,6 @@ def _refuse(constraints: tuple[NonlinearConstraint, ...], values: list[float], f
         )
 
 
-_CERTIFICATE = 10.0  # slack of the certificate beside the predicted decrease
-
-
 @dataclass(frozen=True)
 class StoppingTest:
     r"""Test on the predicted decrease w and on the certificate σ + r‖z‖.
@@ -99,12 +96,15 @@ class StoppingTest:
     Attributes:
         limit: Decrease of J that is not worth a step, ε (s + \|J\|).
         reach: Least r, in scaled variables; a longer step extends it to its own length.
+        slack: Largest certificate at the stop in units of ``limit``: it bounds J from below within r, more
+            than the predicted decrease claims.
     """
 
     limit: float
     rounding: float
     reach: float
     first_t: float
+    slack: float = 10.0
 
     def reason(self, step: Step, solve: Callable[[float], Step]) -> Reason | None:
         """Return CONVERGED or STATIONARY where the centre is a solution within the tolerance, else None."""
@@ -112,7 +112,7 @@ class StoppingTest:
         if certificate <= self.limit:
             return Reason.STATIONARY
         promising = step.decrease > max(self.limit, self.rounding)
-        if promising or (certificate > _CERTIFICATE * self.limit and step.decrease > self.rounding):
+        if promising or (certificate > self.slack * self.limit and step.decrease > self.rounding):
             return None
         longer = step if step.t >= self.first_t else solve(self.first_t)
         return Reason.CONVERGED if longer.decrease <= self.limit else None
@@ -126,11 +126,6 @@ def stopping_test(
     return StoppingTest(tolerance * (value_scale + abs(value)), rounding, reach, first_t)
 
 
-_RADIUS = 3.0  # first trust radius, in lengths of the problem
-_RADIUS_LEAST = 1e-8  # least one, in lengths of the problem
-_T_LEAST, _T_MOST = 1e-10, 1e4  # range of t, in units of the first t
-_FIRST_SUBGRADIENT = 0.01  # relative error that the first subgradient of an inexact function may have
-_SLOPE_SHARE = 0.1  # error of an inexact subgradient along a step, relative to the predicted decrease
 # Based on subgradients alone.
 _OF_THE_MODEL = (Reason.CONVERGED, Reason.STATIONARY, Reason.NO_DESCENT, Reason.INFEASIBLE)
 _GRADIENT_NEAR = "a gradient nearby, as the centre lies on a kink"
@@ -187,6 +182,15 @@ class BundleTrust:
         descent: Fraction of the predicted decrease that makes a step serious, in (0, 1).
         inexactness: Errors of J requested from an inexact function, as a fraction of the predicted decrease,
             less than half of ``descent``.
+        slope_share: Error of an inexact subgradient along a step, as a fraction of the predicted decrease
+            (de Oliveira, Sagastizábal, Lemaréchal 2014: bounded errors along the step suffice).
+        first_accuracy: Relative error that the first subgradient of an inexact function may have, when no
+            decrease is predicted yet.
+        radius: First trust radius in lengths of the problem: more than the diagonal of the box, so that it
+            acts only after an invalid design.
+        least_radius: Radius in these lengths below which the design practically cannot move.
+        least_t: Least t in units of the first one, below which no descent can be expected.
+        most_t: Largest t in the same units (the bracket of Schramm and Zowe 1992).
         value_scale: Absolute part of the stopping test, for an objective whose minimum is about 0; None for
             the size of J at the start, but at most 1.
         feasibility: Largest violation of a nonlinear constraint at the stop, relative to its size.
@@ -195,6 +199,8 @@ class BundleTrust:
     References:
         H. Schramm and J. Zowe, A version of the bundle idea for minimizing a nonsmooth function: conceptual
         idea, convergence analysis, numerical results, SIAM J. Optim. 2 (1992) 121-152.
+        W. de Oliveira, C. Sagastizábal, C. Lemaréchal, Convex proximal bundle methods in depth: a unified
+        analysis for inexact oracles, Math. Program. 148 (2014) 241-277.
         K. C. Kiwiel, Proximity control in bundle methods for convex nondifferentiable
         minimization, Math. Program. 46 (1990) 105-122.
         R. H. Byrd, J. Nocedal, R. A. Waltz, Steering exact penalty methods for nonlinear programming, Optim.
@@ -212,10 +218,17 @@ class BundleTrust:
     value_scale: float | None = None
     feasibility: float = 1e-6
     raise_on_failure: bool = True
+    slope_share: float = 0.1
+    first_accuracy: float = 0.01
+    radius: float = 3.0
+    least_radius: float = 1e-8
+    least_t: float = 1e-10
+    most_t: float = 1e4
 
     def __post_init__(self) -> None:
         """Reject parameters with which the method cannot work."""
-        for name in ("tolerance", "first_step", "value_scale", "feasibility"):
+        positive = ("tolerance", "first_step", "value_scale", "feasibility", "slope_share", "first_accuracy")
+        for name in (*positive, "radius", "least_radius", "least_t", "most_t"):
             given = getattr(self, name)
             if given is not None and not 0.0 < given < np.inf:
                 raise InvalidInputError(f"{name} must be positive and finite, got {getattr(self, name)}")
@@ -281,13 +294,14 @@ class _Run:
     def start(self) -> MethodState:
         """Evaluate the starting point; its planes are the bundle."""
         method, problem = self.method, self.problem
-        centre = first_centre(problem, _FIRST_SUBGRADIENT, method.feasibility)
+        centre = first_centre(problem, method.first_accuracy, method.feasibility)
         planes = merit_planes(problem, centre)
         first, norm, locality = planes[0], planes[0].length, method.locality / problem.length
-        t, radius = method.first_step * problem.length / (norm or 1.0), _RADIUS * problem.length
+        t, radius = method.first_step * problem.length / (norm or 1.0), method.radius * problem.length
         bundle = Bundle.of_centre(first, method.locality * norm / problem.length)
         bundle = with_pieces(bundle, problem, centre, centre.value, np.zeros(problem.start.size))
-        trust = Trust(t, radius, _T_LEAST * t, _T_MOST * t, _RADIUS_LEAST * problem.length)
+        least_radius = method.least_radius * problem.length
+        trust = Trust(t, radius, method.least_t * t, method.most_t * t, least_radius)
         error, violation = centre.error, problem.constraints_at(centre).violation
         values = centre.value, centre.value, 0.0, t, 0.0, norm, 0.0, 1, 1, error, violation
         history = (Record(0, StepKind.START, *values),)
@@ -342,7 +356,8 @@ class _Run:
         norm = float(np.linalg.norm(state.bundle.gradients[0]))
         norm += sum(one.penalty * float(np.linalg.norm(one.bundle.gradients[0])) for one in state.soft)
         worth = max(step.decrease, test.limit if reach else test.rounding)
-        return demand(worth, max(step.length, reach), norm, (self.method.inexactness, _SLOPE_SHARE))
+        shares = self.method.inexactness, self.method.slope_share
+        return demand(worth, max(step.length, reach), norm, shares)
 
     def _wanted(
         self,

@@ -79,7 +79,6 @@ Constraints: TypeAlias = "Constraint | Sequence[Constraint]"
 
 # A row counts as satisfied within this fraction of the size of its terms, which is rounding.
 _FEASIBILITY = 1e-9
-_PROJECTIONS = 3
 
 
 def _frozen(values: ArrayLike, name: str, dimensions: int) -> Array:
@@ -184,8 +183,9 @@ class FeasibleSet:
 
     def project(self, x: Array) -> Array:
         """Return the feasible point nearest to x, shape (n,); x clipped to the box where it is feasible."""
-        # The first programme is solved to a fraction of the distance; the second removes the remainder.
-        for _ in range(_PROJECTIONS):
+        # The first programme is solved to a fraction of the distance; the second removes the remainder, a
+        # third its rounding.
+        for _ in range(3):
             if not self.violations(x):
                 break
             near = self.around(x, np.ones(x.size))

@@ -186,10 +186,6 @@ def multipliers(problem: PosedProblem, state: MethodState, step: Step) -> Array:
     return np.where(np.abs(found) * lengths > least, found * here.factors, 0.0)
 
 
-_NEAR = 1e-2  # distance to a neighbour, in lengths of the problem
-_ATTEMPTS = 8  # directions that are tried until one yields half the distance
-
-
 def verified(problem: PosedProblem, given: Evaluation, number: int) -> Evaluation:
     """Return an evaluation whose subgradient is valid, as far as the function knows.
 
@@ -223,17 +219,20 @@ def with_verified_centre(problem: PosedProblem, state: MethodState) -> MethodSta
     return replace(state, centre=centre, bundle=remaining, trust=trust, careful=True, soft=tuple(soft))
 
 
-def neighbour(problem: PosedProblem, x: Array) -> Array:
+def neighbour(problem: PosedProblem, x: Array, *, distance: float = 1e-2, attempts: int = 8) -> Array:
     """Return a feasible point near x in a random direction, the same one for the same x.
 
     Steps that leave the box are reflected into it; of several points the one furthest from x is taken, x
     itself where no other is feasible.
+
+    `distance`: length of the steps, in lengths of the problem; `attempts`: directions that are tried until
+    one yields half that distance.
     """
     allowed, scale = problem.allowed, problem.scale
     below, above = (allowed.lower - x) / scale, (allowed.upper - x) / scale
-    length, best = _NEAR * problem.length, x
+    length, best = distance * problem.length, x
     random = np.random.default_rng(np.frombuffer(x.tobytes(), dtype=np.uint32))
-    for _ in range(_ATTEMPTS):
+    for _ in range(attempts):
         way = random.standard_normal(x.size)
         way *= length / np.linalg.norm(way)
         way = np.where((way < below) | (way > above), -way, way)

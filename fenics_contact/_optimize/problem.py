@@ -164,12 +164,6 @@ def _length(start: Array, allowed: FeasibleSet, scale: Array) -> float:
     return max(1.0, float(np.linalg.norm(start / scale)))
 
 
-#: Factor on the sufficient accuracy that is requested, so that not every step re-evaluates the centre.
-_HEADROOM = 0.25
-#: An unconfirmed centre is evaluated with errors smaller by this factor.
-_CONFIRM = 0.1
-
-
 @dataclass(frozen=True)
 class Demand:
     """The errors that a decision tolerates.
@@ -179,6 +173,10 @@ class Demand:
     where that is larger, the decrease that is not worth a step. No trial that raises J then becomes the
     centre, as long as twice the share is less than the ``descent`` of the method.
 
+    Attributes:
+        headroom: Factor on the sufficient accuracy that is requested: not every step re-evaluates the centre.
+        confirm: An unconfirmed centre is evaluated with errors smaller by this factor.
+
     References:
         K. C. Kiwiel, A proximal bundle method with approximate subgradient linearizations, SIAM J. Optim. 16
         (2006) 1007-1023. W. de Oliveira, C. Sagastizábal, C. Lemaréchal, Convex proximal bundle methods in
@@ -187,11 +185,13 @@ class Demand:
 
     value: float
     subgradient: float
+    headroom: float = 0.25
+    confirm: float = 0.1
 
     @property
     def asked(self) -> Accuracy:
         """Accuracy to request from the function."""
-        return Accuracy(_HEADROOM * self.value, _HEADROOM * self.subgradient)
+        return Accuracy(self.headroom * self.value, self.headroom * self.subgradient)
 
     def missed_by(self, centre: Evaluation) -> bool:
         """Return whether the centre must be re-evaluated, if that was not tried already."""
@@ -200,12 +200,12 @@ class Demand:
 
     def confirmed_by(self, centre: Evaluation) -> bool:
         """Return whether a second evaluation has shown that the centre's subgradient is accurate enough."""
-        return centre.turned <= self.subgradient / _CONFIRM or centre.asked_subgradient == 0.0
+        return centre.turned <= self.subgradient / self.confirm or centre.asked_subgradient == 0.0
 
     def sharper_than(self, centre: Evaluation) -> Accuracy:
         """Return the accuracy for a re-evaluation of the centre."""
-        value = min(self.asked.value, _CONFIRM * centre.asked_value)
-        return Accuracy(value, min(self.asked.subgradient, _CONFIRM * centre.asked_subgradient))
+        value = min(self.asked.value, self.confirm * centre.asked_value)
+        return Accuracy(value, min(self.asked.subgradient, self.confirm * centre.asked_subgradient))
 
 
 def demand(worth: float, reach: float, norm: float, shares: tuple[float, float]) -> Demand:

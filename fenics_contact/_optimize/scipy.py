@@ -26,7 +26,6 @@ Array = NDArray[np.float64]
 _WITHOUT_DERIVATIVE = ("cobyla", "cobyqa", "nelder-mead", "powell")
 _WITHOUT_BOUNDS = ("cobyla",)  # before SciPy 1.11; as constraints, every version takes them
 _CONSTRAINED = ("cobyla", "cobyqa", "slsqp", "trust-constr")
-_TINY = float(np.finfo(float).tiny)
 _SLOPE = 10.0  # of the wall around invalid designs, in scaled values over scaled variables
 
 
@@ -225,7 +224,7 @@ class ForScipy:
         distance = float(np.linalg.norm(away))
         top = max(visit.value for visit in valid) / self._unit
         # Curved, because quasi-Newton methods estimate the curvature.
-        steep = _SLOPE * (1.0 + distance) / max(distance, _TINY)
+        steep = _SLOPE * (1.0 + distance) / max(distance, float(np.finfo(float).tiny))
         wall = np.asarray(steep * away, dtype=np.float64)
         return top + _SLOPE * (1.0 + 0.5 * distance) * distance, wall
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +25,6 @@ from fenics_contact.errors.kinds import safe_log
 Array = NDArray[np.float64]
 
 _LOG = logging.getLogger(__name__)
-
-_REFINEMENTS = 2
-_BLURRED = 1e-2  # ‖z‖ in units of the programme below which a second solve sharpens it
-_VANISHED = 1e-7  # ‖z‖ against the longest subgradient below which it is rounding and cannot be sharpened
 
 
 @dataclass(frozen=True)
@@ -85,7 +82,16 @@ class Model:
         return replace(self, bundle=self.bundle.chosen(rows), soft=soft)
 
 
-def solve_step(bundle: Bundle, near: Surroundings, t: float, soft: Sequence[SoftConstraint] = ()) -> Step:
+def solve_step(
+    bundle: Bundle,
+    near: Surroundings,
+    t: float,
+    soft: Sequence[SoftConstraint] = (),
+    *,
+    sharpenings: int = 2,
+    blurred: float = 1e-2,
+    vanished: float = 1e-7,
+) -> Step:
     r"""Minimise v + Σ ρ_k s_k + ‖y‖²/(2t) subject to g_i·y - β_i ≤ v, C y ≤ room and E y = 0.
 
     Each nonlinear inequality adds c_k + a_ki·y - β_ki ≤ s_k for its planes, and s_k ≥ 0.
@@ -96,14 +102,18 @@ def solve_step(bundle: Bundle, near: Surroundings, t: float, soft: Sequence[Soft
     solved again with γ = ‖z‖, without the planes that lie too deep to affect the solution, and the sharper
     result is used if the solver reports success.
 
+    `sharpenings`: largest number of further solves; `blurred`: ‖z‖ in units of the programme below which a
+    further solve sharpens it; `vanished`: ‖z‖ relative to the longest subgradient below which it is rounding
+    and cannot be sharpened.
+
     References:
         H. Schramm and J. Zowe, SIAM J. Optim. 2 (1992) 121-152, section 2.
     """
     model = Model(bundle, near, soft)
     lengths = np.sqrt((bundle.gradients**2).sum(axis=1))
     step, unit = _solved(model, t, lengths)
-    for _ in range(_REFINEMENTS):
-        if not _VANISHED * lengths.max() < step.aggregate_norm < _BLURRED * unit:
+    for _ in range(sharpenings):
+        if not vanished * lengths.max() < step.aggregate_norm < blurred * unit:
             break
         unit = step.aggregate_norm
         sharper = _refined(model, step, lengths)
@@ -214,14 +224,6 @@ def _step(model: Model, solution: QuadraticSolution, t: float, unit: float) -> S
     )
 
 
-_GROWTH = 10.0  # largest factor on t after one serious step
-_STREAK = 2  # consecutive serious steps after which t at least doubles
-_SHRINKAGE = (0.1, 0.5)  # smallest and largest factor on t after a bad null step
-_PATIENCE = 1  # null steps that may be far off before t shrinks
-_FAR = 3.0  # a null step is far off when its error exceeds this many predicted decreases
-_CUT = 0.5  # fraction of the predicted decrease that a new plane must remove, else the step was too long
-
-
 @dataclass(frozen=True)
 class Trial:
     """A trial step and the response of the objective.
@@ -230,8 +232,10 @@ class Trial:
         change: J at the trial point minus J at the centre.
         slope: g·y with the subgradient at the trial point.
         measure: Locality measure β of the trial's plane, seen from the centre.
+        growth: Largest factor on t after one serious step.
     """
 
+    growth: ClassVar[float] = 10.0
     step: Step
     change: float
     slope: float
@@ -250,7 +254,7 @@ class Trial:
     @property
     def parabola(self) -> float:
         """Factor on t that leads to the minimiser of the parabola through both values and the prediction."""
-        return 0.5 / max(1.0 - self.agreement, 0.5 / _GROWTH)
+        return 0.5 / max(1.0 - self.agreement, 0.5 / self.growth)
 
 
 @dataclass(frozen=True)
@@ -268,12 +272,22 @@ class Trust:
     Attributes:
         t_least: Below it no descent can be expected.
         radius_least: Below it the design practically cannot move.
+        streak: Consecutive serious steps after which t at least doubles.
+        shrinkage: Smallest and largest factor on t after a bad null step.
+        patience: Null steps that may be far off before t shrinks.
+        far: A null step is far off if its error exceeds this many predicted decreases.
+        cut: Fraction of the predicted decrease that a new plane must remove, else the step was too long.
 
     References:
         H. Schramm and J. Zowe, SIAM J. Optim. 2 (1992) 121-152, inner iteration of section 3.
         K. C. Kiwiel, Math. Program. 46 (1990) 105-122, procedure 2.2.
     """
 
+    streak: ClassVar[int] = 2
+    shrinkage: ClassVar[tuple[float, float]] = (0.1, 0.5)
+    patience: ClassVar[int] = 1
+    far: ClassVar[float] = 3.0
+    cut: ClassVar[float] = 0.5
     t: float
     radius: float
     t_least: float
@@ -296,7 +310,7 @@ class Trust:
         """Return the trust after a serious step: t grows where the prediction was good or steps repeat."""
         length, serious = trial.step.length, self.serious + 1
         t = max(1.0, trial.parabola) * self.t
-        if serious > _STREAK:
+        if serious > self.streak:
             t = max(t, 2.0 * self.t)
         radius = 2.0 * self.radius if length > 0.5 * self.radius else self.radius
         return replace(self, t=min(t, self.t_most), radius=radius, serious=serious, nulls=0)
@@ -309,11 +323,11 @@ class Trust:
         such step.
         """
         nulls, predicted = self.nulls + 1, trial.step.decrease
-        improves = trial.slope - trial.measure >= -_CUT * predicted
-        far = trial.error > max(_FAR * predicted, trial.step.aggregate_error)
+        improves = trial.slope - trial.measure >= -self.cut * predicted
+        far = trial.error > max(self.far * predicted, trial.step.aggregate_error)
         t = self.t
-        if not improves or (far and nulls > _PATIENCE):
-            t *= min(max(trial.parabola, _SHRINKAGE[0]), _SHRINKAGE[1])
+        if not improves or (far and nulls > self.patience):
+            t *= min(max(trial.parabola, self.shrinkage[0]), self.shrinkage[1])
         return replace(self, t=max(t, self.t_least), serious=0, nulls=nulls)
 
     def after_rejection(self, length: float) -> Trust:

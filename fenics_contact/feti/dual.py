@@ -21,7 +21,7 @@ from fenics_contact.feti.inverse import Condensations, LocalKind, TornInverse, k
 from fenics_contact.feti.kernel_basis import whole_motions
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.coarse import CoarseSpace
-from fenics_contact.qp.problem import EVEN, DualProblem, Scaling
+from fenics_contact.qp.problem import DualProblem, Scaling
 from fenics_contact.qp.reductions import global_sum
 
 #: Fraction of its diagonal added to the contact block of B D⁻¹ Bᵀ. A node in two contact pairs has more rows
@@ -273,12 +273,6 @@ def _dependent_part(
     return np.where(kept, left, 0.0), np.where(kept, REGULARISATION * force, 0.0), np.where(kept, number, -1)
 
 
-#: Substitute flexibility of rows that have none, relative to the mean of all contact rows.
-STIFF = 1e-6
-#: Work of the loads on an unresisted motion, relative to their sum, above which it is not rounding.
-UNBALANCED = 1e-8
-
-
 class DualSystem:
     """The dual of a torn system: operators on multipliers, and the recovery of displacements.
 
@@ -507,14 +501,18 @@ class DualSystem:
         self.kernel, self.points = self.kernel[:, remaining], self.points[:, remaining]
         return CoarseSpace(coarse.comm, coarse.matrix[remaining], coarse.load[remaining])
 
-    def _require_unloaded(self) -> None:
-        """Reject loads on motions in the kernel of B. Collective."""
+    def _require_unloaded(self, unbalanced: float = 1e-8) -> None:
+        """Reject loads on motions in the kernel of B. Collective.
+
+        `unbalanced`: work of the loads on an unresisted motion, relative to their sum, above which it is not
+        rounding.
+        """
         if self.unheld.shape[1] == 0:
             return
         work = np.append(self.unheld.T @ self.torn.load, np.abs(self.torn.load).sum())
         work = self.torn.numbering.comm.allreduce(work)
         driven, loads = work[:-1] + self._unheld_points.T @ self.torn.free.load, self._size(work[-1])
-        if np.abs(driven).max() > UNBALANCED * loads:
+        if np.abs(driven).max() > unbalanced * loads:
             raise InfeasibleError(
                 "every loaded body must be held by supports, ties or contact, but the load works "
                 f"{max(driven, key=abs):.3e} on a rigid motion that nothing resists: support that body"
@@ -559,9 +557,10 @@ class DualSystem:
         )
         factor, layout = np.sqrt(plain / weighted), self.torn.layout
         factor[layout.tangential] = factor[layout.tangential_frictional, None]
+        # Factors that hardly differ are not worth scaling with.
         low = numbering.comm.allreduce(factor.min(initial=np.inf), op=MPI.MIN)
         high = numbering.comm.allreduce(factor.max(initial=0.0), op=MPI.MAX)
-        return None if high - low <= EVEN * high else Scaling.build(factor / high, coarse)
+        return None if high - low <= 1e-6 * high else Scaling.build(factor / high, coarse)
 
     def _diagonal(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the diagonal of F on contact rows, one elsewhere, and marks of filled rows. Collective."""
@@ -573,12 +572,14 @@ class DualSystem:
         diagonal[numbering.owned < self.torn.n_equality] = 1.0
         return self._filled(diagonal)
 
-    def _filled(self, diagonal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _filled(self, diagonal: np.ndarray, share: float = 1e-6) -> tuple[np.ndarray, np.ndarray]:
         """Give rows that supports alone determine the diagonal of their disc, or a small one. Collective.
 
         Small, as such a row has no flexibility: any slip that supports prescribe must count as slip.
 
         Returns the diagonal, and marks of the rows that got a small one, both owned.
+
+        `share`: substitute flexibility of rows that have none, relative to the mean of all contact rows.
         """
         layout, comm = self.torn.layout, self.torn.numbering.comm
         total, count = comm.allreduce(
@@ -590,5 +591,5 @@ class DualSystem:
         diagonal[layout.tangential] = np.where(discs > 0, discs, discs.max(axis=1, initial=0.0)[:, None])
         supported = np.zeros(len(diagonal), dtype=bool)
         supported[layout.contact] = ~(diagonal[layout.contact] > 0)
-        diagonal[supported] = STIFF * total / count
+        diagonal[supported] = share * total / count
         return diagonal, supported

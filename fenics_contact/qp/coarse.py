@@ -16,6 +16,7 @@ from fenics_contact._base.sparse import SharedFactor
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.qp.reductions import Vector, global_sum
 
+#: Null vectors have eigenvalues below this fraction of the largest, in a matrix scaled to a unit diagonal.
 RANK_TOLERANCE = 1e-12
 
 
@@ -67,10 +68,6 @@ def _trusted_cholesky(matrix: Vector) -> Vector | None:
     return factor if reciprocal_condition > RANK_TOLERANCE else None
 
 
-#: Vectors in the first search for null vectors: a floating body has six.
-FIRST_BLOCK = 8
-
-
 class SparseGramInverse:
     """Generalised inverse of S = Σ S_rank, which may be rank deficient; see `GramInverse`.
 
@@ -104,7 +101,7 @@ class SparseGramInverse:
     def _null_vectors(self) -> Vector:
         """Return orthonormal null vectors of the scaled matrix. Collective."""
         m = len(self._scale)
-        count = min(FIRST_BLOCK, m)
+        count = min(8, m)  # a floating body has six null vectors
         while True:
             start = np.random.default_rng(0).standard_normal((m, count))
             basis, _ = np.linalg.qr(self._invert_scaled(start))
@@ -250,12 +247,6 @@ def summed_if_small(comm: MPI.Comm, share: sp.csr_matrix) -> Gram:
     return global_sum(comm, share.toarray()).reshape(m, m) if m <= DENSE_LIMIT else share
 
 
-#: Reciprocal condition number below which a matrix counts as singular.
-INVERSE_TOLERANCE = 1e-10
-#: Number of random vectors in the search for a null vector.
-PROBES = 4
-
-
 class SquareInverse(Protocol):
     """The inverse of a square matrix."""
 
@@ -263,14 +254,19 @@ class SquareInverse(Protocol):
         """Return the inverse times a replicated array of shape (m,). Collective."""
 
 
-def invert_square(comm: MPI.Comm, share: sp.csr_matrix, scale: Vector) -> SquareInverse | None:
-    """Factor the sum of shares, scaled to order one; None if it is singular. Collective."""
+def invert_square(
+    comm: MPI.Comm, share: sp.csr_matrix, scale: Vector, singular: float = 1e-10
+) -> SquareInverse | None:
+    """Factor the sum of shares, scaled to order one; None if it is singular. Collective.
+
+    It counts as singular if its reciprocal condition number is below ``singular``.
+    """
     matrix = summed_if_small(comm, share)
     if isinstance(matrix, np.ndarray):
         dense = DenseSquareInverse(matrix, scale)
-        return dense if dense.condition > INVERSE_TOLERANCE else None
+        return dense if dense.condition > singular else None
     factor = SharedFactor(comm, share, scale)
-    return factor if _largest_growth(factor, scale) < 1.0 / INVERSE_TOLERANCE else None
+    return factor if _largest_growth(factor, scale) < 1.0 / singular else None
 
 
 class DenseSquareInverse:
@@ -299,10 +295,10 @@ class DenseSquareInverse:
         return np.asarray(self._scale * solved)
 
 
-def _largest_growth(factor: SharedFactor, scale: Vector) -> float:
+def _largest_growth(factor: SharedFactor, scale: Vector, probes: int = 4) -> float:
     """Return a lower estimate of the scaled inverse's norm by inverse iteration. Collective."""
     largest = 0.0
-    for start in np.random.default_rng(0).standard_normal((PROBES, factor.size)):
+    for start in np.random.default_rng(0).standard_normal((probes, factor.size)):
         x = start / np.linalg.norm(start)
         for _ in range(2):
             x = factor.solve(x / scale, refine=False) / scale

@@ -15,7 +15,7 @@ from fenics_contact.qp.cones import TrescaLaw
 from fenics_contact.qp.newton_steps import FaceState, FaceSteps, Forcing, run_newton
 from fenics_contact.qp.problem import CountedOperator, DualProblem
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
-from fenics_contact.qp.rescue import DIVERGED, Rescue, Rescued
+from fenics_contact.qp.rescue import Rescue, Rescued
 from fenics_contact.qp.smalse import Smalse
 from fenics_contact.qp.solution import (
     Certificate,
@@ -30,22 +30,20 @@ from fenics_contact.qp.solution import (
 )
 from fenics_contact.qp.solve import Equilibrium, find_equilibrium
 
-#: Wedging friction may itself press surfaces together: at most by this factor on the other normal forces.
-WEDGED = 100.0
-#: Gaps are reliable if jumps are smaller than this, and bodies are unheld if this much of the load is
-#: unbalanced.
-PLAIN = 1e-2
 
+def without_contact(history: Sequence[SolverStep], count: int, plain: float = 1e-2) -> bool:
+    """Return whether contacts that alone balance the load stayed open in the last ``count`` steps.
 
-def without_contact(history: Sequence[SolverStep], count: int) -> bool:
-    """Return whether contacts that alone balance the load stayed open in the last ``count`` steps."""
+    Gaps are reliable if jumps are smaller than ``plain``, and bodies are unheld if that much of the load is
+    unbalanced.
+    """
     late = history[-count:]
-    return len(late) == count and all(_open(step) for step in late)
+    return len(late) == count and all(_open(step, plain) for step in late)
 
 
-def _open(step: SolverStep) -> bool:
+def _open(step: SolverStep, plain: float) -> bool:
     residuals = step.residuals
-    lost = step.closed == 0 and residuals.natural == 0.0 and residuals.gluing < PLAIN < residuals.coarse
+    lost = step.closed == 0 and residuals.natural == 0.0 and residuals.gluing < plain < residuals.coarse
     return lost and "rescue" not in step.method
 
 
@@ -82,24 +80,29 @@ class SlidingError(InfeasibleError):
 
 @dataclass(frozen=True, eq=False)
 class FrictionAlone:
-    """Test whether friction can hold what nothing else holds; used where a solver makes no progress."""
+    """Test whether friction can hold what nothing else holds; used where a solver makes no progress.
+
+    `wedged`: wedging friction may itself press surfaces together: at most by this factor on the other normal
+    forces.
+    """
 
     problem: DualProblem
     solve: Callable[[DualProblem, Start], DualSolution]
+    wedged: float = 100.0
 
     def require_enough(self) -> None:
         """Reject a problem whose friction is far from sufficient. Collective.
 
-        If even `WEDGED` times the slip bounds of the forces without friction cannot balance the load,
+        If even `wedged` times the slip bounds of the forces without friction cannot balance the load,
         friction is taken to hold nothing, as where supports keep the surfaces apart. That is not a proof.
         """
         if self._forces is None:
             return
-        equilibrium = self._under(WEDGED * self.problem.law.bound(self._forces))
+        equilibrium = self._under(self.wedged * self.problem.law.bound(self._forces))
         if equilibrium.motion is not None:
             raise InfeasibleError(
                 "friction needs surfaces that are pressed together, but without it they are pressed so "
-                f"little that even {WEDGED:g} times the forces that it may then bear leave "
+                f"little that even {self.wedged:g} times the forces that it may then bear leave "
                 f"{100 * equilibrium.error:.2g} % of the load unbalanced: support bodies that only friction "
                 "holds, or press them"
             )
@@ -187,24 +190,6 @@ class FrictionAlone:
             return None
 
 
-#: Distance from equilibrium beyond which proximal points cannot repair an iterate.
-UNBALANCED = 1e-6
-#: A residual above this after all steps is no approximate solution at all.
-HARDLY = 1e-2
-#: Consecutive steps in which nothing sticks: a single one occurs on the way to states that stick.
-SLIDING = 5
-#: Number of the rescue before which it is tested whether friction can suffice.
-DOUBT = 4
-#: Tolerance of that test.
-ROUGH = 1e-3
-#: Steps without progress after which faces are solved more accurately.
-CARELESS = 2
-#: Number of consecutive rescues to the same iterate after which to stop.
-VAIN = 7
-#: Relative difference of residuals below which two iterates are the same.
-SAME = 1e-6
-
-
 @dataclass(frozen=True)
 class FaceNewton:
     """Faces by the natural map w = λ − ρ r, each solved by projected preconditioned CG.
@@ -230,12 +215,18 @@ class FaceNewton:
         forcing: Largest inner tolerance relative to the outer residual.
         loosest: Largest absolute inner tolerance.
         patience: Steps in which the residual must halve before a rescue is called.
-        care: Factor on the inner tolerance after each step without progress beyond the second: where forces
-            vanish in the limit, residuals relative to them do not measure the accuracy of the gaps.
+        care: Factor on the inner tolerance after each step without progress beyond ``careful_after``: where
+            forces vanish in the limit, residuals relative to them do not measure the accuracy of the gaps.
+        careful_after: Steps without progress that do not tighten the inner tolerance yet.
         rescue: Parameters of the fallback of problems without a preconditioner.
         rescue_products: Products that a rescue may use; doubled each time Newton fails again.
+        repairable: Relative imbalance up to which a rescue starts from the best iterate: proximal points
+            preserve equilibrium and do not restore it. From more the first iterate is the start.
+        max_vain: Consecutive rescues to the same iterate after which to stop.
         doubts: Whether to ask, without progress, if friction can suffice at all: more solves, of no use
             where another load is tried after any failure.
+        doubted_rescue: Number of the rescue before which that is asked: the first ones mostly help.
+        doubt_tolerance: Tolerance of the solves without friction of that test.
 
     References:
         S. Hüeber, G. Stadler, B. Wohlmuth, A primal-dual active set algorithm for three-dimensional
@@ -253,6 +244,11 @@ class FaceNewton:
     rescue: Smalse = field(default_factory=Smalse)
     rescue_products: int = 300
     doubts: bool = True
+    careful_after: int = 2
+    repairable: float = 1e-6
+    max_vain: int = 7
+    doubted_rescue: int = 4
+    doubt_tolerance: float = 1e-3
 
     def with_tolerance(self, tolerance: float) -> FaceNewton:
         """Return the solver with another tolerance."""
@@ -312,7 +308,8 @@ class _Run:
         most = parameters.max_products
         forcing = Forcing(parameters.forcing, parameters.loosest, parameters.tolerance)
         steps = FaceSteps.build(problem, start.operator, forcing, most)
-        rough = replace(parameters, tolerance=ROUGH, max_products=10 * parameters.rescue_products)
+        products = 10 * parameters.rescue_products
+        rough = replace(parameters, tolerance=parameters.doubt_tolerance, max_products=products)
         rescue = Rescue(problem, forcing, most, parameters.rescue)
         if not start.cold:
             start = replace(start, iterate=steps.at_rest(start.iterate))
@@ -328,7 +325,7 @@ class _Run:
         parameters, products = self.parameters, self.start.operator.products
         if state.answer is not None:
             return state.answer.solution(state.history, products, state.memory)
-        in_vain = state.last_rescue is not None and state.last_rescue.vain >= VAIN
+        in_vain = state.last_rescue is not None and state.last_rescue.vain >= parameters.max_vain
         if in_vain or len(state.history) >= parameters.max_steps or products >= parameters.max_products:
             self._fail(state)
         return None
@@ -352,18 +349,19 @@ class _Run:
         if now.worst_in_scales_with(best) < 0.5 * best.worst_in_scales_with(now):
             state = replace(state, best=iterate, since_best=0, care=1.0)
         else:
-            factor = self.parameters.care if state.since_best >= CARELESS else 1.0
+            careful = state.since_best >= self.parameters.careful_after
+            factor = self.parameters.care if careful else 1.0
             state = replace(state, since_best=state.since_best + 1, care=factor * state.care)
         stuck = (
             lost
             or state.since_best >= self.parameters.patience
-            or not now.worst_in_scales_with(best) < DIVERGED
+            or not now.worst_in_scales_with(best) < self.rescue.diverged
         )
         return self._rescued(state) if stuck else state
 
     def _rescued(self, state: _State) -> _State:
         """Continue from the best iterate improved by a rescue. Collective."""
-        if self.parameters.doubts and state.rescues + 1 == DOUBT:
+        if self.parameters.doubts and state.rescues + 1 == self.parameters.doubted_rescue:
             self.friction_alone.require_enough()
         if self.parameters.doubts and state.rescues == 1 and slides(state.history):
             self._require_enough_sliding()
@@ -396,7 +394,7 @@ class _Run:
     def _fail(self, state: _State) -> NoReturn:
         """Raise the error of a solve that is exhausted. Collective."""
         failure = ConvergenceError(self._failed(state), state.history)
-        if self.parameters.doubts and state.rescues >= DOUBT:
+        if self.parameters.doubts and state.rescues >= self.parameters.doubted_rescue:
             try:
                 self._require_enough_sliding()
             except InfeasibleError as reason:
@@ -413,8 +411,8 @@ class _Run:
 
         SMALSE restores equilibrium, proximal points only preserve it.
         """
-        lost = self.problem.preconditioner is not None and best.residuals.coarse > UNBALANCED
-        return self.start.iterate if lost else best
+        lost = best.residuals.coarse > self.parameters.repairable
+        return self.start.iterate if lost and self.problem.preconditioner is not None else best
 
     def _line(self, state: _State, origin: Iterate, outcome: Rescued) -> SolverStep:
         """Return the line of history of a rescue, with its reason. Collective."""
@@ -444,7 +442,7 @@ class _Run:
             f"and {len(history)} steps: {last}; the best was {best:.1e}, "
             f"{state.newton.stall(self.problem.comm)}, and {state.rescues} rescues did not help"
         )
-        if slides(history) and best > HARDLY:
+        if slides(history) and best > 1e-2:  # no approximate solution at all
             ways = ["raise the friction", "lower the load", "add a support", *more]
             why = f"all {history[-1].slip} discs slip, and friction may not suffice for any equilibrium; "
         else:
@@ -454,15 +452,18 @@ class _Run:
         return f"{reached}: {why}{', '.join(ways[:-1])}, or {ways[-1]}"
 
 
-def _same(before: Iterate, after: Iterate) -> bool:
-    """Return whether two rescues led to the same iterate."""
+def _same(before: Iterate, after: Iterate, difference: float = 1e-6) -> bool:
+    """Return whether two rescues led to the same iterate, by its residual."""
     worst = after.residuals.worst
-    return abs(worst - before.residuals.worst) <= SAME * worst
+    return abs(worst - before.residuals.worst) <= difference * worst
 
 
-def slides(history: Sequence[SolverStep]) -> bool:
-    """Return whether all discs slip, and have done so for several steps."""
-    late = history[-max(SLIDING, len(history) // 4) :]
+def slides(history: Sequence[SolverStep], count: int = 5) -> bool:
+    """Return whether all discs slip, and have done so for ``count`` steps and a quarter of all.
+
+    A single such step occurs on the way to states that stick.
+    """
+    late = history[-max(count, len(history) // 4) :]
     return bool(late) and all(step.slip > 0 and step.stick == 0 for step in late)
 
 

@@ -24,6 +24,8 @@ class FaceSystem:
         operator: F, owned to owned, collective.
         preconditioner: Approximation of F⁻¹, owned to owned, or None.
         patience: Iterations without progress after which an inner solver gives up.
+        divergence: It gives up, too, if the residual grows by more than this factor: the system is then
+            inconsistent, as a consistent one leaves a residual in the size of its first.
     """
 
     comm: MPI.Comm
@@ -32,6 +34,7 @@ class FaceSystem:
     coarse: CoarseSpace
     preconditioner: Operator | None = None
     patience: int = 60
+    divergence: float = 1e6
 
     def image(self, y: Vector, full: Vector) -> Vector:
         """Return A y, shape (n_face,), for y on the face and full = F Z y, owned."""
@@ -96,10 +99,6 @@ class FaceSystems:
         return FaceSystem(problem.comm, face, self._operator, restricted, preconditioner)
 
 
-#: Lower bound on D that keeps motions resisted only by offsets distinct from unresisted ones.
-LEAST_DAMPING = 1e-4
-
-
 @dataclass(frozen=True, eq=False)
 class ObliqueProjector:
     """v ↦ v − G_sᵀ (G_u G_sᵀ)⁻¹ G_u v: removes rigid motions, with range in the kernel of G_u.
@@ -148,7 +147,7 @@ class DampedEquilibrium:
     times as much.
 
     Attributes:
-        damping: D, that of the face down to `LEAST_DAMPING`, shape (n_face,), owned.
+        damping: D, that of the face down to a least one, shape (n_face,), owned.
     """
 
     damping: Vector
@@ -196,11 +195,13 @@ class CoupledSystem:
         *,
         curvature: Vector | None = None,
         damped: bool = False,
+        least_damping: float = 1e-4,
     ) -> CoupledSystem | None:
         """Join both bases; None where the face does not hold every body. Collective.
 
         `tested`: W, shape (n_owned, n_face); `moving`: Z, shape (n_owned, n_face); `curvature`: κ, by default
-        that of the face.
+        that of the face; `least_damping`: lower bound on D, so that motions that only offsets resist stay
+        distinct from unresisted ones.
         """
         oblique = ObliqueProjector.build(sp.csr_matrix(coarse.matrix @ tested), coarse.restricted(moving))
         if oblique is None:
@@ -208,7 +209,7 @@ class CoupledSystem:
         kappa = system.face.curvature if curvature is None else curvature
         if not damped:
             return cls(system, tested, moving, kappa, oblique)
-        damping = np.maximum(system.face.damping, LEAST_DAMPING)
+        damping = np.maximum(system.face.damping, least_damping)
         spared = coarse.restricted(sp.csr_matrix(moving @ sp.diags(damping)))
         return cls(system, tested, moving, kappa, oblique, DampedEquilibrium(damping, spared))
 

@@ -18,17 +18,6 @@ from fenics_contact.qp.reductions import Vector, global_sum
 from fenics_contact.qp.solution import DualSolution, SolverStep, Start, measure
 from fenics_contact.qp.solve import DualSolver, find_equilibrium, solve
 
-#: Slip bounds have returned to earlier ones if the distance to these, relative to the last ones, is below
-#: this.
-RETURN_RATIO = 0.3
-#: A cycle is a return in this many consecutive steps.
-RETURNS = 3
-#: Residuals have stopped falling if this many steps (1/θ times as many when damped) have not reduced the best
-#: one by this factor.
-PATIENCE, PROGRESS = 10, 0.9
-#: Number of earlier slip bounds that are compared: the longest period that is recognised, plus one.
-MEMORY = 6
-
 
 @dataclass(frozen=True)
 class Damping:
@@ -40,9 +29,20 @@ class Damping:
 
     Attributes:
         fractions: The values of θ, each used when the one before it failed.
+        patience: Steps (1/θ times as many when damped) in which the residual must fall before θ fails.
+        progress: Factor on the best residual below which it has fallen.
+        returns: A cycle is a return to earlier slip bounds in this many consecutive steps.
+        return_ratio: Slip bounds have returned if they are this much nearer to earlier ones than to the last.
+        memory: Number of earlier slip bounds that are compared: the longest period that is recognised, plus
+            one.
     """
 
     fractions: tuple[float, ...] = (1.0, 0.6, 0.3, 0.15)
+    patience: int = 10
+    progress: float = 0.9
+    returns: int = 3
+    return_ratio: float = 0.3
+    memory: int = 6
 
 
 class SlipBoundSequence:
@@ -50,7 +50,7 @@ class SlipBoundSequence:
 
     def __init__(self, comm: MPI.Comm, damping: Damping) -> None:
         """Begin with the first θ and an empty record."""
-        self._comm, self._fractions = comm, damping.fractions
+        self._comm, self._damping = comm, damping
         self._stage = 0
         self._bounds: list[Vector] = []
         self._best, self._since_best, self._returns = np.inf, 0, 0
@@ -58,12 +58,12 @@ class SlipBoundSequence:
     @property
     def fraction(self) -> float:
         """θ of the next step."""
-        return self._fractions[min(self._stage, len(self._fractions) - 1)]
+        return self._damping.fractions[min(self._stage, len(self._damping.fractions) - 1)]
 
     @property
     def exhausted(self) -> bool:
         """Whether the smallest θ failed too."""
-        return self._stage >= len(self._fractions)
+        return self._stage >= len(self._damping.fractions)
 
     def advance(self, bound: Vector, image: Vector, residual: float) -> tuple[Vector, str]:
         """Return the next slip bound and a note on the decision. Collective.
@@ -71,10 +71,10 @@ class SlipBoundSequence:
         `bound`: Ψ of the last Tresca problem, shape (n_friction,), owned; `image`: the slip bound that
         belongs to its solution, shape (n_friction,), owned.
         """
-        self._bounds = [*self._bounds[1 - MEMORY :], bound]
+        self._bounds = [*self._bounds[1 - self._damping.memory :], bound]
         period, change = self._returned(image)
         self._returns = self._returns + 1 if period else 0
-        if residual < PROGRESS * self._best:
+        if residual < self._damping.progress * self._best:
             self._best, self._since_best = residual, 0
         else:
             self._since_best += 1
@@ -89,9 +89,9 @@ class SlipBoundSequence:
 
     def _failure(self, period: int) -> str:
         """Return why the present θ fails, empty if it does not."""
-        if self._returns >= RETURNS and self._since_best >= RETURNS:
+        if min(self._returns, self._since_best) >= self._damping.returns:
             return f"they cycle with period {period}"
-        if self._since_best * self.fraction >= PATIENCE:
+        if self._since_best * self.fraction >= self._damping.patience:
             return f"the residual has not fallen in {self._since_best} steps"
         return ""
 
@@ -101,13 +101,9 @@ class SlipBoundSequence:
         *distances, size = np.sqrt(global_sum(self._comm, *squares, image @ image))
         change = float(distances[0] / size) if size > 0.0 else 0.0
         older = distances[1:]
-        if not older or distances[0] == 0.0 or min(older) > RETURN_RATIO * distances[0]:
+        if not older or distances[0] == 0.0 or min(older) > self._damping.return_ratio * distances[0]:
             return 0, change
         return int(np.argmin(older)) + 2, change
-
-
-#: Factor on an equilibrium's own friction in the first Tresca problem, so that it surely has a solution.
-FIRST_MARGIN = 1.1
 
 
 @dataclass(frozen=True)
@@ -208,16 +204,17 @@ class FixedPoint:
         )
 
 
-def _first_slip_bound(problem: DualProblem, start: Start) -> np.ndarray:
+def _first_slip_bound(problem: DualProblem, start: Start, margin: float = 1.1) -> np.ndarray:
     """Return slip bounds for which the first Tresca problem has an equilibrium. Collective.
 
-    Zero, the obvious choice, might leave a body unheld, and so might the bounds of another load.
+    Zero, the obvious choice, might leave a body unheld, and so might the bounds of another load. Those of
+    forces in equilibrium are taken with a margin for the error of these forces.
     """
     if not start.cold:
         bound = problem.law.bound(start.iterate.multiplier)
         if find_equilibrium(problem.with_law(TrescaLaw(problem.layout, bound))).motion is None:
             return bound
-    return FIRST_MARGIN * problem.law.bound(find_equilibrium(problem).multiplier)
+    return margin * problem.law.bound(find_equilibrium(problem).multiplier)
 
 
 def _under_own_bound(problem: DualProblem, solution: DualSolution) -> DualSolution:

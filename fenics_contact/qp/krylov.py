@@ -14,8 +14,6 @@ from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact.qp.face_system import CoupledSystem, FaceSystem
 from fenics_contact.qp.reductions import Vector, global_sum
 
-DIVERGENCE_FACTOR = 1e6
-
 
 class Stop(Enum):
     """Why the inner iteration ended."""
@@ -115,7 +113,7 @@ def projected_cg(
         residual = residual + length * image
         size = system.weighted_norm(residual, weights)
         best, since_best = (size, 0) if size < 0.9 * best else (best, since_best + 1)
-        if since_best > system.patience or not size <= DIVERGENCE_FACTOR * first:
+        if since_best > system.patience or not size <= system.divergence * first:
             stop = Stop.STAGNATION if since_best > system.patience else Stop.DIVERGENCE
             break
     return FaceStep(step, product, residual, iterations, size, stop)
@@ -154,10 +152,6 @@ def _image(
     return projected, slope, curvature, LAST_PLACES * float(lengths[0] * lengths[1])
 
 
-#: A recomputed residual above this many tolerances means that the recursion has lost accuracy.
-FALSE_HOPE = 10.0
-
-
 def projected_gmres(
     coupled: CoupledSystem, gradient: Vector, weights: Vector, tolerance: float, max_iterations: int
 ) -> FaceStep:
@@ -187,8 +181,8 @@ def projected_gmres(
     residual = coupled.oblique(gradient + coupled.operate(step, product))
     left = float(np.sqrt(global_sum(comm, (weights * residual) @ (weights * residual))[0]))
     stop = found.stop
-    if stop is Stop.CONVERGED and left > FALSE_HOPE * tolerance:
-        # Rounding was taken for the image of a direction that has none.
+    if stop is Stop.CONVERGED and left > 10.0 * tolerance:
+        # The recursion has lost accuracy: rounding was taken for the image of a direction that has none.
         stop = Stop.NO_CURVATURE
     return FaceStep(step, product, residual, found.iterations, max(left, found.residual), stop)
 

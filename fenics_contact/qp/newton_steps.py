@@ -26,7 +26,7 @@ from fenics_contact.qp.face_system import CoupledFace, FaceSystem, FaceSystems, 
 from fenics_contact.qp.krylov import FaceStep, Stop, projected_cg, projected_gmres
 from fenics_contact.qp.problem import CountedOperator, DualProblem, RowsOfFace, ShiftedOperator
 from fenics_contact.qp.reductions import Vector, global_least, global_sum
-from fenics_contact.qp.rigid_motions import NEARLY, RigidMotionCorrection, keep_free_motions
+from fenics_contact.qp.rigid_motions import RigidMotionCorrection, keep_free_motions
 from fenics_contact.qp.solution import (
     Iterate,
     Residuals,
@@ -36,9 +36,6 @@ from fenics_contact.qp.solution import (
     iterate_at,
     iterate_between,
 )
-
-#: Fractions of a step that are tried where its end is worse than its start and the point before that.
-FRACTIONS = (0.5, 0.25, 0.1)
 
 State = TypeVar("State")
 Answer = TypeVar("Answer", covariant=True)
@@ -118,19 +115,23 @@ def damp(
     at: Callable[[float], Point],
     measured: Callable[[Point], Residuals],
     earlier: Iterable[Residuals | None],
-    fractions: tuple[float, ...] = FRACTIONS,
+    *,
+    fractions: tuple[float, ...] = (0.5, 0.25, 0.1),
+    shortest: float | None = None,
 ) -> Damped[Point]:
     """Return the end of a step, or the best of a few points on it if that is worse. Collective.
 
     Where the active set alternates between two faces the solution lies between them. The way to the right
     face may lead over a worse one: a full step is taken if it improves on either of the last two points.
 
-    `earlier`: those of the last two points, None without.
+    `earlier`: those of the last two points, None without; `fractions`: parts of the step that are tried where
+    its end is worse; `shortest`: one more, for the neighbourhood of a solution.
     """
     end = measured(full)
     if any(old is not None and not end.is_worse_than(old) for old in earlier):
         return Damped(full, 1.0)
-    tried = [Damped(full, 1.0), *(Damped(at(part), part) for part in fractions)]
+    parts = fractions if shortest is None else (*fractions, shortest)
+    tried = [Damped(full, 1.0), *(Damped(at(part), part) for part in parts)]
     return min(tried, key=lambda each: measured(each.point).worst_in_scales_with(end))
 
 
@@ -177,8 +178,13 @@ class Contradiction:
         return np.asarray(multiplier + part[self.group] * moved)
 
 
-def contradiction(problem: DualProblem, system: FaceSystem, gradient: Vector) -> Contradiction | None:
-    """Return what no multiplier of a face changes in a residual; None where that is nothing. Collective."""
+def contradiction(
+    problem: DualProblem, system: FaceSystem, gradient: Vector, rigid: float = 1e-6
+) -> Contradiction | None:
+    """Return what no multiplier of a face changes in a residual; None where that is nothing. Collective.
+
+    Forces that deform nothing may still push rigid surfaces that move freely, by more than ``rigid`` of them.
+    """
     face, rows = system.face, system.preconditioner
     if not isinstance(rows, RowsOfFace):
         return None
@@ -186,8 +192,8 @@ def contradiction(problem: DualProblem, system: FaceSystem, gradient: Vector) ->
     if found is None:
         return None
     excess, direction, group, count = found
-    if problem.coarse.norm(problem.coarse.apply(direction)) > NEARLY * problem.norm(direction):
-        return None  # forces that deform nothing may still push rigid surfaces that move freely
+    if problem.coarse.norm(problem.coarse.apply(direction)) > rigid * problem.norm(direction):
+        return None
     return Contradiction(face.restrict(excess), direction, group, count)
 
 
@@ -208,30 +214,27 @@ def _until_slip(trial: Vector, moved: Vector, bound: Vector, pressing: Vector) -
     return np.where(reached, -c / np.where(reached, divisor, 1.0), np.inf)
 
 
-#: The longest cycle of active sets that is recognised.
-LONGEST_CYCLE = 6
-#: Factor on ρ of a disc whose friction force would reverse.
-TURNED = 0.3
-#: Used only near a solution: far from one, a step as short as this makes no progress.
-SHORTEST = 0.01
-#: The largest relative residual that counts as near.
-NEAR = 0.5
-
-
 def shorten(
-    problem: DualProblem, before: Iterate, after: Iterate, earlier: Residuals | None = None
+    problem: DualProblem,
+    before: Iterate,
+    after: Iterate,
+    earlier: Residuals | None = None,
+    *,
+    shortest: float = 0.01,
+    near: float = 0.5,
 ) -> Damped[Iterate]:
     """Return the end of a step from one iterate to another, or the best of a few between. Collective.
 
     F λ and r are linear in λ and α, so no product is needed; the natural residual is not, and often has its
-    minimum inside.
+    minimum inside. Where the residual is below ``near``, the fraction ``shortest`` is tried, too: far from a
+    solution, a step as short makes no progress.
     """
     return damp(
         after,
         lambda part: iterate_between(problem, before, after, part),
         lambda iterate: iterate.residuals,
         (before.residuals, earlier),
-        (*FRACTIONS, SHORTEST) if before.residuals.worst < NEAR else FRACTIONS,
+        shortest=shortest if before.residuals.worst < near else None,
     )
 
 
@@ -243,12 +246,16 @@ class Safeguards:
         shorten: Chooses a point of a step, given its ends and the residuals before it.
         adapts_step: Whether the ρ of a disc whose friction force would turn by more than a right angle is
             reduced: it was too large, unless springs prescribe it.
+        reduction: Factor on that ρ.
+        longest_cycle: The longest cycle of active sets that is recognised.
         moves_held: Whether floating bodies are equilibrated also where the face holds them all.
     """
 
     shorten: Callable[[DualProblem, Iterate, Iterate, Residuals | None], Damped[Iterate]] = shorten
     adapts_step: bool = True
     moves_held: bool = True
+    reduction: float = 0.3
+    longest_cycle: int = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -371,7 +378,7 @@ class FaceSteps:
         after = iterate_at(self.problem, self._relieved(solved, alpha, step), solved.product, alpha)
         mismatch = abs(after.residuals.size - solved.inner.measure) / (before.residuals.size or 1.0)
         taken = self.safeguards.shorten(self.problem, before, after, state.before)
-        faces = (face, *state.faces[:LONGEST_CYCLE])
+        faces = (face, *state.faces[: self.safeguards.longest_cycle])
         following = FaceState(taken.point, step, faces, mismatch, before.residuals)
         return following, self._record(number, taken, solved, changed)
 
@@ -384,7 +391,7 @@ class FaceSteps:
             return state.step, face
         turned = np.einsum("ia,ia->i", face.direction, state.faces[0].direction) < 0.0
         step = state.step.copy()
-        step[layout.tangential[turned]] *= TURNED
+        step[layout.tangential[turned]] *= self.safeguards.reduction
         return step, classify(layout, bound, iterate.multiplier, iterate.residual, step)
 
     def _solve(self, face: Face, before: Iterate, tolerance: float) -> _SolvedFace:

@@ -23,9 +23,6 @@ Operator = Callable[[Vector], Vector]
 #: Called with the number of F-products so far and, after a step of a solver, with its residual.
 Report = Callable[[int, float | None], None]
 
-#: Factors whose relative differences are below this are not worth scaling with.
-EVEN = 1e-6
-
 
 @runtime_checkable
 class FacePreconditioner(Protocol):

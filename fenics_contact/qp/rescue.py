@@ -24,28 +24,6 @@ from fenics_contact.qp.solution import (
     iterate_between,
 )
 
-#: A rescue aims at a residual smaller by this factor.
-REDUCTION = 0.1
-#: Stiffness of the springs of a proximal point in units of 1/diag F: soft for Newton, stiff for the centre.
-SPRINGS = 10.0
-#: If a centre takes no more steps than this, the springs of the next are stiffer by this factor: constant
-#: springs move the centre by the same small fraction of its way to the solution each time.
-FEW, STIFFER = 2, 4.0
-#: Newton steps of a rescue by proximal points.
-PROXIMAL_STEPS = 60
-#: The centre moves once the residual with springs is this small, or this much smaller than that without.
-CENTRED, AHEAD = 0.03, 0.3
-#: A residual beyond recovery.
-DIVERGED = 1e12
-#: Largest inner tolerances, relative to the residual and absolute.
-FORCING, LOOSEST = 0.25, 0.1
-#: The full step is taken if the potential's slope at its end is below this fraction of its initial descent.
-STEEP = 0.3
-#: Slope at which a minimum of the potential is accepted, relative to the initial one.
-LEVEL = 0.1
-#: Gluing residual above which bodies are torn apart, and their potential is meaningless.
-TORN = 0.1
-
 
 @dataclass(frozen=True, eq=False)
 class ProximalPoint:
@@ -110,23 +88,34 @@ class ProximalPoint:
 
 
 def descend(
-    problem: DualProblem, before: Iterate, after: Iterate, earlier: Residuals | None = None
+    problem: DualProblem,
+    before: Iterate,
+    after: Iterate,
+    earlier: Residuals | None = None,
+    *,
+    steep: float = 0.3,
+    level: float = 0.1,
+    torn: float = 0.1,
 ) -> Damped[Iterate]:
     """Return the minimum between two iterates of the potential that a proximal point minimises. Collective.
 
     The potential energy of displacements u(λ, α) together with that of springs ρ in all contacts and discs is
     convex; its derivative along a step is the product of that of r with the force λ that deforms the bodies
     less the force P_Λ(λ − ρ r) of the springs. Torn bodies are joined first, whatever the potential.
+
+    `steep`: the full step is taken if the slope at its end is below this fraction of the initial descent;
+    `level`: slope at which a minimum is accepted, relative to the initial one; `torn`: gluing residual above
+    which bodies are torn apart, and their potential is meaningless.
     """
     slope = _slope(problem, before, after)
     first, last = slope(0.0), slope(1.0)
-    if first >= 0.0 or last <= -STEEP * first or before.residuals.gluing > TORN:
+    if first >= 0.0 or last <= -steep * first or before.residuals.gluing > torn:
         return Damped(after, 1.0)
     left, right, low, high = 0.0, 1.0, first, last
     for _ in range(30):
         part = left + (right - left) * min(max(-low / (high - low), 0.1), 0.9)
         value = slope(part)
-        if abs(value) <= -LEVEL * first:
+        if abs(value) <= -level * first:
             break
         if value < 0.0:
             left, low = part, value
@@ -183,12 +172,33 @@ class Rescue:
         forcing: How accurately Newton's method solves its faces, and the tolerance of the solve.
         max_products: Largest number of F-products of the whole solve.
         smalse: Parameters where there is no preconditioner.
+        reduction: A rescue aims at a residual smaller by this factor.
+        diverged: A residual beyond recovery.
+        springs: First stiffness of the springs in units of 1/diag F: soft for Newton, stiff for the centre.
+        few: If a centre takes no more steps than this, the springs of the next are stiffer: constant springs
+            move the centre by the same small fraction of its way to the solution each time.
+        stiffer: Factor on the springs then.
+        max_steps: Newton steps of a rescue by proximal points.
+        centred: The centre moves once the residual with springs is this small,
+        ahead: or this much smaller than that without.
+        face_forcing: Largest inner tolerance relative to the residual with springs,
+        face_loosest: and the largest absolute one.
     """
 
     problem: DualProblem
     forcing: Forcing
     max_products: int
     smalse: Smalse
+    reduction: float = 0.1
+    diverged: float = 1e12
+    springs: float = 10.0
+    few: int = 2
+    stiffer: float = 4.0
+    max_steps: int = 60
+    centred: float = 0.03
+    ahead: float = 0.3
+    face_forcing: float = 0.25
+    face_loosest: float = 0.1
 
     def __call__(self, start: Start, budget: int, *, further: bool = False) -> Rescued:
         """Improve an iterate. Collective."""
@@ -197,31 +207,31 @@ class Rescue:
             iterate, line, memory = self._by_smalse(start, limit)
         else:
             iterate, line = self._by_proximal_points(start, limit, further)
-        reached = _improved(iterate.residuals, start.iterate.residuals, further)
+        reached = self._improved(iterate.residuals, start.iterate.residuals, further)
         line = replace(line, products=start.operator.products, residuals=iterate.residuals)
         return Rescued(iterate, line, memory, reached)
 
     def _by_proximal_points(self, start: Start, limit: int, further: bool) -> tuple[Iterate, SolverStep]:
         """Take Newton steps with springs, and move their centre whenever they converge. Collective."""
         path = self._first_centre(start)
-        for number in range(PROXIMAL_STEPS):
+        for number in range(self.max_steps):
             newton, line = path.steps.step(path.newton, number)
             iterate = path.point.leave(newton.iterate)
-            if not iterate.residuals.worst < DIVERGED:
+            if not iterate.residuals.worst < self.diverged:
                 iterate = start.iterate
                 break
-            improved = _improved(iterate.residuals, start.iterate.residuals, further)
+            improved = self._improved(iterate.residuals, start.iterate.residuals, further)
             solved = iterate.residuals.within(self.forcing.tolerance)
             if improved or solved or start.operator.products >= limit:
                 break
             path = replace(path, newton=newton, since=path.since + 1)
-            if newton.iterate.residuals.worst < max(CENTRED, AHEAD * iterate.residuals.worst):
+            if newton.iterate.residuals.worst < max(self.centred, self.ahead * iterate.residuals.worst):
                 path = self._next_centre(path, start.operator, iterate)
         return iterate, replace(line, method="proximal rescue")
 
     def _first_centre(self, start: Start) -> _ProximalPath:
         """Add soft springs centred at the initial forces. Collective."""
-        point = ProximalPoint.build(self.problem, start.operator, SPRINGS)
+        point = ProximalPoint.build(self.problem, start.operator, self.springs)
         point = point.centred(start.iterate.multiplier)
         steps = self._steps(point)
         return _ProximalPath(point, steps, steps.init(steps.at_rest(point.enter(start.iterate))))
@@ -229,8 +239,9 @@ class Rescue:
     def _next_centre(self, path: _ProximalPath, operator: CountedOperator, iterate: Iterate) -> _ProximalPath:
         """Move the centre to the spring forces; stiffen springs that converged quickly. Collective."""
         force = path.point.force(path.newton.iterate)
-        if path.since <= FEW:
-            point = ProximalPoint.build(self.problem, operator, STIFFER * path.point.stiffness).centred(force)
+        if path.since <= self.few:
+            stiffness = self.stiffer * path.point.stiffness
+            point = ProximalPoint.build(self.problem, operator, stiffness).centred(force)
             steps = self._steps(point)
             return _ProximalPath(point, steps, steps.init(point.enter(iterate)))
         point = path.point.centred(force)
@@ -239,14 +250,14 @@ class Rescue:
 
     def _steps(self, point: ProximalPoint) -> FaceSteps:
         """Prepare Newton's method for a proximal point. Collective."""
-        forcing = self.forcing.at_most(FORCING, LOOSEST)
+        forcing = self.forcing.at_most(self.face_forcing, self.face_loosest)
         return FaceSteps.build(point.problem, point.operator, forcing, self.max_products, WITH_SPRINGS)
 
     def _by_smalse(self, start: Start, limit: int) -> tuple[Iterate, SolverStep, SmalseMemory]:
         """Take SMALSE steps. Collective."""
         problem = self.problem
         frozen = problem.with_law(TrescaLaw(problem.layout, problem.law.bound(start.iterate.multiplier)))
-        target = REDUCTION * start.iterate.residuals.worst
+        target = self.reduction * start.iterate.residuals.worst
         settings = replace(self.smalse, tolerance=target, max_products=limit)
         for state in outer_iterations(frozen, start, settings):
             if state.residuals.within(target) or start.operator.products >= limit:
@@ -254,6 +265,12 @@ class Rescue:
         improved = certify(problem, state.multiplier, start.operator(state.multiplier), state.residual)
         line = state.record(0, frozen, start.operator.products)
         return improved.iterate, replace(line, method="SMALSE rescue"), state.memory
+
+    def _improved(self, after: Residuals, before: Residuals, further: bool) -> bool:
+        better = after.worst_in_scales_with(before) <= self.reduction * before.worst_in_scales_with(after)
+        # Almost any iterate is far better than a very bad one, but not always good enough for Newton to
+        # progress.
+        return better and (not further or after.worst <= self.reduction)
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,9 +281,3 @@ class _ProximalPath:
     steps: FaceSteps  # Newton's method with these springs
     newton: FaceState  # its state
     since: int = 0  # steps since the centre moved
-
-
-def _improved(after: Residuals, before: Residuals, further: bool) -> bool:
-    better = after.worst_in_scales_with(before) <= REDUCTION * before.worst_in_scales_with(after)
-    # Almost any iterate is far better than a very bad one, but not always good enough for Newton to progress.
-    return better and (not further or after.worst <= REDUCTION)

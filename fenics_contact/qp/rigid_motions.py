@@ -13,15 +13,6 @@ from fenics_contact.qp.cones import FeasibleSet
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
-#: Imbalance relative to the sum of all forces at which bodies count as in equilibrium.
-BALANCED = 1e-11
-#: The same, where the bounds of friction were updated as often as allowed.
-NEARLY = 1e-6
-#: Steps of Newton's method, coupled or with frozen bounds, and updates of frozen bounds.
-COUPLED_STEPS, FROZEN_STEPS, REFRESHES = 30, 60, 30
-#: Motions that contact resists less than this, relative to the others, are left unchanged.
-UNRESISTED = 1e-10
-
 
 @dataclass(frozen=True, eq=False)
 class RigidMotionCorrection:
@@ -45,11 +36,13 @@ class RigidMotionCorrection:
         problem: The dual problem, whose law is that of the trial forces.
         motions: N, orthonormal motions of bodies that no equality row holds, shape (m, k), replicated.
         rows: Gᵀ N without rounding, shape (n_owned, k).
+        unresisted: Motions that contact resists less than this, relative to the others, are left unchanged.
     """
 
     problem: DualProblem
     motions: Vector
     rows: Vector
+    unresisted: float = 1e-10
 
     @classmethod
     def build(cls, problem: DualProblem) -> RigidMotionCorrection:
@@ -68,7 +61,7 @@ class RigidMotionCorrection:
         problem = self.problem
         stiffness = problem.comm.allreduce(self.rows.T @ (step[:, None] * self.rows))
         values, vectors = np.linalg.eigh(stiffness)
-        resisted = values > UNRESISTED * values.max(initial=0.0)
+        resisted = values > self.unresisted * values.max(initial=0.0)
         units = vectors[:, resisted] / np.sqrt(values[resisted])
         springs = _Springs(
             problem,
@@ -129,6 +122,11 @@ class _Springs:
     rows: Vector  # Gᵀ N in the coordinates z, shape (n_owned, k)
     load: Vector  # Nᵀ e in the coordinates z, shape (k,)
     forces: float  # ‖λ‖ over all rows of the problem
+    balanced: float = 1e-11  # imbalance relative to all forces at which bodies count as in equilibrium
+    nearly: float = 1e-6  # the same, where the bounds of friction were updated as often as allowed
+    coupled_steps: int = 30  # steps of Newton's method with the bound of the trial force
+    frozen_steps: int = 60  # the same with a frozen bound
+    refreshes: int = 30  # updates of frozen bounds
 
     def at(self, z: Vector, bound: Vector | None = None) -> _Balance:
         """Return the balance at a motion, with a frozen bound or that of the trial force. Collective."""
@@ -150,7 +148,7 @@ class _Springs:
         others.
         """
         largest = global_max(self.problem.comm, float(np.abs(self.rows).max(initial=0.0)))
-        return max(BALANCED * self._scale(balance), LAST_PLACES * largest * self.forces)
+        return max(self.balanced * self._scale(balance), LAST_PLACES * largest * self.forces)
 
     def _scale(self, balance: _Balance) -> float:
         """Return the norm of all forces. Collective."""
@@ -207,13 +205,13 @@ def _equilibrium_motion(springs: _Springs, bound: Vector) -> Vector:
     if balance.size <= target:
         return balance.motion
     balance, bound = begin, np.maximum(begin.bound, bound)
-    for _ in range(REFRESHES):
+    for _ in range(springs.refreshes):
         frozen = _minimise(springs, springs.at(balance.motion, bound), 0.1 * target)
         balance = springs.at(frozen.motion)
         bound = balance.bound
         if frozen.size > target or balance.size <= target:
             break
-    if balance.size <= NEARLY / BALANCED * target:
+    if balance.size <= springs.nearly / springs.balanced * target:
         return balance.motion
     slope = springs.slope(begin, None) + np.eye(len(springs.load))
     return -np.asarray(np.linalg.solve(slope, begin.imbalance), dtype=np.float64)
@@ -221,7 +219,7 @@ def _equilibrium_motion(springs: _Springs, bound: Vector) -> Vector:
 
 def _coupled(springs: _Springs, balance: _Balance, target: float) -> _Balance:
     """Take Newton steps as long as each halves the imbalance. Collective."""
-    for _ in range(COUPLED_STEPS):
+    for _ in range(springs.coupled_steps):
         if balance.size <= target:
             break
         slope = springs.slope(balance, springs.problem.law.growth)
@@ -236,7 +234,7 @@ def _coupled(springs: _Springs, balance: _Balance, target: float) -> _Balance:
 def _minimise(springs: _Springs, balance: _Balance, target: float) -> _Balance:
     """Minimise the convex potential of a frozen bound by Levenberg–Marquardt steps. Collective."""
     bound, damping = balance.bound, 1e-10
-    for _ in range(FROZEN_STEPS):
+    for _ in range(springs.frozen_steps):
         if balance.size <= target or damping > 1e4:
             break
         slope = springs.slope(balance, None) + damping * np.eye(len(springs.load))

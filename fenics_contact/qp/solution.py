@@ -15,6 +15,7 @@ from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.problem import CountedOperator, DualProblem, LeastSizes, Operator
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
+#: Forces below this fraction of those in all rows are rounding: residuals are not relative to them.
 FORCE_FLOOR = 1e-10
 
 
@@ -274,10 +275,6 @@ class DualSolution(Solution):
     released: bool = False
 
 
-#: Discs inside their slip bound by this relative margin count as sticking where only λ is known.
-SLIP_MARGIN = 1e-4
-
-
 @dataclass(frozen=True, eq=False)
 class Iterate:
     """An iterate of the multiplier.
@@ -329,13 +326,16 @@ def iterate_at(problem: DualProblem, multiplier: Vector, product: Vector, alpha:
     return Iterate(multiplier, product, residual, residuals)
 
 
-def iterate_fitted(problem: DualProblem, multiplier: Vector, product: Vector) -> Iterate:
+def iterate_fitted(
+    problem: DualProblem, multiplier: Vector, product: Vector, margin: float = 1e-4
+) -> Iterate:
     """Return the iterate with α = (G_F G_Fᵀ)⁻¹ G_F (F λ − d)_F of the rows that are free by λ. Collective.
 
-    Free are the gluing rows, contacts with λ_N > 0, discs well inside their bound, and the tangents of the
-    others. There r should vanish; open rows have gaps and slipping ones slip, which must not enter the fit.
+    Free are the gluing rows, contacts with λ_N > 0, discs inside their bound by the relative ``margin``, and
+    the tangents of the others. There r should vanish; open rows have gaps and slipping ones slip, which
+    must not enter the fit.
     """
-    bound = (1.0 - SLIP_MARGIN) * problem.law.bound(multiplier)
+    bound = (1.0 - margin) * problem.law.bound(multiplier)
     step = contact_step(problem.layout, problem.diagonal)
     face = classify(problem.layout, bound, multiplier, np.zeros_like(multiplier), step)
     free = problem.coarse.restricted(face.restriction)

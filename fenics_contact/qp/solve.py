@@ -26,9 +26,6 @@ from fenics_contact.qp.solution import (
     iterate_fitted,
 )
 
-#: A thin plate clamped at one edge needs forces as many times the load as its length is times its thickness.
-LARGEST_FORCE = 1e7
-
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
@@ -47,13 +44,18 @@ class Equilibrium:
 
 
 def find_equilibrium(
-    problem: DualProblem, *, tolerance: float = 1e-4, max_iterations: int = 2000
+    problem: DualProblem,
+    *,
+    tolerance: float = 1e-4,
+    max_iterations: int = 2000,
+    largest_force: float = 1e7,
 ) -> Equilibrium:
     """Compute an admissible multiplier that balances the load, without any F-product. Collective.
 
     Minimises ½‖Q z − λ₀‖² over the admissible set by accelerated projected gradients, Q = I − P. At
     distance g = Q z − λ₀ with optimality error s = z − P_Λ(z − g), any equilibrium y satisfies ‖g‖² ≤ ‖s‖(‖y
-    − z‖ + ‖g‖). Once that would need a force 10⁷ times the load's, none exists.
+    − z‖ + ‖g‖). Once that would need a force ``largest_force`` times the load's, none exists: a thin plate
+    clamped at one edge needs forces as many times the load as its length is times its thickness.
     """
     coarse, law = problem.coarse, problem.law
     target = coarse.particular()
@@ -70,7 +72,7 @@ def find_equilibrium(
         )
         if distance <= (tolerance * size) ** 2:
             return Equilibrium(momentum, float(np.sqrt(distance)) / (size or 1.0), None)
-        if distance > np.sqrt(error) * (LARGEST_FORCE * size + np.sqrt(distance)):
+        if distance > np.sqrt(error) * (largest_force * size + np.sqrt(distance)):
             return Equilibrium(following, float(np.sqrt(distance)) / size, resultant)
         weight, previous = (1.0, 1.0) if turn > 0.0 else (0.5 + np.sqrt(0.25 + weight**2), weight)
         momentum = following + (previous - 1.0) / weight * (following - z) * (turn <= 0.0)
@@ -120,13 +122,6 @@ def may_grip(problem: DualProblem, multiplier: Vector) -> bool:
     if np.abs(gripping.unresisted()).max() > 1e-8 * load[-1]:
         return False
     return find_equilibrium(replace(problem, coarse=gripping)).motion is None
-
-
-#: Largest number of times that a solution in scaled multipliers is refined.
-SCALED_ATTEMPTS = 4
-#: Forces of bodies that no load acts on, relative to those of the last load, that are none if zero is one of
-#: the answers.
-SMALL = 1e-3
 
 
 class DualSolver(Protocol):
@@ -219,7 +214,8 @@ def _run(problem: DualProblem, solver: DualSolver, begin: Start) -> DualSolution
     residuals, size = begin.iterate.residuals, problem.norm(begin.iterate.multiplier)
     least = LeastSizes(residuals.force_scale, residuals.gluing_scale, size)
     found = solver.run(replace(problem, least=least, reach=None), begin)
-    if problem.norm(found.multiplier) <= max(solver.tolerance, min(100.0 * solver.tolerance, SMALL)) * size:
+    # Zero is one of the answers: forces this small relative to those of the last load are none.
+    if problem.norm(found.multiplier) <= max(solver.tolerance, min(100.0 * solver.tolerance, 1e-3)) * size:
         return replace(released, products=found.products)
     answer = certify(problem, found.multiplier, found.product, found.residual)
     if answer.iterate.residuals.within(solver.tolerance):
@@ -233,7 +229,11 @@ def _released(problem: DualProblem, begin: Start, tolerance: float) -> DualSolut
 
 
 def _solve_scaled(
-    problem: DualProblem, solver: DualSolver, start: DualSolution | Vector | None, same: bool
+    problem: DualProblem,
+    solver: DualSolver,
+    start: DualSolution | Vector | None,
+    same: bool,
+    attempts: int = 4,
 ) -> DualSolution:
     """Solve in scaled multipliers until the residuals of the unscaled ones are small, too. Collective."""
     scaled = problem.scaled_problem
@@ -241,7 +241,7 @@ def _solve_scaled(
     begin = _scaled_start(problem, start)
     tolerance, products = solver.tolerance, 0
     history: tuple[SolverStep, ...] = ()
-    for attempt in range(SCALED_ATTEMPTS):
+    for attempt in range(attempts):
         begin = _solve_as_given(scaled, solver.with_tolerance(tolerance), begin, same or attempt > 0)
         products, history = products + begin.products, (*history, *begin.history)
         solution = _unscaled(problem, begin)
@@ -250,7 +250,7 @@ def _solve_scaled(
         tolerance *= 0.3 * solver.tolerance / solution.residuals.worst
     raise ConvergenceError(
         f"a solution needs residuals below {solver.tolerance:.1e}, got {solution.residuals} after "
-        f"{SCALED_ATTEMPTS} attempts with ever stricter scaled ones: loosen the tolerance",
+        f"{attempts} attempts with ever stricter scaled ones: loosen the tolerance",
         history,
     )
 

@@ -50,7 +50,7 @@ def test_factors_of_another_pattern_are_not_refilled():
 
 
 def test_cholesky_factors_that_do_not_fit_are_replaced(monkeypatch):
-    monkeypatch.setattr("fenics_contact._large_deformations.tangent.WRONG", 0.0)
+    monkeypatch.setattr(RefillableFactor, "accuracy", 0.0)
     assert isinstance(mostly_positive(stiffness(0.0), None), IndefiniteFactor)
 
 

@@ -58,6 +58,7 @@ def dragged() -> list[list[AnyState]]:
     [
         ({"tolerance": 2.0}, "tolerance of TangentNewton must lie between 0 and 1, got 2.0: .* 1e-08"),
         ({"forcing": 0.0}, "forcing of TangentNewton must lie between 0 and 1, got 0.0"),
+        ({"nested": 1.0}, "nested of TangentNewton must lie between 0 and 1, got 1.0: .* 0.01"),
         ({"max_steps": 0}, "max_steps of TangentNewton must be an integer of at least 1, got 0"),
         ({"max_products": 2.5}, r"TangentNewton.max_products must be an integer, got 2.5"),
     ],

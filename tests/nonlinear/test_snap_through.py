@@ -30,6 +30,7 @@ from fenics_contact import (
     box_partition,
     solve_steps,
 )
+from fenics_contact._large_deformations.load_steps import Stages
 from fenics_contact.errors import LoadStepError
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import NeoHooke
@@ -131,7 +132,7 @@ def test_without_leave_to_snap_the_path_ends() -> None:
 
 def test_bodies_that_find_no_rest_end_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
     """A strip that is crushed: its load has no equilibrium that Newton's method could find."""
-    monkeypatch.setattr("fenics_contact._large_deformations.load_steps.MOST", 10)
+    monkeypatch.setattr("fenics_contact._large_deformations.load_steps.Snapping.by", Stages(most=10))
     strip = Body(rectangle((0.0, 0.0), (2.0, 1.0), (4, 2)), NeoHooke(1.0, 0.3))
     crushed = Scene({"strip": strip}, [Support("strip", "x0")], [Traction("strip", "x1", (-300.0, 0.0))])
     steps = AutomaticSteps(smallest=1.0 / 4, snaps=True)

@@ -319,6 +319,7 @@ def test_history_tells_of_every_evaluation_in_order() -> None:
     [
         ({"tolerance": 0.0}, "tolerance must be positive and finite, got 0.0"),
         ({"first_step": np.nan}, "first_step must be positive and finite, got nan"),
+        ({"least_t": 0.0}, "least_t must be positive and finite, got 0.0"),
         ({"max_bundle": 2}, "max_bundle must be at least 3, got 2"),
         ({"max_evaluations": 0}, "max_evaluations must be at least 1, got 0"),
         ({"descent": 1.0}, r"descent must lie in \(0, 1\), got 1.0"),
