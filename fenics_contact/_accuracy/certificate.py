@@ -21,10 +21,6 @@ from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 from fenics_contact.qp.solution import DualSolution, contact_step
 
-#: Newton steps and halvings of one.
-STEPS, HALVINGS = 100, 30
-#: Fraction of the predicted decrease that a step must achieve, or of the imbalance that it may leave.
-ARMIJO, REDUCED = 1e-4, 0.5
 #: Largest weight of multipliers at their bounds, relative to free ones.
 HELD = 1e-3
 
@@ -40,7 +36,9 @@ class _Point:
     value: float
 
 
-def nearest(problem: DualProblem, feasible: FeasibleSet, start: Vector, enough: float) -> Vector:
+def nearest(
+    problem: DualProblem, feasible: FeasibleSet, start: Vector, enough: float, max_steps: int = 100
+) -> Vector:
     """Return the multiplier of a cone in equilibrium that is nearest to a given one. Collective; no product.
 
     With P the projection on the cone it is λ(α) = P(λ₀ − Gᵀα), where α minimises the convex function
@@ -55,7 +53,7 @@ def nearest(problem: DualProblem, feasible: FeasibleSet, start: Vector, enough: 
     """
     search = _Search(problem, feasible, start)
     point = search.at(np.zeros(problem.coarse.m))
-    for _ in range(STEPS):
+    for _ in range(max_steps):
         left = search.length(point)
         if left <= enough:
             break
@@ -68,6 +66,10 @@ def nearest(problem: DualProblem, feasible: FeasibleSet, start: Vector, enough: 
 
 class _Search:
     """The convex function and Newton's steps on it."""
+
+    halvings = 30  # of a step
+    armijo = 1e-4  # fraction of the predicted decrease that a step must achieve,
+    reduced = 0.5  # or of the imbalance that it may leave
 
     def __init__(self, problem: DualProblem, feasible: FeasibleSet, start: Vector) -> None:
         self._problem, self._feasible, self._start = problem, feasible, start
@@ -92,10 +94,10 @@ class _Search:
         direction = self._coarse.restricted(self._slope(point, weight)).solve(point.lacking)
         promised = float(point.lacking @ direction)
         share = 1.0
-        for _ in range(HALVINGS):
+        for _ in range(self.halvings):
             trial = self.at(point.alpha + share * direction)
-            decreases = trial.value <= point.value - ARMIJO * share * promised
-            if decreases or self.length(trial) <= REDUCED * left:
+            decreases = trial.value <= point.value - self.armijo * share * promised
+            if decreases or self.length(trial) <= self.reduced * left:
                 return trial
             share *= 0.5
         return None
@@ -128,10 +130,6 @@ def evening(problem: DualProblem) -> Vector:
 
 #: Imbalance above this fraction of all forces, at which duality gives no bound.
 UNBALANCED = 1e-9
-#: Rounds of alternating projections on the cone and on equilibrium.
-ROUNDS = 100
-#: A round that leaves more than this fraction of the imbalance makes no progress.
-PROGRESS = 0.9
 #: A slip bound larger than any force.
 ENDLESS = 1e300
 
@@ -242,24 +240,29 @@ def _balanced_by_nearest(problem: DualProblem, feasible: FeasibleSet, start: Vec
     return closest, _unbalanced(problem, closest)
 
 
-def _balanced(statuses: Statuses, feasible: FeasibleSet, start: Vector) -> tuple[Vector, float]:
+def _balanced(
+    statuses: Statuses, feasible: FeasibleSet, start: Vector, rounds: int = 100, progress: float = 0.9
+) -> tuple[Vector, float]:
     """Return a multiplier of the cone in equilibrium, and the remaining G λ − e. Collective.
 
     The shortest change of the free multipliers restores equilibrium or, where these do not suffice, of all
     closed ones, or of all; the result is projected on the cone again. Neighbouring contact forces take part:
     gluing forces alone would carry the difference through the bodies, which bends thin ones. Forces across
     open gaps come last, as each costs its gap in energy.
+
+    `rounds`: rounds of alternating projections on the cone and on equilibrium; `progress`: a round that
+    leaves more than this fraction of the imbalance makes no progress.
     """
     problem, point = statuses.problem, feasible.project(start)
     left = _unbalanced(problem, point)
     for rows, coarse in statuses.spaces():
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             if left <= ROUNDING:
                 return point, left
             lacking = rows @ coarse.transpose(coarse.solve(problem.coarse.residual(point)))
             point = feasible.project(point - evening(problem) * lacking)
             before, left = left, _unbalanced(problem, point)
-            if left > PROGRESS * before:
+            if left > progress * before:
                 break
     return point, left
 
@@ -290,8 +293,6 @@ def _forces(problem: DualProblem, multiplier: Vector) -> float:
     return max(problem.norm(multiplier), problem.coarse.norm(problem.coarse.load))
 
 
-#: Number of corrections for the regularisation of the contact block.
-REFINEMENTS = 12
 #: Largest remaining violation relative to the initial one.
 UNLIFTED = 1e-9
 
@@ -354,14 +355,17 @@ class _Closing:
     left: float
 
 
-def _close(rows: _Rows, residual: Vector, cancelled: float) -> _Closing:
-    """Close rows, and those that penetrate afterwards. Collective; no application of S."""
+def _close(rows: _Rows, residual: Vector, cancelled: float, refinements: int = 12) -> _Closing:
+    """Close rows, and those that penetrate afterwards. Collective; no application of S.
+
+    `refinements`: number of corrections for the regularisation of the contact block.
+    """
     system = rows.system
     comm, w = system.problem.comm, np.zeros(len(system.inverse.interface))
     start = global_max(comm, np.abs(rows.wanted(residual)).max(initial=0.0))
     small = max(UNLIFTED * start, LAST_PLACES * cancelled)
     lifting, current, violation = system.preconditioner.lifting(rows.restriction), residual, start
-    for _ in range(REFINEMENTS):
+    for _ in range(refinements):
         w += lifting.jump(rows.spread(rows.wanted(current)))
         current = residual - system.interface_jump(w)
         more = rows.penetrating(current, small)

@@ -296,9 +296,6 @@ def padded(sites: Sites, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return table.indices[place], np.where(real, table.data[place], 0.0)
 
 
-#: Weight of the highest derivatives relative to the moments of a patch, which are of order one: it affects
-#: only what the patch leaves undetermined, which rounding would decide otherwise.
-SLIGHT = 1e-5
 #: A patch does not determine the highest derivatives if the trace of the inverse of its moments on them
 #: exceeds this, by degree and dimension. It is 5.5 and 13.1 inside regular meshes of linear cells, 144 and
 #: 273 of quadratic ones; on curved boundaries it may be finite only because layers of nodes are slightly
@@ -306,14 +303,14 @@ SLIGHT = 1e-5
 OPEN = {(2, 2): 8.0, (2, 3): 18.0, (3, 2): 210.0, (3, 3): 400.0}
 #: Their weight, by degree, where neighbours prescribe them.
 FIRM = {2: 0.2, 3: 0.02}
-#: Where no patch suffices, those within this factor of the best are used.
-ALIKE = 1.5
 
 
-def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
+def recovered_gradients(sites: Sites, displacement: np.ndarray, slight: float = 1e-5) -> np.ndarray:
     """Return the recovered displacement gradient at every site. Collective.
 
-    `displacement`: displacement of each site, shape (n_sites, dim), [length].
+    `displacement`: displacement of each site, shape (n_sites, dim), [length]; `slight`: weight of the highest
+    derivatives relative to the moments of a patch, which are of order one: it affects only what the patch
+    leaves undetermined, which rounding would decide otherwise.
 
     Returns ∂u_k/∂x_j as entry (k, j), shape (n_sites, dim, dim), dimensionless.
     """
@@ -322,7 +319,7 @@ def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
     coefficients = np.zeros((sites.count, patches.polynomials.count, dim))
     waiting, doubts = [], []
     for moments in patches.moments(displacement):
-        inverse = np.linalg.inv(moments.matrix + SLIGHT * penalty)
+        inverse = np.linalg.inv(moments.matrix + slight * penalty)
         first = inverse @ moments.right
         # Once more with the remainder, which removes the effect of the weight.
         coefficients[moments.rows] = first + inverse @ (moments.right - moments.matrix @ first)
@@ -334,11 +331,14 @@ def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
     return np.asarray(np.einsum("njk,nji->nki", coefficients[:, :dim], patches.turn))
 
 
-def _ask_neighbours(patches: Patches, open_: Moments, doubt: np.ndarray, coefficients: np.ndarray) -> None:
+def _ask_neighbours(
+    patches: Patches, open_: Moments, doubt: np.ndarray, coefficients: np.ndarray, alike: float = 1.5
+) -> None:
     """Refit undetermined sites with the highest derivatives of neighbours, layer by layer. Collective.
 
     `doubt`: measure of how poorly each is determined, shape (n,); `coefficients`: coefficients of all sites,
-    which are overwritten, shape (n_sites, m, dim), [length].
+    which are overwritten, shape (n_sites, m, dim), [length]; `alike`: where no patch suffices, those within
+    this factor of the best are used.
     """
     comm = patches.sites.sharing.comm
     known = np.ones(patches.sites.count, dtype=bool)
@@ -349,7 +349,7 @@ def _ask_neighbours(patches: Patches, open_: Moments, doubt: np.ndarray, coeffic
             ready = open_.part(heard)
             coefficients[ready.rows] = _fitted(patches, ready, derivatives[heard])
         else:
-            heard = doubt <= ALIKE * comm.allreduce(float(doubt.min(initial=np.inf)), op=MPI.MIN)
+            heard = doubt <= alike * comm.allreduce(float(doubt.min(initial=np.inf)), op=MPI.MIN)
         known[open_.rows[heard]] = True
         open_, doubt = open_.part(~heard), doubt[~heard]
 

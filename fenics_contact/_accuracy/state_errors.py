@@ -174,8 +174,6 @@ def _ratio(value: float, norm: float) -> float:
     return value / norm if norm > 0.0 else float(np.inf)
 
 
-#: Fraction of the allowed error that the next tolerance aims at: errors do not fall exactly as residuals do.
-MARGIN = 0.5
 #: Smallest and largest ratio of one tolerance to the one before.
 STEP = (1e-4, 0.3)
 
@@ -225,18 +223,22 @@ class BalancedTolerance:
         """Return whether the solver's errors are within their share of the discretisation's."""
         return errors.together <= self.share * discretisation
 
-    def tightened(self, reached: float, errors: SolverErrors, discretisation: float) -> float:
+    def tightened(
+        self, reached: float, errors: SolverErrors, discretisation: float, margin: float = 0.5
+    ) -> float:
         """Return the next tolerance.
 
         Args:
             reached: Largest residual so far.
             errors: The solver's errors.
             discretisation: Estimated error of the mesh, [√(force · length)].
+            margin: Fraction of the allowed error that the next tolerance aims at: errors do not fall exactly
+                as residuals do.
         """
         allowed, have = self.share * discretisation, errors.together
         # For so small an allowed error intermediate tolerances are useless; with an unknown error all are
         # useful.
         if np.isfinite(have) and allowed <= self.finest * have:
             return self.finest
-        ratio = MARGIN * allowed / have
+        ratio = margin * allowed / have
         return max(self.finest, reached * min(max(ratio, STEP[0]), STEP[1]))

@@ -15,8 +15,10 @@ __all__ = ["counted", "displayed", "force_units", "in_lines", "in_short", "name_
 
 Class = TypeVar("Class", bound=type)
 
-#: Largest number of lines, and of columns, of a ``repr``.
-LINES, COLUMNS = 10, 110
+#: Largest number of lines of a ``repr``: it fits on a screen with others.
+LINES = 10
+#: Largest number of its columns: a wide terminal, as of the sources.
+COLUMNS = 110
 #: Largest number of columns of a part inside another object.
 INSIDE = 64
 #: Largest number of entries of a mapping or sequence that are shown.

@@ -21,8 +21,6 @@ from pathlib import Path
 from fenics_contact.errors import FenicsContactError
 
 _HIDDEN = re.compile(r"\..+\.[0-9a-f]{8}\.partial")
-#: On file systems without locks, age at which a folder counts as abandoned: no write takes that long, [s].
-_ABANDONED = 24 * 3600.0
 
 
 class CheckpointError(FenicsContactError, OSError):
@@ -76,14 +74,18 @@ def hidden_folder(folder: Path, stem: str) -> Iterator[Path]:
             os.close(lock)
 
 
-def remove_abandoned(folder: Path) -> None:
-    """Remove the hidden folders of dead writers."""
+def remove_abandoned(folder: Path, abandoned: float = 24 * 3600.0) -> None:
+    """Remove the hidden folders of dead writers.
+
+    `abandoned`: on file systems without locks, age at which a folder counts as abandoned: no write takes that
+    long, [s].
+    """
     for left in folder.glob(".*.partial"):
         if not _HIDDEN.fullmatch(left.name) or not left.is_dir():
             continue
         with suppress(OSError):  # another writer may remove it at the same time
             taken, lock = locked(left)
-            if taken or (lock is None and time.time() - left.stat().st_mtime > _ABANDONED):
+            if taken or (lock is None and time.time() - left.stat().st_mtime > abandoned):
                 shutil.rmtree(left, ignore_errors=True)
             if lock is not None:
                 os.close(lock)

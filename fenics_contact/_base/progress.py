@@ -322,8 +322,10 @@ def _launcher() -> int | None:
     return launcher
 
 
-#: Outermost work leaves a line if it took this long, [s], and this fraction of the time so far.
-WORTH, SHARE = 1.0, 0.05
+#: Outermost work leaves a line if it took this long, [s],
+WORTH = 1.0
+#: and this fraction of the time so far.
+SHARE = 0.05
 
 
 @contextmanager

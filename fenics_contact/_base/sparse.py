@@ -49,8 +49,6 @@ class Rates:
 
 #: Bytes of a sparse factor of n dofs of a solid, divided by n^1.5.
 FACTOR_BYTES = 29.0
-#: Bytes of the two packed triangles of dense operators, divided by the square of the interface dofs.
-TRIANGLE_BYTES = 6.0
 #: Rates measured as `Rates` describes.
 MEASURED = Rates()
 
@@ -103,10 +101,14 @@ def expected_seconds(size: int, interface: int) -> float:
     return min(_totals(size, interface, PRODUCTS, MEASURED))
 
 
-def expected_bytes(size: int, interface: int) -> float:
-    """Return the memory of a factored subdomain stored in the cheaper way; arguments as above."""
+def expected_bytes(size: int, interface: int, triangle_bytes: float = 6.0) -> float:
+    """Return the memory of a factored subdomain stored in the cheaper way; arguments as above.
+
+    `triangle_bytes`: bytes of the two packed triangles of dense operators, divided by the square of the
+    interface dofs.
+    """
     if prefers_explicit(size, interface):
-        return TRIANGLE_BYTES * interface**2 + FACTOR_BYTES * (size - interface) ** 1.5
+        return triangle_bytes * interface**2 + FACTOR_BYTES * (size - interface) ** 1.5
     return FACTOR_BYTES * (size**1.5 + (size - interface) ** 1.5)
 
 

@@ -91,8 +91,10 @@ SHOWN = (
     "kind", "written", "ranks", "solver", "counts", "residuals", "energies", "errors", "seconds", "contact",
     "rigid_motions", "optimisation", "more",
 )  # fmt: skip
-#: Longest list that is printed in full, and largest number of evaluations.
-LONGEST, MOST = 8, 20
+#: Longest list that is printed in full.
+LONGEST = 8
+#: Largest number of evaluations that are printed.
+MOST = 20
 
 
 def add_to(app: typer.Typer) -> None:

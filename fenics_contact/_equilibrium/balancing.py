@@ -25,8 +25,6 @@ from fenics_contact.qp.solve import DualSolver
 #: An estimate is repeated if the solver's error was more than this share of it: jumps between subdomains that
 #: are not converged yet raise it by about three times the solver's error.
 DOUBTED = 0.1
-#: A solution this good is accepted where the solver cannot reach the accuracy of the mesh.
-GOOD = 1e-6
 
 #: An earlier solution, a multiplier, or nothing.
 Start: TypeAlias = DualSolution | np.ndarray | None
@@ -41,10 +39,12 @@ def solve_balanced(
     balanced: BalancedTolerance,
     start: Start,
     timer: PhaseTimer,
+    good: float = 1e-6,
 ) -> Rounds:
     """Tighten the tolerance until the solver's error is a share of the mesh's. Collective.
 
-    `start`: multiplier to start from, owned, or None.
+    `start`: multiplier to start from, owned, or None; `good`: a solution this good is accepted where the
+    solver cannot reach the accuracy of the mesh.
 
     Returns the rounds; the last one holds the solution.
     """
@@ -54,7 +54,7 @@ def solve_balanced(
         try:
             rounds.add(solve, solver.with_tolerance(tolerance), earlier)
         except ConvergenceError as failure:
-            if not rounds.within(GOOD):
+            if not rounds.within(good):
                 raise ConvergenceError(str(failure), (*rounds.history, *failure.history)) from failure
             rounds.remark(f"{tolerance:.1e} was not reached, this is accepted")
             break

@@ -16,8 +16,6 @@ from fenics_contact.results.dual_solve import solve_dual
 
 #: Parts of the change of the loads whose equilibria lead to that of all of it.
 PARTS = (0.5, 0.875, 1.0)
-#: Contact forces that fall with the loads, but for this part, are not held by friction.
-HELD = 0.05
 
 
 @dataclass(frozen=True)
@@ -87,13 +85,16 @@ class FollowedLoads:
         return problem.is_loaded or may_grip(problem.with_law(system.torn.law), start)
 
     @staticmethod
-    def _falls(system: DualSystem, before: np.ndarray, after: np.ndarray) -> bool:
-        """Return whether contact forces have fallen as all loads would that are taken off. Collective."""
+    def _falls(system: DualSystem, before: np.ndarray, after: np.ndarray, held: float = 0.05) -> bool:
+        """Return whether contact forces have fallen as all loads would that are taken off. Collective.
+
+        `held`: contact forces that fall with the loads, but for this part, are not held by friction.
+        """
         if system.problem.is_loaded:
             return False
         rows = system.problem.layout.normal
         was, now = (system.problem.norm(forces[rows]) for forces in (before, after))
-        return now <= (1.0 - PARTS[0] + HELD) * was
+        return now <= (1.0 - PARTS[0] + held) * was
 
     def _partly(self, torn: TornSystem, part: float) -> TornSystem:
         """Return the system with a part of the change of its loads."""

@@ -27,9 +27,6 @@ from fenics_contact.results.rigid_motions import MOTION_ROUNDING, UnheldMotion, 
 MARGIN = 1e-6
 #: Loads count as balanced when less than this fraction of them remains; the conic solver is run to a tenth.
 LEFT = 1e-8
-#: Weight of the normal forces relative to the unbalanced load: it bounds the forces of bodies that grip each
-#: other, and leaves nothing unbalanced where forces below its inverse times the load suffice.
-SMALL = 1e-9
 
 
 def check_held(torn: TornSystem) -> None:
@@ -194,12 +191,15 @@ class _Balance:
     right: np.ndarray
     tresca_bound: np.ndarray
 
-    def left(self, part: float, speed: np.ndarray | float = 0.0) -> _Left | None:
+    def left(self, part: float, speed: np.ndarray | float = 0.0, small: float = 1e-9) -> _Left | None:
         """Minimise ‖[support contact] x − right‖ + Σ μ s λ_N over x = (reactions, λ_N, τ) in its cones.
 
         The smallest distance, unlike feasibility, is well determined also where forces only just suffice.
 
-        `speed`: sliding speeds s for the associated law to be freed of lift-off, shape (n_friction,).
+        `speed`: sliding speeds s for the associated law to be freed of lift-off, shape (n_friction,);
+        `small`: weight of the normal forces relative to the unbalanced load: it bounds the forces of bodies
+        that grip each other, and leaves nothing unbalanced where forces below its inverse times the load
+        suffice.
 
         Returns None if the load is balanced, else the direction of what is left.
         """
@@ -209,7 +209,7 @@ class _Balance:
         forces, admissible, limit, cones = _admissible(self.support.shape[1], torn, (part, self.tresca_bound))
         # Unknowns: x, the distance t and the remainder y; ‖y‖ ≤ t.
         size, left = forces.size, np.arange(len(right))
-        cost = SMALL * forces
+        cost = small * forces
         cost[self.support.shape[1] + torn.frictional] += part * torn.friction_coefficient * speed
         balance = sp.hstack(
             [self.support, self.contact, sp.csr_matrix((len(left), 1)), sp.identity(len(left))]

@@ -29,8 +29,6 @@ from fenics_contact.results.state import State
 
 #: Errors up to this share of what moves are small.
 SHARE = 0.1
-#: Gaps that grow by this share of how far the point of the largest pressure is pressed in are curved.
-CURVED = 0.1
 #: By how much the largest pressure may be off, by the edges of facets from its point to the next open one.
 OFF = {1: "by a half or more", 2: "by a tenth"}
 #: Rotation [rad], as the root mean square of all cells, that triggers the warning: it strains a body of small
@@ -305,13 +303,16 @@ def _is_curved(scene: Scene, side: Surface, pair: ContactPair) -> bool:
     return not known and surface_of(scene, side, "reconstructed").relief is not None
 
 
-def _coarse_peak(state: State, number: int, pressed_in: np.ndarray) -> list[tuple[int, str, str]]:
+def _coarse_peak(
+    state: State, number: int, pressed_in: np.ndarray, curved: float = 0.1
+) -> list[tuple[int, str, str]]:
     """Return the doubt about a pair whose largest pressure lies next to its edge, if there is one.
 
     So it is of round bodies. Contact that ends where a surface ends, or between planes that lift off each
     other, has no peak that more points would resolve.
 
-    `pressed_in`: how far its force presses each contact point in, shape (n,), [length].
+    `pressed_in`: how far its force presses each contact point in, shape (n,), [length]; `curved`: gaps that
+    grow by this share of how far the point of the largest pressure is pressed in are curved.
     """
     contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
     mine = contact.on_pair(number)
@@ -333,7 +334,7 @@ def _coarse_peak(state: State, number: int, pressed_in: np.ndarray) -> list[tupl
         opened = gap[reached][~np.isnan(gap[reached])]
         if len(opened):
             grown = opened.min() - contact.points.gap[mine[top]]
-            if grown > CURVED * pressed_in[mine[top]]:
+            if grown > curved * pressed_in[mine[top]]:
                 kind = "peak" if steps == 1 else "rough peak"
                 return [(number, kind, _words_of_peak(pair, int(pressing.sum()), steps))]
             break

@@ -223,10 +223,6 @@ class GaussPoints:
         return indptr, keys % size, places.reshape(len(dofs), -1)
 
 
-#: Part of the dilatation that a step led to, below which a foreseen one says nothing.
-FLATTENED = 0.1
-
-
 def assembled(form: _dolfinx.fem.Form, shape: tuple[int, int]) -> sp.csr_matrix:
     """Assemble a bilinear form on one rank."""
     indptr, indices, data = _dolfinx.assemble_csr(form)
@@ -283,10 +279,12 @@ class MeanDilatation:
         """Set dilatations and pressures to those of a displacement."""
         self._set(self._polynomials.coefficients(self._dilatation.at(displacement)[..., None])[..., 0])
 
-    def foresee(self, origin: np.ndarray, displacement: np.ndarray) -> None:
+    def foresee(self, origin: np.ndarray, displacement: np.ndarray, flattened: float = 0.1) -> None:
         """Set the dilatations to those that a step was expected to lead to, θ + M⁻¹ D δu, and the pressures.
 
         Where that turns a cell inside out, or nearly so, to those that it led to.
+
+        `flattened`: part of the dilatation that a step led to, below which a foreseen one says nothing.
         """
         shape = self._polynomials.centres.shape[0], -1
         change = (self._inverse @ (self._volume_changes() @ (displacement - origin))).reshape(shape)
@@ -296,7 +294,7 @@ class MeanDilatation:
         )
         foreseen = before + change[self._cells]
         points, reached = self._polynomials.at(foreseen), self._polynomials.at(actual)
-        possible = (points > FLATTENED * reached).all(axis=1)
+        possible = (points > flattened * reached).all(axis=1)
         self._set(np.where(possible[:, None], foreseen, actual))
 
     def stiffness(self) -> sp.csr_matrix:

@@ -231,8 +231,6 @@ class NodeNumbers:
         return nodes + self.first_of(body)
 
 
-#: Cosine between weights of nodes above which two points compare the same places.
-SAME_PLACE = 0.95
 #: Cosine between normals above which two points act in the same direction: corners stay what they are.
 PARALLEL = 0.9
 
@@ -371,11 +369,16 @@ def _held(
     return np.asarray(np.where(sliding, along, bonded) > PARALLEL)
 
 
-def _same_places(points: ContactPoints, others: ContactPoints) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the numbers of points and others that compare the same places, and −1 where slaves swap."""
+def _same_places(
+    points: ContactPoints, others: ContactPoints, same_place: float = 0.95
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the numbers of points and others that compare the same places, and −1 where slaves swap.
+
+    `same_place`: cosine between weights of nodes above which two points compare the same places.
+    """
     left, right = (_unit_rows(each.jump) for each in (points, others))
     cosine = (left @ right.T).tocoo()
-    same = np.abs(cosine.data) > SAME_PLACE
+    same = np.abs(cosine.data) > same_place
     row, column = cosine.row[same].astype(np.int64), cosine.col[same].astype(np.int64)
     return row, column, np.sign(cosine.data[same])
 

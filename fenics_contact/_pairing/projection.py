@@ -49,22 +49,27 @@ def shared_projection(
     return join([part for part in comm.allgather(projection) if part is not None])
 
 
-#: Nodes count as on their shape if their distance is no more than this fraction of an edge.
-ON_SHAPE = 1e-6
-
 _LOG = logging.getLogger(__name__)
 
 
 def warn_of_surface(
-    scene: Scene, surface: Surface, geometry: Geometry, faceted: FacetedSurface, comm: MPI.Comm
+    scene: Scene,
+    surface: Surface,
+    geometry: Geometry,
+    faceted: FacetedSurface,
+    comm: MPI.Comm,
+    on_shape: float = 1e-6,
 ) -> None:
-    """Warn of nodes off their shape, and of reconstructed facets that stay flat."""
+    """Warn of nodes off their shape, and of reconstructed facets that stay flat.
+
+    `on_shape`: nodes count as on their shape if their distance is no more than this fraction of an edge.
+    """
     mesh = scene.bodies[surface.body].mesh.origin
     away = mesh.off_shapes.get(surface.name) if geometry == "best" else None
     name = f"surface {surface.name!r} of {surface.body!r}"
     if comm.rank > 0:
         return
-    if away is not None and (off := np.count_nonzero(away > ON_SHAPE)):
+    if away is not None and (off := np.count_nonzero(away > on_shape)):
         safe_log(
             _LOG.warning,
             "%d of %d nodes of %s lie off its shape, %s, by up to %.3g of an edge: gaps are measured "
@@ -81,12 +86,13 @@ def warn_of_surface(
         )  # fmt: skip
 
 
-#: Weights of nodes that are not tied below this are rounding.
-LEAST = 1e-6
-
-
 def warn_of_edge(
-    tie: Tie, slave: FacetedSurface, held: np.ndarray, master: FacetedSurface, comm: MPI.Comm
+    tie: Tie,
+    slave: FacetedSurface,
+    held: np.ndarray,
+    master: FacetedSurface,
+    comm: MPI.Comm,
+    least: float = 1e-6,
 ) -> None:
     """Warn where nodes beyond the master's edge leave a part of the master to the others. Collective.
 
@@ -94,7 +100,8 @@ def warn_of_edge(
     them between these nodes and its edge is missing.
 
     `held`: which nodes of the slave are tied or held by supports, shape (n_nodes,); `comm`: communicator of
-    the ranks that share the work; rank 0 logs.
+    the ranks that share the work; rank 0 logs; `least`: weights of nodes that are not tied below this are
+    rounding.
     """
     whole, some = (each(held[slave.facets], axis=1) for each in (np.all, np.any))
     if not np.any(some & ~whole):
@@ -102,7 +109,7 @@ def warn_of_edge(
     hit = shared_projection(master, np.arange(len(master.nodes)), slave, comm)
     weights, _ = shape_functions(hit.local, slave.corners)
     nodes = slave.facets[hit.facet]
-    off = (np.abs(weights) * ~held[nodes]).sum(axis=1) > LEAST
+    off = (np.abs(weights) * ~held[nodes]).sum(axis=1) > least
     crossed = off & some[hit.facet]
     share = master.areas[hit.point[crossed]].sum() / max(master.areas[hit.point].sum(), np.finfo(float).tiny)
     if share > 0.0 and comm.rank == 0:
@@ -116,18 +123,20 @@ def warn_of_edge(
         )  # fmt: skip
 
 
-#: Errors of a uniform pressure up to this are told to nobody.
-EVEN = 0.1
-
-
 def warn_of_uneven_pressure(
-    scene: Scene, pair: ContactPair | Tie, slave: FacetedSurface, master: FacetedSurface, comm: MPI.Comm
+    scene: Scene,
+    pair: ContactPair | Tie,
+    slave: FacetedSurface,
+    master: FacetedSurface,
+    comm: MPI.Comm,
+    even: float = 0.1,
 ) -> None:
     """Say by how much a uniform pressure will be missed, and whether less with slave and master swapped.
 
     Only of quadratic cells: linear ones have mortar. Collective.
 
-    `comm`: communicator of the ranks that share the work; rank 0 logs.
+    `comm`: communicator of the ranks that share the work; rank 0 logs; `even`: errors of a uniform pressure
+    up to this are not reported.
     """
     if slave.whole is None and master.whole is None:
         return
@@ -136,7 +145,7 @@ def warn_of_uneven_pressure(
     with together(comm):
         share = master_share(scene, pair)
         error = unevenness(slave, there, master, back, share) if comm.rank == 0 else 0.0
-        if error <= EVEN:
+        if error <= even:
             return
         swapped = unevenness(master, back, slave, there, 1.0 - share)
     better = "swap them" if swapped < error else "it would not help to swap them"

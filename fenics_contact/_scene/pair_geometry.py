@@ -31,12 +31,8 @@ if TYPE_CHECKING:
     from fenics_contact._scene.parts import SceneParts
 
 
-#: Nodes around the smallest gap to which the gap is fitted.
-AROUND = 30
 #: Contact is taken as line contact if one relative curvature is below this fraction of the other.
 LINE = 1e-2
-#: A gap counts as flat if its curvature times the size of the surface is below this.
-FLAT = 1e-6
 
 
 def displacement_along(scene: SceneParts, normal: np.ndarray) -> float:
@@ -116,7 +112,7 @@ def _constants(body: Body) -> tuple[float, float] | None:
 
 
 def hertz_approach(
-    force: float, modulus: float, place: np.ndarray, normal: np.ndarray, gap: np.ndarray
+    force: float, modulus: float, place: np.ndarray, normal: np.ndarray, gap: np.ndarray, flat: float = 1e-6
 ) -> float | None:
     """Return how far two bodies come closer by Hertz's theory; None where it does not hold, [length].
 
@@ -126,13 +122,14 @@ def hertz_approach(
 
     `force`: force that presses the bodies together, [force], in the plane [force / length]; `modulus`: E*,
     [force / length²]; `place`: coordinates of the nodes of one surface that face the other, shape (n, dim),
-    [length]; `normal`: normals of the gaps there, shape (n, dim); `gap`: gaps, shape (n,), [length].
+    [length]; `normal`: normals of the gaps there, shape (n, dim); `gap`: gaps, shape (n,), [length]; `flat`:
+    A gap counts as flat if its curvature times the size of the surface is below this.
     """
     curvatures, reach = _relative_curvatures(place, normal[np.argmin(gap)], gap)
     if force <= 0.0 or len(curvatures) == 0:
         return None
     low, high, size = curvatures[0], curvatures[-1], reach.max()
-    if high * size <= FLAT or low < -LINE * high:
+    if high * size <= flat or low < -LINE * high:
         return None
     if len(curvatures) == 1 or low <= LINE * high:
         line = hertz_line(force / (1.0 if len(curvatures) == 1 else reach[0]), high, modulus)
@@ -142,17 +139,19 @@ def hertz_approach(
 
 
 def _relative_curvatures(
-    place: np.ndarray, normal: np.ndarray, gap: np.ndarray
+    place: np.ndarray, normal: np.ndarray, gap: np.ndarray, around: int = 30
 ) -> tuple[np.ndarray, np.ndarray]:
     """Fit a quadratic polynomial to the gap around its minimum.
 
     Returns the relative curvatures, ascending, shape (dim − 1,), [1 / length], and how far the nodes reach
     along their directions, shape (dim − 1,), [length]; nothing if there are too few nodes.
+
+    `around`: nodes around the smallest gap to which the gap is fitted.
     """
     dim = place.shape[1]
     axes = tangent_bases(normal[None])[0]
     along = (place - place[np.argmin(gap)]) @ axes.T
-    near = np.argsort((along**2).sum(axis=1))[:AROUND]
+    near = np.argsort((along**2).sum(axis=1))[:around]
     if len(near) < dim * (dim + 1) // 2:
         return np.zeros(0), np.zeros(0)
     size = float(np.abs(along[near]).max())
@@ -305,12 +304,10 @@ def _largest_height(surface: FacetedSurface, facets: np.ndarray) -> float:
     return float(np.abs(heights(surface, facets, local).value).max(initial=0.0))
 
 
-#: Part of a facet within which surfaces touch, and by which they overlap before loads more than facets do.
-TOUCHING, OVERLAPPING = 1e-3, 0.05
-#: Part of the largest displacement by which a facet counts as inside another body.
-DEEP = 1e-3
-#: Barycentric coordinates down to this are inside.
-ROUNDING = -1e-12
+#: Part of a facet within which surfaces touch.
+TOUCHING = 1e-3
+#: Part of a facet by which they overlap before loads more than facets do.
+OVERLAPPING = 0.05
 
 #: The boundary of a body, in linear facets, with the cell behind each, and its inside, in simplices.
 Outline: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -397,6 +394,7 @@ def unpaired(
     moved: Mapping[str, np.ndarray],
     reach: float,
     share: slice = slice(None),
+    least_depth: float = 1e-3,
 ) -> Unpaired:
     """Count the facets of two bodies that nothing keeps out of each other.
 
@@ -404,10 +402,11 @@ def unpaired(
     other. Those that go there behind a named surface are left out: how far that passes is the pair's matter.
 
     `moved`: body name -> displacement of its nodes, shape (n_nodes, dim), [length]; `reach`: the largest
-    displacement of all bodies, [length].
+    displacement of all bodies, [length]; `least_depth`: part of the largest displacement by which a facet
+    counts as inside another body.
     """
     named = _named(scene, both)
-    counts, deep = np.zeros(3, dtype=int), DEEP * reach
+    counts, deep = np.zeros(3, dtype=int), least_depth * reach
     for body, into in (both, both[::-1]):
         before, wall = scene.bodies[body].mesh.points, scene.bodies[into].mesh.points
         facets, behind, _ = outlines[body]
@@ -497,8 +496,13 @@ class _Facets:
         return found
 
 
-def _in_simplices(places: np.ndarray, points: np.ndarray, simplices: np.ndarray) -> np.ndarray:
-    """Return which places are in simplices, (n,)."""
+def _in_simplices(
+    places: np.ndarray, points: np.ndarray, simplices: np.ndarray, border: float = -1e-12
+) -> np.ndarray:
+    """Return which places are in simplices, (n,).
+
+    `border`: barycentric coordinates down to this are inside.
+    """
     low, high = places.min(axis=0), places.max(axis=0)
     for axis in np.argsort((high - low) / np.ptp(points, axis=0)):  # what leaves out most comes first
         along = points[simplices.T, axis]
@@ -518,5 +522,5 @@ def _in_simplices(places: np.ndarray, points: np.ndarray, simplices: np.ndarray)
     kept = full[simplex]
     place, simplex = place[kept], simplex[kept]
     rest = np.linalg.solve(sides[simplex], (places[place] - start[simplex])[..., None])[..., 0]
-    inside[place[np.minimum(rest.min(axis=1), 1.0 - rest.sum(axis=1)) >= ROUNDING]] = True
+    inside[place[np.minimum(rest.min(axis=1), 1.0 - rest.sum(axis=1)) >= border]] = True
     return inside

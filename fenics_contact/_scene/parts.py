@@ -414,14 +414,12 @@ def _shortest_edges(surface: FacetedSurface) -> np.ndarray:
     return result
 
 
-#: A facet is normal to an axis if the cosine of its normal differs from one by no more than this.
-ACROSS = 1e-9
-
-
-def mirrored(scene: SceneParts, body: str) -> np.ndarray:
+def mirrored(scene: SceneParts, body: str, tilt: float = 1e-9) -> np.ndarray:
     """Return which nodes of a body lie on a plane of symmetry normal to each axis, shape (n_nodes, dim).
 
     A plane of symmetry is a flat side normal to an axis on which a support prescribes only that component.
+
+    `tilt`: a facet is normal to an axis if the cosine of its normal differs from one by no more than this.
     """
     mesh = scene.bodies[body].mesh
     marks = np.zeros(mesh.points.shape, dtype=bool)
@@ -433,7 +431,7 @@ def mirrored(scene: SceneParts, body: str) -> np.ndarray:
             continue
         facets = mesh.surfaces[support.surface]
         areas = vector_areas(mesh.points, facets)
-        across = np.abs(areas[:, given[0]]) >= (1.0 - ACROSS) * np.linalg.norm(areas, axis=1)
+        across = np.abs(areas[:, given[0]]) >= (1.0 - tilt) * np.linalg.norm(areas, axis=1)
         marks[facets[across].ravel(), given[0]] = True
     return marks
 

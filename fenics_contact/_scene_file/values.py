@@ -67,9 +67,11 @@ _COMPARED: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Gt: np.greater,
     ast.GtE: np.greater_equal,
 }
-#: Longest accepted formula, and largest depth of nested operations; those of a sum or a product, which are
-#: evaluated from left to right, are not nested.
-LONGEST, DEEPEST = 2000, 50
+#: Longest accepted formula, in characters: files may come from others.
+LONGEST = 2000
+#: Largest depth of nested operations, below Python's limit of recursion; those of a sum or a product, which
+#: are evaluated from left to right, are not nested.
+DEEPEST = 50
 ALLOWED = (
     f"numbers, {', '.join(COORDINATES)}, {TIME}, {', '.join(CONSTANTS)}, + - * / **, comparisons with < <= > "
     f">=, and {', '.join(sorted(FUNCTIONS))}"
@@ -320,8 +322,10 @@ FREE = "free"
 SEPARATOR = "|"
 #: Prefix of tags that pydantic adds to the path of an error: it does not occur in files.
 MARK = "\0"
-#: Limits of Linux, in bytes.
-LONGEST_NAME, LONGEST_PATH = 255, 4000
+#: Longest name of a file on Linux, in bytes.
+LONGEST_NAME = 255
+#: Longest path there, in bytes, with room below its 4096.
+LONGEST_PATH = 4000
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,16 +12,9 @@ from scipy.spatial import cKDTree
 from fenics_contact._surfaces.facets import FacetedSurface, heights, outside, shape_functions, shape_weights
 from fenics_contact.mesh.faces import coordinate_rounding
 
-#: Facets tried for each point in the first round, nearest centroids first.
-NEAREST = 9
 #: A facet is tried in the second round if its bounding ball is as near as the nearest centroid times this.
 REACH = 1.1
 NEWTON_STEPS = 25
-#: Number of steps after which a point still a facet's width away belongs to another facet.
-PATIENCE = 8
-#: Tolerance of a projection outside a facet, in local coordinates, for rounding on shared edges. Far from the
-#: origin the rounding of coordinates is added.
-EDGE_TOLERANCE = 1e-9
 #: Residual tolerance of Newton's method, relative to the facet and the gap.
 RESIDUAL = 1e-10
 #: Tolerance beyond the outer edges of the surface. Where a plane of symmetry cuts two round bodies the
@@ -122,9 +115,12 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     return replace(projection, gap=gap, lost=np.setdiff1d(projection.lost, projection.point))
 
 
-def nearest_facets(tree: cKDTree, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pair every point with the facets whose centroids are nearest: numbers of points and of facets."""
-    ranks = np.arange(min(NEAREST, tree.n)) + 1
+def nearest_facets(tree: cKDTree, points: np.ndarray, nearest: int = 9) -> tuple[np.ndarray, np.ndarray]:
+    """Pair every point with the facets whose centroids are nearest: numbers of points and of facets.
+
+    `nearest`: facets tried for each point in the first round, nearest centroids first.
+    """
+    ranks = np.arange(min(nearest, tree.n)) + 1
     _, facets = tree.query(points, k=ranks)
     return np.repeat(np.arange(len(points)), len(ranks)), facets.ravel()
 
@@ -151,8 +147,15 @@ def _solve(
     point: np.ndarray,
     facet: np.ndarray,
     rounding: float,
+    patience: int = 8,
+    edge_tolerance: float = 1e-9,
 ) -> Projection:
-    """Solve for each (point, facet) pair by Newton's method; keep those in a facet or barely beside it."""
+    """Solve for each (point, facet) pair by Newton's method; keep those in a facet or barely beside it.
+
+    `patience`: number of steps after which a point still a facet's width away belongs to another facet;
+    `edge_tolerance`: tolerance of a projection outside a facet, in local coordinates, for rounding on shared
+    edges. Far from the origin the rounding of coordinates is added.
+    """
     nodes = master.facets[facet]
     # Relative to the facet's own corner it is as exact far from the origin as near it.
     start = master.points[nodes[:, 0]]
@@ -168,7 +171,7 @@ def _solve(
         local[at] = np.clip(local[at] + step[:, :-1], -3, 3)
         gap[at] += step[:, -1]
         moving = np.abs(step[:, :-1]).max(axis=1) > 1e-8  # quadratic convergence: next comes rounding
-        if count >= PATIENCE:
+        if count >= patience:
             moving &= outside(local[at], master.corners) < 1.0
         at = at[moving]
         if len(at) == 0:
@@ -179,7 +182,7 @@ def _solve(
     matrix = newton_matrix(corners, corner_normals, derivatives, gap, normal, length)
     solved = np.linalg.norm(residual, axis=1) < RESIDUAL * (size + np.abs(gap))
     beside = outside(local, master.corners)
-    beside = np.where(beside <= EDGE_TOLERANCE + _local_rounding(matrix, rounding), 0.0, beside)
+    beside = np.where(beside <= edge_tolerance + _local_rounding(matrix, rounding), 0.0, beside)
     facing = np.einsum("nd,nd->n", normal, normals[point]) < 0
     near = facing & (beside <= MARGIN * (0.5 if master.corners == 3 else 1.0))
     lost = np.unique(point[near & ~solved])

@@ -33,10 +33,6 @@ from fenics_contact.shapes.simple import SurfaceShape, evaluate_shape, tangent_b
 CREASE = 40.0
 #: Ratio of a crease's angle to those of a smooth surface at the next edges.
 SEVERAL = 3.0
-#: Edges are parallel if the cosine of the angle between them is above this.
-ALIKE = 0.9
-#: Angles below this count as zero, in radians.
-ROUNDING = 1e-6
 #: Surfaces with a slope above this at the end of an edge have a cusp there, or fold.
 STEEPEST = 1.0
 
@@ -186,12 +182,17 @@ def _joints_with_images(surface: FacetedSurface) -> list[_Joints]:
     return joints
 
 
-def _is_crease(surface: FacetedSurface, joints: _Joints) -> np.ndarray:
+def _is_crease(
+    surface: FacetedSurface, joints: _Joints, rounding: float = 1e-6, parallel: float = 0.9
+) -> np.ndarray:
     """Return which joints are creases.
 
     A smooth surface turns by similar angles at the next parallel joints on both sides; where it turns by
     several times as much as at one of them, and by more than at the others there, it has a crease, however
     shallow.
+
+    `rounding`: angles below this count as zero, in radians; `parallel`: edges are parallel if the cosine of
+    the angle between them is above this.
     """
     nodes = surface.facets.ravel()[joints.corners[:, 0]]
     count, size = nodes.shape[0], len(surface.nodes)
@@ -207,7 +208,7 @@ def _is_crease(surface: FacetedSurface, joints: _Joints) -> np.ndarray:
         joint, corner = np.nonzero(apart)
         across = sp.csr_matrix((np.ones(len(joint)), (joint, beside[joint, corner])), shape=(count, size))
         pairs = (across @ at_node).tocoo()
-        alike = np.abs(np.einsum("nd,nd->n", along[pairs.row], along[pairs.col])) > ALIKE
+        alike = np.abs(np.einsum("nd,nd->n", along[pairs.row], along[pairs.col])) > parallel
         alike |= surface.dim == 2
         share = np.where(alike, 1.0, 1.0 / SEVERAL)
         turned, known = np.zeros(count), np.bincount(pairs.row, alike, count) > 0
@@ -215,7 +216,7 @@ def _is_crease(surface: FacetedSurface, joints: _Joints) -> np.ndarray:
             known &= across @ rim == 0
         np.maximum.at(turned, pairs.row, share * joints.angle[pairs.col])
         expected = np.minimum(expected, np.where(known, turned, np.inf))
-    alone = joints.angle > SEVERAL * expected + ROUNDING
+    alone = joints.angle > SEVERAL * expected + rounding
     return np.asarray(alone | (joints.angle > np.radians(CREASE)))
 
 
@@ -320,12 +321,6 @@ Geometry: TypeAlias = Literal["best", "reconstructed", "faceted"]
 _KNOWN: WeakKeyDictionary[BodyMesh, dict[Hashable, Relief | None]] = WeakKeyDictionary()
 """Reliefs of the surfaces of meshes, shared with reshaped meshes."""
 
-#: Newton steps along a ray to a shape; distances are nearly linear there.
-STEPS = 12
-#: Directions count as tangential to a shape if the cosine of their angle to its normal is below this.
-ALONG = 0.02
-#: Largest angle in radians between the normals of shapes that meet smoothly.
-SHARP = 0.02
 #: A true surface has no relief if its height over the facets is below this multiple of their size.
 FLAT = 1e-12
 
@@ -386,13 +381,13 @@ def _is_flat(surface: FacetedSurface) -> bool:
     return bool(max(bends) <= limit and np.abs(relief.normals).max() <= limit / edges.min())
 
 
-def by_shape(surface: FacetedSurface, shape: SurfaceShape) -> FacetedSurface:
+def by_shape(surface: FacetedSurface, shape: SurfaceShape, sharp: float = 0.02) -> FacetedSurface:
     """Return a surface with the relief of the shape on which its nodes lie.
 
     Nodes slightly off the shape are not moved; the heights between them are relative to them. Where several
     shapes meet in a crease, or one its mirror image, each facet uses its own.
 
-    `shape`: the shape.
+    `shape`: the shape; `sharp`: largest angle in radians between the normals of shapes that meet smoothly.
     """
     parts = _parts(shape, surface.points[surface.facets].mean(axis=1))
     corners = np.zeros((*surface.facets.shape, surface.dim))
@@ -405,7 +400,7 @@ def by_shape(surface: FacetedSurface, shape: SurfaceShape) -> FacetedSurface:
     normals = np.zeros_like(surface.averaged)
     np.add.at(normals, surface.facets, corners)
     normals = _unit(np.where(surface.mirrored, 0.0, normals))
-    turned = np.einsum("nkd,nkd->nk", corners, normals[surface.facets]) < np.cos(SHARP)
+    turned = np.einsum("nkd,nkd->nk", corners, normals[surface.facets]) < np.cos(sharp)
     creased = np.isin(np.arange(len(normals)), surface.facets[turned])
     normals[creased] = surface.averaged[creased]
     smooth = ~creased[surface.facets]
@@ -473,14 +468,17 @@ def sample_points(corners: int) -> np.ndarray:
     return np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, 0.0]])
 
 
-def height_over(points: np.ndarray, directions: np.ndarray, shape: SurfaceShape) -> np.ndarray:
+def height_over(
+    points: np.ndarray, directions: np.ndarray, shape: SurfaceShape, max_steps: int = 12
+) -> np.ndarray:
     """Return the distances from points along directions to a shape, shape (n,), [length].
 
     `points`: points near the shape, shape (n, dim), [length]; `directions`: unit vectors that point out of
-    it, shape (n, dim); `shape`: the shape.
+    it, shape (n, dim); `shape`: the shape; `max_steps`: Newton steps along a ray to a shape; distances are
+    nearly linear there.
     """
     height = np.zeros(len(points))
-    for _ in range(STEPS):
+    for _ in range(max_steps):
         place = points + height[:, None] * directions
         step = evaluate_shape(shape, "distance", place)
         cosine = np.einsum("nd,nd->n", evaluate_shape(shape, "normals", place), directions)
@@ -492,9 +490,15 @@ def height_over(points: np.ndarray, directions: np.ndarray, shape: SurfaceShape)
     return height
 
 
-def _check_across(cosine: np.ndarray, place: np.ndarray, shape: SurfaceShape) -> None:
-    """Reject directions that are tangential to a shape."""
-    along = np.abs(cosine) < ALONG
+def _check_across(
+    cosine: np.ndarray, place: np.ndarray, shape: SurfaceShape, tangential: float = 0.02
+) -> None:
+    """Reject directions that are tangential to a shape.
+
+    `tangential`: directions count as tangential to a shape if the cosine of their angle to its normal is
+    below this.
+    """
+    along = np.abs(cosine) < tangential
     if along.any():
         where = ", ".join(f"{x:.6g}" for x in place[np.argmax(along)])
         raise InvalidInputError(

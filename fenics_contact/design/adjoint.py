@@ -30,13 +30,6 @@ from fenics_contact.results.contact import RowValues
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State
 
-#: A contact point is weakly active if it is closer to a switch of the contact law than this many residuals.
-UNCERTAINTY = 3.0
-#: Weak points further from the switch than this fraction of the forces are assigned to the closer side.
-LEANING = 1e-5
-#: A projection within this distance of a facet's edge, in local coordinates, counts as on the edge.
-EDGE_TOLERANCE = 1e-6
-
 
 class WeakChoice(Enum):
     """The branch that all weakly active points are given.
@@ -173,7 +166,9 @@ def _on_switch(
     return _OnSwitch(contact, vanishing, disc)
 
 
-def _uncertainty(comm: MPI.Comm, rows: RowValues) -> tuple[np.ndarray, np.ndarray]:
+def _uncertainty(
+    comm: MPI.Comm, rows: RowValues, leaning: float = 1e-5, residual_share: float = 3.0
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the distance from a switch beyond which a point's side is certain, owned, [force]. Collective.
 
     It is the uncertainty of λ − ρ r due to the residuals of the state, with ρ the step: those of the
@@ -181,20 +176,27 @@ def _uncertainty(comm: MPI.Comm, rows: RowValues) -> tuple[np.ndarray, np.ndarra
 
     Returns the distance, and that below which a point of an inaccurate state is assigned to no side, shapes
     (size,).
+
+    `leaning`: weak points further from the switch than this fraction of the forces are assigned to the closer
+    side; `residual_share`: a contact point is weakly active if it is closer to a switch of the contact law
+    than this many residuals.
     """
     residuals = rows.residuals
     forces, jumps = residuals.natural * residuals.force_scale, residuals.gluing * residuals.gluing_scale
     moved = np.where(rows.between_supports, 0.0, rows.step * rows.opening)  # none changes the others
     squares = [float(global_sum(comm, x @ x)[0]) for x in (rows.multiplier, moved)]
     rounding = ROUNDING * float(np.sqrt(max(squares)))
-    uncertainty = np.asarray(UNCERTAINTY * (forces + rows.step * jumps) + rounding)
-    return uncertainty, np.minimum(uncertainty, LEANING * residuals.force_scale + rounding)
+    uncertainty = np.asarray(residual_share * (forces + rows.step * jumps) + rounding)
+    return uncertainty, np.minimum(uncertainty, leaning * residuals.force_scale + rounding)
 
 
-def _points_on_edges(state: State) -> int:
+def _points_on_edges(state: State, edge_tolerance: float = 1e-6) -> int:
     """Count the closed points over an edge of their master facet, where the normal field has a kink.
 
     Points of mortar contact represent a mean over facets and lie on none.
+
+    `edge_tolerance`: a projection within this distance of a facet's edge, in local coordinates, counts as on
+    the edge.
     """
     points = state.torn.points
     total = 0
@@ -204,7 +206,7 @@ def _points_on_edges(state: State) -> int:
             mesh = state.scene.bodies[pair.master.body].mesh.linear
             corners = mesh.surfaces[pair.master.name].shape[1]
             distance = np.abs(edge_distance(points.local[closed], corners))
-            total += int(np.count_nonzero(distance < EDGE_TOLERANCE))
+            total += int(np.count_nonzero(distance < edge_tolerance))
     return total
 
 
@@ -228,8 +230,6 @@ NOT_HELD = (
     "resistance: refine the contact until more points hold it, add a support, choose WeakChoice.HELD where "
     "points are weakly active, or take a design away from this one"
 )
-#: Derivatives along a rigid motion below this fraction of their summands are rounding.
-UNFELT = 1e-9
 
 
 @displayed
@@ -351,16 +351,18 @@ def _begin(
     return _Begin(bearing + share * direction, gradient + share * turned, size, rounding)
 
 
-def _require_held(system: DualSystem, by_displacement: np.ndarray) -> None:
+def _require_held(system: DualSystem, by_displacement: np.ndarray, rounded: float = 1e-9) -> None:
     """Reject objectives that change along motions that nothing resists. Collective.
 
     Such motions are fixed by convention, not by the state, and how the convention changes with the shape is
     not part of the adjoint.
+
+    `rounded`: derivatives along a rigid motion below this fraction of their summands are rounding.
     """
     work = system.unheld.T @ by_displacement
     size = abs(system.unheld).T @ np.abs(by_displacement)
     work, size = system.problem.comm.allreduce(np.stack([work, size]))
-    if np.any(np.abs(work) > UNFELT * size):
+    if np.any(np.abs(work) > rounded * size):
         raise ConvergenceError(
             "the adjoint needs an objective that is the same wherever nothing holds a body, but this one "
             "changes along a rigid motion that meets no resistance (`State.unheld`): add a support, or use "

@@ -40,13 +40,17 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
 
-#: Seconds that a rank which failed in collective calls waits for the others: as long as the calls took so
-#: far, but within these limits.
-SHORTEST_WAIT, LONGEST_WAIT = 5.0, 60.0
+#: Least time that a rank which failed in collective calls waits for the others, [s]; more if the calls took
+#: longer so far.
+SHORTEST_WAIT = 5.0
+#: Longest time that it waits, [s].
+LONGEST_WAIT = 60.0
 #: Seconds after which a rank reports where it waits for the others.
 PATIENCE = 30.0
-#: Waiting ranks poll again after this fraction of the time waited, and at most after this many seconds.
-PAUSE, LONGEST_PAUSE = 0.05, 5e-3
+#: Waiting ranks poll again after this fraction of the time waited,
+PAUSE = 0.05
+#: and at most after this time, [s].
+LONGEST_PAUSE = 5e-3
 #: What a failed rank reports instead of its position.
 FAILED = 0
 #: Position of ranks whose program has ended.

@@ -11,9 +11,6 @@ from fenics_contact._pairing.points import HELD, ContactPoints, movable
 from fenics_contact._scene.pairs import Tie
 from fenics_contact.feti.decomposition import Rows, Tearing
 
-#: Directions count as parallel if their sine is below this.
-PARALLEL = 1e-6
-
 
 @dataclass(frozen=True)
 class Relations:
@@ -44,14 +41,15 @@ class Relations:
         moved = self.points.jump @ np.nan_to_num(prescribed)
         return np.asarray(np.einsum("rd,rd->r", self.directions, moved[self.which]))
 
-    def held(self, fixed: np.ndarray) -> np.ndarray:
+    def held(self, fixed: np.ndarray, parallel: float = 1e-6) -> np.ndarray:
         """Return which rows supports determine, alone or with the normal row, shape (n_rows,).
 
         With rollers on both sides, the free part of a tangent is parallel to that of the normal: along it a
         closed point cannot slip, and an open one opens. Such a row is left to the normal one unless it has
         the larger free part, or supports drive the point along it: then it slips.
 
-        `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
+        `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `parallel`: directions
+        count as parallel if their sine is below this.
         """
         free = movable(self.points, fixed)[self.which]
         left = np.where(free, self.directions, 0.0)
@@ -61,7 +59,7 @@ class Relations:
         normal = np.where(free, self.points.normal[self.which], 0.0)
         other = np.einsum("rd,rd->r", normal, normal)
         across = mine * other - np.einsum("rd,rd->r", left, normal) ** 2
-        tilted = (across <= PARALLEL**2 * mine * other) & (mine < other)
+        tilted = (across <= parallel**2 * mine * other) & (mine < other)
         return np.asarray((mine <= HELD**2) | (self.resting & tilted))
 
     def freedom(self, fixed: np.ndarray) -> np.ndarray:

@@ -21,8 +21,6 @@ from fenics_contact.feti.subdomain import LocalOperator, Subdomain, interface_do
 
 #: Number of cached symbolic factorisations. Each also holds the values of its last matrix: a few MB.
 CACHED = 8
-#: MUMPS control parameter and its value for nested dissection by METIS.
-ORDERING, METIS = 7, 5
 
 
 class Condensation:
@@ -45,7 +43,7 @@ class Condensation:
         self._pc.setFactorSolverType("mumps")
         self._pc.setFactorSetUpSolverType()
         self._factor = self._pc.getFactorMatrix()
-        self._factor.setMumpsIcntl(ORDERING, METIS)
+        self._factor.setMumpsIcntl(7, 5)  # ICNTL(7) = 5: nested dissection by METIS
         self._rows = PETSc.IS().createGeneral(interface.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
         petsc_call("MatFactorSetSchurIS", self._factor.handle, self._rows.handle)
         dispose_with(self, self._rows, self._factor, self._pc, self._matrix)
@@ -108,10 +106,6 @@ class Condensations:
         if len(self._recent) > CACHED:
             self._recent.popitem(last=False)
         return self._recent[key](stiffness)
-
-
-#: Entries of S below this fraction of those of K are rounding.
-ROUNDED = 1e-12
 
 
 class ExplicitOperator:
@@ -200,15 +194,19 @@ class ExplicitOperator:
         return solution
 
 
-def _packed_inverse(schur: np.ndarray, kernel: np.ndarray, typical: float) -> np.ndarray:
+def _packed_inverse(
+    schur: np.ndarray, kernel: np.ndarray, typical: float, rounded: float = 1e-12
+) -> np.ndarray:
     """Return the packed lower triangle of (S + ρ Q Qᵀ)⁻¹, overwriting ``schur``.
 
     ρ is the largest diagonal entry of S. Where that is rounding compared with the typical stiffness, every
     displacement of the interface is a rigid motion, as in a statically determinate body.
+
+    `rounded`: entries of S below this fraction of those of K are rounding.
     """
     modes, _ = np.linalg.qr(kernel)
     largest = schur.diagonal().max()
-    rho = largest if largest > ROUNDED * typical else typical
+    rho = largest if largest > rounded * typical else typical
     filled = blas.dsyrk(rho, modes, beta=1.0, c=schur, lower=1, overwrite_c=1)
     factor, failed = lapack.dpotrf(filled, lower=1, overwrite_a=1)
     if failed:

@@ -16,9 +16,6 @@ from fenics_contact.errors import together
 from fenics_contact.feti.subdomain import Subdomain, common_kernel
 from fenics_contact.feti.torn import TornSystem
 
-#: Modes of a subdomain must reproduce those of its body to this accuracy, else the subdomains' own are used.
-SPANNED = 1e-10
-
 
 def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
     """Return T that replaces the modes of every cut body's first subdomain by those of the body. Collective.
@@ -54,12 +51,15 @@ def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
     return (motions + sp.diags(unchanged)).tocsr()
 
 
-def _coefficients(subdomain: Subdomain, modes: np.ndarray) -> np.ndarray | None:
+def _coefficients(subdomain: Subdomain, modes: np.ndarray, spanned: float = 1e-10) -> np.ndarray | None:
     """Return the body's modes, (n_nodes, dim, n_modes), in terms of a subdomain's, one per column.
 
     None if they are not in its span.
+
+    `spanned`: modes of a subdomain must reproduce those of its body to this accuracy, else the subdomains'
+    own are used.
     """
     wanted = modes[subdomain.mesh.nodes].reshape(subdomain.mesh.size, modes.shape[-1])
     coefficients = np.linalg.lstsq(subdomain.kernel, wanted, rcond=None)[0]
     error = np.abs(subdomain.kernel @ coefficients - wanted).max(initial=0.0)
-    return coefficients if error <= SPANNED * np.abs(wanted).max(initial=0.0) else None
+    return coefficients if error <= spanned * np.abs(wanted).max(initial=0.0) else None

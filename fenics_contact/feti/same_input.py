@@ -16,9 +16,6 @@ from fenics_contact._scene.supports import Support
 from fenics_contact.errors import together
 from fenics_contact.errors.kinds import user_code
 
-#: Number of nodes at which functions are compared: different functions differ nearly everywhere.
-COMPARED = 8
-
 
 def check_same_input(comm: MPI.Comm, scene: Scene, **settings: Any) -> None:
     """Reject a scene or settings that differ from rank to rank. Collective on ``comm``.
@@ -57,9 +54,12 @@ def _values(scene: Scene) -> dict[str, str]:
     return descriptions
 
 
-def _nodes(scene: Scene, part: Any) -> np.ndarray:
-    """Return the coordinates of some nodes that a load or support acts on, shape (n, dim)."""
+def _nodes(scene: Scene, part: Any, compared: int = 8) -> np.ndarray:
+    """Return the coordinates of some nodes that a load or support acts on, shape (n, dim).
+
+    `compared`: number of nodes at which functions are compared: different functions differ nearly everywhere.
+    """
     mesh = scene.bodies[part.body].mesh
     on_surface = isinstance(part, Support | SurfaceLoad)
     nodes = np.unique(mesh.surfaces[part.surface]) if on_surface else np.arange(mesh.n_nodes)
-    return mesh.points[nodes[np.linspace(0, len(nodes) - 1, min(COMPARED, len(nodes))).astype(int)]]
+    return mesh.points[nodes[np.linspace(0, len(nodes) - 1, min(compared, len(nodes))).astype(int)]]

@@ -22,9 +22,6 @@ from fenics_contact.feti.factor import fixing_nodes
 from fenics_contact.materials.elastic import Material
 from fenics_contact.mesh.faces import corners_of
 
-#: Singular values of the kernel's trace on an interface below this count as zero: the modes have length one.
-RANK_TOLERANCE = 1e-6
-
 
 class LocalOperator(Protocol):
     """A factored subdomain. Its *interface* are the dofs that B touches.
@@ -57,18 +54,21 @@ class LocalOperator(Protocol):
         """Return bᵀ (K⁺)_bb b for each row b of a matrix with interface columns, shape (n_rows,)."""
 
 
-def interface_dofs(touched: np.ndarray, kernel: np.ndarray, points: np.ndarray) -> np.ndarray:
+def interface_dofs(
+    touched: np.ndarray, kernel: np.ndarray, points: np.ndarray, rank_tolerance: float = 1e-6
+) -> np.ndarray:
     """Return the dofs that B touches, and a few more if fixing these does not prevent rigid motions.
 
     With the interface fixed the inside must have no rigid motion, or K_ii would be singular.
 
     `touched`: marks of the dofs, shape (n,); `kernel`: columns that span the kernel of K, shape (n, n_modes);
-    `points`: coordinates by block of dim dofs, shape (n / dim, dim).
+    `points`: coordinates by block of dim dofs, shape (n / dim, dim); `rank_tolerance`: singular values of the
+    kernel's trace on an interface below this count as zero: the modes have length one.
     """
     modes, _ = np.linalg.qr(kernel)
     trace = np.linalg.svd(modes[touched], compute_uv=False)
     # A body on an elastic bed may have no contact at all, but the interface must not be empty.
-    if not touched.any() or np.count_nonzero(trace > RANK_TOLERANCE) < kernel.shape[1]:
+    if not touched.any() or np.count_nonzero(trace > rank_tolerance) < kernel.shape[1]:
         touched = touched.copy()
         touched.reshape(points.shape)[fixing_nodes(points)] = True
     return np.flatnonzero(touched)

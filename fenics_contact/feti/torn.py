@@ -39,9 +39,6 @@ from fenics_contact.feti.subdomain import Subdomain, assemble
 from fenics_contact.qp.cones import CoulombLaw, SlipLaw, TrescaLaw
 from fenics_contact.qp.layout import ContactLayout
 
-#: Supports hold a point along its normal if the free fraction is no larger than this: normals of facets are
-#: slightly tilted, and sliding along that tilt does not open a gap.
-SLIGHT = 0.02
 #: Penetration attributable to faceting, relative to the size of a slave facet.
 FACETING = 0.1
 
@@ -98,14 +95,18 @@ def check_apart(scene: Scene, decomposition: Decomposition) -> None:
         check_no_penetration(scene, points)
 
 
-def gap_with_room(normal: Relations, fixed: np.ndarray, prescribed: np.ndarray) -> np.ndarray:
+def gap_with_room(
+    normal: Relations, fixed: np.ndarray, prescribed: np.ndarray, slight: float = 0.02
+) -> np.ndarray:
     """Return the gaps; between surfaces held by supports, penetration due to faceting is removed.
 
     `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `prescribed`: prescribed
-    components of all nodes, NaN where free, shape (n_nodes, dim).
+    components of all nodes, NaN where free, shape (n_nodes, dim); `slight`: supports hold a point along its
+    normal if the free fraction is no larger than this: normals of facets are slightly tilted, and sliding
+    along that tilt does not open a gap.
     """
     points = normal.points
-    missing = np.where(normal.freedom(fixed) <= SLIGHT, normal.of_supports(prescribed) - points.gap, 0.0)
+    missing = np.where(normal.freedom(fixed) <= slight, normal.of_supports(prescribed) - points.gap, 0.0)
     # A given interference is meant: it must not vanish where nothing can yield.
     pressed = missing > np.where(points.given, HELD, 1.0) * _explained(points)
     if pressed.any():

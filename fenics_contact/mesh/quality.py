@@ -139,8 +139,6 @@ def thickness(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
 #: Largest distance of nodes from their shape, relative to the shortest edge of a facet around them.
 FARTHEST = 0.1
-#: Cosine of the angle between a facet's normal and the inward normal of a shape above which it faces inwards.
-INWARD = 0.5
 
 
 def distance_in_edges(points: np.ndarray, facets: np.ndarray, shape: SurfaceShape) -> np.ndarray:
@@ -195,8 +193,14 @@ def check_shapes(
     return distances
 
 
-def _check_side(name: str, points: np.ndarray, facets: np.ndarray, shape: SurfaceShape) -> None:
-    """Reject a shape, or a part of a joined one, whose normals point into the body."""
+def _check_side(
+    name: str, points: np.ndarray, facets: np.ndarray, shape: SurfaceShape, turned_in: float = 0.5
+) -> None:
+    """Reject a shape, or a part of a joined one, whose normals point into the body.
+
+    `turned_in`: cosine of the angle between a facet's normal and the inward normal of a shape above which it
+    faces inwards.
+    """
     corners = points[corners_of(facets, points.shape[1])]
     if points.shape[1] == 2:
         along = corners[:, 1] - corners[:, 0]
@@ -210,7 +214,7 @@ def _check_side(name: str, points: np.ndarray, facets: np.ndarray, shape: Surfac
     part = np.zeros(len(middles), dtype=np.int64)
     if isinstance(shape, Joined):
         parts, part = shape.shapes, shape.nearest(middles)
-    inward = np.bincount(part, np.where(along < -INWARD * area, area, 0.0), len(parts))
+    inward = np.bincount(part, np.where(along < -turned_in * area, area, 0.0), len(parts))
     # By area, as normals of a coarse facet beside a sharp edge may be those of the next part.
     wrong = np.flatnonzero(inward > 0.5 * np.bincount(part, area, len(parts)))
     if len(wrong):

@@ -328,8 +328,10 @@ def axis_label(direction: np.ndarray) -> str:
 
 #: Width of every sheet in inches: fonts and lines scale with the number of pixels.
 INCHES = 16.0
-#: Size of the title, and its largest width relative to the sheet.
-HEADLINE, WIDEST = 18, 0.97
+#: Size of the title, in points.
+HEADLINE = 18
+#: Largest width of the title relative to the sheet.
+WIDEST = 0.97
 
 
 _STYLE = {

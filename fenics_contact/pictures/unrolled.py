@@ -296,8 +296,10 @@ def pressure_bar(axes: Axes, clim: tuple[float, float], extend: str, units: Unit
     axes.figure.colorbar(key, cax=place, label=label, extend=extend)
 
 
-#: Length of the longest arrow, relative to the width, and the largest number of arrows.
-ARROW, MOST_ARROWS = 0.03, 40
+#: Length of the longest arrow, relative to the width.
+ARROW = 0.03
+#: Largest number of arrows: more would overlap at that length.
+MOST_ARROWS = 40
 
 
 def draw_traction(

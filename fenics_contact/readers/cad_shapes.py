@@ -18,11 +18,12 @@ from fenics_contact.shapes.combined import Joined, recognised
 from fenics_contact.shapes.parametric import SplinePatch, tensor_grid
 from fenics_contact.shapes.simple import SurfaceShape
 
-#: Smallest and largest number of points along each parameter, doubled until the spline through them is this
-#: close to the face, relative to its extent.
-FEWEST, MOST, CLOSE = 33, 129, 1e-9
-#: Tangents whose cross product is below this fraction of the largest define no normal.
-POLE = 1e-6
+#: Smallest number of points along each parameter; intervals are halved until the spline is close to the face.
+FEWEST = 33
+#: Largest number of points along each parameter.
+MOST = 129
+#: Distance of the spline from the face, relative to its extent, at which it is close.
+CLOSE = 1e-9
 
 
 def shape_of_entity(
@@ -56,15 +57,18 @@ def _leads_out(shape: SurfaceShape, middles: np.ndarray, outwards: np.ndarray) -
     return bool(np.einsum("nd,nd->", shape.normals(middles), outwards) > 0)
 
 
-def _normals(gmsh: ModuleType, entity: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return points of an entity and the normals there, to either side, where these exist."""
+def _normals(gmsh: ModuleType, entity: tuple[int, int], pole: float = 1e-6) -> tuple[np.ndarray, np.ndarray]:
+    """Return points of an entity and the normals there, to either side, where these exist.
+
+    `pole`: tangents whose cross product is below this fraction of the largest define no normal.
+    """
     parameters = _parameters(gmsh, entity, FEWEST)
     points = _values(gmsh, entity, parameters)
     slopes = np.reshape(gmsh.model.getDerivative(*entity, parameters.ravel()), (len(points), -1, 3))
     first = slopes[:, 0]
     across = np.column_stack([first[:, 1], -first[:, 0]]) if entity[0] == 1 else np.cross(first, slopes[:, 1])
     length = np.linalg.norm(across, axis=1)
-    sound = length > POLE * length.max()
+    sound = length > pole * length.max()
     return points[sound], across[sound] / length[sound, None]
 
 
@@ -108,13 +112,6 @@ def _periodic(grid: np.ndarray) -> tuple[bool, ...]:
 
 
 _LOGGER = logging.getLogger(__name__)
-#: Largest distance of nodes from their face, relative to the shortest edge of the surface.
-FAR = 0.01
-#: Middles of facets coincide if they are closer than this fraction of that edge.
-SAME = 1e-6
-#: Two faces have a common shape if on one of them their shapes differ by less than this fraction of its
-#: extent.
-ALIKE = 1e-8
 
 
 def cad_shapes(
@@ -184,9 +181,17 @@ def _nodes(gmsh: ModuleType) -> np.ndarray:
 
 
 def _shape(
-    gmsh: ModuleType, tags: list[int], nodes: np.ndarray, mesh: BodyMesh, facets: np.ndarray
+    gmsh: ModuleType,
+    tags: list[int],
+    nodes: np.ndarray,
+    mesh: BodyMesh,
+    facets: np.ndarray,
+    far: float = 0.01,
 ) -> SurfaceShape | None:
-    """Return the shape of a surface of the body; None if any of its facets is on no geometry."""
+    """Return the shape of a surface of the body; None if any of its facets is on no geometry.
+
+    `far`: largest distance of nodes from their face, relative to the shortest edge of the surface.
+    """
     corners, outwards = mesh.points[corners_of(facets, mesh.dim)], vector_areas(mesh.points, facets)
     middles = corners.mean(axis=1)
     edge = float(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).min())
@@ -198,7 +203,7 @@ def _shape(
         if not mine.any():  # on another body's boundary
             continue
         shape = shape_of_entity(gmsh, entity, middles[mine], outwards[mine])
-        if shape is None or np.abs(shape.distance(mesh.points[np.unique(facets[mine])])).max() > FAR * edge:
+        if shape is None or np.abs(shape.distance(mesh.points[np.unique(facets[mine])])).max() > far * edge:
             return None
         left &= ~mine
         _add(shapes, parts, shape, corners[mine])
@@ -208,22 +213,38 @@ def _shape(
 
 
 def _on_entity(
-    gmsh: ModuleType, entity: tuple[int, int], nodes: np.ndarray, middles: np.ndarray, edge: float
+    gmsh: ModuleType,
+    entity: tuple[int, int],
+    nodes: np.ndarray,
+    middles: np.ndarray,
+    edge: float,
+    same: float = 1e-6,
 ) -> np.ndarray:
-    """Return which facets are elements of an entity, by equal middles, (n,)."""
+    """Return which facets are elements of an entity, by equal middles, (n,).
+
+    `same`: middles of facets coincide if they are closer than this fraction of that edge.
+    """
     on = np.zeros(len(middles), dtype=bool)
     types, _, elements = gmsh.model.mesh.getElements(*entity)
     for kind, numbers in zip(types, elements, strict=True):
         _, _, _, each, _, first, *_ = gmsh.model.mesh.getElementProperties(kind)
         theirs = nodes[numbers.astype(np.int64).reshape(-1, each)[:, :first]].mean(axis=1)
-        on |= cKDTree(theirs[:, : middles.shape[1]]).query(middles)[0] < SAME * edge
+        on |= cKDTree(theirs[:, : middles.shape[1]]).query(middles)[0] < same * edge
     return on
 
 
 def _add(
-    shapes: list[SurfaceShape], parts: list[np.ndarray], shape: SurfaceShape, corners: np.ndarray
+    shapes: list[SurfaceShape],
+    parts: list[np.ndarray],
+    shape: SurfaceShape,
+    corners: np.ndarray,
+    alike: float = 1e-8,
 ) -> None:
-    """Add the shape of a part, or the part to a shape that it continues: halves of a hole, of a torus."""
+    """Add the shape of a part, or the part to a shape that it continues: halves of a hole, of a torus.
+
+    `alike`: two faces have a common shape if on one of them their shapes differ by less than this fraction of
+    its extent.
+    """
     middles = corners.mean(axis=1)
     for number, other in enumerate(shapes):
         if isinstance(other, SplinePatch) or isinstance(shape, SplinePatch):
@@ -231,7 +252,7 @@ def _add(
         size = float(np.ptp(corners.reshape(-1, corners.shape[2]), axis=0).max())
         apart = np.abs(other.distance(middles) - shape.distance(middles)).max()
         along = np.einsum("nd,nd->n", other.normals(middles), shape.normals(middles)).min()
-        if apart <= ALIKE * size and along > 0:
+        if apart <= alike * size and along > 0:
             parts[number] = np.concatenate([parts[number], corners])
             return
     shapes.append(shape)

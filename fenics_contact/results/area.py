@@ -10,9 +10,6 @@ from fenics_contact._surfaces.facets import filled_at_corners
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.results.state import State
 
-#: Newton steps to the root of a cubic, from above: sufficient in practice for any ratio of its coefficients.
-NEWTON_STEPS = 60
-
 
 def contact_area(state: State, pair: int = 0) -> float:
     """Return the area in which the surfaces of a pair touch, in the plane the length, [length²] or [length].
@@ -112,18 +109,21 @@ def _closed_share(
     return share
 
 
-def _reach(pressure: np.ndarray, spread: np.ndarray, length: np.ndarray) -> np.ndarray:
+def _reach(
+    pressure: np.ndarray, spread: np.ndarray, length: np.ndarray, newton_steps: int = 60
+) -> np.ndarray:
     """Return how far contact reaches from a closed towards an open node, relative to their distance.
 
     p = K √d and E* g = 4/3 K (L − d)^(3/2); with y = K^(−2/3): p² y³ + (3/4 E* g)^(2/3) y = L.
 
     `pressure`: p of the closed node, shape (n,), [force / length²]; `spread`: E* g of the open node, shape
-    (n,), [force / length]; `length`: distance L of the nodes, shape (n,), [length].
+    (n,), [force / length]; `length`: distance L of the nodes, shape (n,), [length]; `newton_steps`: Newton
+    steps to the root of a cubic, from above: sufficient in practice for any ratio of its coefficients.
     """
     if np.isnan(spread).any():
         return np.full(len(length), 0.5)
     slope = (0.75 * spread) ** (2.0 / 3.0)
     root = np.cbrt(length / pressure**2)  # convex and increasing: Newton's method descends to the root
-    for _ in range(NEWTON_STEPS):
+    for _ in range(newton_steps):
         root -= (pressure**2 * root**3 + slope * root - length) / (3.0 * pressure**2 * root**2 + slope)
     return np.asarray(np.clip(pressure**2 * root**3 / length, 0.0, 1.0))

@@ -27,9 +27,6 @@ from fenics_contact.shapes.simple import (
 
 #: Samples on each edge of a border.
 SAMPLES = 4
-#: Weight of the distance along a shape beyond its part. Near a ridge two parts are equally far away; this
-#: selects the one above which a point is higher, whose distance is closer to that from the ridge.
-BEYOND = 2.0
 
 
 @displayed
@@ -93,8 +90,13 @@ class Joined:
                 answer[mine] = getattr(shape, what)(points[mine])
         return answer
 
-    def _away(self, number: int, points: np.ndarray) -> np.ndarray:
-        """Return the distance of points from a shape's part of the surface, (n,)."""
+    def _away(self, number: int, points: np.ndarray, beyond: float = 2.0) -> np.ndarray:
+        """Return the distance of points from a shape's part of the surface, (n,).
+
+        `beyond`: weight of the distance along a shape beyond its part. Near a ridge two parts are equally far
+        away; this selects the one above which a point is higher, whose distance is closer to that from the
+        ridge.
+        """
         shape = self.shapes[number]
         distance = shape.distance(points)
         if (border := self._borders[number]) is None:
@@ -103,7 +105,7 @@ class Joined:
         feet = points - distance[:, None] * shape.normals(points)
         _, closest = tree.query(feet)
         over = np.einsum("nd,nd->n", feet - tree.data[closest], outwards[closest])
-        return np.hypot(distance, BEYOND * np.maximum(over, 0.0))
+        return np.hypot(distance, beyond * np.maximum(over, 0.0))
 
     @cached_property
     def _borders(self) -> list[tuple[cKDTree, np.ndarray] | None]:

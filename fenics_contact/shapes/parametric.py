@@ -106,9 +106,10 @@ def masked(matrices: np.ndarray, free: np.ndarray) -> np.ndarray:
     return np.where(both, matrices, np.eye(free.shape[1]))
 
 
-#: Largest number of steps to a closest point, and size of the last one relative to the range of the
-#: parameters.
-STEPS, LAST = 60, 1e-10
+#: Largest number of steps to a closest point: if all were halved, the last would be below rounding.
+STEPS = 60
+#: Size of the last step to a closest point, relative to the range of the parameters.
+LAST = 1e-10
 #: A closest point is held at the border if its parameter would leave the range by more than this fraction.
 HELD = 1e-8
 

@@ -336,10 +336,6 @@ class Revolved:
         return np.stack([radius, along], axis=1), out
 
 
-#: Smallest length of arms relative to the radius: at the centre all directions are normal.
-SHORTEST = float(np.finfo(float).eps)
-
-
 class _Round:
     """The distance to a point or an axis less a radius, with the opposite sign if hollow."""
 
@@ -365,8 +361,13 @@ class _Round:
     def _sign(self) -> float:
         return -1.0 if self.hollow else 1.0
 
-    def _out(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return direction and length of the arm."""
+    def _out(
+        self, points: np.ndarray, shortest: float = float(np.finfo(float).eps)
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return direction and length of the arm.
+
+        `shortest`: smallest length of arms relative to the radius: at the centre all directions are normal.
+        """
         arm = self._arm(points)
         length = np.linalg.norm(arm, axis=1)
         # The column that the projection shortens least is a possible direction of the arm.
@@ -374,7 +375,7 @@ class _Round:
         any_way = across[np.argmax(np.diag(across))]
         arm[length == 0] = any_way
         direction = arm / np.where(length == 0, np.linalg.norm(any_way), length)[:, None]
-        return direction, np.maximum(length, SHORTEST * self.radius)
+        return direction, np.maximum(length, shortest * self.radius)
 
     def _arm(self, points: np.ndarray) -> np.ndarray:
         raise NotImplementedError

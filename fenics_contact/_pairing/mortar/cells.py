@@ -25,10 +25,6 @@ from fenics_contact._surfaces.facets import FacetedSurface, facet_shape_values, 
 
 #: Facets face each other if their normals are opposite within 60 degrees: smallest cosine of that angle.
 FACING = 0.5
-#: Number of steps along a normal towards the master; one suffices for planes.
-STEPS = 5
-#: Number of nearest master facets, the first of which that faces the slave determines the step.
-NEAREST = 4
 
 
 def candidate_pairs(slave: Planes, master: Planes) -> tuple[np.ndarray, np.ndarray]:
@@ -48,11 +44,15 @@ def candidate_pairs(slave: Planes, master: Planes) -> tuple[np.ndarray, np.ndarr
     return pair_slave[order], pair_master[order]
 
 
-def _feet(slave: Planes, master: Planes) -> np.ndarray:
-    """Return where the normals through the centres of slave facets reach the master, shape (n, dim)."""
+def _feet(slave: Planes, master: Planes, max_steps: int = 5, tried: int = 4) -> np.ndarray:
+    """Return where the normals through the centres of slave facets reach the master, shape (n, dim).
+
+    `max_steps`: number of steps along a normal towards the master; one suffices for planes; `tried`: number
+    of nearest master facets, the first of which that faces the slave determines the step.
+    """
     tree, feet = cKDTree(master.origin), slave.origin.copy()
-    for _ in range(STEPS):
-        _, nearest = tree.query(feet, k=np.arange(min(NEAREST, tree.n)) + 1)
+    for _ in range(max_steps):
+        _, nearest = tree.query(feet, k=np.arange(min(tried, tree.n)) + 1)
         cosine = np.einsum("nd,nkd->nk", slave.normal, master.normal[nearest])
         # The nearest one that faces the slave, or the nearest of all if none does.
         choice = np.argmax(cosine < -FACING, axis=1)[:, None]
@@ -302,10 +302,6 @@ def _area(vertices: np.ndarray, count: np.ndarray) -> np.ndarray:
     return np.where(count > 0, np.abs(measure(vertices)), 0.0)
 
 
-#: Area, relative to the smaller of two facets, below which a piece of their intersection is rounding.
-NOTHING = 1e-14
-
-
 @dataclass(frozen=True)
 class Cells:
     """Quadrature points on the pieces of intersections of slave and master facets.
@@ -378,12 +374,17 @@ class Overlaps:
 
 
 def overlaps_of(
-    planes: Planes, pair_slave: np.ndarray, pair_master: np.ndarray, master: FacetedSurface
+    planes: Planes,
+    pair_slave: np.ndarray,
+    pair_master: np.ndarray,
+    master: FacetedSurface,
+    nothing: float = 1e-14,
 ) -> Overlaps:
     """Clip pairs of facets.
 
     `pair_slave`: slave facet of each pair, ascending, shape (n,); `pair_master`: master facet of each pair,
-    shape (n,).
+    shape (n,); `nothing`: area, relative to the smaller of two facets, below which a piece of their
+    intersection is rounding.
     """
     subject, heights = laid_flat(master.points[master.facets[pair_master]], planes, pair_slave)
     window = planes.flat[pair_slave]
@@ -396,7 +397,7 @@ def overlaps_of(
     count = np.where(hidden(vertices, count, middle, pair_slave, planes.area), 0, count)
     pieces, pair, corner = simplices(vertices, count)
     smaller = np.minimum(np.abs(measure(subject)), measure(window))
-    real = np.abs(measure(pieces)) > NOTHING * smaller[pair]
+    real = np.abs(measure(pieces)) > nothing * smaller[pair]
     used, pair = np.unique(pair[real], return_inverse=True)
     facets, facet = np.unique(pair_slave[used], return_inverse=True)
     return Overlaps(

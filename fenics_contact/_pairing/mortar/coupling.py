@@ -228,8 +228,6 @@ def _heights_along(
     return np.asarray(height / np.einsum("nd,nd->n", normal, direction)).reshape(local.shape[:2])
 
 
-#: Fraction of a node's area that must face the master for the node to carry a multiplier.
-LEAST_SHARE = 1e-8
 #: Pairs of facets per chunk: its arrays stay below about 50 MB, and mostly in the cache.
 CHUNK = 4096
 
@@ -308,9 +306,13 @@ def _coupling(
     area: np.ndarray,
     integrals: sparse.csr_matrix,
     relief: np.ndarray,
+    least_share: float = 1e-8,
 ) -> MortarCoupling:
-    """Keep the nodes that face the master, and divide by their areas."""
-    node = np.flatnonzero(area > LEAST_SHARE * slave.areas)
+    """Keep the nodes that face the master, and divide by their areas.
+
+    `least_share`: fraction of a node's area that must face the master for the node to carry a multiplier.
+    """
+    node = np.flatnonzero(area > least_share * slave.areas)
     chosen = integrals[node]
     # The row sums are the areas, and dividing by them cancels their rounding errors.
     weight = scaled_rows(chosen, 1 / np.asarray(chosen.sum(axis=1)).ravel())

@@ -20,9 +20,6 @@ from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact._pairing.mortar.coupling import MortarCoupling
 from fenics_contact._surfaces.facets import FacetedSurface
 
-#: Fraction of a node's area below which it hardly faces the master.
-HARDLY = 0.05
-
 
 @dataclass(frozen=True)
 class Gathering:
@@ -39,13 +36,15 @@ class Gathering:
     own: sp.csr_matrix
 
     @classmethod
-    def of(cls, whole: MortarCoupling, slave: FacetedSurface) -> Gathering | None:
+    def of(cls, whole: MortarCoupling, slave: FacetedSurface, least_share: float = 0.05) -> Gathering | None:
         """Return which points gather what; None if all nodes face the master well.
 
         A node without a neighbour that does keeps its multiplier, and so do all where the rest could not
         bear a body that tips.
+
+        `least_share`: fraction of a node's area below which it hardly faces the master.
         """
-        well = whole.area > HARDLY * slave.areas[whole.node]
+        well = whole.area > least_share * slave.areas[whole.node]
         hardly = np.flatnonzero(~well)
         shared = _shared_facets(whole.node, slave)[np.flatnonzero(well)][:, hardly]
         facets = np.asarray(shared.sum(axis=0)).ravel()

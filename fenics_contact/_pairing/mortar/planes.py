@@ -87,10 +87,6 @@ def rule(dim: int) -> tuple[np.ndarray, np.ndarray]:
     return np.column_stack([1 - positions.sum(axis=1), positions]), weights / weights.sum()
 
 
-#: Double area of a corner's triangle, relative to the facet's area, below which a facet counts as re-entrant.
-CONVEX = -1e-10
-
-
 @dataclass(frozen=True)
 class Planes:
     """One plane (in plane problems: line) per facet, with orthonormal axes.
@@ -206,13 +202,17 @@ def _normals_pulled_back(corners: np.ndarray, normal: np.ndarray, by_normal: np.
     return np.asarray(np.cross(across, (by_unit / double[:, None])[:, None]))
 
 
-def check_convex(planes: Planes, chosen: np.ndarray) -> None:
-    """Check that the flat facets are convex, as required of clipping windows."""
+def check_convex(planes: Planes, chosen: np.ndarray, convex: float = -1e-10) -> None:
+    """Check that the flat facets are convex, as required of clipping windows.
+
+    `convex`: double area of a corner's triangle, relative to the facet's area, below which a facet counts as
+    re-entrant.
+    """
     if planes.flat.shape[1] != 4:
         return
     turned = [np.roll(planes.flat, shift, axis=1) - planes.flat for shift in (-1, 1)]
     corner = turned[0][:, :, 0] * turned[1][:, :, 1] - turned[0][:, :, 1] * turned[1][:, :, 0]
-    bad = np.flatnonzero(~(corner.min(axis=1) >= CONVEX * planes.area))
+    bad = np.flatnonzero(~(corner.min(axis=1) >= convex * planes.area))
     if len(bad):
         raise FoldedFacetsError(
             f"mortar coupling needs convex facets on the slave surface, but {len(bad)} are folded or have a "

@@ -280,8 +280,6 @@ LEANING = np.array([0.4796, 0.7311, 0.4853])
 #: Lengths that differ by less than this part count as the same: which node is first among them may not depend
 #: on rounding, nor on how the body lies in space.
 ALIKE = 1e-6
-#: Its weight beside one way, of length one.
-LIGHT = 0.1
 
 
 @dataclass(frozen=True)
@@ -312,12 +310,15 @@ class Roles:
         known = last[found.point] >= 0
         return known | (self._go_forward(found, known) & ~self._are_masters(found, last))
 
-    def _go_forward(self, found: Projection, known: np.ndarray) -> np.ndarray:
-        """Return which ways to closest points go forward, those of known slaves mostly do, shape (n,)."""
+    def _go_forward(self, found: Projection, known: np.ndarray, light: float = 0.1) -> np.ndarray:
+        """Return which ways to closest points go forward, those of known slaves mostly do, shape (n,).
+
+        `light`: weight of the leaning compared with one way, of length one.
+        """
         weights = self.patches.weights(found.facet, self.patches.functions(found.local).value)
         way = weights @ self.places - self.places[self.candidates[found.point]]
         way /= np.maximum(np.linalg.norm(way, axis=1), np.finfo(float).tiny)[:, None]
-        leaning = LIGHT * self._leaning
+        leaning = light * self._leaning
         _, axes = np.linalg.eigh(way.T @ way / max(len(way), 1) + np.outer(leaning, leaning))
         along = way @ axes[:, ::-1] * np.sign((way[known].sum(axis=0) + leaning) @ axes[:, ::-1])
         chosen = np.argmax(np.abs(along) >= 0.5, axis=1)  # in space one of three is, in the plane one of two

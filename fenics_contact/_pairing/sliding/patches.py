@@ -275,12 +275,15 @@ def _kind(corners: int, order: int) -> CellType:
     return FACET_TYPES[n_values(corners, order), 2 if corners == 2 else 3]
 
 
-#: Where derivatives along an edge are compared, and the coefficients of 3t(1 − t)² and 3t²(1 − t) from there.
-AT = (1 / 3, 2 / 3)
 FITTED = ((3.0, -1.5), (-1.5, 3.0))
 
 
-def edge_turns(tangents: SurfaceTangents, control: sp.csr_matrix, order: int) -> sp.csr_matrix:
+def edge_turns(
+    tangents: SurfaceTangents,
+    control: sp.csr_matrix,
+    order: int,
+    parameters: tuple[float, ...] = (1 / 3, 2 / 3),
+) -> sp.csr_matrix:
     """Return the weights of the functions that give neighbouring patches one tangent plane along their edge.
 
     Along an edge with the curve C(t), the patches on both sides get derivatives across it that are
@@ -293,7 +296,8 @@ def edge_turns(tangents: SurfaceTangents, control: sp.csr_matrix, order: int) ->
     and C' span a plane that both patches have in common.
 
     `control`: weights of the nodes in the patches' functions along edges, see `edge_functions`, shape
-    (n_facets · functions, n_nodes).
+    (n_facets · functions, n_nodes); `parameters`: where derivatives along an edge are compared, and the
+    coefficients of 3t(1 − t)² and 3t²(1 − t) from there.
 
     The result has shape (n_facets · corners · 2, n_nodes): of both functions of each edge, see
     `turning_functions`; zero at edges that end in a straight tangent.
@@ -312,7 +316,7 @@ def edge_turns(tangents: SurfaceTangents, control: sp.csr_matrix, order: int) ->
     smooth = tangents.smooth.all(axis=2)
     smooth = (smooth & np.roll(smooth, -1, axis=1)).ravel().astype(np.float64)
     lacking = []
-    for t in AT:
+    for t in parameters:
         p, q = (sp.diags(((1 - t) * a + t * b).ravel()) for a, b in ((p0, p1), (q0, q1)))
         along, across = (edge_derivatives(control, first.shape[1], order, t, way) for way in (1, -1))
         lacking.append(sp.diags(smooth) @ (p @ ((1 - t) * here + t * there) + q @ along - across))

@@ -40,11 +40,15 @@ from fenics_contact.results.state import State
 from fenics_contact.study.scenes.nested_box import mirrored, nested_half
 from fenics_contact.study.study import BALANCED, Outcome, Parameters, Problem, Quantity, StudyScene, Sweep
 
-YOUNG, POISSON, FRICTION = 1000.0, 0.3, 0.4
-RADIUS, SIZE = 2000.0, 30.0
+YOUNG = 1000.0
+POISSON = 0.3
+FRICTION = 0.4
+RADIUS = 2000.0
+SIZE = 30.0
 #: Half the width of the region of equal cells; the half contact is 1.
 CORE = 1.25
-PRESS, SHEAR = 0.00205, 0.000735
+PRESS = 0.00205
+SHEAR = 0.000735
 #: Displacements vary as r^0.711 at the corners between free and held edges, with ν = 0.3 in plane strain:
 #: sin²(λπ/2) = (4 (1 − ν)² − λ²) / (3 − 4ν) [Williams 1952].
 CORNER = 0.711

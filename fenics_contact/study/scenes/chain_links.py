@@ -22,7 +22,8 @@ from fenics_contact.gallery.ring import LinkShape
 from fenics_contact.materials.elastic import IsotropicElasticity
 from fenics_contact.study.study import BALANCED, Outcome, Parameters, Problem, Quantity, StudyScene, Sweep
 
-FRICTION, PULL = 0.3, 80e3
+FRICTION = 0.3
+PULL = 80e3
 #: Cells around, through and across a link for each unit of `Parameters.size`; 4 is the published mesh.
 CELLS = (12, 2, 5)
 #: As in the demo: ten cells of the published mesh lie across the contact.

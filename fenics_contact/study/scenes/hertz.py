@@ -27,7 +27,9 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.study.scenes.nested_box import mirrored, nested_box
 from fenics_contact.study.study import BALANCED, Outcome, Parameters, Problem, Quantity, StudyScene, Sweep
 
-YOUNG, POISSON, RADIUS = 1000.0, 0.3, 1000.0
+YOUNG = 1000.0
+POISSON = 0.3
+RADIUS = 1000.0
 SIZE = 40.0
 CONTACT_MODULUS = YOUNG / (2 * (1 - POISSON**2))
 FORCE = 4 * CONTACT_MODULUS / (3 * (RADIUS / 2))
