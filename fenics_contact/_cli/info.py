@@ -1,4 +1,4 @@
-"""`fenics-contact info`: the software that this machine computes and draws with, and what slows it down."""
+"""`fenics-contact info` and `schema`: the software of this machine, and the JSON schema of scene files."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from fenics_contact._base import requirements as _requirements
 from fenics_contact._base.display import counted
 from fenics_contact._base.libraries import MPI
 from fenics_contact._cli.console import console_of, facts
+from fenics_contact._scene_file.validation import json_schema
 from fenics_contact.errors import MissingRequirementError
-from fenics_contact.output.files import json_text
+from fenics_contact.output.files import json_text, write_json
 from fenics_contact.output.result import versions
 
 if TYPE_CHECKING:
@@ -27,8 +28,9 @@ _REFERENCE = re.compile(r"/blas/libblas|libblas\.so\.3\.\d")
 
 
 def add_to(app: typer.Typer) -> None:
-    """Add the command to the program."""
+    """Add both commands to the program."""
     app.command("info", short_help="versions, PETSc, BLAS, MPI, pictures")(info)
+    app.command("schema", short_help="JSON schema of scene files, for editors")(schema)
 
 
 def info(
@@ -105,3 +107,23 @@ def _advice(comm: MPI.Comm, libraries: list[str]) -> Iterator[str]:
         yield (
             "several ranks, and BLAS may use threads on top: set OPENBLAS_NUM_THREADS=1 and OMP_NUM_THREADS=1"
         )
+
+
+def schema(
+    context: typer.Context,
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="FILE", help="File to write; stdout unless given.", show_default=False),
+    ] = None,
+) -> None:
+    """Write the JSON schema of scene files, which editors use for completion and checks.
+
+    A scene file whose first line is "#:schema scene_file.schema.json" is checked while it is edited, by taplo
+    or the extension Even Better TOML.
+    """
+    console = console_of(context)
+    if file is None:
+        console.say(json_text(json_schema()).rstrip())
+        return
+    write_json(file, json_schema(), comm=console.comm)
+    console.say(f"schema of scene files in {file}")

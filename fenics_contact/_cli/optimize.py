@@ -13,8 +13,7 @@ from fenics_contact._cli.console import Console, ExitCode, facts
 from fenics_contact._cli.options import checkpoint_of, forget, resumable, scene_command
 from fenics_contact._cli.view import Gallery, can_draw, draw_state
 from fenics_contact._optimize.result import Result
-from fenics_contact._scene_file.building import ShapeTask
-from fenics_contact._scene_file.reading import SceneFile
+from fenics_contact._scene_file.reading import SceneFile, ShapeTask
 from fenics_contact.design.problem import ShapeProblem
 from fenics_contact.design.several import LoadPath
 from fenics_contact.errors import InvalidInputError

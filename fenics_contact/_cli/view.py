@@ -15,7 +15,8 @@ from fenics_contact._cli.console import Console, console_of, facts, forces_table
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact._scene_file.source import suggestion
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, agree, together
-from fenics_contact.output.reading import FIELD_FILES, fields_of_result, read_result, stored_fields
+from fenics_contact.output.paraview import FIELD_FILES, fields_of_result, stored_fields
+from fenics_contact.output.result import read_result
 from fenics_contact.results.state import State
 
 

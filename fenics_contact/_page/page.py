@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
+import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from dataclasses import field as attribute
@@ -13,28 +16,407 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.colors import Colormap, to_hex
 
+from fenics_contact._base.display import force_units, name_in_words
 from fenics_contact._base.requirements import require_extra
-from fenics_contact._page.content import (
-    Arrays,
-    body_entry,
-    colour_scales,
-    obstacle_entries,
-    sections,
-    status_words,
-)
 from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.mesh.faces import boundary_faces
 from fenics_contact.output.files import json_text, write_text
-from fenics_contact.output.reading import FIELD_FILES, fields_of_result, read_result, stored_fields
-from fenics_contact.output.result import result_record
-from fenics_contact.pictures.canvas import Units
-from fenics_contact.pictures.section import field_entries, is_plane
+from fenics_contact.output.paraview import FIELD_FILES, fields_of_result, stored_fields
+from fenics_contact.output.result import listed_forces, read_result, result_record, scales_of
+from fenics_contact.pictures.canvas import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    PRESSURE_MAP,
+    SIGNED_MAP,
+    STRESS_MAP,
+    Units,
+)
+from fenics_contact.pictures.drawing import outline
+from fenics_contact.pictures.section import field_entries, is_plane, linear_cells
 from fenics_contact.pictures.states import chosen_scale
 from fenics_contact.results.state import State
+from fenics_contact.shapes.combined import placed, simplified
+from fenics_contact.shapes.simple import Cylinder, Plane, Sphere, SurfaceShape
 
 if TYPE_CHECKING:
     import pyvista
     from mpi4py import MPI
+
+
+class Arrays:
+    """Collects arrays; equal ones are kept once, such as the mesh of all load steps."""
+
+    def __init__(self) -> None:
+        self.index: list[dict[str, int | str]] = []
+        self._numbers: dict[tuple[str, int, bytes], int] = {}
+        self._parts: list[bytes] = []
+        self._size = 0
+
+    def add(self, values: np.ndarray, *, exact: bool = False) -> int:
+        """Return the number of an array, added unless it is there.
+
+        `values`: numbers of any shape, (n, ...); integers are kept as such.
+        """
+        whole = np.issubdtype(values.dtype, np.integer) and values.min(initial=0) >= 0
+        kept = np.ascontiguousarray(values, dtype="<u4" if whole else "<f4")
+        if not whole and not exact:
+            kept = rounded(kept)
+        columns = int(np.prod(values.shape[1:], dtype=int))
+        content = kept.tobytes()
+        key = ("u4" if whole else "f4", columns, hashlib.sha256(content).digest())
+        if key not in self._numbers:
+            self._numbers[key] = len(self.index)
+            self.index.append({"type": key[0], "start": self._size, "length": kept.size, "columns": columns})
+            self._parts.append(content)
+            self._size += len(content)
+        return self._numbers[key]
+
+    def packed(self) -> str:
+        """Return all arrays as text for a page."""
+        return base64.b64encode(gzip.compress(b"".join(self._parts), 6, mtime=0)).decode()
+
+
+def rounded(values: np.ndarray, dropped: int = 10) -> np.ndarray:
+    """Round numbers of single precision to four digits, which compress better."""
+    bits = np.where(np.isfinite(values), values, np.float32(np.nan)).astype("<f4").view("<u4")
+    half = np.uint32(1 << (dropped - 1))
+    mask = np.uint32(0xFFFFFFFF ^ ((1 << dropped) - 1))
+    return np.where(np.isnan(values), bits, (bits + half) & mask).astype("<u4").view("<f4")
+
+
+def body_entry(name: str, grid: pyvista.UnstructuredGrid, arrays: Arrays) -> dict[str, Any]:
+    """Return the geometry and the fields of a body as numbers of arrays.
+
+    Returns ``points``, (n, 3); ``triangles``, (t, 3) nodes of the skin, and the cell ``owner`` of each, (t,);
+    ``edges`` and ``outline``, (e, 2) nodes of the lines of the mesh on the skin and of its sharp edges;
+    ``cells``, (c, 3 | 4 | 8) corners; ``nodes`` and ``on_cells``, the fields by name. Quadratic cells are cut
+    into linear ones.
+    """
+    cells, pieces, dim = linear_cells(name, grid)
+    faces, owner = boundary_faces(cells, 3) if dim == 3 else (cells, np.arange(len(cells)))
+    quads = faces.shape[1] == 4
+    triangles = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]]) if quads else faces
+    edges, outline = _lines(np.asarray(grid.points), faces)
+    return {
+        "points": arrays.add(np.asarray(grid.points), exact=True),
+        "triangles": arrays.add(triangles),
+        "owner": arrays.add(np.tile(owner, 2) if quads else owner),
+        "edges": arrays.add(edges),
+        "outline": arrays.add(outline),
+        "cells": arrays.add(cells),
+        "nodes": {key: arrays.add(np.asarray(values)) for key, values in grid.point_data.items()},
+        "on_cells": {
+            key: arrays.add(np.repeat(np.asarray(values), pieces, axis=0))
+            for key, values in grid.cell_data.items()
+        },
+    }
+
+
+def _lines(points: np.ndarray, faces: np.ndarray, sharp: float = 30.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return all edges of faces, and those at ends and where faces meet at a larger angle, (n, 2) each."""
+    import pyvista as pv
+
+    skin = pv.PolyData.from_regular_faces(points, faces)
+    skin.point_data["node"] = np.arange(len(points))
+    # Nodes of cells keep their numbers; lines are between nodes of their own.
+    found = (skin.extract_all_edges(), skin.extract_feature_edges(feature_angle=sharp, manifold_edges=False))
+    first, second = (
+        np.asarray(lines.point_data["node"])[np.asarray(lines.lines).reshape(-1, 3)[:, 1:]]
+        if lines.n_cells
+        else np.zeros((0, 2), dtype=np.int64)
+        for lines in found
+    )
+    return first, second
+
+
+def colour_scales() -> dict[str, list[list[float | str]] | list[str] | str]:
+    """Return places from 0 to 1 and their colours for sizes and signed values, and single colours by use."""
+    return {
+        "size": _samples(STRESS_MAP),
+        "contact": _samples(PRESSURE_MAP),
+        "signed": _samples(SIGNED_MAP),
+        "status": [GREY, BLUE, ORANGE],
+        "line": INK,
+        "obstacle": GREY,
+    }
+
+
+def _samples(colours: Colormap, count: int = 33) -> list[list[float | str]]:
+    return [[float(place), to_hex(colours(float(place)))] for place in np.linspace(0.0, 1.0, count)]
+
+
+#: What describes a shape in a record, the larger sets first.
+_SHAPES: tuple[tuple[tuple[str, ...], type], ...] = (
+    (("point", "axis", "radius"), Cylinder),
+    (("centre", "radius"), Sphere),
+    (("point", "normal"), Plane),
+)
+
+
+def obstacle_entries(record: Mapping[str, Any], points: np.ndarray) -> list[dict[str, Any]]:
+    """Return type and lines of each different rigid obstacle; no lines if it is of another shape.
+
+    `points`: all nodes of the bodies, (n, 3).
+    """
+    scene = record.get("scene") or {}
+    dim = int(scene.get("dimension") or 3)
+    different: list[Mapping[str, Any]] = []
+    for pair in scene.get("contacts") or ():
+        master = pair.get("master") or {}
+        if "type" in master and master not in different:
+            different.append(master)
+    return [
+        {
+            "type": (each.get("obstacle") or each)["type"],
+            "lines": [
+                np.pad(line, ((0, 0), (0, 3 - dim))).tolist()
+                for line in _obstacle_lines(each, points[:, :dim])
+            ],
+        }
+        for each in different
+    ]
+
+
+def _obstacle_lines(entry: Mapping[str, Any], points: np.ndarray) -> list[np.ndarray]:
+    shape = _shape(entry.get("obstacle") or entry)
+    if shape is None:
+        return []
+    if "translation" in entry:
+        shape = simplified(placed(shape, np.asarray(entry["rotation"]), entry["translation"]))
+    return outline(shape, points)
+
+
+def _shape(entry: Mapping[str, Any]) -> SurfaceShape | None:
+    """Return the shape that an entry of a record describes, None if it is of none that is drawn."""
+    for names, kind in _SHAPES:
+        if all(isinstance(entry.get(name), list | float | int) for name in names):
+            shape: SurfaceShape = kind(**{name: entry[name] for name in names})
+            return shape
+    return None
+
+
+Record = Mapping[str, Any]
+
+
+def sections(record: Record, units: Units) -> str:
+    """Return the tables of a result as HTML, each under its heading, of the entries in the record."""
+    parts = {
+        "Summary": _rows(_summary(record, units)),
+        "Contact": _contact(record, units),
+        "Load steps": _steps(record, units),
+        "Rigid surfaces": _rows(_motions(record, units)),
+        "Forces and moments": _forces(record, units),
+        "Errors and residuals": _rows(_accuracy(record)),
+        "Computed with": _rows(_origin(record)),
+    }
+    return "".join(f"<section><h2>{name}</h2>{part}</section>\n" for name, part in parts.items() if part)
+
+
+def number(value: Any) -> str:
+    """Return a value for readers: numbers with five digits, a dash for None."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return str(value)
+    text = f"{value:,}" if isinstance(value, int) else f"{value:.5g}"
+    return text.replace(",", "\u202f").replace("-", "\u2212")
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[Any]], words: int) -> str:
+    """Return a table of which the first columns are text; one of many columns is a list on narrow screens."""
+    body = "".join(f"<tr>{_line('td', row, words, head or row)}</tr>\n" for row in rows)
+    top = f"<thead><tr>{_line('th', head, words, head)}</tr></thead>" if head else ""
+    kind = ' class="many"' if len(head) > 4 else ""
+    return f'<div class="wide"><table{kind}>{top}<tbody>\n{body}</tbody></table></div>'
+
+
+def _line(tag: str, cells: Sequence[Any], words: int, head: Sequence[Any]) -> str:
+    texts = [escape(number(cell)) for cell in cells]
+    names = [f' class="number" data-name="{escape(str(name))}"' for name in head]
+    return "".join(
+        f"<{tag}{'' if place < words else names[place]}>{text}</{tag}>" for place, text in enumerate(texts)
+    )
+
+
+def _rows(facts: Mapping[str, Any]) -> str:
+    """Return a table of names and what they are."""
+    kept = [(name, value) for name, value in facts.items() if value not in (None, "")]
+    return _table((), kept, words=2) if kept else ""
+
+
+def _summary(record: Record, units: Units) -> dict[str, Any]:
+    scene, counts, solver = (record.get(name) or {} for name in ("scene", "counts", "solver"))
+    energies, (_, work) = record.get("energies") or {}, _force_units(record, units)
+    facts: dict[str, Any] = {
+        f"body {name}": f"{number(body['cells'])} cells ({body['cell_type']}), {number(body['nodes'])} nodes"
+        for name, body in (scene.get("bodies") or {}).items()
+    }
+    facts |= {name.replace("f_", "F-").replace("_", " "): value for name, value in counts.items()}
+    facts |= {
+        f"energy, {name.replace('_', ' ')}": f"{number(value)} {work}"
+        for name, value in energies.items()
+        if value is not None
+    }
+    facts["solver"] = ", ".join([*solver.get("methods", ()), solver.get("reason") or ""]).strip(", ")
+    facts["tolerance"] = _tolerance(solver.get("tolerance"))
+    facts["held by nothing"] = "; ".join(record.get("unheld") or ())
+    objective = (record.get("optimisation") or {}).get("objective") or {}
+    return facts | {f"objective, {name.replace('_', ' ')}": value for name, value in objective.items()}
+
+
+def _tolerance(given: Any) -> Any:
+    """Return a tolerance; one that follows the mesh in words."""
+    if not isinstance(given, Mapping) or "share" not in given:
+        return given
+    return f"solver's error at most {100 * given['share']:.3g} % of the discretisation's"
+
+
+def _force_units(record: Record, units: Units) -> tuple[str, str]:
+    """Return the units of forces, and of moments and energies."""
+    return force_units(units.force, units.length, 2 if _plane(record) else 3)
+
+
+def _accuracy(record: Record) -> dict[str, Any]:
+    errors = record.get("errors") or {}
+    facts = {f"residual, {name}": value for name, value in (record.get("residuals") or {}).items()}
+    facts |= {
+        f"error, {name.replace('_', ' ')}": "not estimated" if value is None else value
+        for name, value in errors.items()
+        if not isinstance(value, Mapping)
+    }
+    facts |= {f"error of {name}": value for name, value in (errors.get("by_body") or {}).items()}
+    if facts and not errors:
+        facts["errors"] = "not computed"
+    return facts
+
+
+def _contact(record: Record, units: Units) -> str:
+    entries, (force, _) = record.get("contact") or [], _force_units(record, units)
+    names = (record.get("scene") or {}).get("contacts") or [{}] * len(entries)
+    rows: list[tuple[str, str]] = []
+    for pair, entry in zip(names, entries, strict=True):
+        rows.append(("contact", f"{_side(pair.get('slave'))} on {_side(pair.get('master'))}"))
+        named = zip(("open", "stick", "slip"), status_words([pair]), strict=True)
+        states = [f"{entry[name]} {word}" for name, word in named if word and name in entry]
+        rows.append(("points", f"{number(entry.get('points'))}: {', '.join(states)}"))
+        rows += [
+            (words, f"{number(entry[name])} {unit}")
+            for name, words, unit in (
+                ("normal_force", "normal force", force),
+                ("peak_pressure", "largest pressure", units.stress),
+                ("peak_nominal_pressure", "largest nominal pressure", units.stress),
+                ("area", "area in contact", units.length if _plane(record) else f"{units.length}²"),
+                ("smallest_gap", "smallest gap", units.length),
+                ("largest_slip", "largest slip of the last step", units.length),
+            )
+            if entry.get(name) is not None
+        ]
+    return _table((), rows, words=2) if rows else ""
+
+
+def status_words(pairs: Sequence[Record]) -> tuple[str, str, str]:
+    """Return the words for points of status OPEN, STICK and SLIP of contact pairs, "" where there are none.
+
+    Frictionless closed points have status SLIP: they are called closed.
+    """
+    laws = [pair.get("friction") or {} for pair in pairs]
+    rub = [any(value for name, value in law.items() if name != "type") for law in laws]
+    if all(rub):
+        return "open", "stick", "slip"
+    return ("open", "stick", "slip or closed") if any(rub) else ("open", "", "closed")
+
+
+def _side(side: Any) -> str:
+    if not isinstance(side, Mapping):
+        return "?"
+    if "surface" in side:
+        return f"{side['body']} {side['surface']}"
+    return name_in_words(str(side.get("type", "obstacle")))
+
+
+def _plane(record: Record) -> bool:
+    return (record.get("scene") or {}).get("dimension") == 2
+
+
+def _steps(record: Record, units: Units) -> str:
+    steps = (record.get("more") or {}).get("steps")
+    if not isinstance(steps, Mapping) or "name" not in steps:
+        return ""
+    force, _ = _force_units(record, units)
+    named = {
+        "number": "", "name": "step", "iterations": "iterations", "products": "products", "open": "open",
+        "stick": "stick", "slip": "slip", "normal_force": f"normal force ({force})",
+        "friction_force": f"friction ({force})", "peak_pressure": f"largest pressure ({units.stress})",
+    }  # fmt: skip
+    columns = [name for name in named if name in steps]
+    rows = list(zip(*(steps[name] for name in columns), strict=True))
+    return _table([named[name] for name in columns], rows, words=2)
+
+
+def _motions(record: Record, units: Units) -> dict[str, str]:
+    """Return displacement and rotation of the points of rigid surfaces."""
+    facts: dict[str, str] = {}
+    for place, entry in enumerate(record.get("rigid_motions") or ()):
+        move, turn, about = (
+            ", ".join(map(number, _several(entry[name]))) for name in ("displacement", "rotation", "about")
+        )
+        name = f"{place} {_side(entry)}, point {about}"
+        facts |= {name: f"displacement {move} {units.length}; rotation {turn} rad"}
+    return facts
+
+
+def _forces(record: Record, units: Units) -> str:
+    """Two rows for each force: itself and its moment, so that narrow screens hold them."""
+    forces = record.get("forces") or {}
+    if not forces:
+        return ""
+    scales, imbalance = scales_of(forces), forces["balance"]["imbalance"]
+    names = _force_units(record, units)
+    entries = [
+        (f"{what} {_side(entry)}" if "surface" in entry else what, entry)
+        for what, entry in listed_forces(forces)
+    ]
+    rows = [row for name, entry in entries for row in _force_rows(name, entry, scales, names)]
+    words = f"<p>Imbalance of all forces and moments: {escape(number(imbalance))}.</p>"
+    return _table(("", "", "x", "y", "z"), rows, words=2) + words
+
+
+def _force_rows(
+    name: str, entry: Record, given: Mapping[str, float], units: tuple[str, str], rounding: float = 1e-8
+) -> list[tuple[Any, ...]]:
+    """Return a row for a force and one for its moment; none if both are zero but for rounding."""
+    scales = {**given, "about": given["moment"] / given["force"] if given["force"] else 0.0}
+    force, moment, about = (
+        [0 if abs(part) <= rounding * scale else part for part in _several(entry[kind])]
+        for kind, scale in scales.items()
+    )
+    if not any([*force, *moment]):
+        return []
+    # In the plane a moment is one number, about the axis across it.
+    return [
+        (name, f"force ({units[0]})", *force, *[""] * (3 - len(force))),
+        (
+            f"about {', '.join(map(number, about))}",
+            f"moment ({units[1]})",
+            *[""] * (3 - len(moment)),
+            *moment,
+        ),
+    ]
+
+
+def _several(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, Sequence) else [value]
+
+
+def _origin(record: Record) -> dict[str, Any]:
+    facts = {"written": record.get("written"), "ranks": record.get("ranks")}
+    seconds = record.get("seconds") or {}
+    facts["seconds"] = ", ".join(f"{name} {spent:.2f}" for name, spent in seconds.items())
+    return facts | dict(record.get("versions") or {})
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,8 @@ what was given.
 """
 
 from fenics_contact._scene_file import _libraries  # noqa: F401
-from fenics_contact._scene_file.building import ShapeTask
 from fenics_contact._scene_file.document import Document, UnitNames
-from fenics_contact._scene_file.reading import SceneFile, read_scene_file
+from fenics_contact._scene_file.reading import SceneFile, ShapeTask, read_scene_file
 from fenics_contact._scene_file.source import Mistake, SceneFileError, Source, suggestion
 from fenics_contact._scene_file.validation import json_schema
 from fenics_contact._scene_file.values import Expression, VectorExpression

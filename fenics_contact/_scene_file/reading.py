@@ -1,31 +1,368 @@
-"""Reading of scene files as objects for scripts."""
+"""Scene files read, checked and built: meshes, bodies, scenes, designs; errors refer to their keys."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from pydantic import BaseModel
 
 from fenics_contact._base.checkpoint import Checkpoint
 from fenics_contact._base.checks import require_file
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._equilibrium.steps import LoadSequence
+from fenics_contact._optimize.bundle_trust import BundleTrust, minimize
+from fenics_contact._optimize.constraints import LinearConstraints
+from fenics_contact._optimize.nonlinear import NonlinearConstraint
+from fenics_contact._optimize.progress import Callback
+from fenics_contact._optimize.result import Result
+from fenics_contact._scene.body import Body
+from fenics_contact._scene.fields import SampledField, read_field
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene_file.bodies import Shaped
-from fenics_contact._scene_file.building import Builder, ShapeTask, shape_task, with_fields_read
+from fenics_contact._scene_file.design import (
+    DesignPart,
+    ObjectiveConstraint,
+    VolumeConstraint,
+    check_formulas,
+    check_pair,
+    design_surface,
+    in_words,
+    objective_of,
+)
 from fenics_contact._scene_file.document import Document, load_steps, refused_python
-from fenics_contact._scene_file.source import SceneFileError, Source, located, parse
-from fenics_contact._scene_file.validation import validated, wrong_names
+from fenics_contact._scene_file.source import (
+    Mistake,
+    SceneFileError,
+    Source,
+    branches,
+    located,
+    parse,
+    written,
+)
+from fenics_contact._scene_file.source import Path as Keys
+from fenics_contact._scene_file.validation import surface_parts, unknown, validated, wrong_names
+from fenics_contact._scene_file.values import FieldFile, at_time, is_reference, load
+from fenics_contact.design.design import SurfaceDesign
+from fenics_contact.design.memory import AdaptiveTolerance
+from fenics_contact.design.objective import Objective
+from fenics_contact.design.problem import ShapeProblem
+from fenics_contact.design.several import LoadPath
 from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors.kinds import scene_file_code
+from fenics_contact.materials.elastic import Material
 from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
     from mpi4py import MPI
+
+
+#: Keys that may hold formulas.
+_FORMULAS = {"supports": ("value",), "loads": ("value",), "contacts": ("master", "formula")}
+
+
+class Builder:
+    """Builds the parts in order and collects their mistakes.
+
+    Functions that read meshes or run gmsh agree on errors themselves; Python files are read by every rank.
+    """
+
+    def __init__(self, source: Source, document: Document, comm: MPI.Comm) -> None:
+        """Start with nothing built."""
+        self._source, self._document, self._comm = source, document, comm
+        self._mistakes: list[Mistake] = []
+
+    def bodies(self) -> tuple[dict[str, Body], dict[str, Shaped]]:
+        """Return the bodies with their shapes. Collective."""
+        shapes: dict[str, Mapping[str, Shaped]] = {}
+        for name, mesh in self._document.meshes.items():
+            with self._at("meshes", name):
+                shapes[name] = mesh.build(self._source.folder, self._comm)
+        materials: dict[str, Material] = {}
+        for name, part in self._document.materials.items():
+            with self._at("materials", name):
+                materials[name] = part.build(self._source.folder)
+        self._check()
+        chosen, made = {}, {}
+        for name, body in self._document.bodies.items():
+            with self._at("bodies", name):
+                chosen[name] = self._part_of(name, body, shapes[body.mesh])
+                made_of: Any = body.material
+                if isinstance(made_of, str):
+                    made[name] = Body(chosen[name].mesh, materials[made_of])
+                else:
+                    by_region = {region: materials[part] for region, part in made_of.items()}
+                    made[name] = Body(chosen[name].mesh, by_region)
+        self._check()
+        return made, chosen
+
+    def _part_of(self, name: str, body: Any, shapes: Mapping[str, Shaped]) -> Shaped:
+        if body.part is None and len(shapes) == 1:
+            return next(iter(shapes.values()))
+        path: Keys = ("bodies", name, "part") if body.part is not None else ("bodies", name)
+        parts = [part for part in shapes if part]
+        if body.part in shapes:
+            return shapes[body.part]
+        if body.part is None:
+            words = (
+                f"{written(path)} must have 'part', one of {parts}: the mesh {body.mesh!r} has several bodies"
+            )
+            raise SceneFileError(self._source.name, [self._source.mistake(path, words)])
+        wrong = unknown(self._source, path, body.part, f"a body of the mesh {body.mesh!r}", parts)
+        raise SceneFileError(self._source.name, [wrong])
+
+    def scene(self, bodies: Mapping[str, Body]) -> Scene:
+        """Return the scene of the bodies."""
+        self._check_surfaces(bodies)
+        document, dim = self._document, next(iter(bodies.values())).mesh.dim
+        empty = Scene(bodies)
+        built: dict[str, list[Any]] = {}
+        for key in ("supports", "loads", "contacts", "ties"):
+            built[key] = []
+            for number, part in enumerate(getattr(document, key)):
+                with self._at(key, number):
+                    one = self._made(part, dim)
+                    alone: dict[str, Any] = {key: (one,)}
+                    replace(empty, **alone)  # rejects what does not suit the bodies
+                    built[key].append(one)
+                    with self._at(key, number, *_FORMULAS.get(key, ())):
+                        check_formulas(one, bodies)
+                    for name in ("friction", "gap", "interference") if key == "contacts" else ():
+                        with self._at(key, number, name):
+                            check_pair(one, name, bodies)
+        self._check()
+        if document.automatic_contact is None:
+            return Scene(bodies, **built)
+        with self._at("automatic_contact"):
+            if built["contacts"]:
+                raise InvalidInputError(
+                    f"a scene has [automatic_contact] or [[contacts]], got both, {len(built['contacts'])} of "
+                    "the latter: leave one of them out"
+                )
+            scene = Scene(bodies, **{**built, "contacts": document.automatic_contact.made()})
+        self._check()
+        return scene
+
+    def _made(self, part: Any, dim: int) -> Any:
+        """Return a part, as it is before the first load step if there are any."""
+        if not hasattr(part, "build"):
+            return part.made()
+        return part.build(dim, at_time(part.size, 0.0) if self._document.steps else None)
+
+    def _check_surfaces(self, bodies: Mapping[str, Body]) -> None:
+        for path, part in surface_parts(self._document):
+            surfaces = bodies[part.body].mesh.surfaces
+            if part.surface not in surfaces:
+                what, where = f"a surface of the body {part.body!r}", (*path, "surface")
+                self._mistakes.append(unknown(self._source, where, part.surface, what, sorted(surfaces)))
+        self._check()
+
+    def _at(self, *path: str | int) -> AbstractContextManager[None]:
+        """Collect an error of the block as a mistake at a key."""
+        return located(self._source, path, self._mistakes)
+
+    def _check(self) -> None:
+        """Raise on all ranks if one has a mistake, such as a file that only it cannot read. Collective."""
+        with together(self._comm):
+            if self._mistakes:
+                raise SceneFileError(self._source.name, self._mistakes)
+
+
+AnyDocument = TypeVar("AnyDocument", bound=BaseModel)
+
+
+def with_fields_read(source: Source, document: AnyDocument, comm: MPI.Comm) -> AnyDocument:
+    """Return a document in which every field from a file is a function of position. Collective on ``comm``.
+
+    Each file is read once, on rank 0.
+    """
+    mistakes: list[Mistake] = []
+    read: dict[tuple[Any, ...], SampledField] = {}
+    for path, part in branches(document):
+        if isinstance(part, FieldFile) and _key(part) not in read:
+            with located(source, path, mistakes):
+                read[_key(part)] = read_field(source.folder / part.file, part.field, comm=comm)
+    with together(comm):
+        if mistakes:
+            raise SceneFileError(source.name, mistakes)
+    return _replaced(document, read) if read else document
+
+
+def _key(part: FieldFile) -> tuple[Any, ...]:
+    return part.file, tuple(part.field) if isinstance(part.field, list) else part.field
+
+
+def _replaced(value: Any, read: Mapping[tuple[Any, ...], SampledField]) -> Any:
+    """Return a copy of a part of a document with its fields."""
+    if isinstance(value, FieldFile):
+        return read[_key(value)]
+    if isinstance(value, BaseModel):
+        own = {name: (part, _replaced(part, read)) for name, part in value}
+        changed = {name: new for name, (old, new) in own.items() if new is not old}
+        return value.model_copy(update=changed) if changed else value
+    if isinstance(value, list | tuple):
+        parts = [_replaced(part, read) for part in value]
+        same = all(new is old for new, old in zip(parts, value, strict=True))
+        return value if same else type(value)(parts)
+    if isinstance(value, Mapping):
+        return {name: _replaced(part, read) for name, part in value.items()}
+    return value
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeTask:
+    """A shape optimisation, ready to run.
+
+    Attributes:
+        start: Design variables at the start, [length].
+        bounds: Least and largest values of the variables, [length].
+        constraints: The linear ones in one, volumes, and limits of other objectives.
+        restore: Whether the start may violate limits of other objectives.
+    """
+
+    problem: ShapeProblem | LoadPath
+    start: np.ndarray
+    bounds: tuple[np.ndarray, np.ndarray]
+    constraints: tuple[LinearConstraints | NonlinearConstraint, ...]
+    method: BundleTrust
+    restore: bool = False
+
+    def minimize(self, *, callback: Callback | None = None, checkpoint: Checkpoint | None = None) -> Result:
+        """Run it. Collective; a stop before the tolerance is met is reported by the result's reason.
+
+        Args:
+            callback: Called after every evaluation, see `fenics_contact.minimize`.
+            checkpoint: File from which an interrupted run continues, or None.
+        """
+        return minimize(
+            self.problem,
+            self.start,
+            self.method,
+            bounds=self.bounds,
+            constraints=self.constraints,
+            restore=self.restore,
+            callback=callback,
+            checkpoint=checkpoint,
+        )
+
+
+def shape_task(
+    source: Source,
+    document: Document,
+    contact: ContactProblem,
+    shapes: Mapping[str, Shaped],
+    steps: Sequence[LoadStep],
+) -> ShapeTask:
+    """Pose the optimisation of a scene file. Collective.
+
+    `shapes`: body name -> its mesh with its shape.
+    """
+    design = document.design
+    assert design is not None
+    moving = tuple(
+        SurfaceDesign(
+            part.body, design_surface(shapes[part.body], part.surface, part.body), part.net, part.transition
+        )
+        for part in design.surfaces
+    )
+    with together(contact.comm):
+        objective = _objective(design.objective, source)
+    adaptive = AdaptiveTolerance() if design.adaptive else None
+    alone = ShapeProblem(contact, moving, objective, tolerance=adaptive)
+    problem = _over_steps(alone, design, steps)
+    lower, upper = (
+        np.repeat([getattr(part, side) for part in design.surfaces], [move.size for move in moving])
+        for side in ("lower", "upper")
+    )
+    start = np.zeros(problem.size) if design.start is None else _fitting("start", design.start, problem.size)
+    method = design.made(raise_on_failure=False)
+    constraints = _constraints(design, problem, start, source)
+    return ShapeTask(problem, start, (lower, upper), constraints, method, design.restore)
+
+
+def _over_steps(
+    problem: ShapeProblem, design: DesignPart, steps: Sequence[LoadStep]
+) -> ShapeProblem | LoadPath:
+    """Return the problem whose objective is added over load steps, if there are any. Collective."""
+    if not steps:
+        if design.over_steps is not None or any(getattr(part, "step", None) for part in design.constraints):
+            raise InvalidInputError(
+                "over_steps and step are names of load steps, but the file has none: give [[steps]], or "
+                "leave them out"
+            )
+        return problem
+    if design.over_steps is None:
+        return LoadPath(problem, steps)
+    return LoadPath(problem, steps, dict.fromkeys(design.over_steps, problem.objective))
+
+
+def _objective(name: Any, source: Source) -> Objective:
+    if not is_reference(name):
+        return objective_of(name)
+    given: Any = load(name, source.folder)
+    with scene_file_code(f"objective {name!r}"):
+        missing = [part for part in ("value", "partials") if not hasattr(given, part)]
+    if missing or isinstance(given, type):
+        raise InvalidInputError(
+            f"objective {name!r} must be an object with value and partials, got {given!r}: see "
+            "fenics_contact.design.Objective, and give an instance, not a class"
+        )
+    objective: Objective = given
+    return objective
+
+
+def _constraints(
+    design: DesignPart, problem: ShapeProblem | LoadPath, start: np.ndarray, source: Source
+) -> tuple[LinearConstraints | NonlinearConstraint, ...]:
+    """Return the constraints of a design, all linear ones in one. Collective."""
+    rows: list[np.ndarray] = []
+    limits: list[float] = []
+    others: list[NonlinearConstraint] = []
+    for part in design.constraints:
+        if isinstance(part, VolumeConstraint):
+            upper, lower = _limits(part, problem.volume(start)[0])
+            others.append(NonlinearConstraint(problem.volume, upper, lower, "volume"))
+        elif isinstance(part, ObjectiveConstraint):
+            others.append(_limited(part, problem, source))
+        else:
+            rows.append(_fitting("coefficients", part.coefficients, problem.size))
+            limits.append(part.at_most)
+    return (*([LinearConstraints(np.array(rows), np.array(limits))] if rows else []), *others)
+
+
+def _limited(
+    part: ObjectiveConstraint, problem: ShapeProblem | LoadPath, source: Source
+) -> NonlinearConstraint:
+    """Return the limits of an objective. Collective."""
+    with together(problem.comm):
+        objective = _objective(part.objective, source)
+    name = part.name or in_words(part.objective)
+    if isinstance(problem, LoadPath):
+        step = part.step or list(problem.problems)[-1]
+        return NonlinearConstraint(problem.function({step: objective}), *_limits(part), name)
+    return NonlinearConstraint(problem.function(objective, name), *_limits(part), name)
+
+
+def _limits(part: VolumeConstraint | ObjectiveConstraint, unit: float = 1.0) -> tuple[float, float]:
+    """Return the upper and the lower limit, infinite where it is not given."""
+    return (
+        np.inf if part.at_most is None else part.at_most * unit,
+        -np.inf if part.at_least is None else part.at_least * unit,
+    )
+
+
+def _fitting(name: str, values: tuple[float, ...], size: int) -> np.ndarray:
+    if len(values) != size:
+        raise InvalidInputError(
+            f"{name} must have {size} entries, one for each design variable, got {len(values)}: the nets of "
+            "design.surfaces have so many control points"
+        )
+    return np.array(values)
 
 
 #: Largest size of a scene file, in bytes.

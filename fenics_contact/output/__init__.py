@@ -6,8 +6,7 @@ On several ranks rank 0 writes (XDMF: all ranks together), and all raise if one 
 from fenics_contact.output.cad import CadError, write_step
 from fenics_contact.output.files import OutputError, only_run_in, write_json, write_text
 from fenics_contact.output.paraview import ResultSeries, write_xdmf
-from fenics_contact.output.reading import read_result
-from fenics_contact.output.result import versions, write_optimisation_result
+from fenics_contact.output.result import read_result, versions, write_optimisation_result
 from fenics_contact.output.surfaces import write_design_table, write_stl
 
 __all__ = [

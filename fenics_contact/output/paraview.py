@@ -1,4 +1,4 @@
-"""Files for ParaView: VTU with indices, XDMF, and series of states (PVD)."""
+"""Files for ParaView: VTU with indices, XDMF, and series of states (PVD), and how they are read back."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ import numpy as np
 from fenics_contact import _dolfinx
 from fenics_contact._base.files import remove_abandoned
 from fenics_contact._base.libraries import MPI
+from fenics_contact._base.requirements import require_extra
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.output.files import replacing, replacing_together, write_text
 from fenics_contact.results.fields import in_space
@@ -25,19 +26,78 @@ from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
     import meshio
+    import pyvista
 
     from fenics_contact._optimize.result import Record
     from fenics_contact.design.problem import ShapeProblem
     from fenics_contact.design.several import JointProblem
 
 
-@dataclass(frozen=True, order=True)
-class Member:
-    """One state of a series.
+#: Suffixes of the files of fields that are read back.
+FIELD_FILES = (".vtu", ".vtm", ".pvd")
+
+
+@dataclass(frozen=True)
+class StoredFields:
+    """A file with the fields of one state.
 
     Attributes:
-        label: Description; ParaView stores it as the field datum "Name".
+        value: Its time, load factor or number in a series, 0 where there is none.
+        label: Its description in a series, such as the name of a load step; ParaView's field datum "Name".
     """
+
+    file: Path
+    value: float = 0.0
+    label: str = ""
+
+    def read(self) -> dict[str, pyvista.UnstructuredGrid]:
+        """Return body name -> grid with all fields."""
+        require_extra("files of fields", "viz", "pyvista")
+        import pyvista
+
+        if not self.file.is_file():
+            raise InvalidInputError(
+                f"a file of fields must exist, '{self.file}' does not: write the result again"
+            )
+        data = pyvista.read(self.file)
+        if isinstance(data, pyvista.MultiBlock):
+            return {str(name): data[name] for name in data.keys()}
+        return {self.file.stem: data}
+
+
+def fields_of_result(folder: Path) -> Path | None:
+    """Return the file of fields to open in a folder of results: a series before a single state."""
+    files = [*sorted(folder.glob("*.pvd")), *sorted(folder.glob("*.vtm"))]
+    return files[0] if files else None
+
+
+def stored_fields(path: str | Path) -> list[StoredFields]:
+    """Return the members of a PVD file in the order of their values; any other file as the only one.
+
+    Example:
+        >>> [member.label for member in stored_fields("output/history.pvd")]  # doctest: +SKIP
+        ['pressed', 'sheared']
+    """
+    path = Path(path)
+    if path.suffix != ".pvd":
+        return [StoredFields(path)]
+    try:
+        members = [
+            StoredFields(
+                path.parent / entry.attrib["file"], float(entry.get("timestep", 0)), entry.get("name", "")
+            )
+            for entry in ET.parse(path).getroot().iter("DataSet")
+        ]
+    except (ET.ParseError, KeyError, OSError, ValueError) as error:
+        raise InvalidInputError(f"'{path}' must be a whole .pvd file, got {error}: write it again") from error
+    if not members:
+        raise InvalidInputError(f"'{path}' must name at least one file of fields, it names none")
+    return sorted(members, key=lambda member: member.value)
+
+
+@dataclass(frozen=True, order=True)
+class Member:
+    """One state of a series."""
 
     value: float
     number: int
@@ -67,18 +127,14 @@ def read_collection(path: Path) -> list[Member]:
     """Return the members of a PVD file whose multi-block files exist."""
     name, members = path.stem, []
     try:
-        for entry in ET.parse(path).getroot().iter("DataSet"):
-            file = entry.attrib["file"]
-            member = Member(
-                float(entry.attrib["timestep"]),
-                int(Path(file).stem.removeprefix(f"{name}_")),
-                entry.attrib.get("name", ""),
-            )
-            if file != f"{name}/{stem_of(name, member.number)}.vtm" or not math.isfinite(member.value):
-                raise ValueError(f"it names {file!r} at {member.value}")
-            if (path.parent / file).is_file():
-                members.append(member)
-    except (OSError, ET.ParseError, KeyError, ValueError) as error:
+        for stored in stored_fields(path):
+            number = int(stored.file.stem.removeprefix(f"{name}_"))
+            ours = path.parent / name / f"{stem_of(name, number)}.vtm"
+            if stored.file != ours or not math.isfinite(stored.value):
+                raise ValueError(f"it names '{stored.file}' at {stored.value}")
+            if ours.is_file():
+                members.append(Member(stored.value, number, stored.label))
+    except (InvalidInputError, ValueError) as error:
         raise InvalidInputError(
             f"a series needs a PVD file that a ResultSeries wrote, or none, {str(path)!r} is another one "
             f"({error}): give the series another name, or move the file away"

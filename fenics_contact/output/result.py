@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import datetime
 import importlib
+import json
 import platform
 import re
 from collections.abc import Mapping, Sequence
@@ -31,7 +32,6 @@ from fenics_contact.feti.direct import DirectSolution
 from fenics_contact.materials.elastic import Material
 from fenics_contact.output.files import plain, write_json
 from fenics_contact.output.paraview import checked_name
-from fenics_contact.output.reading import FORMAT, FORMAT_VERSION
 from fenics_contact.qp.solution import SolverStep
 from fenics_contact.results.area import contact_area
 from fenics_contact.results.contact import Status
@@ -197,6 +197,9 @@ def _installed(name: str) -> str:
     return str(getattr(module, "__version__", "unknown"))
 
 
+#: Value of ``format`` in files of `write_result`.
+FORMAT = "fenics_contact result"
+FORMAT_VERSION = 1
 UNITS = (
     "those of the input: a scene in N and mm has forces in N, stresses, moduli and pressures in N/mm², "
     "energies and moments in N mm; seconds are wall time of rank 0; residuals and errors are relative; "
@@ -471,3 +474,52 @@ def _history(result: Result) -> dict[str, list[Any]]:
         return {}
     names = list(vars(result.history[0]))
     return {name: [readable(getattr(record, name)) for record in result.history] for name in names}
+
+
+def read_result(path: str | Path) -> dict[str, Any]:
+    """Read a file of `write_result` or `write_optimisation_result`.
+
+    Args:
+        path: The file, or a folder that holds a "result.json".
+
+    Returns:
+        The entries as described there.
+
+    Raises:
+        InvalidInputError: If there is no such file, it cannot be read, is not complete JSON, not a result, or
+            of a newer format; states what to do.
+
+    Example:
+        >>> read_result("output/result.json")["energies"]["total_potential"]  # doctest: +SKIP
+    """
+    file = Path(path)
+    file = file / "result.json" if file.is_dir() else file
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InvalidInputError(
+            f"a result is needed at {str(file)!r}, which cannot be read: {error.strerror or error}; give the "
+            "file that write_result returned, or its folder"
+        ) from error
+    except ValueError as error:  # of JSON or of the encoding
+        raise InvalidInputError(
+            f"a result must be a whole JSON file, {str(file)!r} is none ({error}): it was cut or edited; "
+            "bring back a copy or write it again"
+        ) from error
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        kind = data.get("format") if isinstance(data, dict) else None
+        raise InvalidInputError(
+            f'a result must have "format": {FORMAT!r}, {str(file)!r} has {kind!r}: give a file that '
+            "write_result or write_optimisation_result wrote"
+        )
+    version = data.get("format_version")
+    if not isinstance(version, int) or version < 1:
+        raise InvalidInputError(
+            f"a result must have a format_version of 1 or more, {str(file)!r} has {version!r}: write it again"
+        )
+    if version > FORMAT_VERSION:
+        raise InvalidInputError(
+            f"this version of fenics_contact reads results up to format_version {FORMAT_VERSION}, "
+            f"{str(file)!r} has {version}: read it with a newer version"
+        )
+    return data

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from fenics_contact import write_vtu
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.output import ResultSeries
-from fenics_contact.output.reading import StoredFields, fields_of_result, stored_fields
+from fenics_contact.output.paraview import StoredFields, fields_of_result, stored_fields
 from tests.io.states import touching_blocks
 
 

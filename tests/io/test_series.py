@@ -144,7 +144,7 @@ def test_a_member_whose_file_is_gone_is_left_out(tmp_path: Path) -> None:
             "invalid literal",
         ),
         ("<VTKFile><Collection><DataSet timestep='0' file='run_3.vtm'/></Collection></VTKFile>", "it names"),
-        ("<VTKFile><Collection><DataSet file='a.vtu'/></Collection></VTKFile>", "timestep"),
+        ("<VTKFile><Collection><DataSet timestep='0'/></Collection></VTKFile>", "'file'"),
     ],
 )
 def test_a_collection_of_another_writer_is_refused_and_kept(

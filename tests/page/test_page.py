@@ -18,8 +18,7 @@ from mpi4py import MPI
 
 from fenics_contact import State, Status, result_page, write_result, write_vtu
 from fenics_contact import _cli as cli
-from fenics_contact._page.content import rounded, sections, status_words
-from fenics_contact._page.page import Page
+from fenics_contact._page.page import Page, rounded, sections, status_words
 from fenics_contact.errors import InvalidInputError, MissingRequirementError
 from fenics_contact.output import ResultSeries
 from fenics_contact.output.result import result_record
