@@ -16,7 +16,7 @@
 # $$ \delta = \frac{3F}{4E^*a}\ [\mathrm{mm}], \qquad E^* = \frac{E}{1-\nu^2}, $$
 #
 # and the rest stays: an imprint, and around it stress that no load causes, since what has flowed no longer
-# fits. Of the work of the ball only what is stored in that stress is not spent on plastic flow.
+# fits. Of the work of the ball only what is stored in that stress is not dissipated by plastic flow.
 #
 # Run it with `make demo DEMO=ball_imprint`, on two ranks with `make demo DEMO=ball_imprint NP=2`.
 
@@ -87,7 +87,7 @@ with show_progress(comm):
 
 # ## Hardness and springback
 #
-# Four quarters. Contact is as large as the nodes tell that touch, half a cell more or less.
+# Four quarters. Contact is as large as that of the nodes that touch, half a cell more or less.
 
 sunk = -np.array([path(time)[1][2] for time in times])
 force = np.array([-4.0 * state.contact.force[:, 2].sum() for state in states])
@@ -161,7 +161,7 @@ for number, state in enumerate(states):
 # ## Result
 
 newton = NewtonSteps.of(states)
-# The first steps bear so little that rounding shows in their balance.
+# The first steps carry so little that rounding shows in their balance.
 imbalance = max(state.balance().imbalance for state in states[IN:])
 record = {
     "depth": way,
@@ -188,14 +188,14 @@ if comm.rank == 0:
     print(f"  springback           {1e3 * springback:9.2f} µm, by Hertz {1e3 * hertz:.2f} µm")
     print(f"  residual stress      {record['residual']:9.1f} N/mm², von Mises, at most")
     print(f"  work of the ball     {work:9.2f} N mm")
-    print(f"    spent on flow      {flow:9.2f} N mm, {100 * flow / work:.1f} %")
+    print(f"    dissipated by flow {flow:9.2f} N mm, {100 * flow / work:.1f} %")
     print(f"    stored for ever    {stored:9.2f} N mm, {100 * stored / work:.1f} %")
     print(f"  {newton}")
     print(f"  loads, reactions and contact forces balance to {imbalance:.1e}")
     print(f"pictures and files in {output}/")
 
-# The metal springs back as Hertz tells, to a sixth: the edge of the imprint is not where nodes are. Nine
-# tenths of the work are spent on flow. Pressure is above Tabor's: linear cells are too stiff where metal
+# The metal springs back as Hertz predicts, to a sixth: the edge of the imprint is not where nodes are. Nine
+# tenths of the work are dissipated by flow. Pressure is above Tabor's: linear cells are too stiff where metal
 # flows without a change of volume, by about a tenth of the force here, and the area is as uncertain.
 
 assert 2.8 < tabor < 3.6

@@ -126,8 +126,8 @@ for name, state in list(states.items())[1:]:
     contact = state.contact
     sticks = contact.status == Status.STICK
     traction = np.abs(contact.friction_force[:, 0]) / contact.points.area
-    lack = (friction_coefficient * contact.pressure - traction)[sticks]
-    slope, start = np.polyfit(place[sticks] ** 2, lack**2, 1)
+    reserve = (friction_coefficient * contact.pressure - traction)[sticks]
+    slope, start = np.polyfit(place[sticks] ** 2, reserve**2, 1)
     ratio = abs(contact.friction_force.sum()) / (friction_coefficient * contact.normal_force.sum())
     found[name] = (ratio, np.sqrt(-start / slope), half_width * np.sqrt(1 - ratio))
 

@@ -4,7 +4,7 @@
 #
 # Two links of a round-steel chain hang in each other. Link 1 is held at its far crown. Link 2 is pulled at
 # its far crown by a dead force and is held by nothing but contact and friction. We look for the shape of
-# link 1's crown, where link 2 bears, that minimises the total potential energy
+# link 1's crown, where link 2 presses, that minimises the total potential energy
 #
 # $$ J(\alpha) = \tfrac12 u^T K(\alpha) u - f^T u \quad [\mathrm{N\,mm}], $$
 #
@@ -74,7 +74,7 @@ comm = MPI.COMM_WORLD
 #
 # The published experiment has 48 × 8 × 20 hexahedra a link. Here they shrink towards the spots where links
 # touch, so that ten cells lie across it in both directions. Contact does not see the cells' flat facets but
-# the tori that they stand for, which `two_links` hands over: facets are off by more than the bodies approach.
+# the tori that they represent, which `two_links` hands over: facets are off by more than the bodies approach.
 
 SIZES = {
     "small": gallery.LinkShape(n_around=36, n_a=6, n_b=14, grading=2.5),
@@ -248,8 +248,8 @@ with timer.phase("files"):
 # retreat; the rest of the drop is the better shape's. It is negative for the published objective: the seat is
 # 0.25 mm deeper, as much as the bounds allow, and a little softer. The drop is printed beside the published
 # one, which belongs to other dimensions, load and bounds. For less pressure the crown becomes a groove that
-# fits link 2 more closely. The file tells the scene, the history, the best design and its state; what is
-# added here stands under `more`.
+# fits link 2 more closely. The file holds the scene, the history, the best design and its state; what is
+# added here is under `more`.
 
 drop = (before.value - after.value) / abs(before.value) * 100
 volume_final = problem.volume(result.x)[0]

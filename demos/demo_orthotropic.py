@@ -92,8 +92,8 @@ reference = materials.OrthotropicElasticity(
     orientation=materials.material_axes(fibre, (0.0, 0.0, 1.0)),
 )
 
-# The block, 30 × 30 × 15 mm, has small cells where the ball bears. It rests on the plane z = −15 mm, which is
-# lifted by 0.4 mm against the ball.
+# The block, 30 × 30 × 15 mm, has small cells where the ball presses. It rests on the plane z = −15 mm,
+# which is lifted by 0.4 mm against the ball.
 
 half = np.concatenate([np.linspace(0, 4, 9), [5, 6.6, 9, 12, 15]])
 across = np.concatenate([-half[:0:-1], half])

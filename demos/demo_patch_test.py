@@ -2,7 +2,7 @@
 #
 # ![Contact pressure, node to surface](../docs/pictures/patch_test_node.png)
 #
-# Two blocks of one material stand upon each other, pressed by $p$ [N/mm²] and free to widen. The exact
+# Two blocks of one material lie upon each other, pressed by $p$ [N/mm²] and free to widen. The exact
 # answer is the same stress everywhere,
 #
 # $$ \sigma = -p \, e_z \otimes e_z, \qquad \lambda_i = p \, A_i, $$
@@ -81,7 +81,7 @@ for slave, master in CELLS:
 
 # ## Result
 #
-# The file tells the last of the scenes in full, and the errors of all.
+# The file describes the last of the scenes in full, and the errors of all.
 
 record = {"errors": {", ".join(names): error for names, error in errors.items()}}
 write_result(state, output, more=record)

@@ -1,4 +1,4 @@
-# # A rubber seal: closing a groove until the seal meets itself
+# # A rubber seal: closing a groove until the seal touches itself
 #
 # ![The seal when the groove is nearly closed](../docs/pictures/rubber_seal_stress.png)
 #
@@ -8,7 +8,7 @@
 # then it leans on the walls, and at the end its bore closes and rubber presses on rubber. The seal is tight
 # against a pressure that is below the contact pressure on the lid.
 #
-# While it stands free it is a ring between two plates. For a thin one of radius $R$ and thickness $t$ [mm]
+# At first it is a ring between two plates. For a thin one of radius $R$ and thickness $t$ [mm]
 # the force of a squeeze $\delta$ is (S. Timoshenko, Strength of Materials, part II)
 #
 # $$ F = \frac{E}{1 - \nu^2}\,\frac{t^3}{12 R^3}\,\frac{\delta}{\pi/4 - 2/\pi}\ [\mathrm{N/mm}] $$
@@ -78,7 +78,7 @@ seal = replace(
 
 # ## Groove
 #
-# Floor and wall stand still, the lid comes down as time goes by. The bore folds: its surface is slave and
+# Floor and wall are fixed, the lid comes down as time goes by. The bore folds: its surface is slave and
 # master at once.
 
 rubber = materials.NeoHooke(young_modulus=6.0, poisson_ratio=0.45)  # N/mm²
@@ -182,4 +182,4 @@ assert np.median(newton.reduction) < 1e-3
 #
 # - `MooneyRivlin(0.6, 0.15, 20.0, mean_dilatation=True)`: rubber that hardly changes its volume.
 # - A wider groove, `gap=2.0`: the bore closes before the wall is reached.
-# - `Coulomb(0.6)`: dry rubber. Lid and floor carry more than the middle of the seal tells.
+# - `Coulomb(0.6)`: dry rubber. Lid and floor carry more than the middle of the seal shows.

@@ -70,8 +70,8 @@ with show_progress(comm):
 
 # ## Shear force
 #
-# The block feels the friction of the floor; what shears it is the opposite. At the end of each stroke all of
-# the floor slides.
+# The friction of the floor acts on the block; what shears it is the opposite. At the end of each stroke
+# all of the floor slides.
 
 shear = np.array([-state.contact.force[:, 0].sum() for state in states])
 pressed = np.array([state.contact.normal_force.sum() for state in states])

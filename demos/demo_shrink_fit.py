@@ -195,5 +195,5 @@ assert imbalance < 1e-9
 #   that of $\nu$, and $(1 + \nu)\,\alpha$ that of $\alpha$.
 # - A harder mount: as the hub shrinks, the mount pulls at its rim, and the pressure falls.
 # - `Coulomb(0.05)`: it slips at half of the torque.
-# - No temperature, but the overlap that it stands for:
+# - No temperature, but the overlap that it would cause:
 #   `ContactPair(..., interference=steel.thermal_expansion * cooling * seat)`.

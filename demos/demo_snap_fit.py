@@ -167,7 +167,7 @@ if comm.rank == 0:
     print(f"  loads, reactions and contact forces balance to {imbalance:.1e}")
     print(f"pictures and files in {output}/")
 
-# As the formula tells for turned surfaces, to a fifth: it takes a tip for a point. Out takes more than in,
+# As the formula predicts for turned surfaces, to a fifth: it takes a tip for a point. Out takes more than in,
 # the snap pulls, forces balance as well as they were solved, and Newton's method is superlinear.
 
 for found, name in ((inward, "in"), (outward, "out")):

@@ -172,7 +172,7 @@ before, after = problem.first, problem.at(result.x)
 #
 # The same design on cells two thirds as large: the relieved peak stays, that of the sharp edge grows. The
 # last control point is at its bound, 40 µm: with 100 µm the peak would be a tenth lower here, but the relief
-# would be felt in other positions of the gears, which this design does not see.
+# would matter in other positions of the gears, which this design does not see.
 
 finer = posed(cell / 1.5)
 with show_progress(comm):

@@ -1,7 +1,7 @@
 """Sphinx builds the documentation with this: `make docs`.
 
 The source folder is the root of the project, not `docs/`: demos, notebooks, benchmarks and the changelog are
-pages where they stand, so that one relative link serves both here and where the files are read as they are.
+pages where they are, so that one relative link serves both here and where the files are read as they are.
 Nothing is executed, and nothing is fetched.
 """
 
@@ -102,5 +102,5 @@ myst_update_mathjax = False
 
 
 def setup(app: Any) -> None:
-    """Tell where the sources of types are."""
+    """Return where the sources of types are."""
     app.connect("viewcode-follow-imported", reference.source_of)

@@ -15,9 +15,9 @@
 #
 # ![A block pressed and pushed on another one](../docs/pictures/notebooks/01_first_contact.png)
 #
-# A steel block stands on another one. It is pressed down with 16 kN and pushed sideways with 3 kN. Nothing
+# A steel block lies on another one. It is pressed down with 16 kN and pushed sideways with 3 kN. Nothing
 # holds it but contact and friction: it could lift off, slide, or stay. What does it do, and with which
-# pressure do the blocks meet?
+# pressure are the blocks in contact?
 #
 # This notebook solves that problem with a few lines of code, looks at the answer, and checks it against
 # what a sheet of paper says. No knowledge of contact mechanics is needed.
@@ -90,7 +90,7 @@ scene = Scene(
 )
 
 # %% [markdown]
-# Nothing has been computed yet. The plan tells what will be: how many unknowns, which solver, how much
+# Nothing has been computed yet. The plan reports what will be: how many unknowns, which solver, how much
 # memory. It is the place to notice a forgotten support or a mesh that is far too fine.
 
 # %%
@@ -142,7 +142,7 @@ pictures.plot_contact_pressure(state, title="Under the tower", width=1200)
 # ## Is it right?
 #
 # A sheet of paper knows the resultants. The table must push back with exactly the load, 16 kN upwards and 3
-# kN sideways. And the moment tells where the pressure's resultant acts: the push at the height $h$ = 30 mm
+# kN sideways. And the moment shows where the pressure's resultant acts: the push at the height $h$ = 30 mm
 # moves it by $e = F_x h / F_z$ from the middle.
 
 # %%
@@ -174,7 +174,7 @@ assert np.all(contact.normal_force[closed] > 0)
 # %% [markdown]
 # The state also knows how far off it is itself, in energy norm: what the solver left, what is missing to
 # Coulomb's law, and what the mesh cannot represent. The last is much the largest, mostly because of the
-# sharp edges; the solver stops when its own error no longer matters beside it.
+# sharp edges; the solver stops when its own error no longer matters compared with it.
 
 # %%
 print(state.estimate_errors())

@@ -16,7 +16,7 @@
 # ![Von Mises stress in two chain links](../docs/pictures/notebooks/02_chain_links_and_friction.png)
 #
 # Two links of a round-steel chain hang in each other. One is held, the other is pulled, then swung to and
-# fro. What does friction do where they meet? This notebook looks at the status of contact points, at the
+# fro. What does friction do where they touch? This notebook looks at the status of contact points, at the
 # influence of the coefficient of friction, and at what makes friction special among forces: it remembers.
 #
 # It builds on [01 First contact](01_first_contact.ipynb). Lengths are in mm, forces in N, stresses in
@@ -124,7 +124,7 @@ pictures.plot_contact_pressure(state, title=f"μ = {mu:g}", width=1200)
 # pressure and with it the bound of friction falls to zero there. The arrows show the direction of slip.*
 #
 # Coulomb's law can be checked in every point. The package's friction force acts on the master; the slave
-# feels the opposite, so a point slips along $\tau$: the cosine between both is one.
+# is under the opposite one, so a point slips along $\tau$: the cosine between both is one.
 
 # %%
 import numpy as np

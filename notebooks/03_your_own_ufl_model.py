@@ -26,7 +26,7 @@
 # %% [markdown]
 # ## What a model is
 #
-# Total FETI tears bodies into subdomains that float freely. Of a material it needs, beside its stiffness,
+# Total FETI tears bodies into subdomains that float freely. Of a material it needs, besides its stiffness,
 # to know which motions cost no energy: the *kernel*. So a model is
 #
 # | member | what it is |
@@ -192,7 +192,7 @@ pictures.plot_stress(state, title="Fibres at 30°", scale=40, clim=(0.0, 16.0), 
 #
 # A wrong kernel is the worst mistake in a model: the generalised inverse would blow up or take real
 # stiffness away, and the result could pass for a solution. So before anything is built on a model, it must
-# prove itself on one skew cell. Four wrong models, and what they are told. First a class that forgets the
+# prove itself on one skew cell. Four wrong models, and their errors. First a class that forgets the
 # rotations, and one that takes a stretch for a rigid motion:
 
 # %%

@@ -15,7 +15,7 @@
 #
 # ![How the crown of a chain link moves](../docs/pictures/notebooks/04_shape_optimisation.png)
 #
-# Where two chain links meet, a few square millimetres carry the whole load. Can a slightly other shape of
+# Where two chain links touch, a few square millimetres carry the whole load. Can a slightly other shape of
 # the crown spread it? This notebook takes a shape optimisation apart: design, mesh motion, state, adjoint,
 # subgradient, and the bundle method that uses them. `make demo` runs all of it at full size in one go.
 #
@@ -200,7 +200,7 @@ assert abs(forwards - backwards) > 10.0
 # returns there belongs to one branch. A *subgradient* is all that a bundle method asks for; a method for
 # smooth functions, such as BFGS, could stop at such a place although it is no minimum. (Of several points
 # on their switches one branch may give none: a `ShapeProblem` itself, handed to `minimize`, says so, and
-# the method looks beside such designs.)
+# the method looks near such designs.)
 #
 # ## Cutting planes
 #

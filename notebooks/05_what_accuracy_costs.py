@@ -136,7 +136,7 @@ assert min(ratios) >= 1.0 - 1e-2  # the exact solution is known to some digits o
 print(study.accuracy_table(errors, targets=(0.05, 0.01)))
 
 # %% [markdown]
-# What a setting costs, beside a run that differs from it in this setting alone, on the finest mesh that both
+# What a setting costs, compared with a run that differs in this setting alone, on the finest mesh that both
 # have. Ratios above one are dearer:
 
 # %%

@@ -191,7 +191,7 @@ _ = right.set(title="G Gᵀ", xlabel="rigid motion", ylabel="rigid motion", xtic
 # %% [markdown]
 # *Left B, below the orange line the rows of contact, which couple the two bodies. Right the small matrix of
 # the coarse problem, three rows and columns a subdomain; white where subdomains do not touch. Motion 0–2
-# and 9–11 stand for the bodies as wholes: gluing does not feel them, only supports and contact do.*
+# and 9–11 stand for the bodies as wholes: gluing does not depend on them, only supports and contact do.*
 #
 # The properties of the projector, with dense matrices made column by column:
 

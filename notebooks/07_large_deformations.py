@@ -215,7 +215,7 @@ pictures.plot_curves(
 )  # fmt: skip
 
 # %% [markdown]
-# *The second time the disc meets the imprint of the first, and goes back the way it came.*
+# *The second time the disc runs over the imprint of the first, and goes back the way it came.*
 
 # %%
 imprints = [-cycle[k].gather_displacement("plate")[:, 1].min() for k in (10, -1)]

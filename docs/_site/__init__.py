@@ -1,1 +1,1 @@
-"""What Sphinx is told about this project beyond its settings."""
+"""What Sphinx needs to know about this project beyond its settings."""
