@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import astuple, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fenics_contact._base.libraries import MPI
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._equilibrium.static_admissibility import (
     check_held,
@@ -21,14 +19,14 @@ from fenics_contact._equilibrium.warnings import advice
 from fenics_contact._fem.mechanics import History
 from fenics_contact._large_deformations.equations import Configuration, Equations, ResidualState
 from fenics_contact._large_deformations.load_steps import AutomaticSteps, Path, PathEndsError, Snap
-from fenics_contact._large_deformations.loading import FollowingPressures, Loading, TurnedSurface
+from fenics_contact._large_deformations.loading import Loading
 from fenics_contact._large_deformations.moving_contact import Contact, ContactConfiguration, MovingContact
 from fenics_contact._large_deformations.newton import Effort, NonlinearEquilibrium, NotHeldError
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.supports import RigidSurface
-from fenics_contact.errors import InfeasibleError, InvalidInputError, LoadStepError, together
-from fenics_contact.feti.decomposition import Decomposition, prescribed_displacements
-from fenics_contact.feti.torn import TornSystem, build_torn_system
+from fenics_contact.errors import InfeasibleError, InvalidInputError, LoadStepError
+from fenics_contact.feti.decomposition import Decomposition
+from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.qp.solution import Solution
 from fenics_contact.results.contact import ContactResult
@@ -86,10 +84,7 @@ class DeformedEquilibria:
             start = before.equilibrium.configuration
         self._require_later(scene, start.time, time)
         with timer.phase("assemble"):
-            load = self._loading(scene, time, overlap)
-            if step is not None and (callable(step.loads) or callable(step.supports)):
-                course = _LoadHistory(step, scene, self._loading, self._decomposition.comm)
-                load = replace(load, course=course)
+            load = self._loading(scene, time, step, overlap)
             if acted is None:
                 check_held(load.torn)
             if self._unresisted is None:  # supports stay what they are in later steps
@@ -135,17 +130,13 @@ class DeformedEquilibria:
                 f"after {earlier:g}: give later times, or none"
             )
 
-    def _loading(self, scene: Scene, time: float, overlap: bool = False) -> Loading:
+    def _loading(
+        self, scene: Scene, time: float, step: LoadStep | None = None, overlap: bool = False
+    ) -> Loading:
         """Return what acts at a time. Collective."""
-        self._assembled = build_torn_system(
-            scene, self._decomposition, overlap=overlap, previous=self._assembled
-        )
-        prescribed = prescribed_displacements(scene, self._decomposition.tearing)
-        following: tuple[tuple[float, FollowingPressures], ...] = ()
-        if scene.following_pressures:
-            following = ((1.0, FollowingPressures(scene, self._decomposition)),)
-        turned = TurnedSurface.all_of(scene, self._decomposition)
-        return Loading(self._assembled, prescribed, time, following, turned)
+        load = Loading.of(scene, self._decomposition, time, self._assembled, step=step, overlap=overlap)
+        self._assembled = load.torn
+        return load
 
 
 def _require_prescribed(scene: Scene) -> None:
@@ -161,22 +152,6 @@ def _require_prescribed(scene: Scene) -> None:
                 "apply the force by a TotalForce, which leaves the surface flexible, or to a stiff body that "
                 "is tied to the surface"
             )
-
-
-class _LoadHistory:
-    """The functions of time of a load step; a `LoadHistory`."""
-
-    def __init__(
-        self, step: LoadStep, scene: Scene, loading: Callable[[Scene, float], Loading], comm: MPI.Comm
-    ) -> None:
-        self.loads, self.supports = callable(step.loads), callable(step.supports)
-        self._step, self._scene, self._loading, self._comm = step, scene, loading, comm
-
-    def at(self, time: float) -> Loading:
-        """Return what acts at a time. Collective."""
-        with together(self._comm):
-            scene = self._step.at(self._scene, time)
-        return self._loading(scene, time)
 
 
 def _state_after(

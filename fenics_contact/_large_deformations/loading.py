@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.display import displayed
-from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.supports import RigidSurface
 from fenics_contact.errors import together
-from fenics_contact.feti.decomposition import Decomposition
-from fenics_contact.feti.torn import TornSystem
+from fenics_contact.feti.decomposition import Decomposition, prescribed_displacements
+from fenics_contact.feti.torn import TornSystem, build_torn_system
 from fenics_contact.mesh.faces import corners_of
 from fenics_contact.mesh.quality import similarity
 from fenics_contact.qp.reductions import Vector
@@ -30,7 +29,7 @@ class Loading:
             ones.
         prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
         following: Pressures that follow their surfaces, each with the part of them that acts.
-        course: Loads and supports that are functions of time; None without any.
+        course: A load step with functions of time; None without any.
         drag: A viscous medium; None without any.
     """
 
@@ -39,8 +38,29 @@ class Loading:
     time: float
     following: tuple[tuple[float, FollowingPressures], ...] = ()
     turned: tuple[TurnedSurface, ...] = ()
-    course: LoadHistory | None = None
+    course: LoadStep | None = None
     drag: Drag | None = None
+
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        decomposition: Decomposition,
+        time: float,
+        previous: TornSystem | None,
+        *,
+        step: LoadStep | None = None,
+        overlap: bool = False,
+    ) -> Loading:
+        """Return what acts at a time; unchanged parts of a previous system are reused. Collective."""
+        torn = build_torn_system(scene, decomposition, overlap=overlap, previous=previous)
+        prescribed = prescribed_displacements(scene, decomposition.tearing)
+        following: tuple[tuple[float, FollowingPressures], ...] = ()
+        if scene.following_pressures:
+            following = ((1.0, FollowingPressures(scene, decomposition)),)
+        turned = TurnedSurface.all_of(scene, decomposition)
+        varies = step is not None and (callable(step.loads) or callable(step.supports))
+        return cls(torn, prescribed, time, following, turned, step if varies else None)
 
     def between(self, first: Loading, part: float) -> Loading:
         """Return the load at a part of the way from another one to this. Collective.
@@ -53,13 +73,16 @@ class Loading:
         mixed = self._mixed(first, part)
         if self.course is None:
             return mixed
-        now = self.course.at(mixed.time)
-        if self.course.loads:
+        decomposition = self.torn.decomposition
+        with together(decomposition.comm):
+            scene = self.course.at(self.torn.scene, mixed.time)
+        now = Loading.of(scene, decomposition, mixed.time, self.torn)
+        if callable(self.course.loads):
             pairs = zip(mixed.torn.subdomains, now.torn.subdomains, strict=True)
             subdomains = tuple(replace(a, load=b.load) for a, b in pairs)
             torn = replace(mixed.torn, subdomains=subdomains)
             mixed = replace(mixed, torn=torn, following=now.following)
-        if self.course.supports:
+        if callable(self.course.supports):
             torn = replace(mixed.torn, right=now.torn.right, supported=now.torn.supported)
             mixed = replace(mixed, torn=torn, prescribed=now.prescribed, turned=now.turned)
         return mixed
@@ -138,16 +161,6 @@ class Drag:
     def on(self, displacement: Vector) -> Vector:
         """Return the forces against a displacement of this rank, torn, shape (torn_size,), [force]."""
         return self.viscosity * (displacement - self.origin)
-
-
-class LoadHistory(Protocol):
-    """Loads and supports that are functions of time."""
-
-    loads: bool
-    supports: bool
-
-    def at(self, time: float) -> Loading:
-        """Return what acts at a time. Collective."""
 
 
 @displayed
