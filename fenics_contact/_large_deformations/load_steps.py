@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 
 _LOG = logging.getLogger(__name__)
+NO_EFFORT = Effort()
 
 
 @displayed
@@ -95,82 +96,89 @@ class Stages:
     most: int = 200
 
 
-class Snapping:
-    """One such motion.
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Bodies on their way through the medium.
 
     Attributes:
-        by: How its drag falls.
+        drag: α.
+        in_a_row: Number of stages since one failed.
+        tried: Drag, relative to all forces, when an equilibrium was tried last.
         effort: That of all stages, those that failed included.
     """
 
+    at: Configuration
+    torn: TornSystem
+    known: Linearisation | None
+    drag: float
+    tolerance: float
+    in_a_row: int = 0
+    tried: float = np.inf
+    stages: int = 0
+    dissipated: float = 0.0
+    effort: Effort = NO_EFFORT
+    end: NonlinearEquilibrium | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Snapping:
+    """How bodies move on through the medium.
+
+    Attributes:
+        load: Returns what acts, with slip from a configuration and its system.
+        by: How the drag falls.
+    """
+
+    newton: TangentNewton
+    equations: Equations
+    load: Callable[[Configuration, TornSystem], Loading]
+    timer: PhaseTimer
     by = Stages()
 
-    def __init__(
-        self,
-        newton: TangentNewton,
-        equations: Equations,
-        load: Callable[[Configuration, TornSystem], Loading],
-        timer: PhaseTimer,
-    ) -> None:
-        """Prepare; ``load`` returns what acts, with slip from a configuration and its system."""
-        self._newton, self._equations, self._load, self._timer = newton, equations, load, timer
-        self.effort, self.stages, self.dissipated = Effort(), 0, 0.0
+    def follow(self, at: Configuration, torn: TornSystem, known: Linearisation | None) -> Motion:
+        """Return the motion until bodies rest, or after the last stage. Collective."""
+        now = Motion(at, torn, known, self.by.first, self.by.tolerance)
+        for _ in range(self.by.most):
+            now = self.step(now)
+            if now.end is not None:
+                break
+        return now
 
-    def to_rest(
-        self, at: Configuration, torn: TornSystem, known: Linearisation | None
-    ) -> NonlinearEquilibrium:
-        """Return the equilibrium where bodies come to rest. Collective."""
-        by, exact = self.by, self._newton
-        loose = replace(exact, max_steps=by.max_steps, tolerance=by.tolerance)
-        size, tried, in_a_row = by.first, np.inf, 0
-        for _ in range(by.most):
-            drag = Drag(size * self._equations.diagonal, at.displacement)
-            load = self._load(at, torn)
-            found = self._tried(loose, replace(load, drag=drag), at, known)
-            if found is None:
-                size, in_a_row = by.more * size, 0
-                continue
-            if not found.effort.history and loose.tolerance > exact.tolerance:
-                loose = replace(loose, tolerance=max(by.tighter * loose.tolerance, exact.tolerance))
-                continue
-            self.stages, in_a_row = self.stages + 1, in_a_row + 1
-            part = self._dragged(drag, at, found)
-            at, torn, known = found.configuration, found.evaluation.torn, found.linearisation
-            if part < min(by.little, by.tighter * tried):
-                tried = part
-                end = self._tried(exact, self._load(at, torn), at, known)
-                if end is not None:
-                    return end
-            size *= by.less if in_a_row <= by.careful else by.much_less
-        raise ConvergenceError(
-            f"bodies that snap must come to rest, but after {self.stages} stages they still move, the drag "
-            f"being {size:.1e} of their stiffness: take smaller load steps, or hold them better",
-            self.effort.history,
+    def step(self, now: Motion) -> Motion:
+        """Return the motion after another stage. Collective."""
+        by, exact = self.by, self.newton
+        loose = replace(exact, max_steps=by.max_steps, tolerance=now.tolerance)
+        drag = Drag(now.drag * self.equations.diagonal, now.at.displacement)
+        now, found = self._tried(now, loose, replace(self.load(now.at, now.torn), drag=drag))
+        if found is None:
+            return replace(now, drag=by.more * now.drag, in_a_row=0)
+        if not found.effort.history and now.tolerance > exact.tolerance:
+            return replace(now, tolerance=max(by.tighter * now.tolerance, exact.tolerance))
+        displacement, force = found.evaluation.at.displacement, drag.on(found.evaluation.at.displacement)
+        work, square = global_sum(
+            found.evaluation.torn.numbering.comm, force @ (displacement - now.at.displacement), force @ force
         )
+        now = replace(
+            now, at=found.configuration, torn=found.evaluation.torn, known=found.linearisation,
+            in_a_row=now.in_a_row + 1, stages=now.stages + 1, dissipated=now.dissipated + float(work),
+        )  # fmt: skip
+        part = float(np.sqrt(square)) / found.evaluation.residuals.force_scale
+        safe_log(_LOG.info, "stage %d of a snap: drag %.1e of the forces", now.stages, part)
+        if part < min(by.little, by.tighter * now.tried):
+            now, end = self._tried(replace(now, tried=part), exact, self.load(now.at, now.torn))
+            if end is not None:
+                return replace(now, end=end)
+        return replace(now, drag=now.drag * (by.less if now.in_a_row <= by.careful else by.much_less))
 
     def _tried(
-        self, newton: TangentNewton, load: Loading, at: Configuration, known: Linearisation | None
-    ) -> NonlinearEquilibrium | None:
-        """Return the equilibrium, None where there is none near. Collective."""
+        self, now: Motion, newton: TangentNewton, load: Loading
+    ) -> tuple[Motion, NonlinearEquilibrium | None]:
+        """Return the motion after a trial, and the equilibrium if there is one near. Collective."""
         try:
-            found = newton.solve(self._equations, load, at, self._timer, known)
+            found = newton.solve(self.equations, load, now.at, self.timer, now.known)
         except ConvergenceError as failure:
-            self.effort = self.effort.followed_by(Effort.until(failure))
-            return None
-        self.effort = self.effort.followed_by(found.effort)
-        return found
-
-    def _dragged(self, drag: Drag, at: Configuration, found: NonlinearEquilibrium) -> float:
-        """Add the work of a stage; return the drag, relative to all forces. Collective."""
-        displacement, residuals = found.evaluation.at.displacement, found.evaluation.residuals
-        force = drag.on(displacement)
-        work, square = global_sum(
-            found.evaluation.torn.numbering.comm, force @ (displacement - at.displacement), force @ force
-        )
-        self.dissipated += float(work)
-        part = float(np.sqrt(square)) / residuals.force_scale
-        safe_log(_LOG.info, "stage %d of a snap: drag %.1e of the forces", self.stages, part)
-        return part
+            return replace(now, effort=now.effort.followed_by(Effort.until(failure))), None
+        return replace(now, effort=now.effort.followed_by(found.effort)), found
 
 
 @displayed
@@ -288,144 +296,140 @@ class AutomaticSteps:
         first = target.removed() if before is None else before
         # Slip begins where bodies are before supports and obstacles move.
         at = start if start.contact else start.on(equations.contact.at(first, start.displacement, None))
-        stepper = _LoadStepper(self, equations, first, target, at, timer, known)
+        assert at.contact is not None
+        way = _Way(self, equations, first, target, at.contact, timer)
+        now = Progress(at, first.torn, known, (at, first.torn), at.contact.material_points)
         part, longest = self.first, equations.contact.longest_part(first, target)
         smallest = max(self.smallest, self.smallest_before_snap) if self.snaps else self.smallest
-        while stepper.reached < 1.0:
-            left = 1.0 - stepper.reached
+        while now.reached < 1.0:
+            left = 1.0 - now.reached
             part = left / np.ceil(left / min(part, longest) - 1e-9)
-            fraction = 1.0 if stepper.reached + part > 1.0 - 1e-12 else stepper.reached + part
-            try:
-                steps = stepper.advance(fraction)
-            except ConvergenceError as failure:
-                if not held and isinstance(failure, NotHeldError) and stepper.reached == 0.0:
-                    raise
+            fraction = 1.0 if now.reached + part > 1.0 - 1e-12 else now.reached + part
+            now, failure = way.advance(now, fraction)
+            if failure is not None:
+                if not held and isinstance(failure, NotHeldError) and now.reached == 0.0:
+                    raise failure
                 part *= 0.5
                 if part >= smallest:
                     safe_log(_LOG.info, "load step cut to %.3g: %s", part, failure)
                     continue
-                if not self.snaps:
-                    raise stepper.ends(
-                        f"a further {2 * part:.1e} of it fails: {failure}, or let bodies snap where no "
-                        "equilibrium is near (snaps=True)"
-                    ) from failure
-                try:
-                    steps = stepper.snap(fraction)
-                except ConvergenceError as unrest:
-                    raise stepper.ends(f"{failure}; {unrest}") from unrest
-            part *= 2.0 if steps <= self.easy else 1.0
-        return stepper.path()
+                now = way.snapped(now, fraction, 2 * part, failure)
+            assert now.end is not None
+            part *= 2.0 if len(now.end.effort.history) <= self.easy else 1.0
+        return way.path(now)
 
 
-class _LoadStepper:
-    """Equilibria found so far and their cost."""
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """Equilibria found so far on the way to a load, and their cost.
 
-    def __init__(
-        self,
-        steps: AutomaticSteps,
-        equations: Equations,
-        first: Loading,
-        target: Loading,
-        at: Configuration,
-        timer: PhaseTimer,
-        known: Linearisation | None,
-    ) -> None:
-        assert at.contact is not None
-        self._newton, self._finer = steps.newton, steps.finer_history
-        self._equations, self._timer = equations, timer
-        self._first, self._target, self._at, self._known = first, target, at, known
-        self._torn, self._begun, self._start = first.torn, at.contact, at.contact.material_points
-        self._end: NonlinearEquilibrium | None = None
-        self._fractions, self._snaps, self._effort = list[float](), list[Snap](), Effort()
-        # Where the step of histories begins, with the system of then.
-        self._origin, self._since = (at, first.torn), 0.0
-        # Work of friction of those before it, and whether the last equilibrium ends one.
-        self._rubbed, self._ended = 0.0, False
-        self.reached = 0.0
+    Attributes:
+        at: Where the next one starts.
+        origin: Where the step of histories begins, with the system of then.
+        rubbed: Work of friction before that step.
+        ended: Whether the last equilibrium ends one.
+    """
 
-    def advance(self, fraction: float) -> int:
-        """Go on to a part of the load; return the number of Newton steps. Collective."""
+    at: Configuration
+    torn: TornSystem
+    known: Linearisation | None
+    origin: tuple[Configuration, TornSystem]
+    start: MaterialPoints | None
+    end: NonlinearEquilibrium | None = None
+    reached: float = 0.0
+    fractions: tuple[float, ...] = ()
+    snaps: tuple[Snap, ...] = ()
+    since: float = 0.0
+    rubbed: float = 0.0
+    ended: bool = False
+    effort: Effort = NO_EFFORT
+
+    def costing(self, effort: Effort) -> Progress:
+        """Return it with the effort of a trial."""
+        return replace(self, effort=self.effort.followed_by(effort, len(self.fractions)))
+
+    def reaching(
+        self, fraction: float, found: NonlinearEquilibrium, since: float, *, anew: bool, ends: bool
+    ) -> Progress:
+        """Return it with another equilibrium; histories begin anew there, or it ends a step. Collective."""
+        rubbed = self.rubbed
+        if self.end is not None and (self.ended or anew):
+            rubbed += self.end.evaluation.rubbing
+        at = found.configuration if ends else found.continued(self.origin[0])
+        torn, new = found.evaluation.torn, found.evaluation.contact.start
+        start = new if self.start is None or new is None else self.start.extended(new)
+        return replace(
+            self, at=at, torn=torn, known=found.linearisation, origin=(at, torn) if ends else self.origin,
+            start=start, end=found, reached=fraction, fractions=(*self.fractions, fraction), since=since,
+            rubbed=rubbed, ended=ends,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """The way from one load to another, in parts."""
+
+    steps: AutomaticSteps
+    equations: Equations
+    first: Loading
+    target: Loading
+    begun: ContactConfiguration
+    timer: PhaseTimer
+
+    def advance(self, now: Progress, fraction: float) -> tuple[Progress, ConvergenceError | None]:
+        """Return the progress after a further part of the load, or why that fails. Collective."""
         try:
-            load = self._load(fraction, *self._origin)
-            assert self._at.contact is not None
-            moved = self._equations.rigid_start.moved(
-                self._at.contact.prescribed, load, self._at.displacement
-            )
-            found = self._newton.solve(self._equations, load, self._at, self._timer, self._known, moved)
+            load = self._load(fraction, *now.origin)
+            assert now.at.contact is not None
+            moved = self.equations.rigid_start.moved(now.at.contact.prescribed, load, now.at.displacement)
+            found = self.steps.newton.solve(self.equations, load, now.at, self.timer, now.known, moved)
         except ConvergenceError as failure:
-            self._count(Effort.until(failure))
-            raise
-        self._count(found.effort)
-        return self._reach(fraction, found)
+            return now.costing(Effort.until(failure)), failure
+        finer = self.steps.finer_history
+        since = now.reached if finer else now.since
+        return now.costing(found.effort).reaching(fraction, found, since, anew=False, ends=finer), None
 
-    def snap(self, fraction: float) -> int:
-        """Go on to an equilibrium that is not near; return the number of its Newton steps. Collective."""
+    def snapped(self, now: Progress, fraction: float, part: float, failure: ConvergenceError) -> Progress:
+        """Return the progress after bodies have snapped where a part of the load fails. Collective."""
+        if not self.steps.snaps:
+            words = f"{failure}, or let bodies snap where no equilibrium is near (snaps=True)"
+            raise self._ends(now, f"a further {part:.1e} of it fails: {words}") from failure
+        at = now.at if now.end is None else now.end.configuration
         load = partial(self._load, fraction)
-        snapping = Snapping(self._newton, self._equations, load, self._timer)
-        before = self._at.displacement
-        try:
-            at = self._at if self._end is None else self._end.configuration
-            found = snapping.to_rest(at, self._torn, self._known)
-        finally:
-            self._count(snapping.effort)
-        moved = (found.evaluation.at.displacement - before).reshape(-1, self._torn.dim)
-        way = global_max(self._torn.numbering.comm, np.linalg.norm(moved, axis=1).max(initial=0.0))
-        self._snaps.append(Snap(fraction, float(way), snapping.dissipated, snapping.stages))
-        safe_log(_LOG.info, "%s", self._snaps[-1])
-        return self._reach(fraction, found, anew=True)
+        motion = Snapping(self.steps.newton, self.equations, load, self.timer).follow(at, now.torn, now.known)
+        now, found = now.costing(motion.effort), motion.end
+        if found is None:
+            words = (
+                f"{failure}; bodies that snap must come to rest, but after {motion.stages} stages they still "
+                f"move, the drag being {motion.drag:.1e} of their stiffness: take smaller load steps, or "
+                "hold them better"
+            )
+            raise self._ends(now, words) from failure
+        way = (found.evaluation.at.displacement - now.at.displacement).reshape(-1, now.torn.dim)
+        far = global_max(now.torn.numbering.comm, np.linalg.norm(way, axis=1).max(initial=0.0))
+        snap = Snap(fraction, float(far), motion.dissipated, motion.stages)
+        safe_log(_LOG.info, "%s", snap)
+        now = replace(now, snaps=(*now.snaps, snap))
+        return now.reaching(fraction, found, fraction, anew=True, ends=True)
 
     def _load(self, fraction: float, at: Configuration, before: TornSystem) -> Loading:
         """Return the load at a part of the way, with slip that begins at a configuration. Collective."""
-        load = self._target.between(self._first, fraction)
-        if self._begun.points is not None:
+        load = self.target.between(self.first, fraction)
+        if self.begun.points is not None:
             return load
         slipped = before.relative(at.displacement), before.sliding(at.displacement)
         return replace(load, torn=load.torn.with_slip_from(*slipped))
 
-    def _reach(self, fraction: float, found: NonlinearEquilibrium, anew: bool = False) -> int:
-        """Go on from an equilibrium, where histories begin anew or go on; return its Newton steps.
-
-        Collective.
-        """
-        if self._end is not None and (self._ended or anew):
-            self._rubbed += self._end.evaluation.rubbing
-        self._ended = anew or self._finer
-        if anew:
-            self._since = fraction
-        elif self._finer:
-            self._since = self.reached
-        self._fractions.append(fraction)
-        self._torn, self._end = found.evaluation.torn, found
-        if anew or self._finer:
-            self._at = found.configuration
-            self._origin = self._at, self._torn
-        else:
-            self._at = found.continued(self._origin[0])
-        self._known, self.reached = found.linearisation, fraction
-        new = found.evaluation.contact.start
-        self._start = new if self._start is None or new is None else self._start.extended(new)
-        return len(found.effort.history)
-
-    def _count(self, effort: Effort) -> None:
-        self._effort = self._effort.followed_by(effort, len(self._fractions))
-
-    def path(self) -> Path:
+    def path(self, now: Progress) -> Path:
         """Return the path."""
-        assert self._end is not None
+        assert now.end is not None
+        load = self.target.between(self.first, now.reached)
         return Path(
-            self._target.between(self._first, self.reached),
-            self._end,
-            self._begun,
-            self._start,
-            tuple(self._fractions),
-            self._since,
-            tuple(self._snaps),
-            self._rubbed,
-            self._effort,
+            load, now.end, self.begun, now.start, now.fractions, now.since, now.snaps, now.rubbed, now.effort
         )
 
-    def ends(self, reason: str) -> PathEndsError:
+    def _ends(self, now: Progress, reason: str) -> PathEndsError:
         """Return the error where it ends."""
-        path = None if self._end is None else self.path()
-        message = f"the load can be followed up to {self.reached:.3g} of this step, but {reason}"
-        return PathEndsError(message, self._effort.history, path)
+        path = None if now.end is None else self.path(now)
+        message = f"the load can be followed up to {now.reached:.3g} of this step, but {reason}"
+        return PathEndsError(message, now.effort.history, path)

@@ -39,8 +39,8 @@ LARGE_MUTATIONS = (
     Mutation(
         "slip of bodies that do not move far begins anew in every part of a load step",
         "_large_deformations/load_steps.py",
-        "load = self._load(fraction, *self._origin)",
-        "load = self._load(fraction, self._at, self._torn)",
+        "load = self._load(fraction, *now.origin)",
+        "load = self._load(fraction, now.at, now.torn)",
         (f"{ONE_STEP}[metal]",),
     ),
     Mutation(
@@ -95,8 +95,8 @@ LARGE_MUTATIONS = (
     Mutation(
         "friction of parts with histories of their own is not added up",
         "_large_deformations/load_steps.py",
-        "self._rubbed += self._end.evaluation.rubbing",
-        "self._rubbed = 0.0",
+        "rubbed += self.end.evaluation.rubbing",
+        "rubbed = 0.0",
         (
             "tests/nonlinear/test_reported_values.py::test_friction_to_and_fro_within_a_load_step_is_the_sum"
             "_over_parts_with_histories_of_their_own",
