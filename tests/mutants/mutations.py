@@ -196,8 +196,8 @@ MUTATIONS = (
     Mutation(
         "a warmer body shrinks",
         "materials/elastic.py",
-        "return (3 * lame_parameter + 2 * shear) * expansion * ufl.Identity(3)",
-        "return -(3 * lame_parameter + 2 * shear) * expansion * ufl.Identity(3)",
+        "return (3 * lame_parameter + 2 * shear) * expansion * ufl.Identity(self.dims[0])",
+        "return -(3 * lame_parameter + 2 * shear) * expansion * ufl.Identity(self.dims[0])",
         ("tests/models/test_thermal.py::test_a_free_body_expands_evenly_and_without_stress",),
     ),
     Mutation(
