@@ -112,7 +112,7 @@ def test_the_estimate_of_a_pressed_plane_body_is_close_to_its_error() -> None:
 @pytest.mark.claim
 @pytest.mark.parametrize("poisson", [POISSON, 0.499])
 def test_effectivity_of_a_pressed_plane_body_over_four_meshes(poisson: float) -> None:
-    *series, _, reference = (hertz(line, 2, poisson) for line in halved(plane_line(), 6))
+    *series, reference = (hertz(line, 2, poisson) for line in halved(plane_line(), 5))
     effectivity = checked(f"Hertz, disc, ν = {poisson}", series, reference, poisson)
     assert len(effectivity) == 4
     assert np.all(effectivity > 0.8)
@@ -120,12 +120,12 @@ def test_effectivity_of_a_pressed_plane_body_over_four_meshes(poisson: float) ->
 
 
 @pytest.mark.slow
-@pytest.mark.claim
-def test_effectivity_under_a_ball_over_four_meshes() -> None:
+@pytest.mark.parametrize("count", [pytest.param(3, marks=pytest.mark.claim), 4])
+def test_effectivity_under_a_ball_over_several_meshes(count: int) -> None:
     line = np.array([0.0, 1.5, 3.75, 9.0])
-    *series, reference = (hertz(each, 3) for each in halved(line, 5))
+    *series, reference = (hertz(each, 3) for each in halved(line, count + 1))
     effectivity = checked("Hertz, ball", series, reference)
-    assert len(effectivity) == 4
+    assert len(effectivity) == count
     assert np.all(effectivity > 0.5)
     assert np.all(effectivity < 2.0)
 
