@@ -33,6 +33,7 @@ from fenics_contact.materials.elastic import Material
 from fenics_contact.output.files import plain, write_json
 from fenics_contact.output.paraview import checked_name
 from fenics_contact.qp.solution import SolverStep
+from fenics_contact.readers.gmsh_session import interrupt_handler_kept
 from fenics_contact.results.area import contact_area
 from fenics_contact.results.contact import Status
 from fenics_contact.results.forces import Resultant
@@ -191,7 +192,8 @@ def _installed(name: str) -> str:
     except metadata.PackageNotFoundError:
         pass
     try:
-        module: ModuleType = importlib.import_module(name)
+        with interrupt_handler_kept():  # Debian's gmsh has no metadata
+            module: ModuleType = importlib.import_module(name)
     except ImportError:
         return "not installed"
     return str(getattr(module, "__version__", "unknown"))

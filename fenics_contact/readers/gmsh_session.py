@@ -195,7 +195,7 @@ def gmsh_model(name: str, **more: float) -> Iterator[ModuleType]:
     Raises:
         MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
     """
-    with Task("mesh"), _interrupt_handler_kept():
+    with Task("mesh"), interrupt_handler_kept():
         gmsh = _import_gmsh()
         foreign = _is_initialised(gmsh)
         if not foreign:
@@ -222,7 +222,7 @@ def gmsh_model(name: str, **more: float) -> Iterator[ModuleType]:
 
 def running_gmsh() -> ModuleType | None:
     """Return the module ``gmsh`` if it is initialised, else None."""
-    with _interrupt_handler_kept():
+    with interrupt_handler_kept():
         gmsh = _import_gmsh()
         return gmsh if _is_initialised(gmsh) else None
 
@@ -238,7 +238,7 @@ def _import_gmsh() -> ModuleType:
 
 
 @contextmanager
-def _interrupt_handler_kept() -> Iterator[None]:
+def interrupt_handler_kept() -> Iterator[None]:
     """Restore the handler of SIGINT.
 
     gmsh replaces it at import, at initialisation or at finalisation, depending on the version.

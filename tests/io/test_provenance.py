@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 from importlib import metadata
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,3 +35,20 @@ def test_a_library_that_is_not_there_is_said_to_be_missing(monkeypatch: pytest.M
     assert found["numpy"] == np.__version__, "where there are no metadata the library itself is asked"
     monkeypatch.setattr(provenance, "_MODULES", ("no_such_library",))
     assert versions()["no_such_library"] == "not installed"
+
+
+def test_a_library_that_takes_ctrl_c_at_its_import_gives_it_back(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """As gmsh does, which Debian installs without metadata."""
+    (tmp_path / "takes_it.py").write_text(
+        "import signal\n__version__ = '4.8'\nsignal.signal(signal.SIGINT, signal.SIG_DFL)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(provenance, "_MODULES", ("takes_it",))
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        assert versions()["takes_it"] == "4.8"
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
