@@ -16,8 +16,7 @@ from fenics_contact.mesh.bisection import default_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.study.scenes.chain_links import chain
 
-#: Takes long: what claims rest on.
-pytestmark = [pytest.mark.slow, pytest.mark.claim]
+pytestmark = pytest.mark.slow
 
 #: Of the products of the best boxes, as many as there are subdomains; METIS's boundaries are never plane.
 DEFAULT, METIS, METIS_GRADED = 1.15, 1.5, 2.2
@@ -58,13 +57,14 @@ def test_links_need_as_few_products_as_in_the_best_boxes(cells: str) -> None:
     assert metis <= (METIS_GRADED if grading else METIS)
 
 
-@pytest.mark.slow
+@pytest.mark.claim
 def test_graded_links_of_the_published_size_need_fewer_products_than_in_boxes() -> None:
     default, metis = compared(links((48, 8, 20), 2.5), None, [(16, 1, 1), (8, 1, 2)])
     assert default <= 1.0
     assert metis <= METIS
 
 
+@pytest.mark.claim
 def test_a_block_needs_as_few_products_as_in_the_best_boxes() -> None:
     scene = block_on_plane(block_mesh((24, 12, 12)), 0.3)
     default, metis = compared(scene, 7.0**3, [(4, 2, 2)])

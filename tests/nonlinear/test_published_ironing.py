@@ -34,8 +34,8 @@ def ironed(way: str, time: float) -> Scene:
     return Scene(bodies, [Support("block", "y0"), Support("die", "y1", moved)], contacts=[pair])
 
 
-@pytest.mark.claim
-@pytest.mark.parametrize("way", ["node", "mortar"])
+@pytest.mark.slow
+@pytest.mark.parametrize("way", ["node", pytest.param("mortar", marks=pytest.mark.claim)])
 def test_shallow_ironing_lies_within_the_published_spread(way: str) -> None:
     times = [0.25, 0.5, 0.75, 1.0, 1.05, 1.1, 1.15, 1.2, 1.25]
     states = followed([ironed(way, time) for time in times], MPI.COMM_SELF, 1e-8)
