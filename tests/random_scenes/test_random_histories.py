@@ -23,13 +23,15 @@ from tests.random_scenes.deformed_judge import judge_history
 from tests.random_scenes.frame import Frame
 from tests.random_scenes.judge import GOOD, Outcome
 
-CLAIM = [pytest.mark.slow, pytest.mark.claim]
-#: Short ones of some kinds; the others are run with the claims.
-QUICK = (9, 1)
-LONGER = (13, *range(24, 32), 115, 154)
+#: Short ones of two kinds; claims rest on one or two of each other kind, the slow tests on more of them.
+QUICK, CLAIMS, LONG = (9, 1), (25, 27, 28, 29, 115, 154), (13, 24, 26, 30, 31)
 
 
-@pytest.mark.parametrize("seed", [*QUICK, *(pytest.param(n, marks=CLAIM) for n in LONGER)])
+def marks(seed: int) -> list[pytest.MarkDecorator]:
+    return [] if seed in QUICK else [pytest.mark.slow, *([pytest.mark.claim] if seed in CLAIMS else [])]
+
+
+@pytest.mark.parametrize("seed", [pytest.param(n, marks=marks(n)) for n in (*QUICK, *CLAIMS, *LONG)])
 def test_a_random_history_is_the_same_written_and_cut_otherwise(seed: int) -> None:
     verdict = judge_history(seed)
     assert verdict.outcome in GOOD, f"{verdict.detail}\n{verdict.words}"
