@@ -11,22 +11,21 @@ import pytest
 from fenics_contact.output import read_result
 
 DEMOS = Path(__file__).parents[2] / "demos"
+IN_FOLDER = Path(__file__).with_name("in_folder.py")
 
 
 @pytest.fixture
-def demo(
-    mpirun: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Callable[..., tuple[dict[str, Any], Path, str]]:
-    """Return ``demo(name, *arguments, ranks=1, timeout=120.0)``, which runs it in an empty folder.
+def demo(mpirun: Callable[..., str], tmp_path: Path) -> Callable[..., tuple[dict[str, Any], Path, str]]:
+    """Return ``demo(name, *arguments, ranks=1, timeout=120.0, ...)``, which runs it in an empty folder.
 
     The answer is its result, the folder of its files and what it printed.
     """
-    monkeypatch.chdir(tmp_path)
 
     def run(
-        name: str, *arguments: object, ranks: int = 1, timeout: float = 120.0
+        name: str, *arguments: object, ranks: int = 1, timeout: float = 120.0, fresh: bool = False
     ) -> tuple[dict[str, Any], Path, str]:
-        printed = mpirun(DEMOS / f"demo_{name}.py", ranks, *arguments, timeout=timeout, fresh=True)
+        given = (tmp_path, DEMOS / f"demo_{name}.py", *arguments)
+        printed = mpirun(IN_FOLDER, ranks, *given, timeout=timeout, fresh=fresh)
         (output,) = (tmp_path / "output").iterdir()
         return read_result(output), output, printed
 

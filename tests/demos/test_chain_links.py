@@ -17,7 +17,7 @@ PICTURES += [f"{what}_{when}" for what in ("stress", "pressure") for when in ("b
 def test_the_small_demo_lowers_the_energy_and_leaves_pictures_files_and_result(
     demo: Callable[..., Any],
 ) -> None:
-    result, output, printed = demo("chain_links", "--size", "small", ranks=2, timeout=300.0)
+    result, output, printed = demo("chain_links", "--size", "small", ranks=2, timeout=300.0, fresh=True)
     told, counts = result["optimisation"], result["counts"]
     assert result["ranks"] == 2
     assert (counts["torn_unknowns"], counts["subdomains"], told["design"]["variables"]) == (29568, 32, 28)

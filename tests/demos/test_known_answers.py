@@ -1,12 +1,15 @@
-"""The demos with known answers find the same numbers on one rank and on two, and leave pictures."""
+"""The demos with known answers find the same numbers on one rank and on two, and leave pictures and files."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+
+from fenics_contact import read_cad, read_field
 
 #: Of each demo: what its result holds, on any number of ranks, and its pictures. That the numbers are those
 #: of theory is for the demos to assert; they end with an error otherwise.
@@ -61,11 +64,39 @@ DEMOS: dict[str, tuple[dict[str, float | list[float]], set[str]]] = {
     ),
 }
 
+
+def has_a_relieved_bore(more: dict[str, Any], output: Path) -> None:
+    """It has no peak and keeps its force."""
+    assert more["pressure"] == pytest.approx(more["pressure_theory"], rel=0.01)
+    growth = more["finer_straight_peak"] / more["straight_peak"]
+    assert growth == pytest.approx(more["growth_theory"], rel=0.01)
+    assert more["growth_theory"] == pytest.approx(2.0**0.2261, rel=1e-4)
+    assert more["finer_relieved_peak"] == pytest.approx(more["relieved_peak"], rel=0.01)
+    assert more["relieved_peak"] < 1.15 * more["pressure_theory"]
+    relief = read_field(output / "relief.csv", "movement").values
+    assert (np.diff(relief) < 1e-9).all(), "it grows towards the end"
+    assert (relief[0], relief[-1]) == pytest.approx((0.0, -0.006), abs=1e-9)
+
+
+def has_a_relieved_tip(more: dict[str, Any], output: Path) -> None:
+    """It has less pressure, and the tooth is a CAD file."""
+    assert more["pitch_peak"] == pytest.approx(more["pitch_peak_hertz"], rel=0.01)
+    assert more["relieved_peaks"]["half torque"] < 0.8 * more["relieved_peak"]
+    relief = read_field(output / "relief.csv", "movement").values
+    assert relief[0] == 0.0
+    assert (np.diff(relief) <= 0).all(), "it grows towards the tip"
+    assert relief[-1] == pytest.approx(-0.04)
+    (tooth,) = read_cad(output / "wheel_tooth.step", 0.5).values()
+    designed = next(shape for shape in tooth.shapes.values() if type(shape).__name__ == "SplinePatch")
+    points = [read_field(output / "relief.csv", f"{axis}_moved").values for axis in "xy"]
+    assert np.abs(designed.distance(np.column_stack(points)[1:-1])).max() < 1e-6
+
+
+RELIEVED = {"press_fit_edge": has_a_relieved_bore, "tooth_flank": has_a_relieved_tip}
 #: Many states.
 SLOW = {"uncertain_friction"}
-#: One in the plane and one in space run alone, too; `test_reliefs` has two more, the slow tests all.
-ALONE = {"punch_2d", "hertz_sphere"}
-CLAIMS = {*((name, 2) for name in DEMOS if name not in SLOW), *((name, 1) for name in ALONE)}
+#: Claims rest on two ranks, and on one in the plane and in space.
+CLAIMS = {*((name, 2) for name in DEMOS if name not in SLOW), ("punch_2d", 1), ("hertz_sphere", 1)}
 
 
 @pytest.mark.slow
@@ -90,3 +121,5 @@ def test_a_demo_finds_its_number_on_one_rank_and_on_two(
     assert {path.stem for path in output.glob("*.png")} == pictures
     assert min(path.stat().st_size for path in output.glob("*.png")) > 10_000
     assert list(output.rglob("*.vtm"))
+    if name in RELIEVED:
+        RELIEVED[name](result["more"], output)
