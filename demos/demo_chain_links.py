@@ -207,13 +207,11 @@ with show_progress(comm), timer.phase("pictures"):
 mesh = links.first.mesh
 moved = problem.points_of(result.x)["link 1"]
 nets = tuple(design.control_points(mesh.points, alpha) for alpha in (start, result.x))
-values = [record.value for record in result.history]
-kinds = [record.kind.value for record in result.history]
 with show_progress(comm), timer.phase("pictures"):
     pictures.plot_control_net(
         links.first.crown, (mesh.points, moved), nets, output / "control_net.png", comm=comm
     )
-    pictures.plot_convergence(values, kinds, output / "convergence.png", label=label, comm=comm)
+    pictures.plot_convergence(result.history, output / "convergence.png", label=label, comm=comm)
     steps = before.state.solution.history
     products, natural = zip(*((step.products, step.residuals.natural) for step in steps), strict=True)
     pictures.plot_curves(

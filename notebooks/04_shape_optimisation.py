@@ -266,9 +266,8 @@ assert change > -1e-4
 
 # %%
 
-values, kinds = zip(*[(record.value, record.kind.value) for record in result.history], strict=True)
 words = {"label": "largest contact force (N)", "title": "Bundle method"}
-pictures.plot_convergence(values, kinds, **words, logarithmic=True, width=1000)
+pictures.plot_convergence(result.history, **words, logarithmic=True, width=1000)
 
 # %% [markdown]
 # *Serious steps on the line, null steps beside it. The first null step, too long, is far off (the scale is

@@ -37,7 +37,7 @@ picture() { printf '![%s](%s)\n\n' "$1" "$2" >>"$draft"; }
 
 release=$(. /etc/os-release && echo "$PRETTY_NAME")
 say '# The first ten minutes' \
-  "Every command that a new user types and what it printed, nothing skipped, on a fresh $release with nothing but \`git\`, \`make\` and root. The page is written by \`scripts/first_ten_minutes.sh\`, which types them; below each stands how long it took on two cores. On a terminal a few lines more tell how far the work is while it goes on." \
+  "Every command that a new user types and what it printed, nothing skipped, on a fresh $release with nothing but \`git\`, \`make\` and root. The page is written by \`scripts/first_ten_minutes.sh\`, which types them; below each is how long it took on two cores. On a terminal a few lines more show how far the work is while it goes on." \
   '## The picture' \
   'In the folder that `git clone` made, one command sets up everything and optimises the shape of two chain links:'
 run 0 'make demo'

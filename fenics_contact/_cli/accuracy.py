@@ -85,9 +85,9 @@ def accuracy(
     tolerances: Annotated[
         list[Any] | None, _several("tolerances", 'Numbers or "balanced".', _tolerance)
     ] = None,
-    cells: Annotated[list[str] | None, _several("cells", "Cell types beside the base's.")] = None,
+    cells: Annotated[list[str] | None, _several("cells", "Cell types in addition to the base's.")] = None,
     discretisations: Annotated[
-        list[Any] | None, _several("discretisations", "Beside the base's.", _discretisation)
+        list[Any] | None, _several("discretisations", "In addition to the base's.", _discretisation)
     ] = None,
     fixed_points: Annotated[
         list[float] | None, _several("fixed-points", "Tolerances of the fixed point of Coulomb.")
@@ -114,10 +114,10 @@ def accuracy(
     with nullcontext() if report else only_run_in(folder, console.comm):
         status = 0 if report else _measure(plan)
         if status and (folder / "study.json").exists():
-            console.say(f"results of an earlier run stay in {folder}/: --report writes those of what is done")
+            console.write(f"results of an earlier run stay in {folder}/: --report writes those that are done")
             raise typer.Exit(status)
         words = _report(plan, folder, figures=not no_figures)
-    console.say(f"{words}\nresults in {folder}/")
+    console.write(f"{words}\nresults in {folder}/")
     if status:
         raise typer.Exit(status)
 

@@ -91,18 +91,11 @@ class Console:
         """The number of ranks in words."""
         return counted(self.comm.size, "rank")
 
-    def say(self, text: str = "") -> None:
-        """Write a line verbatim."""
-        self._write(Text(text))
-
-    def show(self, table: Table) -> None:
-        """Write a table."""
-        self._write(table)
-
-    def _write(self, what: Table | Text) -> None:
-        """Write on rank 0: with colours to a terminal, else without trailing blanks."""
+    def write(self, given: Table | str = "") -> None:
+        """Write a table, or a line verbatim, on rank 0: to a terminal in colours."""
         if self.comm.rank != 0:
             return
+        what = Text(given) if isinstance(given, str) else given
         drawn, text = at_terminal(sys.stdout), io.StringIO()
         look: dict[str, Any] = {} if drawn else {"width": WIDTH, "no_color": True}
         console = rich.console.Console(file=text, force_terminal=drawn, highlight=False, **look)

@@ -88,8 +88,8 @@ def _list(console: Console, there: dict[str, Path]) -> None:
         options = sorted(set(re.findall(r'"(--[a-z-]+)"', text))) if path.suffix == ".py" else []
         title = re.split(r"[.;](?: |$)", next(iter(re.findall(r"^#[# ]* (\S.*)$", text, re.MULTILINE)), ""))
         table.add_row(name, f"{title[0]} ({' '.join(options)})" if options else title[0])
-    console.show(table)
-    console.say("run one with `fenics-contact demo NAME`, copy its file to change it with --copy")
+    console.write(table)
+    console.write("run one with `fenics-contact demo NAME`, copy its file to change it with --copy")
 
 
 def _copy(console: Console, chosen: Path) -> None:
@@ -103,7 +103,7 @@ def _copy(console: Console, chosen: Path) -> None:
             if chosen.suffix == ".toml" and schema.exists() and not (target.parent / schema.name).exists():
                 shutil.copyfile(schema, target.parent / schema.name)
     program = f"fenics-contact {_command(chosen)}" if chosen.suffix == ".toml" else "python"
-    console.say(f"copied to {target.name}; run it with `{program} {target.name}`")
+    console.write(f"copied to {target.name}; run it with `{program} {target.name}`")
 
 
 def _command(scene: Path) -> str:

@@ -41,13 +41,13 @@ def info(
     console = console_of(context)
     known = gathered(console.comm)
     if as_json:
-        console.say(json_text(known).rstrip())
+        console.write(json_text(known).rstrip())
         return
-    console.show(facts(known["versions"], "versions"))
-    console.say()
-    console.show(facts(known["machine"], "machine"))
+    console.write(facts(known["versions"], "versions"))
+    console.write()
+    console.write(facts(known["machine"], "machine"))
     for line in known["advice"]:
-        console.say(f"! {line}")
+        console.write(f"! {line}")
 
 
 def gathered(comm: MPI.Comm) -> dict[str, Any]:
@@ -123,7 +123,7 @@ def schema(
     """
     console = console_of(context)
     if file is None:
-        console.say(json_text(json_schema()).rstrip())
+        console.write(json_text(json_schema()).rstrip())
         return
     write_json(file, json_schema(), comm=console.comm)
-    console.say(f"schema of scene files in {file}")
+    console.write(f"schema of scene files in {file}")

@@ -68,7 +68,7 @@ def _write_step(
     try:
         write_step(problem, alpha, path, body=body, scale=scale)
     except CadError as error:
-        console.say(f"{path.name} has the designed surface alone: {error}")
+        console.write(f"{path.name} has the designed surface alone: {error}")
         write_step(problem, alpha, path, body=body, scale=scale, solid=False)
 
 
@@ -81,17 +81,17 @@ def _optimize(console: Console, file: SceneFile, resume: bool | None, pictures: 
     """Optimise the contact shape described by the [design] of a scene file."""
     task = file.shape_task()
     words = file.document.design.objective_in_words  # type: ignore[union-attr]
-    console.say(f"{task.problem.size} design variables, objective {words}")
+    console.write(f"{task.problem.size} design variables, objective {words}")
     with only_run_in(file.folder, console.comm):
         result, written = _minimised(console, file, task, resume)
-        console.show(facts(_facts(file, task, result)))
+        console.write(facts(_facts(file, task, result)))
         gallery = Gallery()
         if pictures and can_draw(console, file, gallery):
             _draw(console, file, task, result, gallery)
     names = ", ".join(["result.json", *(path.name for path in (*written, *gallery.drawn))])
-    console.say(f"results in {file.folder}/: {names}")
+    console.write(f"results in {file.folder}/: {names}")
     if not result.reason.success:
-        console.say(f"not converged: {result.reason.value}")
+        console.write(f"not converged: {result.reason.value}")
         raise typer.Exit(int(ExitCode.NOT_CONVERGED))
     gallery.require_all()
 
@@ -161,8 +161,6 @@ def _draw(console: Console, file: SceneFile, task: ShapeTask, result: Result, ga
         plot_control_net(design.lattice, (points, moved[design.body]), nets, path, comm=console.comm)
         gallery.drawn.append(path)
         at += design.size
-    values = [record.value for record in result.history]
-    kinds = [record.kind.value for record in result.history]
     path = file.folder / "convergence.png"
-    plot_convergence(values, kinds, path, title=file.title, comm=console.comm)
+    plot_convergence(result.history, path, title=file.title, comm=console.comm)
     gallery.drawn.append(path)

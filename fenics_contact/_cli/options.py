@@ -90,7 +90,7 @@ def scene_command(
             file = _read(console, scene, output, tolerance, settings, python)
             check(file)
             _show_plan(console, file, sensitivity=sensitivity)
-            console.say()
+            console.write()
             if dry_run:
                 _show_outputs(console, file, draws=pictures)
             else:
@@ -138,8 +138,8 @@ def _show_plan(console: Console, file: SceneFile, *, sensitivity: bool) -> None:
     rows = {line[:15].strip(): line[16:] for line in str(plan).splitlines()}
     if file.steps and not sensitivity:
         rows["load steps"] = str(len(file.steps))
-    console.say(f"{file.title}: {file.source.name} on {console.ranks}")
-    console.show(facts(rows))
+    console.write(f"{file.title}: {file.source.name} on {console.ranks}")
+    console.write(facts(rows))
 
 
 def _show_outputs(console: Console, file: SceneFile, *, draws: bool) -> None:
@@ -150,8 +150,8 @@ def _show_outputs(console: Console, file: SceneFile, *, draws: bool) -> None:
     shapes = (
         f", {', '.join(output.design)} files of the design" if file.document.design and output.design else ""
     )
-    console.say(f"would write to {file.folder}/: result.json{kinds}{shapes}{pictures}")
-    console.say("nothing was solved (--dry-run)")
+    console.write(f"would write to {file.folder}/: result.json{kinds}{shapes}{pictures}")
+    console.write("nothing was solved (--dry-run)")
 
 
 @contextmanager
@@ -172,7 +172,7 @@ def _reporting(console: Console, checkpoint: Checkpoint | None) -> Iterator[None
     path = Path(checkpoint.path)
     resumed = path.exists() and checkpoint.resume is not False
     if resumed:
-        console.say(f"going on from {path} (--fresh starts anew)")
+        console.write(f"going on from {path} (--fresh starts anew)")
     try:
         yield
     except InvalidInputError as error:

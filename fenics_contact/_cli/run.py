@@ -44,7 +44,7 @@ def _run(console: Console, file: SceneFile, resume: bool | None, pictures: bool)
         if pictures and file.document.output.pictures and can_draw(console, file, gallery):
             draw_state(console, file, states, gallery)
     names = ", ".join(["result.json", *_files(file), *(path.name for path in gallery.drawn)])
-    console.say(f"results in {file.folder}/: {names}")
+    console.write(f"results in {file.folder}/: {names}")
     gallery.require_all()
 
 
@@ -89,15 +89,15 @@ def _keeping_last(
         if error.state is not None:
             write(error.state)
             part = error.state.fractions[-1]
-            console.say(f"the last equilibrium, at {part:.3g} of the load step, is in {file.folder}/")
+            console.write(f"the last equilibrium, at {part:.3g} of the load step, is in {file.folder}/")
         raise
 
 
 def _show(console: Console, file: SceneFile, state: State, title: str = "") -> None:
     """Print what was found, and forces and moments. Collective."""
-    console.show(facts(state_facts(state, file.document.units), title))
-    console.say()
-    console.show(forces_table(forces_record(state), file.document.units.model_dump()))
+    console.write(facts(state_facts(state, file.document.units), title))
+    console.write()
+    console.write(forces_table(forces_record(state), file.document.units.model_dump()))
 
 
 def _through_steps(console: Console, file: SceneFile, resume: bool | None) -> dict[str, State]:
@@ -126,7 +126,7 @@ def _through_steps(console: Console, file: SceneFile, resume: bool | None) -> di
             if number in chosen:
                 drawn[f"{number}: {step.name}"] = state
         sequence.finish()
-    console.show(step_table(rows, file))
+    console.write(step_table(rows, file))
     _show(console, file, state, f"{file.title}: after the last step")
     more = {**_origin(file), "steps": _steps(rows, file)}
     write_result(state, file.folder, more=more, errors=state.known_errors is not None)

@@ -50,7 +50,7 @@ def can_draw(console: Console, file: SceneFile, gallery: Gallery) -> bool:
     try:
         agree(console.comm, error)
     except MissingRequirementError as missing:
-        console.say(f"no pictures: {missing}")
+        console.write(f"no pictures: {missing}")
         if "pictures" in file.document.output.model_fields_set:
             gallery.missing += [f"{kind}.png" for kind in file.document.output.pictures]
         return False
@@ -81,7 +81,7 @@ def draw_state(
                 case "error":
                     viz.plot_error(state, path, **words)
         except InvalidInputError as error:
-            console.say(f"no picture {path.name}: {error}")
+            console.write(f"no picture {path.name}: {error}")
             gallery.missing.append(path.name)
         else:
             gallery.drawn.append(path)
@@ -141,7 +141,7 @@ def _write_page(console: Console, result: Path, target: Path) -> None:
     from fenics_contact._page.page import result_page
 
     result_page(result, target)
-    console.say(f"page in {target}, {target.stat().st_size / 1e6:.1f} MB: open it in a browser")
+    console.write(f"page in {target}, {target.stat().st_size / 1e6:.1f} MB: open it in a browser")
 
 
 def _view(console: Console, result: Path, save: Path | None, field: str, scale: float) -> None:
@@ -163,15 +163,15 @@ def _view(console: Console, result: Path, save: Path | None, field: str, scale: 
         fields = fields_of_result(folder)
         pictures = sorted(path.name for path in folder.glob("*.png"))
         if pictures:
-            console.say(f"pictures in {folder}/: {', '.join(pictures)}")
+            console.write(f"pictures in {folder}/: {', '.join(pictures)}")
     if fields is None:
-        console.say("no .vtm or .pvd file of fields is there to draw")
+        console.write("no .vtm or .pvd file of fields is there to draw")
         return
     members = stored_fields(fields)
     shown = next(member for member in members if member.value == members[-1].value)
     bodies = shown.read()
     ranges = _ranges(bodies)
-    console.show(facts(ranges, f"fields of {shown.file.name}"))
+    console.write(facts(ranges, f"fields of {shown.file.name}"))
     if save is None:
         return
     if field not in ranges:
@@ -182,7 +182,7 @@ def _view(console: Console, result: Path, save: Path | None, field: str, scale: 
     from fenics_contact.pictures.states import plot_field
 
     plot_field(bodies, field, save, scale=scale)
-    console.say(f"picture in {save}")
+    console.write(f"picture in {save}")
 
 
 def _ranges(bodies: dict[str, Any]) -> dict[str, str]:
@@ -204,19 +204,19 @@ def show_record(console: Console, record: dict[str, Any]) -> None:
         if isinstance(value, dict):
             history = value.get("history")
             rest = {key: part for key, part in value.items() if key != "history"}
-            console.show(facts(dict(_flat(rest)), name))
-            console.say()
+            console.write(facts(dict(_flat(rest)), name))
+            console.write()
             if history:
-                console.show(evaluations(history))
-                console.say()
+                console.write(evaluations(history))
+                console.write()
         elif isinstance(value, list):
             for number, part in enumerate(value):
-                console.show(facts(dict(_flat(part)), f"{name} {number}"))
-            console.say()
+                console.write(facts(dict(_flat(part)), f"{name} {number}"))
+            console.write()
         else:
-            console.show(facts({name: value}))
+            console.write(facts({name: value}))
     if record.get("forces"):
-        console.show(forces_table(record["forces"], record.get("more", {}).get("unit_names")))
+        console.write(forces_table(record["forces"], record.get("more", {}).get("unit_names")))
 
 
 def evaluations(history: dict[str, list[Any]]) -> Table:

@@ -32,7 +32,7 @@ def check_history_material(
     """Check a material of your own at random displacement gradients, for two steps in succession.
 
     Newton's method converges slowly or not at all with a tangent that is not that of the stress, and nothing
-    else would tell.
+    else would show it.
 
     Args:
         material: The material.

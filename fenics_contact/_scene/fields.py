@@ -272,7 +272,7 @@ def read_field(
         comm: If given, rank 0 reads the file and all ranks receive the field.
 
     Raises:
-        InvalidInputError: If the file is missing or cannot be read, lacks coordinates or the field, or has
+        InvalidInputError: If the file is missing or cannot be read, has no coordinates, not the field, or has
             something other than finite numbers.
 
     Note:

@@ -1,4 +1,4 @@
-"""Rigid obstacles, given by the shapes of their surfaces: they stand still or move as prescribed."""
+"""Rigid obstacles, given by the shapes of their surfaces: they are fixed or move as prescribed."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ Path: TypeAlias = Callable[[float], tuple[Any, Any]]
 class MovingObstacle:
     """A rigid obstacle that moves and turns as prescribed: at a time its points x lie at R x + c.
 
-    Large displacements follow it through the load steps, and friction feels its motion. Small displacements
-    do not: there it must be where it is at time zero.
+    Large displacements follow it through the load steps, and friction depends on its motion. Small
+    displacements do not: there it must be where it is at time zero.
 
     Attributes:
         obstacle: The obstacle before it moves.
@@ -75,7 +75,7 @@ class MovingObstacle:
         """Reject an obstacle that moves already."""
         if isinstance(self.obstacle, MovingObstacle):
             raise InvalidInputError(
-                "MovingObstacle.obstacle must stand still, got one that moves: give the path of both"
+                "MovingObstacle.obstacle must not move, got one that moves: give the path of both"
             )
 
     @property

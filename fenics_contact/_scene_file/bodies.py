@@ -397,7 +397,7 @@ class TwoLinksMesh(_Links):
 
 @keys_of(LinkShape)
 class ChainMesh(_Links):
-    """A straight chain of links, parts "1", "2", ...; each bears with contact on the grip of the next."""
+    """A straight chain of links, parts "1", "2", ...; contact of each touches grip of the next."""
 
     shape: Literal["chain"]
     links: Annotated[int, Field(ge=2, le=10_000, description="number of links")]

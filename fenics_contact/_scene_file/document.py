@@ -190,7 +190,7 @@ MOST = 100_000
 class StepPart(Part):
     """One load step or several: values go linearly from those before to those given here.
 
-    A value given by a formula in t is what the formula says at the end of each load step.
+    A value given by a formula in t is its value at the end of each load step.
     """
 
     name: Line = Field("step", description="what it does, for records")
@@ -284,7 +284,7 @@ class _LoadHistory:
 
 
 class _Values:
-    """The values of all supports or loads as they stand in the file; steps change those with names."""
+    """The values of all supports or loads as they are in the file; steps change those with names."""
 
     def __init__(self, names: Sequence[str | None], values: Sequence[Any]) -> None:
         self._values = dict(enumerate(values))

@@ -388,7 +388,7 @@ def _parsed(override: str) -> tuple[Path, Any]:
         raise ValueError("there is no =")
     path = key_parts(key.strip())
     if not path:
-        raise ValueError("what stands before = is no key")
+        raise ValueError("there is no key before =")
     with suppress(ValueError, RecursionError):
         parsed = tomllib.loads(f"x = {value}")
         if list(parsed) == ["x"]:

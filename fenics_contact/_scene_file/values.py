@@ -340,7 +340,7 @@ class Read:
 
 
 def needed_error(needed: str) -> PydanticCustomError:
-    """Return the error of a value that does not meet ``needed``."""
+    """Return the error of a value that is not what is ``needed``."""
     return PydanticCustomError("needed", "must be {needed}", {"needed": needed})
 
 

@@ -429,7 +429,7 @@ class LargestStress(Weighable):
         J ≤ σ_max ≤ J (V / V_c)^(1/p):
 
     a peak in a thousandth of the body is at most 2.4 J with p = 8, 1.4 J with p = 20. The larger p, the
-    closer, and the more J behaves like the maximum with its kinks. `largest` tells how far off it is. Thermal
+    closer, and the more J behaves like the maximum with its kinks. `largest` shows how far off it is. Thermal
     stress counts.
 
     Attributes:

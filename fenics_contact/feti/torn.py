@@ -187,17 +187,17 @@ class TornSystem:
         jump = self.jump(displacement)
         return jump + self.supported - self.free.columns @ self.free_motion(self.right - jump)
 
-    def free_motion(self, lacking: np.ndarray) -> np.ndarray:
-        """Return q of rigid surfaces, the motion that fits best to what rows lack, replicated. Collective.
+    def free_motion(self, residual: np.ndarray) -> np.ndarray:
+        """Return q of rigid surfaces, the motion that fits the residual of rows best, replicated. Collective.
 
         Args:
-            lacking: c − B u, owned, shape (n_owned,), [length].
+            residual: c − B u, owned, shape (n_owned,), [length].
         """
         if self.free.count == 0:
             return np.zeros(0)
         columns = self.free.columns[self.numbering.owned < self.n_gluing]
         sums = np.column_stack(
-            [(columns.T @ columns).toarray(), -columns.T @ lacking[self.numbering.owned < self.n_gluing]]
+            [(columns.T @ columns).toarray(), -columns.T @ residual[self.numbering.owned < self.n_gluing]]
         )
         sums = self.decomposition.comm.allreduce(sums)
         return np.asarray(np.linalg.solve(sums[:, :-1], sums[:, -1]))

@@ -92,7 +92,7 @@ def bolt(
         layers: Cells along the shank, and through head and nut.
 
     Returns:
-        Hexahedra with surfaces "head" and "nut" (which bear on what is clamped), "shank" and the rest of the
+        Hexahedra with surfaces "head" and "nut" (which press on what is clamped), "shank" and the rest of the
         "side", the ends "top" and "bottom" and the cut "y0". Regions "shank" (between head and nut) and
         "ends". No grid.
 

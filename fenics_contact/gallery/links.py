@@ -53,7 +53,7 @@ class Link:
     Attributes:
         shape: Its proportions.
         mesh: The mesh with surfaces "contact" (inner side of the contact crown) and "grip" (inner side of the
-            far crown, where the chain's next link would bear), pieces of tori, and grid index (around, a, b).
+            far crown, for the chain's next link), pieces of tori, and grid index (around, a, b).
         crown: The contact surface as a design surface.
     """
 
@@ -223,9 +223,9 @@ class Chain:
     """Links in contact, one after the other along +x.
 
     Attributes:
-        links: The first, third, ... ring lies in the x-z plane, the others in the x-y plane. Every link bears
-            with its "contact" surface on the "grip" of the next; the first is to be held at its "grip", the
-            last to be pulled at its "contact".
+        links: The first, third, ... ring lies in the x-z plane, the others in the x-y plane. The
+            "contact" surface of each touches the "grip" of the next; the first is to be held at its "grip",
+            the last to be pulled at its "contact".
     """
 
     links: tuple[Link, ...]

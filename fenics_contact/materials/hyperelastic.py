@@ -242,7 +242,7 @@ class NearlyIncompressible(Hyperelasticity):
         return ufl.diff(ufl.diff(self.volume_energy(dilatation, parameters), dilatation), dilatation)
 
     def unseen_modulus(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
-        """Return what the shape energy lacks of the bulk modulus 2G/3 at F = I, [force / length²].
+        """Return what is missing in the shape energy of the bulk modulus 2G/3 at F = I, [force / length²].
 
         With it the shape energy of small strains is G ε : ε, as in Lamé's form: no strain is without energy.
         """
@@ -508,7 +508,7 @@ def _check_moduli(name: str, shear_modulus: float, bulk_modulus: float) -> None:
 class StVenantKirchhoff(Hyperelasticity):
     """Small strains under large rotations, W = λ/2 (tr E)² + μ E : E with E = (FᵀF − I) / 2.
 
-    It softens under compression and lets cells collapse: a bar bears no larger load than at 58 % of its
+    It softens under compression and lets cells collapse: a bar carries no larger load than at 58 % of its
     length. Take `NeoHooke` where strains are not small. In the plane it is in plane strain.
 
     Attributes:

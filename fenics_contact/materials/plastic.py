@@ -52,7 +52,7 @@ class HistoryMaterial(Elasticity):
     plane strain. The tangent at zero displacement and history, for a step of no duration, is the model's
     linear part (`parameters`, `stress`, `stiffness`): small-strain elasticity.
 
-    `finite` tells whether `respond` uses the whole displacement gradient, rotations included, or its
+    `finite` states whether `respond` uses the whole displacement gradient, rotations included, or its
     symmetric part alone (small strain). With `mean_dilatation`, in small strain, it gets the mean change of
     volume of each cell at all of its points, against locking where flow keeps the volume.
 

@@ -38,7 +38,7 @@ DEGREE = 5
 
 
 class CadError(InvalidDesignError):
-    """A design has no surface, or no body, that a CAD file can hold; the message says why."""
+    """A design has no surface, or no body, that a CAD file can hold; the message has the reason."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +192,7 @@ def flat_sides(
     sides = np.unique(labels[labels >= len(surfaces)])
     if len(sides) > most:
         raise CadError(
-            "a body in a CAD file needs few flat sides beside its designed surfaces, its mesh has "
+            "a body in a CAD file needs few flat sides besides its designed surfaces, its mesh has "
             f"{len(sides)}: write the surfaces alone with solid=False"
         )
     found = []
@@ -326,7 +326,7 @@ def _put(fit: SplineFit, planes: Mapping[int, Plane], tolerance: float) -> Splin
     allowed = tolerance * float(np.ptp(fit.points.reshape(-1, 3), axis=0).max())
     if off > allowed:
         raise CadError(
-            f"the rim of a designed surface must stay within {allowed:.3g} of the flat side beside it, it "
+            f"the rim of a designed surface must stay within {allowed:.3g} of the flat side at it, it "
             f"leaves it by {off:.3g}: hold it there, as with optimize.fixed_rim, or write the surfaces alone "
             "with solid=False"
         )
@@ -375,7 +375,7 @@ def write_step(
     """Write a designed body, or its designed surfaces alone, as a STEP file. Collective.
 
     The designed surfaces are B-splines of degree five through points of `design.MovedSurface`. The body is
-    closed by the flat sides of the reference shape; where these are not flat, as beside the crown of a chain
+    closed by the flat sides of the reference shape; where these are not flat, as next to the crown of a chain
     link, only the surfaces can be written. A plane body is a plane face, its other edges are straight lines
     from node to node.
 
@@ -434,15 +434,15 @@ def write_step(
 
 @contextmanager
 def _reasons() -> Iterator[None]:
-    """Say what gmsh says."""
+    """Report the reason that gmsh gives."""
     try:
         yield
     except CadError:
         raise
     except Exception as reason:  # gmsh raises no other class
         raise CadError(
-            f"OpenCASCADE must be able to build the sides of a body, it says: {reason}: write the surfaces "
-            "alone with solid=False"
+            f"OpenCASCADE must be able to build the sides of a body, it reported: {reason}: write the "
+            "surfaces alone with solid=False"
         ) from reason
 
 
@@ -465,7 +465,7 @@ class _Drawing:
         if self._fits[0].points.ndim == 3:
             faces = [body, *((2, self._face(side)) for side in sides[1:])]
             faces += [self._spline(fit) for fit in self._fits]
-            # Sides meet along edges of the same control points.
+            # Sides share edges of the same control points.
             shell = self._occ.addSurfaceLoop([tag for _, tag in faces], sewing=True)
             body = 3, self._occ.addVolume([shell])
         self._occ.synchronize()

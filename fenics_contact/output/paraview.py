@@ -216,7 +216,7 @@ def write_vtu(
         The multi-block file.
 
     Raises:
-        InvalidInputError: If the name contains a folder, or a field lacks a body or does not fit its cells.
+        InvalidInputError: If the name contains a folder, or a field does not fit the cells of a body.
     """
     import meshio  # takes a tenth of a second
 

@@ -229,7 +229,7 @@ parameters), ``supports``, ``loads``, ``contacts`` and ``ties`` with all their p
 that move also with their ``rotation`` and ``translation`` in the state |
     | ``plan`` | ``effects`` with the reason for each, ``cone``, ``memory_bytes`` as expected |
     | ``solver`` | ``kind``, ``methods`` that took steps, ``tolerance``, ``reason`` for the stop; a state \
-that was read from a checkpoint says so and has no tolerance |
+that was read from a checkpoint is marked so and has no tolerance |
     | ``counts`` | torn unknowns, multipliers, F-products, steps; `State.counts` |
     | ``seconds`` | by phase |
     | ``residuals`` | ``gluing``, ``natural``, ``equilibrium``; recomputed, relative |
@@ -264,7 +264,7 @@ point ``about`` |
         The file; `read_result` reads it.
 
     Raises:
-        InvalidInputError: If the name contains a folder, or ``more`` something that JSON lacks; states where.
+        InvalidInputError: If the name contains a folder, or ``more`` what JSON has not; states where.
 
     Example:
         >>> write_result(state, "output", more={"drop_percent": 12.4})  # doctest: +SKIP
@@ -505,8 +505,8 @@ def read_result(path: str | Path) -> dict[str, Any]:
         ) from error
     except ValueError as error:  # of JSON or of the encoding
         raise InvalidInputError(
-            f"a result must be a whole JSON file, {str(file)!r} is none ({error}): it was cut or edited; "
-            "bring back a copy or write it again"
+            f"a result must be a whole JSON file, {str(file)!r} is not one ({error}): it was cut or edited; "
+            "restore a copy or write it again"
         ) from error
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         kind = data.get("format") if isinstance(data, dict) else None

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy.spatial import cKDTree
 
+from fenics_contact._optimize.result import Record
 from fenics_contact.design.memory import DesignPoint
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery.links import DesignSurface
@@ -431,12 +432,8 @@ def _net_layers(grid: np.ndarray, net: np.ndarray, colour: str, thickness: float
     return [Layer(mesh, look) for mesh in (*tubes, points)]
 
 
-KINDS = ("start", "serious", "null", "rejected", "refined")
-
-
 def plot_convergence(
-    values: Sequence[float] | np.ndarray,
-    kinds: Sequence[str] | None = None,
+    history: Sequence[Record],
     path: str | Path | None = None,
     *,
     label: str = "objective",
@@ -448,16 +445,21 @@ def plot_convergence(
     """Draw the objective of every evaluation: the start and serious steps connected, null steps as points.
 
     Args:
-        values: Objective of each trial point in the order of evaluation, (n,); NaN where it was rejected.
-        kinds: Outcome of each: "start", "serious", "null", "rejected" or "refined"; needed.
+        history: That of the result of an optimisation, ``result.history``.
         label: Name of the objective, with its unit.
         logarithmic: Draw a positive objective logarithmically, so that a trial far off does not dominate.
 
     Raises:
-        InvalidInputError: If the arrays are inconsistent or hold no start.
+        InvalidInputError: If it is no history, or a logarithmic objective is not positive.
     """
     target = png_path(path)
-    objective, kind = _checked(values, kinds)
+    if not isinstance(history, Sequence) or not history or not isinstance(history[0], Record):
+        raise InvalidInputError(
+            "a diagram of convergence needs the records of an optimisation, got "
+            f"{type(history).__name__}: give result.history"
+        )
+    objective = np.array([record.value for record in history])
+    kind = np.array([record.kind.value for record in history])
     if logarithmic and np.nanmin(objective) <= 0.0:
         raise InvalidInputError(
             f"a logarithmic diagram needs a positive objective, got {np.nanmin(objective):g}: leave "
@@ -485,35 +487,3 @@ def plot_convergence(
             axes.legend(loc="best")
 
     return draw_picture(comm, target, draw)
-
-
-def _checked(
-    values: Sequence[float] | np.ndarray, kinds: Sequence[str] | None
-) -> tuple[np.ndarray, np.ndarray]:
-    try:
-        if kinds is None:
-            raise TypeError("no kinds")
-        objective, kind = np.asarray(values, dtype=float), np.asarray(kinds, dtype=str)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(
-            "values must be numbers and kinds words, one for each evaluation, got "
-            f"{type(values).__name__} and {type(kinds).__name__}: of the result of an "
-            "optimisation give [each.value for each in result.history] and the same of each.kind"
-        ) from error
-    if objective.ndim != 1 or objective.shape != kind.shape:
-        raise InvalidInputError(
-            f"values and kinds must have one entry for each evaluation, got {objective.shape} and "
-            f"{kind.shape}: pass both from the same history"
-        )
-    unknown = sorted(set(kind.tolist()) - set(KINDS))
-    if unknown:
-        raise InvalidInputError(f"kinds must be among {KINDS}, got {unknown}: translate them first")
-    if not np.any(kind == "start"):
-        raise InvalidInputError(
-            'a history begins with its "start", got none: pass it from the first evaluation'
-        )
-    if not np.all(np.isfinite(objective[kind != "rejected"])):
-        raise InvalidInputError(
-            "the objective must be finite wherever it was not rejected: mark rejected points"
-        )
-    return objective, kind

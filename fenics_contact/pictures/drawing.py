@@ -89,10 +89,10 @@ def shade_obstacles(axes: Axes, obstacles: list[SurfaceShape], frame: Frame) -> 
 
 
 def outline(shape: SurfaceShape, points: np.ndarray) -> list[np.ndarray]:
-    """Return lines that show an obstacle beside bodies, (n, dim) each; none for shapes other than these.
+    """Return lines that show an obstacle near bodies, (n, dim) each; none for shapes other than these.
 
     Of a plane the edge of the part under the bodies, of a sphere three circles, of a cylinder a circle at
-    each end of the part beside the bodies and four lines between them.
+    each end of the part near the bodies and four lines between them.
 
     `points`: all nodes of the bodies, (n, dim).
     """

@@ -290,7 +290,7 @@ def label_patch(axes: Axes, patch: ContactPatch, units: Units, *, mirror: bool =
 
 
 def pressure_bar(axes: Axes, clim: tuple[float, float], extend: str, units: Units) -> None:
-    """Add a colour bar beside axes, of the same height."""
+    """Add a colour bar to the right of axes, of the same height."""
     key, label = ScalarMappable(Normalize(*clim), PRESSURE_MAP), f"contact pressure ({units.stress})"
     place = axes.inset_axes((1.03, 0.0, 0.04, 1.0))
     axes.figure.colorbar(key, cax=place, label=label, extend=extend)

@@ -57,7 +57,7 @@ def error_without_contact(step: SolverStep) -> InfeasibleError:
 
 
 class SlidingError(InfeasibleError):
-    """The load is more than friction bears while bodies slide.
+    """The load is more than friction carries while bodies slide.
 
     Attributes:
         share: Part of the load's work that friction takes up.
@@ -67,9 +67,9 @@ class SlidingError(InfeasibleError):
     def __init__(self, share: float, motion: Vector, words: str = "bodies slide") -> None:
         """Store the motion; ``words`` say which bodies move."""
         super().__init__(
-            f"every body must be held by supports, contact or friction, but {words}, and friction bears only "
-            f"{100 * share:.3g} % of the load against it: support what slides, press it, lower the load or "
-            "raise the friction coefficient"
+            f"every body must be held by supports, contact or friction, but {words}, and friction carries "
+            f"only {100 * share:.3g} % of the load against it: support what slides, press it, lower the load "
+            "or raise the friction coefficient"
         )
         self.share, self.motion = share, motion
 
@@ -102,7 +102,7 @@ class FrictionAlone:
         if equilibrium.motion is not None:
             raise InfeasibleError(
                 "friction needs surfaces that are pressed together, but without it they are pressed so "
-                f"little that even {self.wedged:g} times the forces that it may then bear leave "
+                f"little that even {self.wedged:g} times the forces that it may then carry leave "
                 f"{100 * equilibrium.error:.2g} % of the load unbalanced: support bodies that only friction "
                 "holds, or press them"
             )
@@ -113,7 +113,7 @@ class FrictionAlone:
         With friction along the motion that it resists least, bodies are pressed otherwise than without; with
         the slip bounds of these forces that motion is another one, and so on. If friction then bears less
         than the load, bodies accelerate. Forces of the last load may hold bodies where they were driven in.
-        They are computed ``times`` times at most, until friction bears the same to ``settled``.
+        They are computed ``times`` times at most, until friction carries the same to ``settled``.
         """
         layout, before = self.problem.layout, np.inf
         forces = self._forces if start is None or self._forces is None else start

@@ -195,7 +195,7 @@ class FixedPoint:
         if sequence.exhausted:
             fractions = ", ".join(f"{fraction:g}" for fraction in self.damping.fractions)
             return (
-                f"{needed}: it cycles or stands still with every θ of {fractions}; use FaceNewton, which "
+                f"{needed}: it cycles or stagnates with every θ of {fractions}; use FaceNewton, which "
                 "updates the slip bound in every step, or give Damping smaller fractions"
             )
         return (

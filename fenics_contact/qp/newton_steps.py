@@ -278,12 +278,12 @@ class FaceState:
     def stall(self, comm: MPI.Comm) -> str:
         """Describe why the last steps made no progress: a cycling or a stationary active set. Collective."""
         if len(self.faces) < 2:
-            return "the residual stands still"
+            return "the residual stagnates"
         last, *earlier = self.faces
         changed = global_sum(comm, *[last.changes(face) for face in earlier])
         flickering = f"{round(float(changed[0]))} statuses changed in the last step"
         if changed[0] == 0.0:
-            return "the residual stands still on one face"
+            return "the residual stagnates on one face"
         if not np.all(changed):
             return f"the active set cycles with period {int(np.argmin(changed)) + 1}, {flickering}"
         return f"the active set does not settle, {flickering}"

@@ -56,7 +56,7 @@ class ContactResult:
         normal_force: λ_N ≥ 0, zero at open points, shape (n,), [force]. What a solver that ends at its
             tolerance leaves besides is in balance, reactions and resultants alone.
         friction_force: τ in the points' tangents, zero without friction, shape (n, dim - 1), [force]. It
-            acts on the master; the slave feels the opposite.
+            acts on the master; the opposite acts on the slave.
         slip_bound: Largest friction force, shape (n,), [force].
         gap: Gap after deformation, shape (n,), [length].
         slip: Relative tangential displacement in the points' tangents since the last load step, also of

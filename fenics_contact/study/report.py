@@ -85,7 +85,7 @@ def _way(errors: Errors, quantity: QuantityFacts, target: float) -> tuple[str, .
 
 
 def reliable(errors: Errors, run: Run, quantity: str, target: float) -> bool:
-    """Return whether a run and every finer and stricter one meet a target.
+    """Return whether a run and every finer and stricter one reach a target.
 
     An error that passes through zero is small by chance on one mesh, and larger again on the next.
     """

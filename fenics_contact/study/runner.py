@@ -83,7 +83,7 @@ def measure(job: Job, *, first: bool = True) -> Record:
         if record is None and (ending.status or 0) > 0 and not ending.output + ending.errors:
             # The start of MPI itself ends so, rarely; what a run raises is always printed. A signal, as for
             # want of memory, has a negative status and would end the run again.
-            logger.warning("%s ended with status %d, without a word: once more", job.name, ending.status)
+            logger.warning("%s exited with status %d and printed nothing: once more", job.name, ending.status)
             ending = finished(command, job.limit, environment=environment)
             record = _read(file)
     if not isinstance(record, dict):
@@ -211,15 +211,15 @@ def measure_all(
 
 def _measure_each(jobs: Sequence[Job], store: Store, repeat: int, title: str) -> None:
     """Measure some jobs once each; the remaining time follows from their weights."""
-    weights, spent = [job.weight for job in jobs], 0.0
+    weights, elapsed = [job.weight for job in jobs], 0.0
     with Task(title, unit="runs", total=len(jobs)) as task:
         for number, job in enumerate(jobs, 1):
             task.step(number - 1, words=job.name)
             start = perf_counter()
             record = measure(job, first=repeat == 0)
             store.write(job, repeat, record)
-            spent += perf_counter() - start
-            left = spent * sum(weights[number:]) / sum(weights[:number])
+            elapsed += perf_counter() - start
+            left = elapsed * sum(weights[number:]) / sum(weights[:number])
             rest = f", {duration(left)} left" if number < len(jobs) else ""
             task.step(number)
             logger.info("%d/%d %s: %s%s", number, len(jobs), job.name, _outcome(record), rest)

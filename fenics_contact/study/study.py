@@ -238,7 +238,7 @@ class StudyScene:
     def __post_init__(self) -> None:
         """Reject a scene without quantities, and names that are unsuitable for files or tables."""
         if not self.quantities:
-            raise InvalidInputError("a study needs at least one quantity, got none: say what is measured")
+            raise InvalidInputError("a study needs at least one quantity, got none: give what is measured")
         names = [quantity.name for quantity in self.quantities]
         if len(set(names)) < len(names):
             raise InvalidInputError(f"quantities must have different names, got {names}: rename one")

@@ -281,5 +281,5 @@ def test_what_is_said_while_bars_are_drawn_appears_above_them(monkeypatch: pytes
     drawn, underneath = io.StringIO(), io.StringIO()
     # Like this bars take over stdout while they are drawn.
     monkeypatch.setattr(sys, "stdout", FileProxy(Console(file=drawn), underneath))
-    cli.Console(MPI.COMM_SELF).say("a line")
+    cli.Console(MPI.COMM_SELF).write("a line")
     assert (drawn.getvalue(), underneath.getvalue()) == ("a line\n", "")

@@ -121,11 +121,11 @@ def test_control_characters_do_not_reach_the_terminal(
     assert run("schema", folder / "a.json") == 0
     assert run("demo", red) == 2
     assert run("accuracy", f"{red}.py") == 2
-    cli.Console(MPI.COMM_SELF).say(f"said {red}\r")
+    cli.Console(MPI.COMM_SELF).write(f"said {red}\r")
     table = Table(title=f"title {red}")
     table.add_column(f"column {red}")
     table.add_row(f"cell {red}")
-    cli.Console(MPI.COMM_SELF).show(table)
+    cli.Console(MPI.COMM_SELF).write(table)
     logging.getLogger("fenics_contact").warning("logged %s", red)
     written = capsys.readouterr()
     for text in (written.out, written.err):

@@ -349,7 +349,7 @@ def test_friction_that_nothing_presses_bears_nothing() -> None:
         [TotalForce("right", "x1", (0.0, 0.0, -1.0))],
         [ContactPair(Surface("left", "x1"), Surface("right", "x0"), Coulomb(0.3))],
     )
-    with pytest.raises(InfeasibleError, match="friction bears only 0 % of the load"):
+    with pytest.raises(InfeasibleError, match="friction carries only 0 % of the load"):
         solve_scene(scene, MPI.COMM_SELF)
     free = replace(scene, supports=[scene.supports[0]], loads=[TotalForce("right", "x1", (-4.0, 0.0, -1.0))])
     state = solve_scene(free, MPI.COMM_SELF)
@@ -370,7 +370,7 @@ def test_friction_that_is_pressed_too_little_is_refused_with_what_it_bears() -> 
     loads = {share: TotalForce("right", "x1", (0.0, 0.0, -share * 0.3 * press)) for share in (0.3, 10.0)}
     state = solve_scene(replace(pushed, loads=[loads[0.3]]), MPI.COMM_SELF)
     assert state.contact.force[:, 2].sum() == pytest.approx(-0.09 * press, rel=1e-4)
-    words = r"makes slide 'right' by translation \(0, 0, -1\), and friction bears only (9\.9|10)"
+    words = r"makes slide 'right' by translation \(0, 0, -1\), and friction carries only (9\.9|10)"
     with pytest.raises(InfeasibleError, match=words):
         solve_scene(replace(pushed, loads=[loads[10.0]]), MPI.COMM_SELF)
     without = FaceNewton(doubts=False, max_products=300)

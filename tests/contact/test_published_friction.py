@@ -65,7 +65,7 @@ def test_every_published_problem_is_solved_by_every_solver(case: str, solver: st
 def test_damping_solves_what_makes_the_plain_fixed_point_cycle(inner: DualSolver) -> None:
     problem, mu_f = published(CYCLING)
     with pytest.raises(
-        ConvergenceError, match="cycles or stands still with every θ of 1; use FaceNewton"
+        ConvergenceError, match="cycles or stagnates with every θ of 1; use FaceNewton"
     ) as plain:
         solve(problem, None, FixedPoint(inner, damping=PLAIN), friction_coefficient=mu_f)
     assert "they cycle with period 2: no θ is left" in plain.value.history[-1].note

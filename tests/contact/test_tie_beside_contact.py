@@ -57,7 +57,7 @@ def test_a_drag_beyond_what_friction_bears_beside_a_sliding_tie_is_refused(parts
 
     assert dragged(1.275e-3).contact.count(Status.STICK) == 1
     for force, share in ((1.295e-3, r"99\.[123]"), (2e-3, r"6[89]\S*")):
-        words = rf"the load makes slide 'up' by translation \(1, 0\), and friction bears only {share} %"
+        words = rf"the load makes slide 'up' by translation \(1, 0\), and friction carries only {share} %"
         with pytest.raises(InfeasibleError, match=words):
             dragged(force)
 
@@ -70,7 +70,7 @@ def test_a_solver_that_has_tried_all_says_that_friction_does_not_suffice(
     scene = half_tied(5, "node", sliding=True)
     top = RigidSurface("up", "y1", (0.7, 1.5), force=(2e-3, -1e-2), moment=-4e-4)
     hasty = FaceNewton(1e-10, max_products=450)
-    with pytest.raises(InfeasibleError, match=r"friction bears only 6[89]\S* %") as caught:
+    with pytest.raises(InfeasibleError, match=r"friction carries only 6[89]\S* %") as caught:
         solve_scene(replace(scene, supports=[scene.supports[0], top]), MPI.COMM_SELF, solver=hasty)
     assert isinstance(caught.value.__cause__, ConvergenceError)
     assert caught.value.__cause__.history

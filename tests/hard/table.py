@@ -34,7 +34,7 @@ All but *cone* and *natural* may be ten times the tolerance, *same* 1e-6; where 
 their neighbours (flat cells, belts, contrasts of 1e6) ten thousand times and 1e-3, which the rows show.
 
 "Unknowns" are torn displacements; products are those with the dual operator F. A *rescue* is a call of
-proximal points, without a preconditioner of SMALSE, where the active set cycled or the residual stood still;
+proximal points, without a preconditioner of SMALSE, where the active set cycled or the residual stagnated;
 a *cut* is a Newton step that was shortened.
 """
 
@@ -102,8 +102,8 @@ GROUPS: dict[str, tuple[str, str]] = {
         "natural map of De Saxcé's form with ρ = 1/‖W‖, relative to max(‖r‖, ρ‖q‖). These are eleven of "
         "the 33 on which Siconos's own solvers reach 1e-8 this often: nonsmooth Newton of Alart and Curnier "
         "(NSN_AC) 30, nonsmooth Gauss-Seidel (NSGS) 27, its fixed point of Tresca problems 25; the other 22 "
-        "were not at hand, and the figures do not compare. Where W lacks rank, forces are not unique and the "
-        "residual alone is judged. Take FaceNewton; a fixed point is the safe second choice, and damps "
+        "were not at hand, and the figures do not compare. Where W is singular, forces are not unique and "
+        "the residual alone is judged. Take FaceNewton; a fixed point is the safe second choice, and damps "
         "itself where it cycles.",
     ),
     "optimisation": (

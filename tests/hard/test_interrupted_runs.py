@@ -166,5 +166,5 @@ def test_a_checkpoint_that_cannot_be_read_is_refused_and_kept(
     with pytest.raises(InvalidInputError, match=r"is not a complete checkpoint .* restore") as caught:
         minimize(case.fun, case.start, checkpoint=Checkpoint(path))
     assert path.read_bytes() == before
-    reason = str(caught.value).partition("is none (")[2].partition(")")[0]
+    reason = str(caught.value).partition("complete checkpoint (")[2].partition(")")[0]
     record(GROUP, f"an unreadable checkpoint: {damage}", outcome=f"refused: no whole checkpoint ({reason})")

@@ -154,9 +154,7 @@ def test_a_rim_over_two_flat_sides_is_refused() -> None:
 
 def test_a_rim_that_leaves_its_flat_side_is_refused(tmp_path: Path) -> None:
     problem = crown((2, 1), (4, 2, 2))
-    with pytest.raises(
-        CadError, match=r"must stay within .* of the flat side beside it, it leaves it by 0\.0"
-    ):
+    with pytest.raises(CadError, match=r"must stay within .* of the flat side at it, it leaves it by 0\.0"):
         write_step(problem, np.array([0.0, 0.2]), tmp_path / "pad.step")
     assert not list(tmp_path.iterdir())
 
@@ -169,8 +167,10 @@ def test_sides_that_do_not_enclose_a_body_are_refused(
         write_step(lid(), variables(), tmp_path / "pad.step")
 
 
-def test_what_opencascade_says_is_passed_on(tmp_path: Path) -> None:
-    with pytest.raises(CadError, match=r"OpenCASCADE must be able to build the sides of a body, it says: .*"):
+def test_the_reason_of_opencascade_is_passed_on(tmp_path: Path) -> None:
+    with pytest.raises(
+        CadError, match=r"OpenCASCADE must be able to build the sides of a body, it reported: .*"
+    ):
         write_step(lid(), variables(), tmp_path / "pad.step", scale=1e-10)
 
 

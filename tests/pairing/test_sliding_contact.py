@@ -359,7 +359,7 @@ def test_a_path_that_is_no_rigid_motion_is_refused(path: object, message: str) -
 
 def test_an_obstacle_moves_along_one_path() -> None:
     still = MovingObstacle(RigidPlane((0, 0, -1.0), (0, 0, 1)), lambda time: (None, (0.0, 0.0, time)))
-    with pytest.raises(InvalidInputError, match="must stand still"):
+    with pytest.raises(InvalidInputError, match="must not move"):
         MovingObstacle(still, still.path)
 
 

@@ -71,8 +71,8 @@ def test_a_disc_whose_force_would_turn_back_gets_a_smaller_step() -> None:
 @pytest.mark.parametrize(
     ("faces", "reason"),
     [
-        ([], "the residual stands still"),
-        ([face(True, True, True)] * 3, "the residual stands still on one face"),
+        ([], "the residual stagnates"),
+        ([face(True, True, True)] * 3, "the residual stagnates on one face"),
         (
             [face(True, True, False), face(False, True, True)] * 2,
             "the active set cycles with period 2, 2 statuses changed in the last step",

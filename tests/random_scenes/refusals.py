@@ -38,7 +38,7 @@ def unjust(error: FenicsContactError, made: Sample) -> str:
         return _some_contact_closes(made)
     if isinstance(error, InfeasibleError) and "friction needs surfaces that are pressed" in str(error):
         return _pressed_enough(made, str(error))
-    if isinstance(error, InfeasibleError) and "friction bears only" in str(error):
+    if isinstance(error, InfeasibleError) and "friction carries only" in str(error):
         return _borne_after_all(made)
     if isinstance(error, InfeasibleError):
         return _held_after_all(made)

@@ -88,7 +88,7 @@ def test_only_a_process_that_ends_by_itself_without_a_word_is_started_once_more(
         record = measure(JOB)
     assert len(count.read_text()) == starts
     assert record.get("seconds") == (2.0 if starts == 2 else None)
-    assert ("nothing ended with status 1, without a word: once more" in caplog.text) == (starts == 2)
+    assert ("nothing exited with status 1 and printed nothing: once more" in caplog.text) == (starts == 2)
 
 
 def test_a_function_is_called_with_its_arguments_and_its_memory_is_told(tmp_path: Path) -> None:

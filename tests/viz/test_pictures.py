@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fenics_contact import Body, Scene, box_partition
+from fenics_contact._optimize.result import Record, StepKind
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import DesignSurface, block
 from fenics_contact.materials import IsotropicElasticity
@@ -140,52 +141,43 @@ def test_a_net_is_drawn_with_straight_bars_between_its_points(counts: tuple[int,
         assert np.asarray(tube.mesh.bounds)[::2] == pytest.approx(row.min(axis=0), abs=0.02)
 
 
-HISTORY = [-100.0, -110.0, -105.0, np.nan, -112.0], ["start", "serious", "null", "rejected", "serious"]
+def history(**steps: float) -> list[Record]:
+    """Return records of steps of some kinds, such as ``start=2.0, null_1=3.0``, with their values."""
+    return [
+        Record(0, StepKind(kind.partition("_")[0]), value, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1, 1)
+        for kind, value in steps.items()
+    ]
+
+
+HISTORY = history(start=-100.0, serious=-110.0, null=-105.0, rejected=np.nan, serious_2=-112.0)
 
 
 def test_convergence_marks_serious_and_null_steps(tmp_path: Path) -> None:
-    image = pixels(plot_convergence(*HISTORY, tmp_path / "history.png", width=1200, title="Chain"))
+    image = pixels(plot_convergence(HISTORY, tmp_path / "history.png", width=1200, title="Chain"))
     assert image.shape[1] == 1200
     assert contains(image, "#0072b2"), "serious steps"
     assert contains(image, "#d55e00", 0.1), "null steps"
-    plain = pixels(plot_convergence([3.0], ["start"], tmp_path / "start.png", width=1200))
+    plain = pixels(plot_convergence(history(start=3.0), tmp_path / "start.png", width=1200))
     assert not contains(plain, "#d55e00", 0.1)
 
 
 def test_a_logarithmic_convergence_leaves_room_beside_a_trial_far_off(tmp_path: Path) -> None:
-    history = [2.0, 1000.0, 1.0], ["start", "null", "serious"]
+    steps = history(start=2.0, null=1000.0, serious=1.0)
 
     def height(logarithmic: bool) -> int:
         path = tmp_path / "history.png"
-        image = pixels(plot_convergence(*history, path, logarithmic=logarithmic, width=600))
+        image = pixels(plot_convergence(steps, path, logarithmic=logarithmic, width=600))
         blue = np.abs(image - np.array([0, 114, 178]) / 255).max(axis=-1) < 0.02
         return int(np.ptp(np.flatnonzero(blue[:, 60:400].any(axis=1))))
 
     assert height(True) > 1.5 * height(False) > 0
-    told = "needs a positive objective, got -1: leave logarithmic=False"
-    with pytest.raises(InvalidInputError, match=told):
-        plot_convergence([-1.0], ["start"], logarithmic=True)
+    needed = "needs a positive objective, got -1: leave logarithmic=False"
+    with pytest.raises(InvalidInputError, match=needed):
+        plot_convergence(history(start=-1.0), logarithmic=True)
 
 
-@pytest.mark.parametrize(
-    ("values", "kinds", "message"),
-    [
-        ([1.0, 2.0], ["start"], r"one entry for each evaluation, got \(2,\) and \(1,\)"),
-        ([1.0], ["begin"], r"kinds must be among .* got \['begin'\]"),
-        ([1.0], ["null"], r'a history begins with its "start", got none'),
-        ([1.0, np.nan], ["start", "serious"], r"must be finite wherever it was not rejected"),
-    ],
-)
-def test_convergence_refuses_a_history_that_is_none(
-    values: list[float], kinds: list[str], message: str, tmp_path: Path
-) -> None:
-    with pytest.raises(InvalidInputError, match=message):
-        plot_convergence(values, kinds, tmp_path / "history.png")
+@pytest.mark.parametrize("given", [object(), [], [3.0, 2.0]])
+def test_convergence_refuses_what_is_no_history(given: Any, tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match=r"the records of an optimisation, got \w+: give result"):
+        plot_convergence(given, tmp_path / "history.png")
     assert not list(tmp_path.iterdir())
-
-
-def test_a_diagram_of_convergence_of_a_whole_result_is_refused_with_what_to_give() -> None:
-    with pytest.raises(InvalidInputError, match=r"got object and list: .* give \[each.value for each"):
-        plot_convergence(object(), [])  # type: ignore[arg-type]
-    with pytest.raises(InvalidInputError, match=r"got object and NoneType"):
-        plot_convergence(object())  # type: ignore[arg-type]

@@ -129,8 +129,8 @@ def stick_half_width(outcome: Outcome) -> float:
     sticks = contact.status == Status.STICK
     if np.count_nonzero(sticks) < 2:
         return 0.0
-    lack = FRICTION * contact.pressure - traction
-    slope, start = np.polyfit(x[sticks] ** 2, lack[sticks] ** 2, 1)
+    reserve = FRICTION * contact.pressure - traction
+    slope, start = np.polyfit(x[sticks] ** 2, reserve[sticks] ** 2, 1)
     return float(np.sqrt(max(0.0, -start / slope)))
 
 

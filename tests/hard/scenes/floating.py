@@ -109,7 +109,7 @@ def a_block_gripped_by_jaws_and_pulled_almost_out() -> Trial:
 @trial(GROUP)
 def a_block_gripped_by_jaws_and_pulled_harder_than_they_can_hold() -> Trial:
     """Rigid bodies could be gripped with any force; how hard these jaws press only the solver finds out."""
-    told = r"makes slide 'block' by translation \(0, 0, 1\), and friction bears only"
+    told = r"makes slide 'block' by translation \(0, 0, 1\), and friction carries only"
     return cut_trial(jaws(0.8), error=InfeasibleError, match=told)
 
 

@@ -114,7 +114,7 @@ def tilted(coefficient: float, slope: float) -> Scene:
 
 @trial(GROUP, "a tower of bricks on a slope of 0.0009 with friction 0.001")
 def a_tower_that_stands_on_a_slope() -> Trial:
-    cause = "the residual stands still while all points slip"
+    cause = "the residual stagnates while all points slip"
     return failing_trial(tilted(1e-3, 0.9e-3), cause, checks=partial(stands, slope=0.9e-3))
 
 

@@ -283,4 +283,4 @@ for _thickness, _angle, _name, _friction in (
 @trial(GROUP, "a belt of 0.01 of the radius, half a turn round a disc, friction 0.5, finer, in three pieces")
 def a_fine_belt() -> Trial:
     scene = capstan(0.01, np.pi, 0.5, 200).scene
-    return failing_trial(scene, "the residual stands still while all points slip", cut=bisected(scene, 3))
+    return failing_trial(scene, "the residual stagnates while all points slip", cut=bisected(scene, 3))

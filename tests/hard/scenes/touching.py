@@ -196,9 +196,7 @@ def almost_unloaded(scale: float) -> Trial:
     scene = replace(block_on_plane(Coulomb(0.7)), loads=[load])
     if scale > 1e-5:
         return cut_trial(scene)
-    return failing_trial(
-        scene, "the brick rolls by a million times what it deforms, the residual stands still"
-    )
+    return failing_trial(scene, "the brick rolls by a million times what it deforms, the residual stagnates")
 
 
 for _scale in (1e-2, 1e-4, 1e-6, 1e-8):

@@ -1,0 +1,39 @@
+"""The public names, and the texts that users read and run."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import fenics_contact
+from tests.conftest import ROOT
+
+#: What users read and run.
+FOLDERS = (
+    "demos/*.py",
+    "demos/scenes/*.toml",
+    "notebooks/*.py",
+    "docs/*.md",
+    "docs/guide/*.md",
+    "docs/studies/true_surfaces.md",
+    "README.md",
+)
+
+
+def texts() -> dict[Path, str]:
+    return {path: path.read_text() for pattern in FOLDERS for path in sorted(ROOT.glob(pattern))}
+
+
+def rooms() -> list[ModuleType]:
+    values = (getattr(fenics_contact, name) for name in fenics_contact.__all__)
+    return [value for value in values if inspect.ismodule(value)]
+
+
+def public() -> dict[str, Any]:
+    """Return every public name, with its room, and what it stands for."""
+    found = {name: getattr(fenics_contact, name) for name in fenics_contact.__all__ if name[0] != "_"}
+    for room in rooms():
+        found |= {f"{room.__name__.rpartition('.')[2]}.{name}": getattr(room, name) for name in room.__all__}
+    return found
