@@ -14,13 +14,13 @@ from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.pairs import ContactPair, Surface
-from fenics_contact._scene.plan import RANK_TOLERANCE, held_components, point_loads, resisted_motions
+from fenics_contact._scene.plan import MOTION_ROUNDING, held_components, point_loads, resisted_motions
 from fenics_contact.errors import ConvergenceError, InfeasibleError, together
 from fenics_contact.feti.factor import fixing_nodes
 from fenics_contact.feti.subdomain import common_kernel
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.kernels import rigid_body_modes
-from fenics_contact.results.rigid_motions import MOTION_ROUNDING, UnheldMotion, motion_in_words
+from fenics_contact.results.rigid_motions import UnheldMotion, motion_in_words
 
 #: A load that needs all but this fraction of the friction is at the limit: how far the body slides would be
 #: decided by rounding.
@@ -162,7 +162,7 @@ def _both(supports: np.ndarray, material: np.ndarray) -> np.ndarray:
     if not material.shape[1]:
         return supports
     basis, size, _ = np.linalg.svd(np.hstack([supports, material]), full_matrices=False)
-    return np.asarray(basis[:, size > RANK_TOLERANCE])
+    return np.asarray(basis[:, size > MOTION_ROUNDING])
 
 
 @dataclass(frozen=True)
@@ -409,7 +409,7 @@ def _unresisted(torn: TornSystem) -> tuple[UnheldMotion, ...]:
     for start in range(0, wrenches.shape[1], CHUNK):  # each is on two bodies at most, so all are many zeros
         more = wrenches[:, start : start + CHUNK].toarray()
         basis, resistance, _ = np.linalg.svd(np.hstack([basis * resistance, more]), full_matrices=False)
-    rank = np.count_nonzero(resistance > RANK_TOLERANCE * resistance.max(initial=0.0))
+    rank = np.count_nonzero(resistance > MOTION_ROUNDING * resistance.max(initial=0.0))
     rest = scipy.linalg.null_space(basis[:, :rank].T) if rank else np.eye(len(basis))
     return _separate(rest, [body.name for body in bodies])
 

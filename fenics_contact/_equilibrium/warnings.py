@@ -15,7 +15,7 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.pair_geometry import Outline, bodies_near, outline_of, unpaired
 from fenics_contact._scene.pairs import ContactPair, Surface
-from fenics_contact._scene.parts import surface_of
+from fenics_contact._scene.parts import TILT, surface_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import FacetedSurface, outside, share_areas
 from fenics_contact._surfaces.projection import node_weights, project
@@ -34,8 +34,6 @@ OFF = {1: "by a half or more", 2: "by a tenth"}
 #: Rotation [rad], as the root mean square of all cells, that triggers the warning: it strains a body of small
 #: strain by half of its square.
 FAR = 0.05
-#: Facets lie in one plane if the cosine of the angle between them differs from one by no more than this.
-FLAT = 1e-9
 
 _LOG = logging.getLogger(__name__)
 
@@ -469,7 +467,7 @@ def _on_symmetry(scene: Scene) -> str:
         touching = [mesh.surfaces[side].ravel() for side in mesh.surfaces if _meets(scene, name, side)]
         flat = {side: normal for side in mesh.surfaces if (normal := _normal(scene, name, side)) is not None}
         for side, normal in flat.items():
-            alone = sum(abs(normal @ other) > 1.0 - FLAT for other in flat.values()) == 1
+            alone = sum(abs(normal @ other) > 1.0 - TILT for other in flat.values()) == 1
             adjacent = touching and np.isin(mesh.surfaces[side], np.concatenate(touching)).any()
             if alone and adjacent and (name, side) not in used:
                 found.append(f"surface {side!r} of body {name!r}")
@@ -489,4 +487,4 @@ def _normal(scene: Scene, body: str, side: str) -> np.ndarray | None:
     mesh = scene.bodies[body].mesh
     areas = vector_areas(mesh.points, mesh.surfaces[side])
     normals = areas / np.linalg.norm(areas, axis=1, keepdims=True)
-    return normals[0] if len(normals) and np.all(normals @ normals[0] >= 1.0 - FLAT) else None
+    return normals[0] if len(normals) and np.all(normals @ normals[0] >= 1.0 - TILT) else None

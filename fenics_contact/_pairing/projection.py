@@ -22,6 +22,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import cg
 
 from fenics_contact._base.libraries import MPI
+from fenics_contact._pairing.points import HELD
 from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
 from fenics_contact._scene.scene import Scene
@@ -92,7 +93,6 @@ def warn_of_edge(
     held: np.ndarray,
     master: FacetedSurface,
     comm: MPI.Comm,
-    least: float = 1e-6,
 ) -> None:
     """Warn where nodes beyond the master's edge leave a part of the master to the others. Collective.
 
@@ -100,8 +100,7 @@ def warn_of_edge(
     them between these nodes and its edge is missing.
 
     `held`: which nodes of the slave are tied or held by supports, shape (n_nodes,); `comm`: communicator of
-    the ranks that share the work; rank 0 logs; `least`: weights of nodes that are not tied below this are
-    rounding.
+    the ranks that share the work; rank 0 logs.
     """
     whole, some = (each(held[slave.facets], axis=1) for each in (np.all, np.any))
     if not np.any(some & ~whole):
@@ -109,7 +108,7 @@ def warn_of_edge(
     hit = shared_projection(master, np.arange(len(master.nodes)), slave, comm)
     weights, _ = shape_functions(hit.local, slave.corners)
     nodes = slave.facets[hit.facet]
-    off = (np.abs(weights) * ~held[nodes]).sum(axis=1) > least
+    off = (np.abs(weights) * ~held[nodes]).sum(axis=1) > HELD
     crossed = off & some[hit.facet]
     share = master.areas[hit.point[crossed]].sum() / max(master.areas[hit.point].sum(), np.finfo(float).tiny)
     if share > 0.0 and comm.rank == 0:

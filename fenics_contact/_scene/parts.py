@@ -414,12 +414,14 @@ def _shortest_edges(surface: FacetedSurface) -> np.ndarray:
     return result
 
 
-def mirrored(scene: SceneParts, body: str, tilt: float = 1e-9) -> np.ndarray:
+#: Directions are the same if the cosine of the angle between them differs from one by no more than this.
+TILT = 1e-9
+
+
+def mirrored(scene: SceneParts, body: str) -> np.ndarray:
     """Return which nodes of a body lie on a plane of symmetry normal to each axis, shape (n_nodes, dim).
 
     A plane of symmetry is a flat side normal to an axis on which a support prescribes only that component.
-
-    `tilt`: a facet is normal to an axis if the cosine of its normal differs from one by no more than this.
     """
     mesh = scene.bodies[body].mesh
     marks = np.zeros(mesh.points.shape, dtype=bool)
@@ -431,7 +433,7 @@ def mirrored(scene: SceneParts, body: str, tilt: float = 1e-9) -> np.ndarray:
             continue
         facets = mesh.surfaces[support.surface]
         areas = vector_areas(mesh.points, facets)
-        across = np.abs(areas[:, given[0]]) >= (1.0 - tilt) * np.linalg.norm(areas, axis=1)
+        across = np.abs(areas[:, given[0]]) >= (1.0 - TILT) * np.linalg.norm(areas, axis=1)
         marks[facets[across].ravel(), given[0]] = True
     return marks
 

@@ -78,8 +78,8 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
     return tuple(Effect(name, counted(count, *words)) for name, count, *words in found if count)
 
 
-#: A motion counts as unresisted if it moves supported nodes by less than this fraction of the other motions.
-RANK_TOLERANCE = 1e-9
+#: Parts of rigid motions, their resistance and work below this fraction of the largest are rounding.
+MOTION_ROUNDING = 1e-9
 
 
 def held_components(scene: SceneParts, body: str, modes: np.ndarray) -> np.ndarray:
@@ -127,7 +127,7 @@ def resisted_motions(held: np.ndarray) -> np.ndarray:
     # The edge of a thin plate moves little when the plate turns about it: singular values resolve how much,
     # their squares would be lost in rounding.
     _, size, motions = np.linalg.svd(held, full_matrices=False)
-    return np.asarray(motions[size > RANK_TOLERANCE * size.max(initial=0.0)].T)
+    return np.asarray(motions[size > MOTION_ROUNDING * size.max(initial=0.0)].T)
 
 
 def held_by_supports(scene: SceneParts, body: str) -> bool:

@@ -14,6 +14,7 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._base.progress import Task
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.pairs import Surface
+from fenics_contact._scene.plan import MOTION_ROUNDING
 from fenics_contact._surfaces.facets import edge_distance
 from fenics_contact.design.objective import Partials
 from fenics_contact.errors import ConvergenceError, InvalidInputError
@@ -351,18 +352,16 @@ def _begin(
     return _Begin(bearing + share * direction, gradient + share * turned, size, rounding)
 
 
-def _require_held(system: DualSystem, by_displacement: np.ndarray, rounded: float = 1e-9) -> None:
+def _require_held(system: DualSystem, by_displacement: np.ndarray) -> None:
     """Reject objectives that change along motions that nothing resists. Collective.
 
     Such motions are fixed by convention, not by the state, and how the convention changes with the shape is
     not part of the adjoint.
-
-    `rounded`: derivatives along a rigid motion below this fraction of their summands are rounding.
     """
     work = system.unheld.T @ by_displacement
     size = abs(system.unheld).T @ np.abs(by_displacement)
     work, size = system.problem.comm.allreduce(np.stack([work, size]))
-    if np.any(np.abs(work) > rounded * size):
+    if np.any(np.abs(work) > MOTION_ROUNDING * size):
         raise ConvergenceError(
             "the adjoint needs an objective that is the same wherever nothing holds a body, but this one "
             "changes along a rigid motion that meets no resistance (`State.unheld`): add a support, or use "

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cell_types import CellType, cell_type_of, quadrature, shape_gradients
 from fenics_contact.mesh.faces import computed_rounding, corners_of
@@ -21,9 +22,6 @@ HEXAHEDRON_LATTICE = tensor_grid(3 * [[0.0, 0.5, 1.0]])
 """Vertices, edge and face midpoints and centre: points at which the Jacobian of a hexahedron is evaluated.
 
 The determinant is quadratic in each coordinate, so these 27 values determine it everywhere."""
-
-FLAT = 1e-14
-"""A Jacobian below this fraction of the bounding box's diagonal to the power of the dimension is rounding."""
 
 _BEST_CORNER = {3: np.sqrt(2.0), 2: 2.0 / np.sqrt(3.0)}
 """One over the corner determinant of unit edge vectors in a regular simplex, by dimension."""
@@ -134,7 +132,7 @@ def thickness(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     corners = points[cells]
     size = np.linalg.norm(corners.max(axis=1) - corners.min(axis=1), axis=1)
     smallest = jacobians(points, cells).min(axis=1) / np.maximum(size, 1e-100) ** points.shape[1]
-    return np.asarray(np.where(smallest <= FLAT, 0.0, smallest) * size)
+    return np.asarray(np.where(smallest <= LAST_PLACES, 0.0, smallest) * size)
 
 
 #: Largest distance of nodes from their shape, relative to the shortest edge of a facet around them.

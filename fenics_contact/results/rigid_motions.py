@@ -10,14 +10,12 @@ import scipy.sparse as sp
 
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.pairs import Surface
+from fenics_contact._scene.plan import MOTION_ROUNDING
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import RigidSurface
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.kernels import rigid_body_modes
-
-#: Parts of a motion below this fraction of the largest are rounding.
-MOTION_ROUNDING = 1e-9
 
 
 @displayed

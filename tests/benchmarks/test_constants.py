@@ -51,7 +51,7 @@ def test_constants_are_numbers_tuples_and_mappings_with_what_is_said_of_them() -
     assert known["_accuracy.state_errors:STEP"].value == (1e-4, 0.3)
     assert known["mesh.bisection:TARGET_NODES"].value == {3: 700, 2: 1000}
     assert known["qp.coarse:RANK_TOLERANCE"].meaning.startswith("Null vectors")
-    assert known["mesh.quality:FLAT"].meaning.startswith("A Jacobian below this")
+    assert known["mesh.quality:FARTHEST"].meaning.startswith("Largest distance of nodes"), "below"
     assert known["_optimize.scipy:_SLOPE"].meaning.startswith("of the wall around invalid designs"), "behind"
 
 

@@ -168,7 +168,7 @@ def test_what_passes_over_the_edges_of_a_matching_master_counts(
     ways = random_ways(here, "master")
     by = here.alone("weight")
     _, quotient, size = both_ways(here, by, ways)
-    monkeypatch.setattr(coupling_derivative, "moved_aside", lambda master, beside: master)
+    monkeypatch.setattr(coupling_derivative, "moved_aside", lambda master: master)
     _, exactly = mortar_pulled_back(here.slave, here.master, here.coupling, by)
     assert abs(np.sum(exactly.points * ways[1]) - quotient) > 1e-3 * size
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact._pairing.mortar.planes import (
     Planes,
     laid_flat,
@@ -378,13 +379,11 @@ def overlaps_of(
     pair_slave: np.ndarray,
     pair_master: np.ndarray,
     master: FacetedSurface,
-    nothing: float = 1e-14,
 ) -> Overlaps:
     """Clip pairs of facets.
 
     `pair_slave`: slave facet of each pair, ascending, shape (n,); `pair_master`: master facet of each pair,
-    shape (n,); `nothing`: area, relative to the smaller of two facets, below which a piece of their
-    intersection is rounding.
+    shape (n,).
     """
     subject, heights = laid_flat(master.points[master.facets[pair_master]], planes, pair_slave)
     window = planes.flat[pair_slave]
@@ -397,7 +396,7 @@ def overlaps_of(
     count = np.where(hidden(vertices, count, middle, pair_slave, planes.area), 0, count)
     pieces, pair, corner = simplices(vertices, count)
     smaller = np.minimum(np.abs(measure(subject)), measure(window))
-    real = np.abs(measure(pieces)) > nothing * smaller[pair]
+    real = np.abs(measure(pieces)) > LAST_PLACES * smaller[pair]
     used, pair = np.unique(pair[real], return_inverse=True)
     facets, facet = np.unique(pair_slave[used], return_inverse=True)
     return Overlaps(

@@ -206,8 +206,6 @@ def mortar_pulled_back(
     coupling: MortarCoupling,
     by: CouplingDerivatives,
     comm: MPI.Comm | None = None,
-    *,
-    beside: float = 1e-9,
 ) -> tuple[SurfaceDerivatives, SurfaceDerivatives]:
     """Vector-Jacobian product of a coupling with respect to both surfaces. Collective on ``comm``.
 
@@ -216,7 +214,7 @@ def mortar_pulled_back(
 
     While an edge of one surface passes over an edge of the other, the integrals change smoothly: what one
     pair of facets loses, the next one gains. For both to be counted, the derivative is that of the master
-    ``beside`` its place. Kinks are left where the rim of the master passes over an edge between slave facets,
+    moved aside a little. Kinks are left where the rim of the master passes over an edge between slave facets,
     whose dual functions differ on both sides, and jumps where one layer of the master hides another: there
     the derivative is that of one side.
 
@@ -231,7 +229,7 @@ def mortar_pulled_back(
     part = touched[comm.rank :: comm.size]
     with together(comm):
         if len(part):
-            _add_integrals(slave, moved_aside(master, beside), part, sums, into)
+            _add_integrals(slave, moved_aside(master), part, sums, into)
     by_slave, by_master = (side.summed(comm) for side in into)
     along = by.gap[:, None] * coupling.normal
     apart = slave.points[coupling.node] - coupling.weight @ master.points + coupling.relief

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact._base.sparse import scaled_rows
+from fenics_contact._base.sparse import LAST_PLACES, scaled_rows
 from fenics_contact._pairing.points import ContactPoints
 
 
@@ -166,7 +166,7 @@ class GeometricStiffness:
 
 
 def geometric_stiffness(
-    points: ContactPoints, differential: Differential, multiplier: np.ndarray, rounding: float = 1e-14
+    points: ContactPoints, differential: Differential, multiplier: np.ndarray
 ) -> GeometricStiffness:
     """Return the derivative of the normal forces Σ −λ_N δg by the coordinates, at fixed λ_N.
 
@@ -192,7 +192,7 @@ def geometric_stiffness(
     width, jump = points.normal.shape[1] - 1, points.jump[pressed]
     rows = [spread(differential.tangents[pressed, a], jump) for a in range(width)]
     rows += [spread(points.normal[pressed], differential.slopes[a][pressed]) for a in range(width)]
-    kept = np.abs(values) > rounding * np.abs(values).max(initial=0.0)
+    kept = np.abs(values) > LAST_PLACES * np.abs(values).max(initial=0.0)
     place, column = np.nonzero(kept)
     chosen = mixed[place, :, column]
     total = sum(scaled_rows(rows[r][place], chosen[:, r]) for r in range(2 * width))
