@@ -13,8 +13,8 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import boundary_faces, corners_of, vector_areas
 
-OPPOSED = -0.5
-"""Facets face each other if the product of their normals is below this: within 60 degrees of opposite."""
+FACING = 0.5
+"""Facets face each other if their normals are opposite within 60 degrees: smallest cosine of that angle."""
 _NEIGHBOURS = 8
 
 
@@ -83,7 +83,7 @@ class _Side:
             return mask
         chosen = np.flatnonzero(mask)
         away, nearest = cKDTree(self.centre[chosen]).query(self.centre)
-        alike = np.einsum("nd,nd->n", self.normal, self.normal[chosen[nearest]]) > -OPPOSED
+        alike = np.einsum("nd,nd->n", self.normal, self.normal[chosen[nearest]]) > FACING
         return np.asarray(mask | (alike & (away <= along + self.radius)))
 
     def over(self, other: _Side, distance: float) -> tuple[np.ndarray, np.ndarray]:
@@ -95,7 +95,7 @@ class _Side:
         normal = other.normal[nearest]
         across = np.abs(np.einsum("nkd,nkd->nk", away, normal))
         along = np.sqrt(np.maximum(np.einsum("nkd,nkd->nk", away, away) - across**2, 0.0))
-        opposed = np.einsum("nd,nkd->nk", self.normal, normal) < OPPOSED
+        opposed = np.einsum("nd,nkd->nk", self.normal, normal) < -FACING
         match = opposed & (across <= distance) & (along <= other.radius[nearest])
         theirs = np.zeros(len(other.centre), dtype=bool)
         theirs[nearest[match]] = True

@@ -16,9 +16,9 @@ from benchmarks.study import filled
 from fenics_contact.study.runner import Job, measure
 
 MATTERS, IDLE, ASIDE = (
-    "_pairing.mortar.cells:FACING",
-    "_pairing.mortar.cells:TWICE",
-    "_pairing.sliding.closest:ALIKE",
+    "mesh.near_surfaces:FACING",
+    "mesh.body_mesh:RESOLVED",
+    "mesh.quality:_BEST_CORNER",
 )
 
 
@@ -74,7 +74,7 @@ def test_values_are_halved_and_doubled_and_none_becomes_nothing(
 
 def test_what_matters_is_seen_to_matter_and_what_does_not_is_not() -> None:
     names = [MATTERS, IDLE, ASIDE]
-    arguments = {"room": "_pairing", "scenes": ["mortar blocks"], "names": names}
+    arguments = {"room": "mesh", "scenes": ["mortar blocks"], "names": names}
     found = measure(Job("some", "benchmarks.constants.measuring:run", arguments))
     assert sorted(found.get("constants", found)) == sorted(names)
     matters, idle, aside = (found["constants"][name] for name in names)

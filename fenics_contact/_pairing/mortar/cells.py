@@ -23,9 +23,7 @@ from fenics_contact._pairing.mortar.planes import (
 )
 from fenics_contact._pairing.mortar.sums import SumsBy
 from fenics_contact._surfaces.facets import FacetedSurface, facet_shape_values, shape_functions
-
-#: Facets face each other if their normals are opposite within 60 degrees: smallest cosine of that angle.
-FACING = 0.5
+from fenics_contact.mesh.near_surfaces import FACING
 
 
 def candidate_pairs(slave: Planes, master: Planes) -> tuple[np.ndarray, np.ndarray]:
