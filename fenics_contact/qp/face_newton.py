@@ -355,7 +355,7 @@ class _Run:
         stuck = (
             lost
             or state.since_best >= self.parameters.patience
-            or not now.worst_in_scales_with(best) < self.rescue.diverged
+            or not np.isfinite(now.worst_in_scales_with(best))
         )
         return self._rescued(state) if stuck else state
 

@@ -24,8 +24,6 @@ class FaceSystem:
         operator: F, owned to owned, collective.
         preconditioner: Approximation of F⁻¹, owned to owned, or None.
         patience: Iterations without progress after which an inner solver gives up.
-        divergence: It gives up, too, if the residual grows by more than this factor: the system is then
-            inconsistent, as a consistent one leaves a residual in the size of its first.
     """
 
     comm: MPI.Comm
@@ -34,7 +32,6 @@ class FaceSystem:
     coarse: CoarseSpace
     preconditioner: Operator | None = None
     patience: int = 60
-    divergence: float = 1e6
 
     def image(self, y: Vector, full: Vector) -> Vector:
         """Return A y, shape (n_face,), for y on the face and full = F Z y, owned."""

@@ -23,7 +23,6 @@ class Stop(Enum):
     NO_CURVATURE = "direction without curvature: the operator is singular on this face"
     BAD_PRECONDITIONER = "preconditioner is not positive"
     STAGNATION = "stagnation: rounding has eaten the residual"
-    DIVERGENCE = "divergence: the system is inconsistent or nearly so"
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +89,7 @@ def projected_cg(
     # Directions p and images P A p, and their curvatures pᵀA p.
     rows, curvatures = _Rows(len(gradient), len(gradient)), list[float]()
     size = system.weighted_norm(residual, weights)
-    first, best, since_best, iterations, stop = size, size, 0, 0, Stop.CONVERGED
+    best, since_best, iterations, stop = size, 0, 0, Stop.CONVERGED
     while not size <= tolerance:
         if iterations == max_iterations:
             stop = Stop.ITERATION_LIMIT
@@ -113,8 +112,8 @@ def projected_cg(
         residual = residual + length * image
         size = system.weighted_norm(residual, weights)
         best, since_best = (size, 0) if size < 0.9 * best else (best, since_best + 1)
-        if since_best > system.patience or not size <= system.divergence * first:
-            stop = Stop.STAGNATION if since_best > system.patience else Stop.DIVERGENCE
+        if since_best > system.patience:
+            stop = Stop.STAGNATION
             break
     return FaceStep(step, product, residual, iterations, size, stop)
 

@@ -173,7 +173,6 @@ class Rescue:
         max_products: Largest number of F-products of the whole solve.
         smalse: Parameters where there is no preconditioner.
         reduction: A rescue aims at a residual smaller by this factor.
-        diverged: A residual beyond recovery.
         springs: First stiffness of the springs in units of 1/diag F: soft for Newton, stiff for the centre.
         few: If a centre takes no more steps than this, the springs of the next are stiffer: constant springs
             move the centre by the same small fraction of its way to the solution each time.
@@ -190,7 +189,6 @@ class Rescue:
     max_products: int
     smalse: Smalse
     reduction: float = 0.1
-    diverged: float = 1e12
     springs: float = 10.0
     few: int = 2
     stiffer: float = 4.0
@@ -217,7 +215,7 @@ class Rescue:
         for number in range(self.max_steps):
             newton, line = path.steps.step(path.newton, number)
             iterate = path.point.leave(newton.iterate)
-            if not iterate.residuals.worst < self.diverged:
+            if not np.isfinite(iterate.residuals.worst):
                 iterate = start.iterate
                 break
             improved = self._improved(iterate.residuals, start.iterate.residuals, further)

@@ -116,7 +116,7 @@ def test_inconsistent_singular_system_stops_with_a_reason():
     system = FaceSystems(dual, dual.operator).build(face)
     gradient = np.random.default_rng(3).standard_normal(face.n_face)
     answer = projected_cg(system, gradient, np.ones(face.n_face), 1e-9, 300)
-    assert answer.stop in (Stop.NO_CURVATURE, Stop.STAGNATION, Stop.DIVERGENCE)
+    assert answer.stop in (Stop.NO_CURVATURE, Stop.STAGNATION)
 
 
 def test_iteration_limit_is_reported():
