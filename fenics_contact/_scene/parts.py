@@ -9,7 +9,6 @@ from typing import Self, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from fenics_contact._base.checks import checked
 from fenics_contact._scene.body import Body
@@ -18,13 +17,13 @@ from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface, Tie
 from fenics_contact._scene.supports import AnySupport, RigidSurface, Support
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
-from fenics_contact._surfaces.projection import project
+from fenics_contact._surfaces.projection import surfaces_match
 from fenics_contact._surfaces.true_surface import Geometry, true_surface
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.elastic import Material, can_expand
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.faces import coordinate_rounding, vector_areas
+from fenics_contact.mesh.faces import vector_areas
 
 
 @dataclass(frozen=True)
@@ -300,10 +299,6 @@ def _require_different(pairs: Sequence[ContactPair | Tie]) -> None:
                 )
 
 
-#: Nodes match where they lie over each other within this fraction of the shortest edge of their facets.
-MATCHING = 1e-3
-#: Number of nodes that are projected first, those nearest to the master: one that meets it decides.
-FIRST = 50
 #: Why every contact with an obstacle is by nodes.
 RIGID = "as the master is rigid"
 #: Reason of a choice that other meshes do not change.
@@ -371,47 +366,6 @@ def _choice(scene: SceneParts, pair: ContactPair | Tie) -> tuple[Discretisation,
 
 def _faceted(mesh: BodyMesh, surface: str) -> FacetedSurface:
     return faceted_surface(mesh.points, mesh.surfaces[surface])
-
-
-def surfaces_match(slave: FacetedSurface, master: FacetedSurface) -> bool:
-    """Return whether the facets of two surfaces are the same where the surfaces meet.
-
-    Their nodes lie over each other along the slave's normals within `MATCHING`, also across a gap, and no
-    slave node without such a partner meets the master. Then contact by nodes passes the patch test.
-    """
-    if slave.corners != master.corners:
-        return False
-    away, partner = cKDTree(master.points).query(slave.points)
-    apart = master.points[partner] - slave.points
-    apart -= np.einsum("nd,nd->n", apart, slave.normals)[:, None] * slave.normals
-    reach = MATCHING * _shortest_edges(master)[partner] + coordinate_rounding(master.points)
-    over = np.linalg.norm(apart, axis=1) <= reach
-    if not _same_facets(slave.facets[over[slave.facets].all(axis=1)], partner, master.facets):
-        return False
-    others = np.flatnonzero(~over)
-    others = others[np.argsort(away[others], kind="stable")]
-    parts = others[:FIRST], others[FIRST:]
-    return not any(len(part) and _meet(slave, part, master) for part in parts)
-
-
-def _same_facets(facets: np.ndarray, partner: np.ndarray, master: np.ndarray) -> bool:
-    """Return whether facets of a slave, at least one, are facets of the master between partners."""
-    mine = np.unique(np.sort(partner[facets], axis=1), axis=0)
-    known = np.unique(np.sort(master, axis=1), axis=0)
-    return len(mine) > 0 and len(np.unique(np.concatenate([known, mine]), axis=0)) == len(known)
-
-
-def _meet(slave: FacetedSurface, nodes: np.ndarray, master: FacetedSurface) -> bool:
-    return len(project(slave.points[nodes], slave.normals[nodes], master).point) > 0
-
-
-def _shortest_edges(surface: FacetedSurface) -> np.ndarray:
-    """Return the length of the shortest edge at each node, shape (n,), [length]."""
-    corners = surface.points[surface.facets]
-    shortest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).min(axis=1)
-    result = np.full(len(surface.points), np.inf)
-    np.minimum.at(result, surface.facets, shortest[:, None])
-    return result
 
 
 #: Directions are the same if the cosine of the angle between them differs from one by no more than this.

@@ -233,3 +233,49 @@ def join(parts: Sequence[Projection]) -> Projection:
     order = np.argsort(np.concatenate([part.point for part in parts]))
     joined = {name: np.concatenate([getattr(part, name) for part in parts])[order] for name in _EACH}
     return Projection(**joined, lost=np.unique(np.concatenate([part.lost for part in parts])))
+
+
+def surfaces_match(
+    slave: FacetedSurface, master: FacetedSurface, *, near: float = 1e-3, first: int = 50
+) -> bool:
+    """Return whether the facets of two surfaces are the same where the surfaces meet.
+
+    Their nodes lie over each other along the slave's normals, also across a gap, and no slave node without
+    such a partner meets the master. Then contact by nodes passes the patch test.
+
+    `near`: how far nodes may be apart, relative to the shortest edge of their facets; `first`: number of
+    nodes that are projected first, those nearest to the master: one that meets it decides.
+    """
+    if slave.corners != master.corners:
+        return False
+    away, partner = cKDTree(master.points).query(slave.points)
+    apart = master.points[partner] - slave.points
+    apart -= np.einsum("nd,nd->n", apart, slave.normals)[:, None] * slave.normals
+    reach = near * _shortest_edges(master)[partner] + coordinate_rounding(master.points)
+    over = np.linalg.norm(apart, axis=1) <= reach
+    if not _same_facets(slave.facets[over[slave.facets].all(axis=1)], partner, master.facets):
+        return False
+    others = np.flatnonzero(~over)
+    others = others[np.argsort(away[others], kind="stable")]
+    parts = others[:first], others[first:]
+    return not any(len(part) and _meet(slave, part, master) for part in parts)
+
+
+def _same_facets(facets: np.ndarray, partner: np.ndarray, master: np.ndarray) -> bool:
+    """Return whether facets of a slave, at least one, are facets of the master between partners."""
+    mine = np.unique(np.sort(partner[facets], axis=1), axis=0)
+    known = np.unique(np.sort(master, axis=1), axis=0)
+    return len(mine) > 0 and len(np.unique(np.concatenate([known, mine]), axis=0)) == len(known)
+
+
+def _meet(slave: FacetedSurface, nodes: np.ndarray, master: FacetedSurface) -> bool:
+    return len(project(slave.points[nodes], slave.normals[nodes], master).point) > 0
+
+
+def _shortest_edges(surface: FacetedSurface) -> np.ndarray:
+    """Return the length of the shortest edge at each node, shape (n,), [length]."""
+    corners = surface.points[surface.facets]
+    shortest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).min(axis=1)
+    result = np.full(len(surface.points), np.inf)
+    np.minimum.at(result, surface.facets, shortest[:, None])
+    return result
