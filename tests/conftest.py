@@ -18,6 +18,8 @@ from tests.waiting_ranks import LAUNCH as LAUNCH
 from tests.waiting_ranks import WaitingRanks, kill_session
 
 ROOT = Path(__file__).resolve().parents[1]
+#: Numbers of ranks that wait for scripts, once they were asked for.
+WAITING = (1, 2, 4)
 
 
 def read_environment(path: Path) -> dict[str, str]:
@@ -47,7 +49,7 @@ def pytest_collection_finish() -> None:
     """Exempt what the imports left behind from garbage collection, which makes it cheap after each test."""
     gc.collect()
     gc.freeze()
-    for ranks in (1, 2):
+    for ranks in WAITING:
         waiting_ranks(ranks)  # they fit tests that find the environment of now
 
 
@@ -106,7 +108,7 @@ def waiting_ranks(ranks: int) -> WaitingRanks:
 
 def pytest_unconfigure() -> None:
     """End the ranks that wait."""
-    for ranks in (1, 2):
+    for ranks in WAITING:
         waiting_ranks(ranks).end()
 
 
@@ -122,14 +124,14 @@ def run_on_ranks(
         ranks: Number of MPI ranks; 1 runs it without mpirun.
         *arguments: What the script finds in ``sys.argv[1:]``.
         timeout: Seconds after which all ranks are killed.
-        fresh: Whether it needs new processes; one or two ranks otherwise run several scripts of the session.
+        fresh: Whether it needs new processes; `WAITING` ranks otherwise run several scripts of the session.
 
     Raises:
         pytest.fail.Exception: It ended with an error or not in time; all its output is in the message.
     """
 
     def start() -> subprocess.CompletedProcess[str]:
-        if fresh or ranks > 2 or not waiting_ranks(ranks).fit():
+        if fresh or ranks not in WAITING or not waiting_ranks(ranks).fit():
             return launch(ranks, script, *arguments, timeout=timeout)
         return waiting_ranks(ranks)(script, [*map(str, arguments)], timeout)
 
