@@ -20,7 +20,7 @@ Results: State, LinearState, DeformedState, NewtonSteps, Status, contact_area
 
 Shape optimisation: ShapeProblem, SurfaceDesign, minimize
 
-Functions for other tools: SceneResponse, DesignResponse, served
+Functions for other tools: SceneResponse, DesignResponse
 
 Files: read_mesh, read_cad, read_scene_file, write_result, write_vtu, result_page
 
@@ -63,7 +63,6 @@ if TYPE_CHECKING:
     from fenics_contact._page.page import result_page as result_page
     from fenics_contact._responses import DesignResponse as DesignResponse
     from fenics_contact._responses import SceneResponse as SceneResponse
-    from fenics_contact._responses import served as served
     from fenics_contact._scene.automatic import AutomaticContact as AutomaticContact
     from fenics_contact._scene.body import Body as Body
     from fenics_contact._scene.fields import SampledField as SampledField

@@ -1,9 +1,7 @@
-"""Histories, responses and served calls in which something fails on the last rank alone, or differs there."""
+"""Histories and responses in which something fails on the last rank alone, or differs there."""
 
 from __future__ import annotations
 
-import os
-import signal
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,7 +19,6 @@ from fenics_contact import (
     SceneResponse,
     State,
     Traction,
-    served,
     solve_steps,
     write_vtu,
 )
@@ -161,68 +158,3 @@ def response_goes_on_after_a_failure(comm: MPI.Comm) -> float:
     except RuntimeError:
         return round(made()["force"], 6)
     raise AssertionError("nothing was raised")
-
-
-def serve(comm: MPI.Comm, function: Callable[..., Any], tool: Callable[[Any], Any]) -> Any:
-    """Let a tool on rank 0 call a function that all ranks serve."""
-    with served(function, comm) as call:
-        if call is not None:
-            return tool(call)
-    return None
-
-
-@case
-def served_function_is_interrupted_on_the_last_rank(comm: MPI.Comm) -> None:
-    serve(comm, fails_on_last(comm, int, KeyboardInterrupt), lambda call: call())
-
-
-@case
-def served_function_is_interrupted_on_the_first_rank(comm: MPI.Comm) -> None:
-    def function() -> int:
-        if comm.rank == 0:
-            os.kill(os.getpid(), signal.SIGINT)
-        return 1
-
-    serve(comm, function, lambda call: call())
-
-
-@case
-def served_function_exits(comm: MPI.Comm) -> None:
-    serve(comm, fails_on_last(comm, int, SystemExit), lambda call: call())
-
-
-@case
-def served_block_is_interrupted(comm: MPI.Comm) -> None:
-    def tool(call: Any) -> None:
-        call()
-        os.kill(os.getpid(), signal.SIGINT)
-
-    serve(comm, lambda: 1, tool)
-
-
-@case
-def served_block_of_the_last_rank_is_interrupted(comm: MPI.Comm) -> None:
-    with served(lambda: 1, comm) as call:
-        if is_last(comm):
-            os.kill(os.getpid(), signal.SIGINT)
-        if call is not None:
-            call()
-
-
-@case
-def served_tool_goes_on_after_an_interrupt(comm: MPI.Comm) -> Any:
-    calls = []
-
-    def function() -> int:
-        calls.append(1)
-        if len(calls) == 1 and is_last(comm):
-            raise KeyboardInterrupt
-        return len(calls)
-
-    def tool(call: Any) -> Any:
-        try:
-            call()
-        except KeyboardInterrupt:
-            return call()
-
-    return serve(comm, function, tool)

@@ -94,12 +94,6 @@ EXPECTED = {
     "response_is_not_built": ("UserCodeError", f"the function that builds the scene of a response {BUG}"),
     "parameters_of_a_response_differ": ("InvalidInputError", f"{SAME}scene.loads[0].value[2] (-2.0, -3.0)"),
     "response_goes_on_after_a_failure": ("nothing", "0.47"),
-    "served_function_is_interrupted_on_the_last_rank": ("KeyboardInterrupt", "a bug on one rank"),
-    "served_function_is_interrupted_on_the_first_rank": ("KeyboardInterrupt", ""),
-    "served_function_exits": ("SystemExit", "a bug on one rank"),
-    "served_block_is_interrupted": ("KeyboardInterrupt", ""),
-    "served_block_of_the_last_rank_is_interrupted": ("RemoteError KeyboardInterrupt", ""),
-    "served_tool_goes_on_after_an_interrupt": ("nothing", ""),
     "contact_objective_raises": ("UserCodeError", f"ContactForces.function {BUG}"),
     "contact_objective_is_nan": ("InvalidInputError", "must return finite numbers, got NaN or infinity"),
     "integrand_raises": ("UserCodeError", f"the integrand of 'squares' {BUG}"),
@@ -122,7 +116,6 @@ ON_THREE = (
     "bodies_are_in_another_order",
     "a_step_is_missing",
     "quantity_raises_before_others_gather",
-    "served_function_is_interrupted_on_the_first_rank",
     "callback_raises",
 )
 #: Seconds that a case may take, also where forms are compiled and cores are shared.
