@@ -55,6 +55,7 @@ if TYPE_CHECKING:
 
 
 FORMAT = "fenics_contact checkpoint"
+#: Of the format: a file of another one is rejected.
 VERSION = 2
 
 Arrays = dict[str, NDArray[Any]]

@@ -21,7 +21,7 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from fenics_contact._base.display import counted, force_units
+from fenics_contact._base.display import COLUMNS, counted, force_units
 from fenics_contact._base.progress import at_terminal, visible
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene_file.reading import SceneFile
@@ -41,10 +41,6 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from fenics_contact._scene_file.document import UnitNames
-
-
-#: Columns of output to a file or a pipe.
-WIDTH = 110
 
 
 class ExitCode(IntEnum):
@@ -97,7 +93,7 @@ class Console:
             return
         what = Text(given) if isinstance(given, str) else given
         drawn, text = at_terminal(sys.stdout), io.StringIO()
-        look: dict[str, Any] = {} if drawn else {"width": WIDTH, "no_color": True}
+        look: dict[str, Any] = {} if drawn else {"width": COLUMNS, "no_color": True}
         console = rich.console.Console(file=text, force_terminal=drawn, highlight=False, **look)
         console.print(_Visible(what), soft_wrap=isinstance(what, Text))
         lines = text.getvalue().split("\n")

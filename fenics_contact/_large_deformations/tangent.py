@@ -15,7 +15,6 @@ from fenics_contact._base.progress import PhaseTimer
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti.dual import DirichletPreconditioner, DualSystem
 from fenics_contact.feti.factor import (
-    FIXING_NODES,
     Factor,
     fixing_dofs,
     held_by,
@@ -226,7 +225,7 @@ def _well_spread(points: np.ndarray, spread: float = 4.0) -> np.ndarray:
     Their number is ``spread`` times the cube root of that of all nodes: held at its corners alone, a body
     under stress buckles around them.
     """
-    return fixing_dofs(points, max(FIXING_NODES, round(spread * len(points) ** (1.0 / 3.0))))
+    return fixing_dofs(points, round(spread * len(points) ** (1.0 / 3.0)))
 
 
 class _Updated:

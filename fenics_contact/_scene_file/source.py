@@ -26,6 +26,7 @@ Path: TypeAlias = tuple[str | int, ...]
 
 #: Largest length of a value in messages.
 LONGEST = 60
+#: Largest integer, in bits: of a thousand digits.
 _MOST_BITS = 3322
 _BARE_PART = re.compile(r"[A-Za-z0-9_-]+")
 

@@ -14,6 +14,7 @@ from fenics_contact.mesh.faces import coordinate_rounding
 
 #: A facet is tried in the second round if its bounding ball is as near as the nearest centroid times this.
 REACH = 1.1
+#: Largest number of Newton steps to a closest point; a few suffice where it exists.
 NEWTON_STEPS = 25
 #: Residual tolerance of Newton's method, relative to the facet and the gap.
 RESIDUAL = 1e-10

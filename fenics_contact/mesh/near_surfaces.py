@@ -16,6 +16,7 @@ from fenics_contact.mesh.faces import boundary_faces, corners_of, vector_areas
 FACING = 0.5
 """Facets face each other if their normals are opposite within 60 degrees: smallest cosine of that angle."""
 _NEIGHBOURS = 8
+"""Facets of the other body that are examined for each facet, nearest centres first."""
 
 
 def near_surfaces(

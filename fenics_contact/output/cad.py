@@ -26,15 +26,12 @@ from fenics_contact.mesh.faces import boundary_faces, vector_areas
 from fenics_contact.output.files import replacing
 from fenics_contact.output.surfaces import moved_body, moved_surfaces
 from fenics_contact.readers.gmsh_session import gmsh_model, silenced
-from fenics_contact.shapes.parametric import tensor_grid
+from fenics_contact.shapes.parametric import DEGREE, tensor_grid
 
 if TYPE_CHECKING:
     from fenics_contact.design.design import MovedSurface
     from fenics_contact.design.problem import ShapeProblem
     from fenics_contact.design.several import JointProblem
-
-
-DEGREE = 5
 
 
 class CadError(InvalidDesignError):

@@ -201,6 +201,7 @@ def _installed(name: str) -> str:
 
 #: Value of ``format`` in files of `write_result`.
 FORMAT = "fenics_contact result"
+#: It rises with every change that a reader must know.
 FORMAT_VERSION = 1
 UNITS = (
     "those of the input: a scene in N and mm has forces in N, stresses, moduli and pressures in N/mm², "

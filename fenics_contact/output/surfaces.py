@@ -13,16 +13,13 @@ from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.mesh.cell_types import FACET_TYPES
 from fenics_contact.mesh.faces import boundary_faces
 from fenics_contact.output.files import replacing, write_text
+from fenics_contact.shapes.combined import CLOSE
 from fenics_contact.shapes.parametric import tensor_grid
 
 if TYPE_CHECKING:
     from fenics_contact.design.problem import ShapeProblem
     from fenics_contact.design.several import JointProblem
     from fenics_contact.mesh.body_mesh import BodyMesh
-
-
-#: Largest distance of a node from its smooth surface, relative to the extent of the surface.
-OFF = 1e-9
 
 
 def moved_surfaces(problem: ShapeProblem | JointProblem, alpha: np.ndarray) -> tuple[MovedSurface, ...]:
@@ -34,7 +31,7 @@ def moved_surfaces(problem: ShapeProblem | JointProblem, alpha: np.ndarray) -> t
         surface = MovedSurface(design, problem.scene.bodies[design.body].mesh, part)
         at = points[design.body][design.lattice.nodes]
         off = float(np.abs(surface.after(surface.parameters) - at).max())
-        if off > OFF * float(np.ptp(at, axis=0).max()):
+        if off > CLOSE * float(np.ptp(at, axis=0).max()):
             raise InvalidInputError(
                 f"a surface in a file must be moved by one design, that on {design.body!r} is moved by "
                 f"{off:.3g} by another one, too: let the designs share no nodes, or give them narrower "

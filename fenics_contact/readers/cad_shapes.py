@@ -14,7 +14,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import corners_of, vector_areas
 from fenics_contact.readers.gmsh_session import physical_groups, running_gmsh
-from fenics_contact.shapes.combined import Joined, recognised
+from fenics_contact.shapes.combined import CLOSE, Joined, recognised
 from fenics_contact.shapes.parametric import SplinePatch, tensor_grid
 from fenics_contact.shapes.simple import SurfaceShape
 
@@ -22,8 +22,6 @@ from fenics_contact.shapes.simple import SurfaceShape
 FEWEST = 33
 #: Largest number of points along each parameter.
 MOST = 129
-#: Distance of the spline from the face, relative to its extent, at which it is close.
-CLOSE = 1e-9
 
 
 def shape_of_entity(

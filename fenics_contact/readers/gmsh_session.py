@@ -30,6 +30,7 @@ _TYPES = {
 }  # fmt: skip
 """gmsh's numbers of the supported cell types."""
 _INCOMPLETE = (16, 17)
+"""gmsh's numbers of quadratic cells without nodes on their faces or in their centre."""
 
 
 def tagged_mesh_of(gmsh: ModuleType, source: str) -> TaggedMesh:

@@ -74,6 +74,7 @@ def _check_nodes(lines: Sequence[str], path: Path) -> None:
 
 
 _CORNERS = {"triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8}
+"""Number of corners by meshio's name of a linear cell."""
 _SERENDIPITY_OR_LAGRANGE = {
     "triangle6": "triangle", "quad8": "quad", "quad9": "quad",
     "hexahedron20": "hexahedron", "hexahedron27": "hexahedron", "tetra10": "tetra",

@@ -333,6 +333,7 @@ class Parametric(Patch):
         return np.where(periodic, u, np.clip(u, low + step, high - step))
 
 
+#: Degree of the spline between sampled points: its curvature is smooth.
 DEGREE = 5
 #: Distance, relative to the range, from sides that degenerate to a point (poles) at which normals are
 #: evaluated.

@@ -32,6 +32,7 @@ from fenics_contact.pictures.canvas import (
 from fenics_contact.study.results import Errors, Run, measured_rate
 from fenics_contact.study.study import BALANCED, QuantityFacts
 
+#: Width of a figure in pixels.
 WIDTH = 1600
 #: Colours and symbols, by cell type and by contact discretisation other than the base's.
 LOOKS = {

@@ -55,6 +55,12 @@ def test_constants_are_numbers_tuples_and_mappings_with_what_is_said_of_them() -
     assert known["_optimize.scipy:_SLOPE"].meaning.startswith("of the wall around invalid designs"), "behind"
 
 
+def test_every_constant_that_answers_may_depend_on_is_explained() -> None:
+    measured = [each for each in constants() if each.room not in NOT_RUN]
+    assert len(measured) > 100
+    assert [each.key for each in measured if not each.meaning] == []
+
+
 @pytest.mark.parametrize(
     ("value", "halved", "doubled"),
     [
