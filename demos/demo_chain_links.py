@@ -204,13 +204,8 @@ with show_progress(comm), timer.phase("pictures"):
 #
 # ![The same for the largest pressure](../docs/pictures/chain_links_less_pressure.png)
 
-mesh = links.first.mesh
-moved = problem.points_of(result.x)["link 1"]
-nets = tuple(design.control_points(mesh.points, alpha) for alpha in (start, result.x))
 with show_progress(comm), timer.phase("pictures"):
-    pictures.plot_control_net(
-        links.first.crown, (mesh.points, moved), nets, output / "control_net.png", comm=comm
-    )
+    pictures.plot_control_net(problem, result.x, output / "control_net.png")
     pictures.plot_convergence(result.history, output / "convergence.png", label=label, comm=comm)
     steps = before.state.solution.history
     products, natural = zip(*((step.products, step.residuals.natural) for step in steps), strict=True)

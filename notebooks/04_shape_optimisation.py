@@ -113,9 +113,7 @@ print(f"{problem.size} design variables; the B_k sum up to one: {np.ptp(design.b
 
 
 def show(alpha, title):
-    before, after = problem.points_of(np.zeros(15))["link 1"], problem.points_of(alpha)["link 1"]
-    nets = [design.control_points(before, a) for a in (np.zeros(15), alpha)]
-    return pictures.plot_control_net(links.first.crown, (before, after), tuple(nets), title=title, width=1000)
+    return pictures.plot_control_net(problem, alpha, title=title, width=1000)
 
 
 show(0.3 * np.eye(15)[4], "One control point")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import typer
@@ -153,14 +152,10 @@ def _draw(console: Console, file: SceneFile, task: ShapeTask, result: Result, ga
     for name, point in (("before", problem.first), ("after", problem.at(result.x))):
         assert point is not None
         draw_state(console, file, {name: point.state}, gallery, f"_{name}")
-    moved, at = problem.points_of(result.x), 0
-    for number, design in enumerate(problem.designs):
-        points, part = file.scene.bodies[design.body].mesh.points, result.x[at : at + design.size]
-        nets: Any = tuple(design.control_points(points, alpha) for alpha in (np.zeros(design.size), part))
+    for number in range(len(problem.designs)):
         path = file.folder / ("control_net.png" if number == 0 else f"control_net_{number + 1}.png")
-        plot_control_net(design.lattice, (points, moved[design.body]), nets, path, comm=console.comm)
+        plot_control_net(problem, result.x, path, design=number)
         gallery.drawn.append(path)
-        at += design.size
     path = file.folder / "convergence.png"
     plot_convergence(result.history, path, title=file.title, comm=console.comm)
     gallery.drawn.append(path)

@@ -20,7 +20,6 @@ from scipy.spatial import cKDTree
 from fenics_contact._optimize.result import Record
 from fenics_contact.design.memory import DesignPoint
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery.links import DesignSurface
 from fenics_contact.pictures.canvas import (
     BLUE,
     GREY,
@@ -67,6 +66,9 @@ from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
     from mpi4py import MPI
+
+    from fenics_contact.design.problem import ShapeProblem
+    from fenics_contact.design.several import JointProblem
 
 
 #: Apparent size of the largest movement relative to the picture.
@@ -289,45 +291,50 @@ _Pair = tuple[np.ndarray, np.ndarray]
 
 
 def plot_control_net(
-    design: DesignSurface,
-    points: tuple[np.ndarray, np.ndarray],
-    net: tuple[np.ndarray, np.ndarray],
+    problem: ShapeProblem | JointProblem,
+    alpha: np.ndarray,
     path: str | Path | None = None,
     *,
+    design: int = 0,
     clim: tuple[float, float] | None = None,
     magnify: float | None = None,
     title: str = "",
     units: Units | None = None,
     width: int = 1600,
-    comm: MPI.Comm | None = None,
 ) -> Picture:
-    """Draw the design surface with its control net before and after, coloured by its outward movement.
+    """Draw a designed surface with its control net, coloured by its outward movement. Collective.
 
     The curve of a plane body is drawn with its control points, before in grey and after in colours.
 
     Args:
-        design: Nodes of the surface, their order and outward normals.
-        points: The body's nodes before and after, (n_nodes, 3 | 2) each, [length].
-        net: Control points before and after, (n_s, n_t, 3) or in the plane (n_s, 2) each, [length].
+        problem: The problem with the design.
+        alpha: Design variables of all its designs, shape (size,), [length]: ``result.x``.
+        design: Number of the design among ``problem.designs``.
         clim: Range of the colours, [length]; symmetric about zero unless given.
         magnify: Factor of the movement in the picture of after; chosen and stated unless given.
 
     Raises:
-        InvalidInputError: If arrays are inconsistent or not finite, or an option cannot be used.
+        InvalidInputError: If there is no such design, alpha does not fit, or an option cannot be used.
     """
-    target, dim = png_path(path), design.directions.shape[1]
-    points = _checked_net("points", points, ("n_nodes",), dim)
-    net = _checked_net("net", net, ("n_s", "n_t")[: dim - 1], dim)
+    target = png_path(path)
+    if design not in range(len(problem.designs)):
+        raise InvalidInputError(
+            f"there are {len(problem.designs)} designs, got number {design}: count from 0"
+        )
     if magnify is not None and not np.isfinite(magnify):
         raise InvalidInputError(
             f"magnify must be finite, got {magnify}: give the factor of the movement, such as 5"
         )
-    start, movement = points[0][design.nodes], (points[1] - points[0])[design.nodes]
-    outward = np.einsum("nd,nd->n", movement, design.directions)
+    one, ends = problem.designs[design], np.cumsum([each.size for each in problem.designs])
+    reference, moved = problem.scene.bodies[one.body].mesh.points, problem.points_of(alpha)[one.body]
+    part, surface, dim = np.split(np.asarray(alpha), ends[:-1])[design], one.lattice, reference.shape[1]
+    net = one.control_points(reference, 0.0 * part), one.control_points(reference, part)
+    start, movement = reference[surface.nodes], (moved - reference)[surface.nodes]
+    outward = np.einsum("nd,nd->n", movement, surface.directions)
     largest = float(np.abs(outward).max()) or 1.0
     shown, named = (-largest, largest) if clim is None else checked_range(clim), units or Units()
     factor = _chosen_factor(start, movement) if magnify is None else float(magnify)
-    shape = (*design.counts, dim)
+    shape = (*surface.counts, dim)
     surfaces = start.reshape(shape), (start + factor * movement).reshape(shape)
     nets = net[0], net[0] + factor * (net[1] - net[0])
     low, high = (written(float(value), 3) for value in (outward.min(), outward.max()))
@@ -347,25 +354,7 @@ def plot_control_net(
             key = ScalarMappable(Normalize(*shown), SIGNED_MAP)
             add_colour_bar(figure, panels, key, f"outward movement ({named.length})")
 
-    return draw_picture(comm, target, draw)
-
-
-def _checked_net(name: str, given: _Pair, counts: tuple[str, ...], dim: int) -> _Pair:
-    before, after = (np.asarray(values, dtype=float) for values in given)
-    for number, array in enumerate((before, after)):
-        if array.ndim != len(counts) + 1 or array.shape[-1] != dim:
-            raise InvalidInputError(
-                f"{name}[{number}] must have shape ({', '.join(counts)}, {dim}), got {array.shape}: pass "
-                "coordinates"
-            )
-        if not np.all(np.isfinite(array)):
-            raise InvalidInputError(f"{name}[{number}] must be finite, got NaN or infinity: check the design")
-    if before.shape != after.shape:
-        raise InvalidInputError(
-            f"before and after must have the same shapes, got {name} {before.shape} and {after.shape}: take "
-            "both from the same design"
-        )
-    return before, after
+    return draw_picture(problem.comm, target, draw)
 
 
 def _chosen_factor(start: np.ndarray, movement: np.ndarray) -> float:
