@@ -14,7 +14,6 @@ import scipy.sparse as sp
 from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import ROUNDING, scaled_columns, scaled_rows
 from fenics_contact._large_deformations.loading import Loading
-from fenics_contact._pairing.sliding_contact import sliding_contact
 from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidPlane
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.scene import Scene
@@ -432,7 +431,9 @@ class MovingContact(Contact):
 
     def __init__(self, scene: Scene, decomposition: Decomposition) -> None:
         """Prepare the surfaces of all pairs. Collective."""
-        self._sliding = sliding_contact(scene, decomposition.fixed, decomposition.comm)
+        from fenics_contact._pairing.sliding.contact import SlidingContact  # only for bodies that move far
+
+        self._sliding = SlidingContact.of(scene, decomposition.fixed, decomposition.comm)
         self._places = scene.points
         surfaces = [
             side for pair in scene.contacts for side in (pair.slave, pair.master) if isinstance(side, Surface)

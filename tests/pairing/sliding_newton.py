@@ -11,9 +11,9 @@ import scipy.sparse as sp
 import scipy.sparse.linalg
 
 from fenics_contact import Scene, _dolfinx
+from fenics_contact._pairing.sliding.contact import SlidingContact
 from fenics_contact._pairing.sliding.points import SlidingPoints
 from fenics_contact._pairing.sliding.stiffness import spread
-from fenics_contact._pairing.sliding_contact import sliding_contact
 from tests.linear.monolithic import _forms
 
 #: Prescribed motion of the upper block's upper side in each load step: down, then along the arch.
@@ -55,7 +55,7 @@ class Dragged:
         self.fixed = np.zeros(scene.points.shape, dtype=bool)
         self.fixed[self.driven] = True
         self.fixed[first + np.unique(scene.bodies["low"].mesh.surfaces["z0"])] = True
-        self.matrix, self.contact = stiffness(scene), sliding_contact(scene, self.fixed)
+        self.matrix, self.contact = stiffness(scene), SlidingContact.of(scene, self.fixed)
         self.u = np.zeros(scene.points.shape)
         self.points = self.contact.at(scene.points)
         self.force = np.zeros(self.points.points.count)

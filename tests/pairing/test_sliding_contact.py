@@ -12,9 +12,9 @@ from fenics_contact import Body, ContactPair, MovingObstacle, RigidCylinder, Rig
 from fenics_contact._pairing.points import movable
 from fenics_contact._pairing.search import find_contact_points
 from fenics_contact._pairing.sliding.closest import ClosestPoints
+from fenics_contact._pairing.sliding.contact import SlidingContact
 from fenics_contact._pairing.sliding.patches import SmoothPatches
 from fenics_contact._pairing.sliding.points import SlidingPoints
-from fenics_contact._pairing.sliding_contact import sliding_contact
 from fenics_contact._surfaces.facets import faceted_surface
 from fenics_contact._surfaces.projection import Projection
 from fenics_contact.errors import InvalidInputError
@@ -199,7 +199,7 @@ def test_nodes_leave_the_rim_and_come_back() -> None:
 def test_nodes_on_a_plane_of_symmetry_do_not_slip_across_it(kind: str) -> None:
     scene = half_on_arch(kind)
     fixed = np.concatenate([scene.fixed(name) for name in scene.body_names])
-    contact = sliding_contact(scene, fixed)
+    contact = SlidingContact.of(scene, fixed)
     x = scene.points * [1.0, 1.1, 1.0]
     x[: scene.bodies["high"].mesh.n_nodes, 1] += 0.07
     now = contact.at(x).points

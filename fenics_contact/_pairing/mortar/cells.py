@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact._pairing.mortar.planes import (
     Planes,
+    SumsBy,
     laid_flat,
     local_coordinates,
     local_coordinates_pulled_back,
@@ -21,7 +22,6 @@ from fenics_contact._pairing.mortar.planes import (
     measure_pulled_back,
     rule,
 )
-from fenics_contact._pairing.mortar.sums import SumsBy
 from fenics_contact._surfaces.facets import FacetedSurface, facet_shape_values, shape_functions
 from fenics_contact.mesh.near_surfaces import FACING
 

@@ -31,8 +31,7 @@ from scipy import sparse
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import scaled_rows
 from fenics_contact._pairing.mortar.cells import Cells, candidate_pairs, cells_of, overlaps_of
-from fenics_contact._pairing.mortar.planes import check_convex, planes_of
-from fenics_contact._pairing.mortar.sums import SumsBy
+from fenics_contact._pairing.mortar.planes import SumsBy, check_convex, planes_of
 from fenics_contact._surfaces.facets import FacetedSurface, heights
 from fenics_contact._surfaces.projection import interpolated_normal
 from fenics_contact.errors import InvalidInputError, together

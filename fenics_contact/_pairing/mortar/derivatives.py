@@ -27,8 +27,7 @@ from fenics_contact._pairing.mortar.coupling import (
     inverted_pulled_back,
     relief_of_cells,
 )
-from fenics_contact._pairing.mortar.planes import Planes, planes_of, planes_pulled_back
-from fenics_contact._pairing.mortar.sums import SumsBy
+from fenics_contact._pairing.mortar.planes import Planes, SumsBy, planes_of, planes_pulled_back
 from fenics_contact._surfaces.facets import FacetedSurface, heights
 from fenics_contact._surfaces.projection import interpolated_normal
 from fenics_contact.errors import together

@@ -1,12 +1,13 @@
-"""Auxiliary planes: each facet's centre and mean normal, onto which facing facets are projected."""
+"""Auxiliary planes onto which facing facets are projected, by centre and mean normal; sums by group."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 
 import numpy as np
+from scipy import sparse
 
-from fenics_contact._pairing.mortar.sums import SumsBy
 from fenics_contact._surfaces.facets import FacetedSurface, corner_products, shape_functions
 from fenics_contact.errors.kinds import FoldedFacetsError
 from fenics_contact.mesh.cell_types import CELL_TYPES, FACET_TYPES, quadrature
@@ -219,3 +220,24 @@ def check_convex(planes: Planes, chosen: np.ndarray, convex: float = -1e-10) -> 
             f"re-entrant corner, among them facet {chosen[bad[0]]}: improve the mesh there or take that side "
             "for the master"
         )
+
+
+class SumsBy:
+    """Sums of arrays over the entries with the same number.
+
+    Args:
+        number: Group of each entry, shape (n,).
+        groups: Number of groups; by default up to the largest that occurs.
+    """
+
+    def __init__(self, number: np.ndarray, groups: int | None = None) -> None:
+        self.groups, count = groups or int(number.max(initial=-1)) + 1, len(number)
+        # By columns, of which each has one entry: there is nothing to sort.
+        entries = np.ones(count), number, np.arange(count + 1)
+        self._matrix = sparse.csc_matrix(entries, shape=(self.groups, count))
+
+    def __call__(self, values: np.ndarray) -> np.ndarray:
+        """Return the sums of values, shape (n, ...), shape (groups, ...)."""
+        shape = values.shape[1:]
+        summed = self._matrix @ values.reshape(len(values), math.prod(shape))
+        return np.asarray(summed.reshape(len(summed), *shape), dtype=np.float64)
