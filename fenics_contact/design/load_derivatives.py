@@ -15,8 +15,8 @@ from fenics_contact._fem.loads import LinearTraction, spread_traction
 from fenics_contact._scene.fields import OfPosition, gradients_of
 from fenics_contact._scene.loads import Load, SurfaceLoad, ThermalStrain, TotalForce
 from fenics_contact._surfaces.facets import GaussPoint, gauss_points, surface_moments
-from fenics_contact.design.contact_derivatives import integral_pulled_back
 from fenics_contact.design.forms import ShapeForms, sum_over_subdomains
+from fenics_contact.design.surface_derivatives import integral_pulled_back
 from fenics_contact.errors import together
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.subdomain import Subdomain

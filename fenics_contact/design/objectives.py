@@ -18,12 +18,12 @@ from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import FacetedSurface
-from fenics_contact.design.contact_derivatives import areas_pulled_back
 from fenics_contact.design.forms import Density, ShapeForms
 from fenics_contact.design.load_derivatives import strain_work_by_shape, work_by_shape
 from fenics_contact.design.motion import BodyIntegral, require_body
 from fenics_contact.design.objective import Partials, Weighable, require_linear
 from fenics_contact.design.sensitivity import by_true_areas
+from fenics_contact.design.surface_derivatives import areas_pulled_back
 from fenics_contact.errors import InvalidDesignError, InvalidInputError, together
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.feti.averages import nodal_mean_at, nodal_mean_transposed

@@ -41,7 +41,7 @@ DESIGN_MUTATIONS = (
     ),
     Mutation(
         "slopes of true surfaces stay when their nodes move",
-        "design/contact_derivatives.py",
+        "design/surface_derivatives.py",
         "by_edges = -scaled[..., None] * c[:, :, None]",
         "by_edges = -0.0 * scaled[..., None] * c[:, :, None]",
         (

@@ -13,14 +13,14 @@ from fenics_contact.design import (
     contact_derivatives as contact_derivative,
 )
 from fenics_contact.design import (
-    contact_derivatives as projection_derivative,
-)
-from fenics_contact.design import (
     load_derivatives as work_derivative,
 )
 from fenics_contact.design import (
     problem,
     sensitivity,
+)
+from fenics_contact.design import (
+    surface_derivatives as projection_derivative,
 )
 from fenics_contact.design.adjoint import LinearisedFace
 from tests.shape.quotients import Patch
@@ -93,7 +93,8 @@ def without_slopes(patch: Patch) -> None:
     def none(*arguments: Any) -> Any:
         return tuple(np.zeros_like(part) for part in whole(*arguments))
 
-    patch.setattr(projection_derivative, "slopes_pulled_back", none)
+    for module in (projection_derivative, contact_derivative):
+        patch.setattr(module, "slopes_pulled_back", none)
 
 
 TERMS: dict[str, Callable[[Patch], None]] = {

@@ -19,8 +19,8 @@ from fenics_contact._surfaces.facets import (
 )
 from fenics_contact._surfaces.projection import Projection, project
 from fenics_contact._surfaces.true_surface import by_shape, height_over, reconstructed
-from fenics_contact.design import contact_derivatives as projection_derivative
-from fenics_contact.design.contact_derivatives import (
+from fenics_contact.design import surface_derivatives as projection_derivative
+from fenics_contact.design.surface_derivatives import (
     PointDerivatives,
     frames_pulled_back,
     normals_pulled_back,

@@ -10,8 +10,8 @@ import pytest
 from fenics_contact import BodyMesh
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
 from fenics_contact._surfaces.true_surface import true_surface
-from fenics_contact.design.contact_derivatives import areas_pulled_back, normals_pulled_back
 from fenics_contact.design.motion import volume_by_points
+from fenics_contact.design.surface_derivatives import areas_pulled_back, normals_pulled_back
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import quadratic
 
