@@ -133,7 +133,7 @@ for name, state in list(states.items())[1:]:
 
 # ## Pictures
 #
-# All tractions over the contact, beside what theory says.
+# All tractions over the contact, compared with theory.
 
 order = np.argsort(place)
 order = order[np.abs(place[order]) < 1.2 * half_width]

@@ -239,7 +239,7 @@ with timer.phase("files"):
 # A lower total potential is not yet a better shape: where the seat gives way, link 2 sinks in and its dead
 # force gains force × way, whatever the shape. How far it may travel unloaded until it touches is that
 # retreat; the rest of the drop is the better shape's. It is negative for the published objective: the seat is
-# 0.25 mm deeper, as much as the bounds allow, and a little softer. The drop is printed beside the published
+# 0.25 mm deeper, as much as the bounds allow, and a little softer. The drop is printed with the published
 # one, which belongs to other dimensions, load and bounds. For less pressure the crown becomes a groove that
 # fits link 2 more closely. The file holds the scene, the history, the best design and its state; what is
 # added here is under `more`.

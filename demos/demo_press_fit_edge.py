@@ -7,9 +7,9 @@
 # by a few micrometres. How far is found here, such that the largest pressure is least and the fit keeps
 # almost all of its force, hence of the torque that friction transmits.
 #
-# The radius is large beside the walls, so that shaft and hub are strips, long across the plane, one on the
-# other. They overlap by $\delta$ [mm]. The axis of the shaft and the rim of the hub, $h_s$ and $h_h$ [mm]
-# away from the seat, stay where they are. Far from the edge the pressure is
+# The radius is large compared with the walls, so that shaft and hub are strips, long across the plane, one
+# on the other. They overlap by $\delta$ [mm]. The axis of the shaft and the rim of the hub, $h_s$ and $h_h$
+# [mm] away from the seat, stay where they are. Far from the edge the pressure is
 #
 # $$ p = \frac{E}{1 - \nu^2}\,\frac{\delta}{h_s + h_h} . $$
 #

@@ -3,8 +3,8 @@
 # ![Von Mises stress](../docs/pictures/punch_2d_stress.png)
 #
 # A round punch of radius $R$ [mm] is pressed on a block by the force $F$ [N/mm], both long across the plane.
-# While the contact is small beside both bodies, Hertz knows its half width $a$ [mm], the pressure $p$ and its
-# peak $p_0$ [MPa] without friction:
+# While the contact is small compared with both bodies, Hertz knows its half width $a$ [mm], the pressure $p$
+# and its peak $p_0$ [MPa] without friction:
 #
 # $$ a = \sqrt{\frac{4 F R}{\pi E^*}}, \qquad p(x) = p_0 \sqrt{1 - x^2/a^2}, \qquad
 #    p_0 = \sqrt{\frac{F E^*}{\pi R}}, \qquad

@@ -116,7 +116,7 @@ pictures.plot_curves(
     comm=comm,
 )
 
-# The distribution of the largest pressure among the samples that hold, beside Hertz's for their loads.
+# The distribution of the largest pressure among the samples that hold, compared with Hertz's.
 
 stiffness = young_modulus / (1 - poisson_ratio**2)
 hertz = np.sqrt(load * stiffness / (np.pi * radius))

@@ -48,7 +48,7 @@ GROUPS: dict[str, tuple[str, str]] = {
     ),
     "touching": (
         "Contact that is nowhere, everywhere, or only just",
-        "Gaps of any size do no harm unless all displacements are rounding beside them. A body that rolls "
+        "Gaps of any size do no harm unless all displacements are rounding to them. A body that rolls "
         "by far more than it deforms is the hardest of these: give it a support that keeps it from "
         "rolling, or shape and mesh that touch at more than one row of nodes.",
     ),
