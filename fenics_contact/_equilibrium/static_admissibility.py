@@ -16,6 +16,7 @@ from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.plan import MOTION_ROUNDING, held_components, point_loads, resisted_motions
 from fenics_contact.errors import ConvergenceError, InfeasibleError, together
+from fenics_contact.errors.ranks import made_once
 from fenics_contact.feti.factor import fixing_nodes
 from fenics_contact.feti.subdomain import common_kernel
 from fenics_contact.feti.torn import TornSystem
@@ -355,12 +356,7 @@ def unresisted_motions(torn: TornSystem) -> tuple[UnheldMotion, ...]:
     Contact counts wherever its surfaces face each other, also across a gap, and in both directions. Surfaces
     with friction and obstacles that move may meet anywhere later: they count against all motions.
     """
-    comm = torn.numbering.comm
-    found: tuple[UnheldMotion, ...] = ()
-    with together(comm):
-        if comm.rank == 0:
-            found = _unresisted(torn)
-    return tuple(comm.bcast(found))
+    return made_once(torn.numbering.comm, lambda: _unresisted(torn))
 
 
 def require_resisted(motions: tuple[UnheldMotion, ...], torn: TornSystem, prescribed: np.ndarray) -> None:

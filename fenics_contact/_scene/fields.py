@@ -16,8 +16,9 @@ from ufl.core.expr import Expr
 
 from fenics_contact._base.checks import checked, require_file
 from fenics_contact._base.display import displayed
-from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
+from fenics_contact.errors.ranks import made_once
 from fenics_contact.readers.meshio import read_with_meshio
 
 if TYPE_CHECKING:
@@ -278,13 +279,7 @@ def read_field(
     Note:
         Collective on ``comm`` if given.
     """
-    if comm is None:
-        return SampledField(*_read(Path(path), field), reach)
-    read = None
-    with together(comm):
-        read = _read(Path(path), field) if comm.rank == 0 else None
-    points, values = comm.bcast(read)
-    return SampledField(points, values, reach)
+    return SampledField(*made_once(comm, lambda: _read(Path(path), field)), reach)
 
 
 def _read(path: Path, field: str | Sequence[str] | None) -> tuple[np.ndarray, np.ndarray]:

@@ -55,6 +55,7 @@ from fenics_contact.design.problem import ShapeProblem
 from fenics_contact.design.several import LoadPath
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.errors.kinds import scene_file_code
+from fenics_contact.errors.ranks import made_once
 from fenics_contact.materials.elastic import Material
 from fenics_contact.results.state import State
 
@@ -526,11 +527,8 @@ def _source(scene: str | Path | Mapping[str, Any], comm: MPI.Comm) -> Source:
             f"a scene must be the path of a TOML file or a dictionary, got {type(scene).__name__}: give one "
             "of them"
         )
-    path, text = Path(scene), ""
-    with together(comm):
-        if comm.rank == 0:
-            text = _text_of(path)
-    return parse(comm.bcast(text), path.name, path.parent)
+    path = Path(scene)
+    return parse(made_once(comm, lambda: _text_of(path)), path.name, path.parent)
 
 
 def _text_of(path: Path) -> str:

@@ -271,6 +271,19 @@ def together(comm: MPI.Comm, where: str = "") -> Iterator[None]:
     agree(comm, error, where)
 
 
+def made_once(comm: MPI.Comm | None, make: Callable[[], Found]) -> Found:
+    """Return what a function makes on rank 0, on all ranks; without a communicator what it makes here.
+
+    Collective on ``comm`` if given; ``make`` must not use it.
+    """
+    if comm is None:
+        return make()
+    made: Found | None = None
+    with together(comm):
+        made = make() if comm.rank == 0 else None
+    return cast(Found, comm.bcast(made))
+
+
 @contextmanager
 def collective(comm: MPI.Comm, where: str, *, closed: bool = False, users: bool = False) -> Iterator[None]:
     """Run a block that makes collective calls; an error of one rank becomes an error of all.

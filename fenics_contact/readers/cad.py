@@ -14,7 +14,8 @@ import numpy as np
 
 from fenics_contact._base.checks import check_numbers, checked, require_file, unit_vector
 from fenics_contact._base.display import displayed
-from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.ranks import made_once
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.readers.bodies import Label
 from fenics_contact.readers.cad_shapes import shape_seen
@@ -307,12 +308,7 @@ def read_cad(
         tetrahedra of at most 2 mm. Faces 4 and 7 are the surface "foot"; all on cylinders of radius 5 mm the
         surface "hole", whose shape is a `Cylinder`.
     """
-    if comm is None:
-        return _read(Path(path), size, order, bodies, surfaces)
-    made = None
-    with together(comm):
-        made = _read(Path(path), size, order, bodies, surfaces) if comm.rank == 0 else None
-    return comm.bcast(made, root=0)
+    return made_once(comm, lambda: _read(Path(path), size, order, bodies, surfaces))
 
 
 def _read(

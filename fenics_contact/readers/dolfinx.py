@@ -18,6 +18,7 @@ from fenics_contact._base.checks import require_file
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import start
 from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors.ranks import made_once
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES, OF_THE_FILE
 from fenics_contact.mesh.plane import flattened, turned_right_handed
@@ -343,13 +344,9 @@ def read_xdmf(
     """
     names = (mesh, cell_tags, facet_tags)
     facets = Path(path if facet_file is None else facet_file)
-    if comm is None:
-        return bodies_of(_read(Path(path), facets, names), bodies, surfaces)
-    read = None
-    start(comm)  # dolfinx starts PETSc, on one rank it would wait for the others
-    with together(comm):
-        read = _read(Path(path), facets, names) if comm.rank == 0 else None
-    return bodies_of(comm.bcast(read, root=0), bodies, surfaces)
+    if comm is not None:
+        start(comm)  # dolfinx starts PETSc, on one rank it would wait for the others
+    return bodies_of(made_once(comm, lambda: _read(Path(path), facets, names)), bodies, surfaces)
 
 
 def from_dolfinx(

@@ -15,7 +15,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact._base.checks import require_file
-from fenics_contact.errors import FenicsContactError, InvalidInputError, together
+from fenics_contact.errors import FenicsContactError, InvalidInputError
+from fenics_contact.errors.ranks import made_once
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import boundary_faces
 from fenics_contact.readers.bodies import TaggedMesh, bodies_of
@@ -71,12 +72,7 @@ def read_msh(
     Note:
         Collective on ``comm`` if given.
     """
-    if comm is None:
-        return bodies_of(_read(Path(path)), bodies, surfaces)
-    read = None
-    with together(comm):
-        read = _read(Path(path)) if comm.rank == 0 else None
-    return bodies_of(comm.bcast(read, root=0), bodies, surfaces)
+    return bodies_of(made_once(comm, lambda: _read(Path(path))), bodies, surfaces)
 
 
 def from_gmsh_model(

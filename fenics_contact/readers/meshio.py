@@ -22,7 +22,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from fenics_contact._base.checks import require_file
-from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.ranks import made_once
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import cell_type_of
 from fenics_contact.mesh.plane import flattened, turned_right_handed
@@ -438,12 +439,7 @@ def read_mesh(
     if other is not None:
         return other(path, bodies, surfaces, comm=comm)
     how = partial(_tagged, labels=labels, corners_only=corners_only, everything=bodies is None)
-    if comm is None:
-        return bodies_of(_read(path, how, file_format), bodies, surfaces)
-    read = None
-    with together(comm):
-        read = _read(path, how, file_format) if comm.rank == 0 else None
-    return bodies_of(comm.bcast(read, root=0), bodies, surfaces)
+    return bodies_of(made_once(comm, lambda: _read(path, how, file_format)), bodies, surfaces)
 
 
 def from_meshio(
