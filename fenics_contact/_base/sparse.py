@@ -189,6 +189,18 @@ def _with_values(matrix: sp.csr_matrix, values: np.ndarray) -> sp.csr_matrix:
     return result
 
 
+def sent(comm: MPI.Comm, receiver: np.ndarray, *columns: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return the rows of columns that all ranks send to this one, in their order. Collective on ``comm``.
+
+    `receiver`: rank that receives each row, shape (n,); `columns`: shape (n,) each.
+    """
+    order = np.argsort(receiver, kind="stable")
+    cuts = np.searchsorted(receiver[order], np.arange(1, comm.size))
+    outgoing = zip(*(np.split(column[order], cuts) for column in columns), strict=True)
+    incoming = comm.alltoall(list(outgoing))
+    return tuple(np.concatenate([part[i] for part in incoming]) for i in range(len(columns)))
+
+
 Vector = npt.NDArray[np.float64]
 
 #: Number of rows per rank that takes part in the factorisation.
@@ -257,13 +269,8 @@ class SharedFactor:
         """Return the scaled rows that this rank is to hold, summed over all ranks."""
         entries = share.tocoo()
         holder = np.searchsorted(self._bounds, entries.row, side="right") - 1
-        order = np.argsort(holder, kind="stable")
-        cuts = np.searchsorted(holder[order], np.arange(1, self._comm.size))
         values = entries.data * self._scale[entries.row] * self._scale[entries.col]
-        columns = (entries.row, entries.col, values)
-        outgoing = zip(*(np.split(column[order], cuts) for column in columns), strict=True)
-        incoming = self._comm.alltoall(list(outgoing))
-        row, column, value = (np.concatenate([part[i] for part in incoming]) for i in range(3))
+        row, column, value = sent(self._comm, holder, entries.row, entries.col, values)
         first = self._bounds[min(self._comm.rank, self.holders - 1)]
         height = self._bounds[self._comm.rank + 1] - first if self._comm.rank < self.holders else 0
         return sp.csr_matrix((value, (row - first, column)), shape=(height, self.size))

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._base.libraries import MPI, PETSc, start
-from fenics_contact._base.sparse import LAST_PLACES, dispose_with, expected_seconds, warn_of_threads
+from fenics_contact._base.sparse import LAST_PLACES, dispose_with, expected_seconds, sent, warn_of_threads
 from fenics_contact._fem.forms import FormLibrary, cell_stiffness
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.scene import Scene
@@ -543,12 +543,7 @@ class DualNumbering:
         """
         shares = local.tocoo()
         rank = self._owner[self.local_rows][shares.row]
-        order = np.argsort(rank, kind="stable")
-        cuts = np.searchsorted(rank[order], np.arange(1, self.comm.size))
-        columns = (self.local_rows[shares.row], shares.col, shares.data)
-        outgoing = zip(*(np.split(column[order], cuts) for column in columns), strict=True)
-        incoming = self.comm.alltoall(list(outgoing))
-        row, column, value = (np.concatenate([part[i] for part in incoming]) for i in range(3))
+        row, column, value = sent(self.comm, rank, self.local_rows[shares.row], shares.col, shares.data)
         shape = (len(self.owned), local.shape[1])
         return sp.csr_matrix((value, (np.searchsorted(self.owned, row), column)), shape=shape)
 
