@@ -43,9 +43,9 @@ def test_what_cannot_be_studied_is_refused(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["accuracy", "hertz", "--tolerances", "2"], "a number between 0 and 1, or \"balanced\", got '2'"),
-        (["accuracy", "hertz", "--discretisations", "dual"], "needs one of ['node', 'mortar'], got 'dual'"),
-        (["accuracy", "hertz", "--tolerances", "tight"], "got 'tight'"),
+        (["accuracy", "hertz", "--tolerances", "2"], 'a number between 0 and 1, or "balanced", got 2.0'),
+        (["accuracy", "hertz", "--discretisations", "dual"], "must be one of ['node', 'mortar'], got 'dual'"),
+        (["accuracy", "hertz", "--tolerances", "tight"], "between 0 and 1, or \"balanced\", got 'tight'"),
         (["accuracy", "hertz", "--limit", "soon"], "Invalid value for '--limit'"),
         (["accuracy", "hertz", "--ranks", "0"], "Invalid value for '--ranks'"),
         (["accuracy"], "Missing argument 'SCENE'"),
