@@ -1,4 +1,4 @@
-"""The certificate is an upper bound of what a solver left, in every scene, and not much more than that."""
+"""Certificates of errors, whole and in parts."""
 
 from __future__ import annotations
 
@@ -6,12 +6,35 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.linalg
+import scipy.sparse as sp
 from mpi4py import MPI
 
-from fenics_contact import Coulomb, FixedPoint, Scene, Status, Tresca, solve_scene
-from fenics_contact._accuracy.certificate import certify, direct_error
+from fenics_contact import (
+    Body,
+    ContactPair,
+    Coulomb,
+    FixedPoint,
+    RigidPlane,
+    Scene,
+    Status,
+    Support,
+    Surface,
+    Traction,
+    Tresca,
+    box_partition,
+    solve_scene,
+)
+from fenics_contact._accuracy import certificate
+from fenics_contact._accuracy.certificate import Certificate, certify, direct_error
+from fenics_contact._accuracy.discretisation import discretisation_error
+from fenics_contact._accuracy.state_errors import friction_error, solver_errors, state_errors
 from fenics_contact.feti.direct import DirectSystem
-from fenics_contact.qp import DualSolver, FaceNewton, Smalse
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import PlaneStrain
+from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, Smalse
+from fenics_contact.results.deformed_state import AnyState
+from fenics_contact.results.dual_solve import solve_dual
 from tests.accuracy.algebraic import CASES, Measured, clamped, energy_norm, measured, solved
 from tests.contact import gallery
 
@@ -133,3 +156,215 @@ def test_the_error_of_a_factorisation_is_that_of_its_residual() -> None:
     off[free] = 1e-3 * np.abs(solution.displacement).max() * np.sin(np.arange(len(free)))
     wrong = replace(solution, displacement=solution.displacement + off)
     assert direct_error(system, wrong) == pytest.approx(energy_norm(state, off), rel=1e-9)
+
+
+# States in which one part of the certificate decides: without it the bound would be below the error.
+
+#: Friction can resist twice the push.
+BOUND, PUSH = 0.1, 0.05
+
+
+def lying(push: float, cells: tuple[int, int], friction: Tresca | None = None) -> AnyState:
+    """A block that lies on a floor, in one piece: nothing but contact holds it."""
+    mesh = rectangle((0.0, 0.0), (3.0, 1.0), cells)
+    scene = Scene(
+        {"block": Body(mesh, PlaneStrain(100.0, 0.3))},
+        loads=[Traction("block", "y1", (push, -1.0))],
+        contacts=[ContactPair(Surface("block", "y0"), RigidPlane((0.0, 0.0), (0.0, 1.0)), friction)],
+    )
+    whole = {"block": np.zeros(mesh.n_cells, dtype=int)}
+    return solve_scene(scene, MPI.COMM_SELF, partitions=whole, solver=FaceNewton(tolerance=1e-11))
+
+
+def made(state: AnyState, multiplier: np.ndarray, way: np.ndarray) -> DualSolution:
+    """Return the state of a multiplier with the block moved rigidly besides by a vector."""
+    problem = state.dual.problem
+    product = problem.operator(multiplier)
+    mesh = state.torn.decomposition.meshes[0]
+    alpha = state.dual_solution.alpha + np.linalg.lstsq(
+        state.dual.kernel.toarray(), np.tile(way, len(mesh.nodes)), rcond=None
+    )[0]  # fmt: skip
+    residual = product - problem.rhs - problem.coarse.transpose(alpha)
+    return replace(
+        state.dual_solution, multiplier=multiplier, product=product, alpha=alpha, residual=residual
+    )
+
+
+def error_of(state: AnyState, solution: DualSolution) -> float:
+    found = state.dual.displacement(solution.multiplier, solution.alpha)
+    return energy_norm(state, found - state.torn_displacement)
+
+
+def without(part: str, patch: pytest.MonkeyPatch, state: AnyState, solution: DualSolution) -> Certificate:
+    with patch.context() as context:
+        context.setattr(certificate, part, lambda *_: 0.0)
+        return certify(state.dual, solution)
+
+
+@pytest.mark.parametrize("cells", [(3, 1), (5, 3), (7, 2)])
+def test_forces_across_a_gap_do_work(cells: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The block hovers over the floor, on forces that balance its load."""
+    state = lying(0.0, cells)
+    problem = state.dual.problem
+    layout = problem.layout
+    hovering = made(state, problem.coarse.particular(), np.array([0.0, 1.0]))
+    assert hovering.multiplier[layout.normal].min() > 0.0
+    found = certify(state.dual, hovering)
+    np.testing.assert_allclose(found.known.multiplier, hovering.multiplier, atol=1e-12)
+    assert not found.known.statuses.closed.any()
+    error = error_of(state, hovering)
+    assert error > 0.05 * energy_norm(state, state.torn_displacement)
+    assert error <= found.bound
+    assert without("_pressed", monkeypatch, state, hovering).bound < 0.1 * error
+    np.testing.assert_allclose(
+        found.gap, hovering.multiplier[layout.normal] @ hovering.residual[layout.normal], rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize("cells", [(3, 1), (5, 3), (7, 2)])
+def test_friction_that_falls_short_of_its_bound_does_less_work(
+    cells: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The block slides, though only a part of its nodes resists as much as it could."""
+    state = lying(PUSH, cells, Tresca(BOUND))
+    layout = state.dual.problem.layout
+    bound = state.dual_solution.slip_bound
+    multiplier = state.dual_solution.multiplier.copy()
+    order = np.argsort(np.abs(state.contact_places[:, 0] - 1.5))
+    resisting = np.zeros(len(bound))
+    left = 3.0 * PUSH
+    for disc in order:  # from the middle outwards
+        resisting[disc] = min(bound[disc], left)
+        left -= resisting[disc]
+    sign = np.sign(multiplier[layout.tangential].sum())
+    multiplier[layout.tangential[:, 0]] = sign * resisting
+    sliding = made(state, multiplier, np.array([1.0, 0.0]))
+    for _ in range(3):  # what is moved into the cone once stays there
+        sliding = made(state, certify(state.dual, sliding).known.multiplier, np.array([1.0, 0.0]))
+    found, error = certify(state.dual, sliding), error_of(state, sliding)
+    assert found.moved < 0.1 * error
+    assert error > 1e-3 * energy_norm(state, state.torn_displacement)
+    assert error <= found.bound
+    assert without("_rubbed", monkeypatch, state, sliding).bound < 0.9 * error
+
+
+@pytest.mark.parametrize(
+    ("scene", "solver"),
+    [
+        (gallery.two_blocks(Coulomb(2.5)), FaceNewton(tolerance=1e-3)),
+        (gallery.pressed_block(Coulomb(1.0), push=0.1), FixedPoint(FaceNewton(tolerance=1e-2))),
+    ],
+    ids=["one loop", "two loops"],
+)
+def test_the_estimate_by_the_law_of_friction_is_needed(scene: Scene, solver: FaceNewton | FixedPoint) -> None:
+    """What separates a state from Coulomb's law may be more than the bound at its own slip bounds."""
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=gallery.partitions(scene), solver=solver)
+    found = measured(state)
+    assert found.error <= found.bound
+    assert found.bound < found.whole <= found.bound + found.friction
+    errors = state.estimate_errors()
+    assert "(at most, at the slip bounds of the state)" in str(errors)
+    assert errors.algebraic + errors.friction == pytest.approx(found.bound + found.friction, rel=0.02)
+
+
+def worst(state: AnyState, sewn: bool) -> np.ndarray:
+    """Return the error of the multiplier for which a bound of the other displacement alone is least enough.
+
+    Every row is closed, so that all is linear: δλ moves by u = −K⁺Bᵀδλ, w closes its rows, a sews them. The
+    result has the largest ‖u + a‖ for a given ‖w‖, or the largest ‖u‖ for a given ½‖w‖ + ‖a − ½w‖, nearly.
+    """
+    system, problem = state.dual, state.dual.problem
+    size = len(state.dual_solution.multiplier)
+    balanced = scipy.linalg.orth(np.column_stack([problem.coarse.project(unit) for unit in np.eye(size)]))
+    closing = system.preconditioner.lifting(sp.identity(size, format="csr"))
+    found = []
+    for change in balanced.T:
+        residual = problem.coarse.project(problem.operator(change))
+        sewing, way = system.sewn(residual), closing.jump(residual)
+        moved = -system.inverse(system.force(change))
+        found.append([moved, *map(system.inverse.extend, (sewing, way))])
+    u, a, w = np.array(found).transpose(1, 2, 0)
+    K = sp.block_diag([subdomain.stiffness for subdomain in state.torn.subdomains])
+    energy = [part.T @ (K @ part) for part in (u, u + a, w, a - 0.5 * w)]
+    above, below = (energy[1], energy[2]) if sewn else (energy[0], 0.25 * energy[2] + energy[3])
+    _, vectors = scipy.linalg.eigh(above, below + 1e-9 * np.trace(below) * np.eye(len(below)))
+    return np.asarray(balanced @ vectors[:, -1])
+
+
+@pytest.mark.parametrize("sewn", [True, False])
+def test_the_bound_is_that_of_both_displacements(sewn: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sewing may lead away from the solution or to it: one displacement may be farther than the other."""
+    mesh = rectangle((0.0, 0.0), (3.0, 1.0), (4, 2))
+    scene = Scene(
+        {"block": Body(mesh, PlaneStrain(100.0, 0.3))},
+        [Support("block", "y1", (0.0, -0.05))],
+        contacts=[ContactPair(Surface("block", "y0"), RigidPlane((0.0, 0.0), (0.0, 1.0)))],
+    )
+    cut = {"block": box_partition(mesh, (2, 1))}
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=1e-12))
+    system, exact = state.dual, state.dual_solution
+    change = worst(state, sewn)
+    change *= 0.01 * np.linalg.norm(exact.multiplier) / np.linalg.norm(change)
+    product = system.problem.operator(exact.multiplier + change)
+    alpha = system.problem.coarse.coefficients(product - system.problem.rhs)
+    residual = product - system.problem.rhs - system.problem.coarse.transpose(alpha)
+    found = replace(
+        exact, multiplier=exact.multiplier + change, product=product, alpha=alpha, residual=residual
+    )
+    torn = system.displacement(found.multiplier, alpha)
+    errors = [energy_norm(state, u - state.torn_displacement) for u in (torn, system.conforming(torn))]
+    assert max(errors) <= certify(system, found).bound
+    both = certificate._distances
+    other = 0 if sewn else 1
+    with monkeypatch.context() as patch:
+        patch.setattr(certificate, "_distances", lambda *given: (both(*given)[other],))
+        assert certify(system, found).bound < 0.95 * errors[1 - other]
+
+
+def test_given_slip_bounds_are_never_raised() -> None:
+    """Where no friction within them balances the load nothing is known of the error, and that is said."""
+    state = lying(PUSH, (5, 3), Tresca(BOUND))
+    weak = replace(state.dual_solution, slip_bound=0.4 * state.dual_solution.slip_bound)
+    found = certify(state.dual, weak)
+    np.testing.assert_array_equal(found.known.slip_bound, weak.slip_bound)
+    assert found.known.unbalanced > 1e-3
+    assert found.bound == np.inf
+    estimate = discretisation_error(state.torn, state.conforming_displacement)
+    told = str(state_errors(solver_errors(state.dual, weak), estimate, state.energies.norm))
+    assert "algebraic       unknown" in told
+    assert "(at most)" in str(state.estimate_errors())
+
+
+def test_slip_bounds_that_follow_normal_forces_are_raised_where_these_are_too_weak() -> None:
+    """Friction holds the block by a thousandth, the solver knows normal forces to a tenth."""
+    resisted = np.hypot(1.0, 0.3) / 2.0
+    scene = gallery.block_on_plane(Coulomb(1.001 * resisted))
+    state = solve_scene(
+        scene, MPI.COMM_SELF, partitions=gallery.partitions(scene), solver=FixedPoint(Smalse(tolerance=0.1))
+    )
+    system, solution = state.dual, state.dual_solution
+    found = certify(system, solution)
+    push = np.hypot(2.0, 0.6)
+    assert solution.slip_bound.sum() < push <= found.known.slip_bound.sum() * (1 + 1e-9)
+    assert np.all(found.known.slip_bound >= solution.slip_bound)
+    exact = solve_dual(system, FaceNewton(tolerance=1e-10))
+    error = energy_norm(state, state.torn_displacement - system.displacement(exact.multiplier, exact.alpha))
+    friction = friction_error(system, solution, found)
+    assert error <= found.bound + friction
+    not_raised = replace(found, known=replace(found.known, slip_bound=solution.slip_bound))
+    assert friction > 1.05 * friction_error(system, solution, not_raised) > 0.0
+
+
+@pytest.mark.parametrize("reserve", [1e-2, 1e-6, 1e-10])
+@pytest.mark.parametrize("tolerance", [1e-1, 1e-2])
+def test_friction_that_just_resists_is_balanced_within_given_bounds(reserve: float, tolerance: float) -> None:
+    """The set of admissible multipliers is narrow; SMALSE's own are out of balance."""
+    scene = gallery.block_on_plane(Tresca((1.0 + reserve) * np.hypot(1.0, 0.3)))
+    state = solve_scene(
+        scene, MPI.COMM_SELF, partitions=gallery.partitions(scene), solver=Smalse(tolerance=tolerance)
+    )
+    found = measured(state)
+    known = found.certificate.known
+    np.testing.assert_array_equal(known.slip_bound, state.dual_solution.slip_bound)
+    assert known.unbalanced < 1e-9
+    assert 0.0 < max(found.error, found.shown) <= found.bound < 10.0 * found.error

@@ -1,17 +1,32 @@
-"""The recovered gradient: exact where it should be, on any mesh; zero estimates where nothing is wrong."""
+"""Recovered stresses and smooth solutions, of all materials."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
+import ufl
+from ufl.domain import extract_unique_domain
 
-from fenics_contact import Body, BodyMesh, Scene
+from fenics_contact import Body, BodyMesh, Scene, Support, ThermalStrain
+from fenics_contact._accuracy.discretisation import discretisation_error, moduli
+from fenics_contact._fem.forms import FormLibrary
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, half_disc, hemisphere, rectangle, rectangle_lattice
-from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.materials import (
+    Elasticity,
+    IsotropicElasticity,
+    Material,
+    OrthotropicElasticity,
+    OrthotropicPlaneStress,
+    PlaneStrain,
+    PlaneStress,
+    material_axes,
+    strain,
+)
 from fenics_contact.mesh import quadratic as quadratic_cells
 from tests.accuracy.fields import (
     cubic,
@@ -25,8 +40,11 @@ from tests.accuracy.fields import (
     torn_field,
     torn_up,
 )
+from tests.accuracy.smooth import PLANE as SMOOTH_PLANE
+from tests.accuracy.smooth import Found, mesh_of, solved
 from tests.models.bodies import bent, box, in_halves
-from tests.models.elements import CELLS
+from tests.models.elements import CELLS, PLANE
+from tests.models.materials import LAME, EnergyByEntries, Foundation, FromEnergy, FromStress
 
 MESHES: dict[str, Callable[[], BodyMesh]] = {
     **{f"bent {cell}": lambda cell=cell: bent(box(cell, (4, 3, 3))) for cell in CELLS},
@@ -169,3 +187,177 @@ def test_parts_add_up_and_do_not_depend_on_the_partition() -> None:
         assert share > 0.1 * whole.total
         assert share == pytest.approx(np.linalg.norm(whole.by_cell(name)), rel=1e-12)
         np.testing.assert_allclose(cut.by_cell(name), whole.by_cell(name), rtol=1e-8)
+
+
+# The energy of the difference for every kind of material, user-written ones included.
+AXES = material_axes((1, 2, 0.5), (0, 1, 1))
+WOOD = OrthotropicElasticity((11.0, 0.9, 0.5), (0.37, 0.42, 0.6), (0.7, 0.6, 0.05), AXES)
+
+
+@dataclass(frozen=True)
+class Graded(Elasticity):
+    """Stiffer along x: E = E_0 (1 + slope x)."""
+
+    slope: float
+
+    @property
+    def parameters(self) -> tuple[float]:
+        return (self.slope,)
+
+    def stress(self, u: Any, parameters: Any) -> Any:
+        x = ufl.SpatialCoordinate(extract_unique_domain(u))
+        return (1 + parameters[0] * x[0]) * (ufl.div(u) * ufl.Identity(len(u)) + 2 * strain(u))
+
+
+def space_moduli(material: Material) -> np.ndarray:
+    scene = scene_of(box("hexahedron", (1, 1, 1)), material)
+    return moduli(torn_up(scene).decomposition.forms, material, "hexahedron")
+
+
+def test_moduli_of_isotropic_materials_are_those_of_hooke() -> None:
+    lame, shear = IsotropicElasticity(1000.0, 0.3).parameters
+    one = np.eye(3)
+    expected = (
+        lame * np.einsum("ki,lj->kilj", one, one)
+        + shear * (np.einsum("kl,ij->kilj", one, one) + np.einsum("kj,il->kilj", one, one))
+    ).reshape(9, 9)
+    np.testing.assert_allclose(space_moduli(IsotropicElasticity(1000.0, 0.3)), expected, atol=1e-9)
+
+
+def test_springs_that_resist_displacements_add_nothing_to_the_moduli() -> None:
+    without, held = (space_moduli(Foundation(springs)) for springs in (1.0, 50.0))
+    np.testing.assert_allclose(held, without, atol=1e-12)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_models_written_by_users_have_the_estimate_of_those_of_the_package(cell: str) -> None:
+    mesh = bent(box(cell))
+    field, _ = quadratic(mesh.dim)
+    expected = estimated(
+        scene_of(mesh, (PlaneStrain if cell in PLANE else IsotropicElasticity)(210.0, 0.3)), field
+    )
+    assert expected.total > 0.01
+    for model in (FromEnergy, FromStress, *([EnergyByEntries] if cell in PLANE else [])):
+        found = estimated(scene_of(mesh, model(*LAME)), field)  # type: ignore[abstract]
+        np.testing.assert_allclose(found.by_cell("body"), expected.by_cell("body"), rtol=1e-9)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_moduli_that_vary_are_integrated_where_they_are(cell: str) -> None:
+    mesh = bent(box(cell))
+    field, _ = quadratic(mesh.dim)
+    known = estimated(scene_of(mesh, FromStress(1.0, 1.0)), field)
+    even = estimated(scene_of(mesh, Graded(0.0)), field)
+    np.testing.assert_allclose(even.by_cell("body"), known.by_cell("body"), rtol=1e-9)
+    graded = estimated(scene_of(mesh, Graded(2.0)), field)
+    middle = mesh.points[mesh.cells].mean(axis=1)[:, 0]
+    ratio = graded.by_cell("body") / known.by_cell("body")
+    np.testing.assert_allclose(ratio, np.sqrt(1 + 2.0 * middle), rtol=0.05)
+
+
+def test_what_varies_and_what_does_not_share_a_body() -> None:
+    mesh = in_halves(box("quadrilateral"))
+    field, _ = quadratic(2)
+    alone = estimated(scene_of(mesh, {"left": FromStress(1.0, 1.0), "right": FromStress(2.0, 1.0)}), field)
+    mixed = estimated(scene_of(mesh, {"left": Graded(0.0), "right": FromStress(2.0, 1.0)}), field, 3)
+    np.testing.assert_allclose(mixed.by_cell("body"), alone.by_cell("body"), rtol=1e-9)
+
+
+PAIRS: dict[str, list[Any]] = {
+    "hexahedron": [WOOD, OrthotropicElasticity((22.0, 1.8, 1.0), (0.37, 0.42, 0.6), (1.4, 1.2, 0.1), AXES)],
+    "triangle": [PlaneStress(5.0, 0.3), PlaneStress(10.0, 0.3)],
+    "quadrilateral": [OrthotropicPlaneStress((e, e / 2), 0.3, e / 3) for e in (11.0, 22.0)],
+}
+
+
+@pytest.mark.parametrize("cell", PAIRS)
+def test_twice_the_moduli_are_twice_the_energy(cell: str) -> None:
+    mesh = bent(box(cell))
+    field, _ = quadratic(mesh.dim)
+    one, two = (estimated(scene_of(mesh, kind), field).total for kind in PAIRS[cell])
+    assert one > 1e-3
+    assert two == pytest.approx(np.sqrt(2) * one, rel=1e-9)
+
+
+def test_thermal_strain_is_no_error() -> None:
+    mesh = box("hexahedron")
+    rollers = [("x0", (0.0, None, None)), ("y0", (None, 0.0, None)), ("z0", (None, None, 0.0))]
+    material = IsotropicElasticity(100.0, 0.3, thermal_expansion=1e-3)
+    bare = scene_of(mesh, material)
+    scene = Scene(bare.bodies, [Support("body", *roller) for roller in rollers], [ThermalStrain("body", 7.0)])
+    free = estimated(scene, lambda points: 7e-3 * points)
+    bending = estimated(scene, lambda points: 7e-3 * points**2)
+    assert free.total < 1e-12 * bending.total
+
+
+def test_nothing_is_compiled_for_moduli_that_are_constant() -> None:
+    field, _ = quadratic(3)
+    for material, more in ((WOOD, 0), (Graded(1.0), 1)):
+        torn = torn_up(scene_of(box("hexahedron"), material))
+        forms: FormLibrary = torn.decomposition.forms
+        before = forms.compiled
+        for _ in range(2):
+            assert discretisation_error(torn, torn_field(torn, field)).total > 0
+        assert len(forms.compiled) == len(before) + more
+
+
+# Effectivity and rate of the estimate where the solution is smooth and known, for every type of cell.
+def estimate(found: Found) -> float:
+    return discretisation_error(found.state.torn, found.state.conforming_displacement).total
+
+
+def series(
+    cell: str, sizes: Sequence[int], shake: float, poisson: float = 0.3
+) -> tuple[np.ndarray, np.ndarray]:
+    """Print and return true errors and estimates."""
+    states = [solved(mesh_of(cell, n, shake), poisson) for n in sizes]
+    error, estimates = np.array([(found.total, estimate(found)) for found in states]).T
+    rates = [np.nan, *(np.log(error[:-1] / error[1:]) / np.log(np.divide(sizes[1:], sizes[:-1])))]
+    print(f"\n{cell}, inner nodes moved by {shake} cells, ν = {poisson}: cells | error, rate | effectivity")
+    for n, e, rate, found in zip(sizes, error, rates, estimates, strict=True):
+        print(f"  {n:3d} | {e:.5f} {rate:5.2f} | {found / e:.3f}")
+    return error, estimates
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_the_estimate_is_close_to_the_error_and_falls_at_its_rate(cell: str) -> None:
+    sizes = (8, 16) if cell in SMOOTH_PLANE else (4, 8)
+    error, found = series(cell, sizes, 0.15)
+    assert error[0] > 0.1, "too good to show anything"
+    np.testing.assert_allclose(found / error, 1.0, atol=0.06)
+    assert np.log2(found[0] / found[1]) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("cell", ["triangle6", "quadrilateral9", "tetrahedron10", "hexahedron27"])
+def test_the_estimate_of_quadratic_cells_falls_at_the_rate_of_their_error(cell: str) -> None:
+    sizes = (4, 6) if cell in ("tetrahedron10", "hexahedron27") else (6, 12)
+    error, found = series(cell, sizes, 0.15)
+    np.testing.assert_allclose(found / error, 1.0, atol=0.15)
+    assert np.log(error[0] / error[1]) / np.log(sizes[1] / sizes[0]) == pytest.approx(2.0, abs=0.15)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_cells_have_their_own_share_of_the_error(cell: str) -> None:
+    found = solved(mesh_of(cell, 12 if cell in SMOOTH_PLANE else 6, 0.15), parts=2)
+    shares = discretisation_error(found.state.torn, found.state.conforming_displacement).by_cell("body")
+    assert found.error.max() > 3 * found.error.min(), "cells are too alike to tell them apart"
+    assert np.quantile(np.abs(np.log(shares / found.error)), 0.9) < np.log(1.35)
+    assert np.corrcoef(shares, found.error)[0, 1] > 0.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("shake", [0.0, 0.15])
+@pytest.mark.parametrize("cell", CELLS)
+def test_the_estimate_becomes_exact(cell: str, shake: float) -> None:
+    sizes = (4, 8, 16, 32) if cell in SMOOTH_PLANE else (3, 6, 12, 18)
+    error, found = series(cell, sizes, shake)
+    np.testing.assert_allclose(found / error, 1.0, atol=0.08)
+    assert found[-1] / error[-1] == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cell", CELLS)
+def test_the_estimate_stays_close_near_incompressibility(cell: str) -> None:
+    sizes = (4, 8, 16, 32) if cell in SMOOTH_PLANE else (3, 6, 12)
+    error, found = series(cell, sizes, 0.0, 0.499)
+    np.testing.assert_allclose(found / error, 1.0, atol=0.08)

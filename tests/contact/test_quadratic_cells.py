@@ -1,7 +1,9 @@
-"""Quadratic displacements: of higher order than linear ones, with pressures and pictures that are right."""
+"""Quadratic cells in contact."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import meshio
@@ -15,6 +17,7 @@ from fenics_contact import (
     BodyMesh,
     ContactPair,
     Coulomb,
+    Pressure,
     RigidPlane,
     Scene,
     State,
@@ -23,15 +26,20 @@ from fenics_contact import (
     Tie,
     TotalForce,
     Traction,
+    contact_area,
     solve_scene,
     write_vtu,
 )
+from fenics_contact._surfaces.facets import filled_at_corners
+from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, half_cylinder, rectangle
-from fenics_contact.materials import IsotropicElasticity, PlaneStrain
+from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
 from fenics_contact.mesh import bisection_partition, quadratic
 from fenics_contact.pictures import plot_contact_pressure, plot_decomposition, plot_stress
 from fenics_contact.qp import FaceNewton
+from fenics_contact.study.scenes.hertz import POISSON, RADIUS, round_block
+from fenics_contact.study.scenes.hertz import YOUNG as QUADRATIC_TETRAHEDRA_YOUNG
 from tests.contact import hertz
 
 SOLVER = FaceNewton(tolerance=1e-10)
@@ -168,3 +176,236 @@ def test_mean_gaps_between_quadratic_facets_are_refused() -> None:
     guides = [Support("low", "y0", (0.0, 0.0)), Support("high", "x0", (0.0, None))]
     state = solved(Scene(bodies, guides, load, [ContactPair(*surfaces)]), parts=1)
     assert state.contact.normal_force.sum() == pytest.approx(1.0)
+
+
+# Two bodies of quadratic cells by nodes: the master moves as its quadratic facets do.
+
+#: Young's modulus, and Lamé's constants for Poisson's ratio 0.3.
+YOUNG, SHEAR, LAME = 100.0, 100.0 / 2.6, 100.0 * 0.3 / 1.3 / 0.4
+PAIRED_CELLS = ["tetrahedron", "hexahedron", "triangle", "quadrilateral"]
+
+
+def stacked(cell: str, below: int, above: int) -> dict[str, BodyMesh]:
+    """Two unit cubes or squares of so many quadratic cells a side, one on the other."""
+    build, plane = (rectangle, 1) if cell in {"triangle", "quadrilateral"} else (block, 2)
+    places = {"lower": (-1.0, 0.0, below), "upper": (0.0, 1.0, above)}
+    return {
+        name: quadratic(build((0.0,) * plane + (z0,), (1.0,) * plane + (z1,), (n,) * (plane + 1), cell=cell))
+        for name, (z0, z1, n) in places.items()
+    }
+
+
+def bodies(meshes: dict[str, BodyMesh], poisson: float) -> dict[str, Body]:
+    law = IsotropicElasticity if meshes["lower"].dim == 3 else PlaneStrain
+    return {name: Body(mesh, law(YOUNG, poisson)) for name, mesh in meshes.items()}
+
+
+def faces(dim: int) -> tuple[Surface, Surface]:
+    """Names of the faces where upper and lower body meet."""
+    return Surface("upper", "yz"[dim - 2] + "0"), Surface("lower", "yz"[dim - 2] + "1")
+
+
+@pytest.mark.parametrize("cell", PAIRED_CELLS)
+def test_a_quadratic_displacement_passes_a_tie_between_meshes_that_do_not_match(cell: str) -> None:
+    """u = (x², x y, x z) / 100 on the boundary of two bodies, and its body force; the meshes are nested."""
+    meshes = stacked(cell, 1, 2)
+    dim = meshes["lower"].dim
+
+    def exact(points: np.ndarray) -> np.ndarray:
+        return np.asarray(1e-2 * points[:, :1] * points)
+
+    force = (-1e-2 * (2 * SHEAR + (dim + 1) * (LAME + SHEAR)), *[0.0] * (dim - 1))
+    upper, lower = faces(dim)
+    supports = [
+        Support(body.body, side, tuple((lambda x, k=k: exact(x)[:, k]) for k in range(dim)))
+        for body in (upper, lower)
+        for side in meshes[body.body].surfaces
+        if side != body.name
+    ]
+    scene = Scene(
+        bodies(meshes, 0.3),
+        supports,
+        [BodyForce(name, force) for name in meshes],
+        ties=[Tie(upper, lower, discretisation="node")],
+    )
+    state = solve_scene(scene, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-11))
+    places = meshes["upper"].points
+    inside = np.all((places[:, :-1] > 0) & (places[:, :-1] < 1), axis=1) & (places[:, -1] == 0)
+    assert np.count_nonzero(inside) > (4 if dim == 3 else 2)
+    for name, mesh in meshes.items():
+        np.testing.assert_allclose(state.gather_displacement(name), exact(mesh.points), atol=1e-9)
+
+
+@pytest.mark.parametrize("cell", PAIRED_CELLS)
+def test_forces_on_the_master_are_those_of_its_shape_functions(cell: str) -> None:
+    """A uniform pressure stays so on matching meshes; on others it varies, but no node opens.
+
+    With weights of linear pieces, on three cells over two of hexahedra it went from 0 to 1.56.
+    """
+    for below, above, largest in ((2, 2, 1e-7), (2, 3, 0.33)):
+        meshes = stacked(cell, below, above)
+        dim = meshes["lower"].dim
+        upper, lower = faces(dim)
+        rollers = [
+            Support(name, "xy"[d] + "0", tuple(0.0 if k == d else None for k in range(dim)))
+            for name in meshes
+            for d in range(dim - 1)
+        ]
+        floor = Support("lower", lower.name[0] + "0", (None,) * (dim - 1) + (0.0,))
+        scene = Scene(
+            bodies(meshes, 0.0),
+            [*rollers, floor],
+            [Pressure("upper", upper.name[0] + "1", 1.0)],
+            [ContactPair(upper, lower, discretisation="node")],
+        )
+        contact = solve_scene(scene, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-10)).contact
+        assert contact.normal_force.sum() == pytest.approx(1.0)
+        assert np.abs(contact.pressure - 1.0).max() < largest
+        assert len(contact.pressure) > 4
+
+
+def squeezed(cell: str, law: type, geometry: Geometry) -> np.ndarray:
+    """Pressures between flat plates, three cells on two, of which hardly anything moves."""
+    plane = cell in {"triangle", "quadrilateral"}
+    build, flat = (rectangle, 1) if plane else (block, 2)
+    parts = {
+        name: quadratic(
+            build((0.0,) * flat + (z0,), (1.0,) * flat + (z0 + 0.6,), (n,) * flat + (1,), cell=cell)
+        )
+        for name, z0, n in (("lower", -0.6, 2), ("upper", 0.0, 3))
+    }
+    upper, lower = faces(flat + 1)
+    still = (None,) * flat
+    supports = [
+        Support(name, "xy"[d] + "0", tuple(0.0 if k == d else None for k in range(flat + 1)))
+        for name in parts
+        for d in range(flat)
+    ]
+    supports += [Support("lower", lower.name[0] + "0", (*still, 0.0))]
+    supports += [Support("upper", upper.name[0] + "1", (*still, -1e-6))]
+    pair = ContactPair(upper, lower, geometry=geometry, discretisation="node")
+    held = {name: Body(mesh, law(1.0, 0.3)) for name, mesh in parts.items()}
+    scene = Scene(held, supports, contacts=[pair])
+    return solve_scene(scene, MPI.COMM_SELF, tolerance=1e-9).contact.pressure
+
+
+@pytest.mark.parametrize("cell", PAIRED_CELLS)
+def test_surfaces_that_slide_and_small_strains_agree_where_hardly_anything_moves(cell: str) -> None:
+    """On the facets themselves but for 1e-6 of strain; smooth surfaces are as near to a uniform pressure."""
+    small = IsotropicElasticity if cell in {"tetrahedron", "hexahedron"} else PlaneStrain
+    facets, slid, smooth = (
+        squeezed(cell, law, geometry)
+        for law, geometry in ((small, "faceted"), (NeoHooke, "faceted"), (NeoHooke, "best"))
+    )
+    np.testing.assert_allclose(slid, facets, rtol=1e-4)
+    assert np.abs(smooth / smooth.mean() - 1.0).max() < 1.2 * np.abs(facets / facets.mean() - 1.0).max()
+    assert np.abs(smooth - facets).max() > 1e-3 * facets.mean(), "smooth surfaces have edges"
+
+
+@pytest.mark.parametrize("cell", PAIRED_CELLS)
+def test_a_master_of_quadratic_cells_that_nothing_faces_is_named(cell: str) -> None:
+    meshes = stacked(cell, 1, 2)
+    upper, lower = faces(meshes["lower"].dim)
+    aside = replace(meshes["upper"], points=meshes["upper"].points + 5.0 * np.eye(meshes["lower"].dim)[0])
+    scene = Scene(
+        bodies({**meshes, "upper": aside}, 0.3), [Support("lower", lower.name.replace("1", "0"))],
+        contacts=[ContactPair(upper, lower)],
+    )  # fmt: skip
+    with pytest.raises(InvalidInputError, match="needs slave nodes that face the master"):
+        solve_scene(scene, MPI.COMM_SELF)
+
+
+# Quadratic tetrahedra, whose facets bear on the midpoints of edges, find what quadratic hexahedra find.
+ACCURATE = FaceNewton(tolerance=1e-8)
+FORCE = 4 * (QUADRATIC_TETRAHEDRA_YOUNG / (1 - POISSON**2)) / (3 * RADIUS)
+PEAK = 3 * FORCE / (2 * np.pi)
+
+
+@cache
+def ball_on_floor(cell: str, curved: bool = True) -> State:
+    """A quarter of a round block on a rigid floor; the radius of the contact is 1, three quadratic cells."""
+    mesh = round_block(1.0, 1.0, 3 if curved else 6, cell)
+    mesh = quadratic(mesh) if curved else mesh
+    guides: dict[str, tuple[float | None, ...]] = {side: (0.0, None, None) for side in ("x0", "x1")}
+    guides |= {side: (None, 0.0, None) for side in ("y0", "y1")}
+    scene = Scene(
+        {"ball": Body(mesh, IsotropicElasticity(QUADRATIC_TETRAHEDRA_YOUNG, POISSON))},
+        [Support("ball", side, value) for side, value in guides.items()],
+        [TotalForce("ball", "z1", (0.0, 0.0, -FORCE / 4))],
+        [ContactPair(Surface("ball", "z0"), RigidPlane((0, 0, 0), (0, 0, 1)))],
+    )
+    return solve_scene(scene, MPI.COMM_SELF, solver=ACCURATE)
+
+
+def found(state: State) -> dict[str, float]:
+    """Peak p0 of the law p² = p0² (1 − r²/a²) fitted to the pressures, radius and approach."""
+    contact, mesh = state.contact, state.scene.bodies["ball"].mesh
+    square = (mesh.points[contact.points.slave][:, :2] ** 2).sum(axis=1)
+    weight = np.sqrt(contact.points.area) * ((contact.status > 0) & (square < 0.64))
+    rows = np.column_stack([np.ones_like(square), -square]) * weight[:, None]
+    fitted = np.linalg.lstsq(rows, contact.pressure**2 * weight, rcond=None)[0]
+    moment = contact.normal_force @ square / contact.normal_force.sum()
+    top = np.unique(mesh.surfaces["z1"])
+    return {
+        "peak": float(np.sqrt(fitted[0])) / PEAK,
+        "radius": float(np.sqrt(2.5 * moment)),
+        "approach": -float(state.gather_displacement("ball")[top, 2].mean()),
+    }
+
+
+def test_tetrahedra_and_hexahedra_agree_on_the_contact_of_hertz() -> None:
+    tetrahedra, hexahedra = found(ball_on_floor("tetrahedron")), found(ball_on_floor("hexahedron"))
+    for key, value in tetrahedra.items():
+        assert value == pytest.approx(hexahedra[key], rel=0.02), key
+    assert tetrahedra["peak"] == pytest.approx(1.0, abs=0.02)
+    assert tetrahedra["radius"] == pytest.approx(1.0, abs=0.01)
+    linear = found(ball_on_floor("tetrahedron", curved=False))
+    assert abs(linear["approach"] / hexahedra["approach"] - 1) > 0.02, "linear ones would do as well"
+
+
+def test_the_largest_pressure_and_the_area_are_those_of_hertz() -> None:
+    state = ball_on_floor("tetrahedron")
+    assert state.contact.pressure.max() == pytest.approx(PEAK, rel=0.03)
+    assert 4 * contact_area(state) == pytest.approx(np.pi, rel=0.04)
+    mesh, points = state.scene.bodies["ball"].mesh, state.contact.points.slave
+    corners = np.unique(mesh.surfaces["z0"][:, :3])
+    assert not np.isin(corners, points).any()
+    pressure = state.gather_fields("ball").points["contact_pressure"]
+    radius = np.linalg.norm(mesh.points[corners][:, :2], axis=1)
+    hertz = PEAK * np.sqrt(np.maximum(1 - radius**2, 0))
+    np.testing.assert_allclose(pressure[corners], hertz, atol=0.35 * PEAK)
+    assert np.all(pressure[corners][radius < 0.8] > 0.5 * hertz[radius < 0.8])
+    assert np.all(pressure[corners][radius > 1.5] == 0.0)
+
+
+def test_values_at_corners_are_those_of_quadratic_fields() -> None:
+    """Around the centre of a regular hexagon: six triangles."""
+    angle = np.arange(6) * np.pi / 3
+    outer = np.column_stack([np.cos(angle), np.sin(angle)])
+    following = np.roll(outer, -1, axis=0)
+    points = np.concatenate([[[0.0, 0.0]], outer, outer / 2, (outer + following) / 2])
+    k = np.arange(6)
+    facets = np.column_stack([0 * k, 1 + k, 1 + (k + 1) % 6, 7 + k, 13 + k, 7 + (k + 1) % 6])
+    values = np.stack([2.0 - (points**2).sum(axis=1), 1.0 + points[:, 0] * points[:, 1]], axis=1)
+    given = values.copy()
+    given[:7] = np.nan
+    np.testing.assert_allclose(filled_at_corners(facets, given)[0], values[0])
+    np.testing.assert_array_equal(filled_at_corners(facets, given)[7:], values[7:])
+    np.testing.assert_array_equal(filled_at_corners(facets[:, :3], given), given)
+
+
+def test_a_pushed_block_rubs_and_its_supports_bear_the_rest() -> None:
+    """Friction on all contact points, and reactions on the corners of facets too."""
+    mesh = quadratic(block((0, 0, 0), (2, 1, 1), (4, 2, 2), cell="tetrahedron"))
+    scene = Scene(
+        {"pad": Body(mesh, IsotropicElasticity(100.0, 0.3))},
+        [Support("pad", "x1", (0.2, None, None)), Support("pad", "y0", (None, 0.0, None))],
+        [TotalForce("pad", "z1", (0.0, 0.0, -6.0))],
+        [ContactPair(Surface("pad", "z0"), RigidPlane((0, 0, 0), (0, 0, 1)), Coulomb(0.25))],
+    )
+    state = solve_scene(scene, MPI.COMM_SELF, solver=ACCURATE)
+    assert state.contact.normal_force.sum() == pytest.approx(6.0)
+    assert scene.plan().multipliers["normal"] == state.contact.points.count
+    pull, rubbed = state.reactions()[0].force[0], state.contact.force.sum(axis=0)[0]
+    assert pull == pytest.approx(-rubbed, rel=1e-6), "corners of the support's facets bear too"
+    assert pull == pytest.approx(0.25 * 6.0, rel=1e-3)

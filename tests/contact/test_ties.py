@@ -1,8 +1,12 @@
-"""Tied bodies behave as one, and where a tie may slide only the normal direction is held."""
+"""Tied surfaces, edges that they share with contact, and corners."""
 
 from __future__ import annotations
 
+import json
+import logging
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,9 +15,13 @@ from mpi4py import MPI
 from fenics_contact import (
     Body,
     ContactPair,
+    ContactProblem,
     Coulomb,
+    FixedPoint,
     RigidPlane,
+    RigidSurface,
     Scene,
+    State,
     Support,
     Surface,
     Tie,
@@ -21,11 +29,19 @@ from fenics_contact import (
     box_partition,
     solve_scene,
 )
+from fenics_contact._equilibrium.warnings import rotation_of
 from fenics_contact._pairing.search import find_tied_points
+from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.errors import InfeasibleError, InvalidInputError
-from fenics_contact.gallery import block
-from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, NeoHooke, OrthotropicElasticity
+from fenics_contact.qp import FaceNewton, Smalse
+from fenics_contact.study import Parameters
+from fenics_contact.study.scenes import hertz
+from tests.contact.corner_cases import corner, planes
+from tests.contact.corner_cases import solved as solved_corner
+from tests.contact.half_tied import FREE, MATERIAL, TIED, TOP, half_tied, solved
 
 STEEL = IsotropicElasticity(1000.0, 0.3)
 FACES = Surface("upper", "z0"), Surface("lower", "z1")
@@ -170,3 +186,235 @@ def test_ties_by_nodes_beyond_the_masters_edge_are_told(
         assert "only some of their nodes are tied, 12 % of the master's surface lies under them" in warning
     assert told(Tie(under, over, discretisation="node")) == []
     assert told(Tie(over, under)) == []
+
+
+# Mortar between true surfaces: gaps that linear displacements of both bodies can close.
+def pressed(size: int) -> Scene:
+    return hertz.build(Parameters(size, discretisation="mortar"), MPI.COMM_SELF).scene
+
+
+def missed(scene: Scene) -> float:
+    """Relative error of the pressure in the middle, beside Hertz."""
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)
+    middle = np.argmin(np.linalg.norm(state.contact_places[:, :2], axis=1))
+    return float(state.contact.pressure[middle] / hertz.PEAK - 1)
+
+
+@pytest.mark.parametrize("size", [2, 4])
+def test_mirrored_bodies_are_as_exact_as_between_their_facets(size: int) -> None:
+    scene = pressed(size)
+    faceted = replace(scene, contacts=[replace(pair, geometry="faceted") for pair in scene.contacts])
+    found = missed(scene)
+    assert abs(found) < 0.005
+    assert found == pytest.approx(missed(faceted), abs=1e-4)
+
+
+def test_the_share_is_that_of_the_compliance() -> None:
+    scene = pressed(2)
+    (pair,) = scene.contacts
+    assert master_share(scene, pair) == pytest.approx(0.5)
+    lower = Body(scene.bodies["lower"].mesh, IsotropicElasticity(3 * hertz.YOUNG, hertz.POISSON))
+    stiffer = replace(scene, bodies={**scene.bodies, "lower": lower})
+    assert master_share(stiffer, pair) == pytest.approx(0.25)
+    wood = OrthotropicElasticity((12e3, 800.0, 500.0), (0.4, 0.35, 0.3), (700.0, 600.0, 60.0))
+    grown = replace(scene, bodies={**scene.bodies, "lower": Body(lower.mesh, wood)})
+    assert master_share(grown, pair) == 0.5
+
+
+# Edges between two contact pairs, or two ties: their nodes are points of one of them alone.
+PARTS = ((1, 1), (2, 3), (6, 5))
+
+
+def two_pairs(discretisation: Discretisation = "node", first: float = 0.4, columns: int = 5) -> Scene:
+    """A block that is pressed on a strip, dragged, and rubs otherwise on its left half."""
+    scene = half_tied(columns, discretisation, sliding=False)
+    drag = RigidSurface("up", "y1", (0.7, 1.5), force=(2.1e-3, -1e-2), moment=-4e-4)
+    pairs = [
+        ContactPair(FREE, TOP, Coulomb(first), discretisation),
+        ContactPair(TIED, TOP, Coulomb(0.1), discretisation),
+    ]
+    return replace(scene, ties=[], contacts=pairs, supports=[scene.supports[0], drag])
+
+
+def of_rubber(discretisation: Discretisation = "node") -> Scene:
+    scene = two_pairs(discretisation)
+    bodies = {name: replace(body, material=NeoHooke(1.0, 0.3)) for name, body in scene.bodies.items()}
+    held = [Support("low", "y0"), Support("up", "y1", (0.02, -0.02))]
+    return replace(scene, bodies=bodies, supports=held)
+
+
+@pytest.mark.parametrize("scene", [two_pairs(), two_pairs("mortar"), of_rubber(), of_rubber("mortar")])
+def test_an_edge_between_two_contacts_has_one_answer_for_every_partition(scene: Scene) -> None:
+    first, *others = (solved(scene, parts) for parts in (PARTS[:2] if scene.is_nonlinear else PARTS))
+    expected, force = first.gather_displacement("up"), first.contact.force
+    # Moving means over the facets of either side differ: both pairs keep theirs.
+    both = scene.is_nonlinear and scene.contacts[0].by_mortar
+    assert first.contact.points.count == 7 + both
+    assert first.contact.points.area.sum() == pytest.approx(2.0)
+    for other in others:
+        found = other.gather_displacement("up")
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-7 * np.abs(expected).max())
+        np.testing.assert_allclose(other.contact.force, force, rtol=0.0, atol=1e-6 * np.abs(force).max())
+
+
+def on_edge(state: State) -> int:
+    (edge,) = np.flatnonzero(np.isclose(state.contact_places[:, 0], 1.0, atol=0.05))
+    return int(edge)
+
+
+def test_the_edge_rubs_as_the_pair_named_first_and_its_pressure_fits_those_beside() -> None:
+    scene = two_pairs()
+    for pairs, friction in ((scene.contacts, 0.4), (scene.contacts[::-1], 0.1)):
+        contact = (state := solved(replace(scene, contacts=pairs), (1, 1))).contact
+        edge = on_edge(state)
+        assert contact.slip_bound[edge] == pytest.approx(friction * contact.normal_force[edge])
+        assert contact.points.pair[edge] == 0
+        order = np.argsort(state.contact_places[:, 0])
+        left, middle, right = contact.pressure[order[2:5]]
+        assert middle == pytest.approx(0.5 * (left + right), rel=0.05)
+
+
+def test_nodes_of_two_contacts_are_counted(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO, "fenics_contact"):
+        solved(two_pairs(), (1, 1))
+    words = "of low tied on up y0 leaves out 1 node, where force and friction are those of low free on up y0"
+    assert words in caplog.text
+
+
+@pytest.mark.parametrize(("turn", "depth", "count"), [(0.0, 1e-9, 7), (0.6, 0.0, 8), (0.0, 1e-3, 8)])
+def test_a_corner_and_a_lower_obstacle_keep_their_points(turn: float, depth: float, count: int) -> None:
+    """Two floors meet under the block: one plane, a roof of 34°, or one lower than the other."""
+    mesh = rectangle((0.0, 0.0), (2.0, 1.0), (6, 3))
+    base = mesh.surfaces["y0"]
+    left = mesh.points[base].mean(axis=1)[:, 0] < 1.0
+    mesh = replace(mesh, surfaces={**mesh.surfaces, "left": base[left], "right": base[~left]})
+    planes = RigidPlane((1.0, 0.0), (0.0, 1.0)), RigidPlane((1.0, -depth), (np.sin(turn), np.cos(turn)))
+    names = ("left", "right")
+    pairs = [ContactPair(Surface("up", n), p) for n, p in zip(names, planes, strict=True)]
+    scene = Scene({"up": Body(mesh, MATERIAL)}, [Support("up", "y1", (0.0, -0.01))], contacts=pairs)
+    assert solve_scene(scene, MPI.COMM_SELF).contact.points.count == count
+
+
+def test_the_same_surfaces_under_two_names_are_one_contact() -> None:
+    scene = two_pairs()
+    low = scene.bodies["low"]
+    surfaces = {**low.mesh.surfaces, "again": low.mesh.surfaces["free"]}
+    bodies = {**scene.bodies, "low": replace(low, mesh=replace(low.mesh, surfaces=surfaces))}
+    turned = ContactPair(Surface("low", "again"), TOP, Coulomb(0.4), "node")
+    points = solved(replace(scene, bodies=bodies, contacts=[*scene.contacts, turned]), (1, 1)).contact.points
+    assert list(np.bincount(points.pair, minlength=3)) == [4, 3, 0]
+    assert points.area.sum() == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("sliding", "kept"),
+    [((False, False), [4, 3]), ((True, True), [4, 3]), ((True, False), [3, 4]), ((False, True), [4, 3])],
+)
+def test_an_edge_between_two_ties_is_tied_once(sliding: tuple[bool, bool], kept: list[int]) -> None:
+    scene = two_pairs()
+    ties = [
+        Tie(s, TOP, sliding=slides, discretisation="node")
+        for s, slides in zip((FREE, TIED), sliding, strict=True)
+    ]
+    held = [Support("low", "y0"), Support("up", "y1", (1e-3, 2e-3))]
+    tied = [solved(replace(scene, contacts=[], ties=ties, supports=held), parts) for parts in PARTS]
+    expected = tied[0].gather_displacement("up")
+    for state in tied:
+        assert list(np.bincount(state.torn.ties.pair, minlength=2)) == kept
+        np.testing.assert_allclose(
+            state.gather_displacement("up"), expected, rtol=0.0, atol=1e-8 * np.abs(expected).max()
+        )
+
+
+# Nodes in several pairs, whose rows contradict each other until one gives way.
+def notes(state: State) -> str:
+    return "\n".join(str(line) for line in state.solution.history)
+
+
+@pytest.mark.parametrize(("friction", "push"), [(0.3, 0.002), (1.0, 0.0005), (3.0, 0.002)])
+def test_a_wall_pushes_a_block_over_a_floor_that_it_sticks_to(friction: float, push: float) -> None:
+    """More than 500 products while rows of the same node stood against each other; the last had no end."""
+    state = solved_corner(corner(friction, push), MPI.COMM_SELF, FaceNewton(1e-9))
+    assert "rows that contradict each other" in notes(state)
+    assert "rescue" not in notes(state)
+    assert 10 < state.solution.products < 45
+
+
+def test_forces_beside_the_wall_are_those_of_another_solver() -> None:
+    scene = corner(0.3, 0.002)
+    found, other = (
+        solved_corner(scene, MPI.COMM_SELF, way) for way in (FaceNewton(1e-9), FixedPoint(Smalse(1e-7)))
+    )
+    expected = other.contact.normal_force
+    assert found.contact.normal_force == pytest.approx(expected, abs=1e-4 * expected.max())
+    assert np.abs(found.contact.force).max() > 0.1
+
+
+@pytest.mark.parametrize("friction", [None, 0.3])
+def test_of_two_floors_the_upper_one_bears(friction: float | None) -> None:
+    upper, lower = (RigidPlane((0.0, 0.0, z), (0.0, 0.0, 1.0)) for z in (0.0, -0.002))
+    once = solved_corner(planes(("z0", upper, friction)), MPI.COMM_SELF, FaceNewton(1e-9))
+    both = solved_corner(
+        planes(("z0", upper, friction), ("z0", lower, friction)), MPI.COMM_SELF, FaceNewton(1e-9)
+    )
+    pressing = both.contact.normal_force.reshape(2, -1)
+    assert pressing[0] == pytest.approx(once.contact.normal_force, abs=1e-7 * pressing.max())
+    assert np.abs(pressing[1]).max() == 0.0
+    assert both.solution.products < 40  # more than 250
+
+
+def test_the_corner_is_the_same_on_two_ranks(mpirun: Any) -> None:
+    ranks, products, force = json.loads(mpirun(Path(__file__).with_name("corner_cases.py"), 2))
+    alone = solved_corner(corner(1.0, 0.002), MPI.COMM_SELF, FaceNewton(1e-9))
+    assert (ranks, products) == (2, alone.solution.products)
+    assert np.abs(np.array(force) - alone.contact.force).max() < 1e-9 * np.abs(force).max()
+
+
+# Bodies of small strain that turn far beside others are told of.
+def turned(angle: float) -> Scene:
+    """A linear block whose lower side is turned, and a block of rubber that stays."""
+    bodies = {
+        "soft": Body(block((0, 0, 0), (1, 1, 1), (2, 2, 2)), NeoHooke(1.0, 0.3)),
+        "hard": Body(block((2, 0, 0), (3, 1, 1), (2, 2, 2)), IsotropicElasticity(100.0, 0.3)),
+    }
+    turn = RigidSurface("hard", "z0", (2.5, 0.5, 0.0), (0, 0, 0), (0.6 * angle, 0.0, 0.8 * angle))
+    return Scene(bodies, [Support("soft", "z0"), turn])
+
+
+@pytest.mark.parametrize(("angle", "told"), [(0.01, False), (0.2, True)])
+def test_a_linear_body_that_turns_far_is_told_of(
+    angle: float, told: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.WARNING, logger="fenics_contact"):
+        solve_scene(turned(angle), MPI.COMM_SELF)
+    assert ("body 'hard' has turned by 0.2 rad; its material is for small rotations" in caplog.text) is told
+    assert "soft" not in caplog.text
+
+
+def test_a_linear_body_alone_is_told_of_once(caplog: pytest.LogCaptureFixture) -> None:
+    """In a scene without any large deformations, in one piece and cut."""
+    beam = block((0, 0, 0), (6, 1, 1), (6, 1, 1))
+
+    def scene(angle: float) -> Scene:
+        turn = RigidSurface("beam", "x1", (6.0, 0.5, 0.5), (0, 0, 0), (0.0, 0.0, angle))
+        return Scene({"beam": Body(beam, IsotropicElasticity(100.0, 0.3))}, [Support("beam", "x0"), turn])
+
+    for partition in ({"beam": np.zeros(6, dtype=int)}, {"beam": np.arange(6) // 3}):
+        caplog.clear()
+        problem = ContactProblem(scene(0.7), MPI.COMM_SELF, partitions=partition)
+        with caplog.at_level(logging.WARNING, logger="fenics_contact"):
+            for angle in (0.01, 0.7, 0.8):
+                problem.solve(scene(angle))
+        (words,) = [record.getMessage() for record in caplog.records]
+        assert words.startswith("body 'beam' has turned by ")
+        assert words.endswith("give it a material for large deformations, such as StVenantKirchhoff")
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_rotation_of_a_body_is_that_of_its_rigid_motion(dim: int) -> None:
+    mesh = rectangle((100, 0), (101, 2), (3, 2)) if dim == 2 else block((100, 0, 0), (101, 2, 3), (2, 2, 1))
+    spin = np.zeros((3, 3))
+    spin[0, 1], spin[2, 0], spin[1, 2] = (0.03, 0.0, 0.0) if dim == 2 else (0.03, 0.1, -0.2)
+    moved = mesh.points @ (spin - spin.T)[:dim, :dim] + 5.0
+    assert rotation_of(mesh, moved) == pytest.approx(np.linalg.norm(spin), rel=1e-10)
+    assert rotation_of(mesh, 0.1 * mesh.points) == pytest.approx(0.0, abs=1e-12)

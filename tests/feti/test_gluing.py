@@ -1,4 +1,4 @@
-"""Gluing rows are orthogonal, weighted by stiffness, and vanish exactly on fitting displacements."""
+"""Gluing, copies, contact rows and rows that contradict one another."""
 
 from __future__ import annotations
 
@@ -8,19 +8,27 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from hypothesis import given
+from hypothesis import strategies as st
+from mpi4py import MPI
 
-from fenics_contact import Body, Scene, Support
+from fenics_contact import Body, Scene, Support, box_partition
+from fenics_contact._fem.forms import FormLibrary, cell_stiffness
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.feti import Rows
+from fenics_contact.feti import DualSystem, Rows, TornSystem, build_torn_system, decompose
 from fenics_contact.feti.decomposition import (
     Tearing,
+    _spread_over_ranks,
     gluing_rows,
     prescribed_displacements,
     tear,
     weighted_helmert,
 )
 from fenics_contact.gallery import block
-from tests.feti.scenes import CELLS, STEEL, Cut, lone_block, ragged_block
+from fenics_contact.qp import DualProblem, FacePreconditioner
+from fenics_contact.qp.problem import RowsOfFace, Scaling
+from tests.contact.corner_cases import corner
+from tests.feti.scenes import CELLS, STEEL, Cut, lone_block, ragged_block, touching_blocks
 
 ROLLERS = (Support("block", "z0", (None, None, 0.1)), Support("block", "x0", (0.2, None, 0.1)))
 
@@ -153,3 +161,233 @@ def test_supports_of_one_body_leave_the_nodes_of_others_alone() -> None:
     fixed = ~np.isnan(prescribed_displacements(scene, torn((scene, whole))))
     assert not fixed[: mesh.n_nodes].any()
     assert fixed[mesh.n_nodes :].all(axis=1).sum() == 9
+
+
+# Subdomains are dealt out to ranks evenly, in order, and none goes without.
+COSTS = st.lists(st.integers(1, 10**6), min_size=1, max_size=60)
+
+
+@given(COSTS, st.data())
+def test_no_rank_is_empty_and_runs_are_consecutive(costs: list[int], data: st.DataObject) -> None:
+    ranks = data.draw(st.integers(1, len(costs)))
+    owner = _spread_over_ranks(np.array(costs), ranks)
+    assert set(owner) == set(range(ranks))
+    assert (np.diff(owner) >= 0).all()
+
+
+@pytest.mark.parametrize(("items", "ranks"), [(8, 1), (8, 2), (8, 8), (12, 4), (32, 4)])
+def test_equal_costs_are_shared_equally(items: int, ranks: int) -> None:
+    owner = _spread_over_ranks(np.full(items, 480), ranks)
+    assert (np.bincount(owner) == items // ranks).all()
+
+
+def test_one_heavy_subdomain_does_not_take_a_neighbour_along() -> None:
+    owner = _spread_over_ranks(np.array([1000, 10, 10, 10]), 2)
+    assert owner.tolist() == [0, 1, 1, 1]
+
+
+def test_nodes_and_subdomains_of_all_bodies_are_numbered_through() -> None:
+    scene, partitions = touching_blocks()
+    forms = FormLibrary(MPI.COMM_SELF)
+    forms.prepare(scene)
+    tearing = tear(scene, partitions, 3, cell_stiffness(scene, forms))
+    assert tearing.body_names == ("lower", "upper", "third")
+    assert tearing.subdomain_offset.tolist() == [0, 4, 7, 9]
+    assert tearing.n_subdomains == 9
+    for index, name in enumerate(tearing.body_names):
+        mesh = scene.bodies[name].mesh
+        for cell in range(mesh.n_cells):
+            nodes = tearing.global_nodes(name, mesh.cells[cell])
+            subdomain = partitions[name][cell] + tearing.subdomain_offset[index]
+            for node in nodes:
+                copies = slice(tearing.first_copy[node], tearing.first_copy[node + 1])
+                assert subdomain in tearing.copy_subdomain[copies]
+    pairs = np.column_stack([tearing.copy_node, tearing.copy_subdomain])
+    assert np.array_equal(pairs, np.unique(pairs, axis=0)), "copies are sorted, each is there once"
+
+
+# Contact rows measure gap and slip, and leave gluing rows and each other alone.
+@pytest.fixture(scope="module")
+def torn_in_contact() -> TornSystem:
+    scene, partitions = touching_blocks()
+    return build_torn_system(scene, decompose(scene, partitions, MPI.COMM_SELF))
+
+
+def in_space(torn_in_contact: TornSystem, field: np.ndarray) -> np.ndarray:
+    """Give every copy of a node the displacement of the node, shape (n_nodes, 3) -> (torn_size,)."""
+    blocks = np.empty((torn_in_contact.B.shape[1] // 3, 3))
+    blocks[torn_in_contact.decomposition.copy_block] = field[torn_in_contact.decomposition.tearing.copy_node]
+    return blocks.ravel()
+
+
+def measured(torn_in_contact: TornSystem, field: np.ndarray) -> np.ndarray:
+    """Return what all rows measure of a nodal displacement, with the share of prescribed components."""
+    found = torn_in_contact.B @ in_space(torn_in_contact, field)
+    prescribed = np.where(torn_in_contact.decomposition.fixed, field, np.nan)
+    found[torn_in_contact.n_gluing :] += np.concatenate(
+        [part.of_supports(prescribed) for part in torn_in_contact.relations]
+    )
+    return found
+
+
+def all_points(torn_in_contact: TornSystem) -> np.ndarray:
+    return np.vstack([body.mesh.points for body in torn_in_contact.scene.bodies.values()])
+
+
+def test_the_scene_has_points_of_every_pair_and_shared_nodes_on_both_sides(
+    torn_in_contact: TornSystem,
+) -> None:
+    assert np.bincount(torn_in_contact.points.pair).tolist() == [24, 9, 9]
+    copies = torn_in_contact.decomposition.tearing.multiplicity
+    touching = torn_in_contact.points.pair != 1
+    assert copies[torn_in_contact.points.slave].max() > 2
+    assert copies[torn_in_contact.points.master[touching].indices].max() > 2
+    assert len(torn_in_contact.frictional) == 24 + 9
+
+
+def free_points(torn_in_contact: TornSystem) -> np.ndarray:
+    """Return which points have no node with a prescribed component."""
+    return np.abs(torn_in_contact.points.jump) @ torn_in_contact.decomposition.fixed.any(axis=1) == 0.0
+
+
+def test_contact_rows_are_orthogonal_to_gluing_and_support_rows(torn_in_contact: TornSystem) -> None:
+    equality, contact = (
+        torn_in_contact.B[: torn_in_contact.n_equality],
+        torn_in_contact.B[torn_in_contact.n_equality :],
+    )
+    assert 20 < free_points(torn_in_contact).sum() < torn_in_contact.points.count
+    assert abs(equality @ contact.T).max() < 1e-15
+
+
+def test_normal_and_tangents_of_a_free_point_are_orthogonal_and_equally_long(
+    torn_in_contact: TornSystem,
+) -> None:
+    gram = (torn_in_contact.B @ torn_in_contact.B.T).tocsr()
+    free = free_points(torn_in_contact)[torn_in_contact.frictional]
+    normal = torn_in_contact.normal_rows[torn_in_contact.frictional]
+    rows = np.column_stack([normal, torn_in_contact.tangential_rows])[free]
+    assert len(rows) > 20
+    for triple in rows:
+        block = gram[triple][:, triple].toarray()
+        np.testing.assert_allclose(block, block[0, 0] * np.eye(3), atol=1e-14)
+        assert block[0, 0] > 0.1
+
+
+def test_frames_are_right_handed_and_orthonormal(torn_in_contact: TornSystem) -> None:
+    frame = np.concatenate([torn_in_contact.points.tangents, torn_in_contact.points.normal[:, None]], axis=1)
+    np.testing.assert_allclose(
+        frame @ frame.transpose(0, 2, 1), np.tile(np.eye(3), (len(frame), 1, 1)), atol=1e-14
+    )
+    np.testing.assert_allclose(np.linalg.det(frame), 1.0, rtol=1e-13)
+
+
+def test_rows_measure_what_a_motion_of_the_slave_does(torn_in_contact: TornSystem) -> None:
+    motion = np.array([0.3, -0.7, 1.1])
+    nodes = np.zeros((len(all_points(torn_in_contact)), 3))
+    tearing = torn_in_contact.decomposition.tearing
+    nodes[tearing.node_offset[1] :] = motion  # everything but the lower block
+    moved = measured(torn_in_contact, nodes)
+    np.testing.assert_allclose(
+        moved[torn_in_contact.normal_rows], -torn_in_contact.points.normal @ motion, atol=1e-14
+    )
+    slip = torn_in_contact.points.tangents[torn_in_contact.frictional] @ motion
+    np.testing.assert_allclose(moved[torn_in_contact.tangential_rows], slip, atol=1e-14)
+
+
+def test_rigid_motions_of_both_bodies_together_change_no_gap_between_them(
+    torn_in_contact: TornSystem,
+) -> None:
+    moved = measured(torn_in_contact, np.tile([0.3, -0.7, 1.1], (len(all_points(torn_in_contact)), 1)))
+    between = torn_in_contact.points.pair != 1
+    assert abs(moved[torn_in_contact.normal_rows[between]]).max() < 1e-14
+    assert abs(moved[torn_in_contact.normal_rows[~between]]).min() > 0.1, "the floor does not move along"
+
+
+def test_closing_every_gap_meets_the_right_side_of_the_normal_rows(torn_in_contact: TornSystem) -> None:
+    points = torn_in_contact.points
+    assert points.gap[points.pair == 2] == pytest.approx(0.2)
+    target = points.master @ all_points(torn_in_contact)
+    onto = np.where((points.pair == 1)[:, None], 0.0, target + points.gap[:, None] * points.normal)
+    slave = all_points(torn_in_contact)[points.slave]
+    between = points.pair != 1
+    np.testing.assert_allclose(onto[between], slave[between], atol=1e-12)
+    right = torn_in_contact.right + torn_in_contact.supported
+    np.testing.assert_array_equal(right[torn_in_contact.normal_rows], points.gap)
+    np.testing.assert_array_equal(right[torn_in_contact.tangential_rows], 0.0)
+    assert np.abs(torn_in_contact.supported[torn_in_contact.tangential_rows]).max() == pytest.approx(0.05), (
+        "a support moves a slave"
+    )
+
+
+def test_a_frictionless_scene_has_no_tangential_rows(torn_in_contact: TornSystem) -> None:
+    frictionless = np.setdiff1d(np.arange(torn_in_contact.points.count), torn_in_contact.frictional)
+    assert (torn_in_contact.points.pair[frictionless] == 2).all()
+    assert (
+        torn_in_contact.numbering.total
+        == torn_in_contact.n_equality + torn_in_contact.points.count + 2 * len(torn_in_contact.frictional)
+    )
+    assert isinstance(torn_in_contact.B, sp.csr_matrix)
+
+
+def test_slip_bounds_belong_to_their_laws(torn_in_contact: TornSystem) -> None:
+    pair = torn_in_contact.points.pair[torn_in_contact.frictional]
+    np.testing.assert_array_equal(torn_in_contact.friction_coefficient, np.where(pair == 0, 0.3, 0.0))
+    area = torn_in_contact.points.area[torn_in_contact.frictional]
+    np.testing.assert_allclose(torn_in_contact.tresca_bound, np.where(pair == 1, 0.4 * area, 0.0))
+    assert area[pair == 1].sum() == pytest.approx(0.8), "nodal areas add up to the surface"
+    assert area[pair == 0].sum() == pytest.approx(1.6**2)
+
+
+# What rows of a face demand of each other: forces on dependent rows deform nothing.
+@pytest.fixture(scope="module")
+def problem() -> DualProblem:
+    scene = corner(0.3, 0.002)
+    cut = {"block": box_partition(scene.bodies["block"].mesh, (2, 1, 1))}
+    return DualSystem(build_torn_system(scene, decompose(scene, cut, MPI.COMM_SELF))).problem
+
+
+def of_face(
+    problem: DualProblem, rows: np.ndarray, factor: np.ndarray | float = 1.0
+) -> tuple[RowsOfFace, np.ndarray]:
+    """The preconditioner of free rows of multipliers divided by a factor, and a residual on them."""
+    size = problem.layout.size
+    face = sp.csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(size, len(rows)))
+    scaled = replace(problem, scaling=Scaling.build(factor * np.ones(size), problem.coarse)).scaled_problem
+    assert isinstance(scaled.preconditioner, FacePreconditioner)
+    on_face = scaled.preconditioner.on_face(face)
+    assert isinstance(on_face, RowsOfFace)
+    return on_face, face @ np.random.default_rng(3).normal(size=len(rows))
+
+
+def test_forces_of_a_contradiction_deform_nothing_and_leave_no_other(problem: DualProblem) -> None:
+    on_face, residual = of_face(problem, np.arange(problem.layout.size))
+    found = on_face.contradiction(residual)
+    assert found is not None
+    excess, force, group, count = found
+    assert len(np.unique(group[group >= 0])) == 6 <= count  # the nodes of the edge
+    flexed = problem.operator(force)
+    assert np.abs(force).max() > 0.1
+    assert np.abs(flexed).max() < 1e-9 * np.abs(problem.operator(residual)).max()
+    assert np.abs(problem.coarse.apply(force)).max() < 1e-9 * np.abs(force).max()
+    assert force @ residual < -0.1
+    assert abs(force @ (residual - excess)) < 1e-8 * abs(force @ residual)
+    assert on_face.contradiction(residual - excess) is None
+
+
+def test_independent_rows_do_not_contradict_each_other(problem: DualProblem) -> None:
+    layout = problem.layout
+    on_face, residual = of_face(problem, np.concatenate([layout.equality, layout.normal]))
+    assert on_face.contradiction(residual) is None
+
+
+def test_scaled_rows_contradict_each_other_by_as_much(problem: DualProblem) -> None:
+    factor = np.ones(problem.layout.size)
+    for rows in (problem.layout.normal[:10], problem.layout.tangential[:10].ravel()):
+        factor[rows] = 0.5
+    rows = np.arange(problem.layout.size)
+    (plain, residual), (scaled, _) = of_face(problem, rows), of_face(problem, rows, factor)
+    found, expected = scaled.contradiction(factor * residual), plain.contradiction(residual)
+    assert found is not None
+    assert expected is not None
+    np.testing.assert_allclose(found[0], factor * expected[0], atol=1e-12)
+    np.testing.assert_allclose(factor * found[1], expected[1], atol=1e-12 * np.abs(expected[1]).max())

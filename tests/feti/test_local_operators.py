@@ -1,4 +1,4 @@
-"""Sparse factors and dense interface matrices are two ways to keep one subdomain, and say the same of it."""
+"""Operators of one subdomain: kernel, generalised inverse and condensation."""
 
 from __future__ import annotations
 
@@ -12,12 +12,19 @@ from mpi4py import MPI
 from fenics_contact import Body, Scene, Support, TotalForce, box_partition
 from fenics_contact._base.sparse import LocalCost, explicit_cost, implicit_cost, prefers_explicit
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
-from fenics_contact.feti.inverse import Condensations, ExplicitOperator, ImplicitOperator, LocalKind
+from fenics_contact.feti.factor import Factor, fixing_nodes, regularised
+from fenics_contact.feti.inverse import (
+    Condensation,
+    Condensations,
+    ExplicitOperator,
+    ImplicitOperator,
+    LocalKind,
+)
 from fenics_contact.feti.subdomain import LocalOperator, Subdomain, interface_dofs
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.qp import FaceNewton, solve
-from tests.feti.scenes import CELLS, STEEL, touching_blocks
+from tests.feti.scenes import CELLS, STEEL, Cut, lone_block, ragged_block, touching_blocks
 
 KINDS = (ImplicitOperator, ExplicitOperator)
 
@@ -236,3 +243,121 @@ def test_a_lifting_closes_the_rows_of_a_face() -> None:
     _, force = system.inverse.energy(lifting.jump(jump))
     expected = system.preconditioner.on_face(face)(jump)
     np.testing.assert_allclose(lifting.multiplier(force), expected, atol=1e-5 * np.abs(expected).max())
+
+
+# Kernels are what the stiffness does not feel, and K⁺ undoes it up to them.
+def subdomains(cut: Cut) -> tuple[Subdomain, ...]:
+    scene, partitions = cut
+    return build_torn_system(scene, decompose(scene, partitions, MPI.COMM_SELF)).subdomains
+
+
+def whole_piece(cell: str, size: tuple[float, float, float], counts: tuple[int, int, int]) -> Subdomain:
+    """One block as one subdomain."""
+    mesh = block((0, 0, 0), size, counts, cell)
+    return subdomains((Scene({"block": Body(mesh, STEEL)}), {"block": np.zeros(mesh.n_cells, dtype=int)}))[0]
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize("cut", [lone_block, ragged_block])
+def test_kernel_is_annihilated_by_stiffness(cell: str, cut: object) -> None:
+    found = subdomains(cut(cell))  # type: ignore[operator]
+    assert len(found) > 4
+    for subdomain in found:
+        stiffness, kernel = subdomain.stiffness, subdomain.kernel
+        assert np.linalg.matrix_rank(kernel) == kernel.shape[1] == 6
+        assert abs(stiffness @ kernel).max() < 1e-12 * abs(stiffness).max()
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_kernel_holds_every_mode_without_energy(cell: str) -> None:
+    for subdomain in subdomains(ragged_block(cell)):
+        energy = np.linalg.eigvalsh(subdomain.stiffness.toarray())
+        assert np.count_nonzero(energy < 1e-10 * energy.max()) == subdomain.kernel.shape[1]
+        assert energy.min() > -1e-12 * energy.max()
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize(
+    ("size", "counts"),
+    [((1, 1, 1), (3, 3, 3)), ((1, 1, 30), (1, 1, 30)), ((30, 30, 1), (8, 8, 1)), ((1, 2, 3), (1, 1, 1))],
+    ids=["cube", "rod", "plate", "one brick"],
+)
+def test_the_inverse_of_the_regularised_stiffness_is_a_generalised_inverse(
+    cell: str, size: tuple[float, float, float], counts: tuple[int, int, int]
+) -> None:
+    subdomain = whole_piece(cell, size, counts)
+    stiffness = subdomain.stiffness.toarray()
+    matrix = regularised(subdomain.stiffness, subdomain.kernel, subdomain.points)
+    assert np.linalg.eigvalsh(matrix.toarray()).min() > 0.0
+    inverse = Factor(matrix).solve_many(np.eye(len(stiffness)))
+    np.testing.assert_allclose(inverse, inverse.T, atol=1e-9 * abs(inverse).max())
+    back = stiffness @ inverse @ stiffness
+    assert abs(back - stiffness).max() < 1e-9 * abs(stiffness).max()
+
+
+def test_one_tetrahedron_is_a_subdomain_too() -> None:
+    mesh = block((0, 0, 0), (1, 1, 1), (1, 1, 1), "tetrahedron")
+    found = subdomains((Scene({"block": Body(mesh, STEEL)}), {"block": np.arange(6)}))
+    assert [subdomain.mesh.size for subdomain in found] == [12] * 6
+    for subdomain in found:
+        matrix = regularised(subdomain.stiffness, subdomain.kernel, subdomain.points)
+        assert np.linalg.eigvalsh(matrix.toarray()).min() > 0.0
+
+
+def test_the_regularised_stiffness_stays_sparse() -> None:
+    subdomain = whole_piece("hexahedron", (1, 1, 1), (4, 4, 4))
+    matrix = regularised(subdomain.stiffness, subdomain.kernel, subdomain.points)
+    assert matrix.nnz < subdomain.stiffness.nnz + 12**2
+
+
+def test_one_right_side_and_many_have_the_same_solutions() -> None:
+    subdomain = whole_piece("hexahedron", (1, 1, 1), (2, 2, 2))
+    factor = Factor(regularised(subdomain.stiffness, subdomain.kernel, subdomain.points))
+    right = np.random.default_rng(0).standard_normal((factor.size, 3))
+    many = factor.solve_many(right)
+    for k in range(3):
+        one = np.empty(factor.size)
+        factor.solve(right[:, k], one)
+        np.testing.assert_allclose(many[:, k], one, rtol=1e-10)
+    assert factor.solve_many(right[:, :0]).shape == (factor.size, 0)
+
+
+@pytest.mark.parametrize("counts", [(4, 4, 4), (1, 1, 9), (6, 6, 1)])
+def test_fixing_nodes_are_far_apart_and_not_on_a_line(counts: tuple[int, int, int]) -> None:
+    points = block((0, 0, 0), counts, counts).points
+    chosen = points[fixing_nodes(points)]
+    apart = np.linalg.norm(chosen[:, None] - chosen, axis=2)[np.triu_indices(4, 1)]
+    assert apart.min() > 0.2 * max(counts)
+    assert np.linalg.matrix_rank(chosen - chosen[0]) >= 2
+
+
+def test_few_nodes_are_all_fixed() -> None:
+    assert sorted(fixing_nodes(np.eye(3))) == [0, 1, 2]
+
+
+def test_the_stiffness_follows_the_material() -> None:
+    soft = whole_piece("hexahedron", (1, 1, 1), (1, 1, 1))
+    scene = Scene(
+        {"block": Body(block((0, 0, 0), (1, 1, 1), (1, 1, 1)), replace(STEEL, young_modulus=420.0))}
+    )
+    stiff = subdomains((scene, {"block": np.zeros(1, dtype=int)}))[0]
+    assert sp.linalg.norm(stiff.stiffness - 2 * soft.stiffness) < 1e-12 * sp.linalg.norm(stiff.stiffness)
+
+
+# Schur complements of subdomains, however few of their dofs lie inside.
+@pytest.mark.parametrize("inside", [1, 2, 5, 30])
+def test_a_condensation_is_the_schur_complement_however_few_dofs_lie_inside(inside: int) -> None:
+    random = np.random.default_rng(inside)
+    size = 24 + inside // 2
+    root = random.standard_normal((size, size))
+    matrix = root @ root.T + np.eye(size)
+    interface = np.sort(random.choice(size, size - min(inside, size - 1), replace=False))
+    within = np.setdiff1d(np.arange(size), interface)
+    given = sp.csr_matrix(matrix)
+    condensation = Condensation(given, interface)
+    reduced = np.linalg.solve(matrix[np.ix_(within, within)], matrix[np.ix_(within, interface)])
+    expected = matrix[np.ix_(interface, interface)] - matrix[np.ix_(interface, within)] @ reduced
+    # MUMPS fills one triangle, and may take too little memory for the integers of small matrices.
+    for found in (condensation(given), condensation._by_factor(given)):
+        small = 1e-12 * np.abs(expected).max()
+        assert np.tril(found) == pytest.approx(np.tril(expected), rel=1e-10, abs=small)

@@ -1,16 +1,22 @@
-"""A result's file says what was computed, how and with what, and is read back or refused in words."""
+"""Results in files: their record, provenance and what is written as JSON."""
 
 from __future__ import annotations
 
 import json
+import re
+import signal
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from enum import Enum
 from functools import lru_cache, partial
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from mpi4py import MPI
 
 from fenics_contact import (
@@ -26,6 +32,7 @@ from fenics_contact import (
     Tie,
     Tresca,
     Ufl,
+    _dolfinx,
     minimize,
     solve_scene,
     write_result,
@@ -35,7 +42,9 @@ from fenics_contact.design import BundleTrust, Result
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
-from fenics_contact.output import read_result, write_optimisation_result
+from fenics_contact.output import read_result, versions, write_json, write_optimisation_result
+from fenics_contact.output import result as provenance
+from fenics_contact.output.files import plain
 from fenics_contact.output.result import described_scene, readable
 from fenics_contact.results import BalancedTolerance
 from tests.contact.rigid_cases import POINT, SCENES, solved
@@ -310,3 +319,113 @@ def test_two_ranks_write_one_file_with_the_same_answer(mpirun: Callable[..., str
         alone["contact"][0][key] for key in ("open", "stick", "slip")
     ]
     assert sorted(path.name for path in tmp_path.glob("*.json")) == ["alone.json", "result.json"]
+
+
+# A result can say what it was computed with.
+def test_versions_name_everything_that_computed(tmp_path: object) -> None:
+    found = versions()
+    assert set(found) >= {
+        "python", "numpy", "scipy", "dolfinx", "petsc", "mpi", "gmsh", "pyvista", "fenics_contact"
+    }  # fmt: skip
+    assert found["numpy"] == np.__version__
+    assert found["dolfinx"] == _dolfinx.release()
+    assert found["petsc"].startswith("3.")
+    assert "MPI" in found["mpi"]
+    write_json(f"{tmp_path}/versions.json", found)
+
+
+def test_a_library_that_is_not_there_is_said_to_be_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing(name: str) -> str:
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(metadata, "version", nothing)
+    found = versions()
+    assert found["numpy"] == np.__version__, "where there are no metadata the library itself is asked"
+    monkeypatch.setattr(provenance, "_MODULES", ("no_such_library",))
+    assert versions()["no_such_library"] == "not installed"
+
+
+def test_a_library_that_takes_ctrl_c_at_its_import_gives_it_back(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """As gmsh does, which Debian installs without metadata."""
+    (tmp_path / "takes_it.py").write_text(
+        "import signal\n__version__ = '4.8'\nsignal.signal(signal.SIGINT, signal.SIG_DFL)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(provenance, "_MODULES", ("takes_it",))
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        assert versions()["takes_it"] == "4.8"
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+# JSON files hold what they were given, or there is an error that says where it could not be held.
+class Colour(Enum):
+    RED = "red"
+
+
+@dataclass(frozen=True)
+class Energies:
+    strain: float
+    parts: np.ndarray
+
+
+def test_types_of_numpy_and_python_are_converted(tmp_path: Path) -> None:
+    data = {
+        "float": np.float64(1.5),
+        "int": np.int32(3),
+        "truth": np.bool_(True),
+        "array": np.arange(4).reshape(2, 2),
+        "tuple": (1, None, "ä"),
+        "path": Path("a/b"),
+        "enumeration": Colour.RED,
+        "dataclass": Energies(2.0, np.zeros(1)),
+    }
+    path = write_json(tmp_path / "new" / "result.json", data)
+    assert json.loads(path.read_text()) == {
+        "float": 1.5,
+        "int": 3,
+        "truth": True,
+        "array": [[0, 1], [2, 3]],
+        "tuple": [1, None, "ä"],
+        "path": "a/b",
+        "enumeration": "red",
+        "dataclass": {"strain": 2.0, "parts": [0.0]},
+    }
+    assert list(json.loads(path.read_text())) == list(data), "the order of the keys is kept"
+
+
+json_data = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+    max_leaves=20,
+)
+
+
+@given(json_data)
+def test_what_json_knows_stays_as_it_is(data: Any) -> None:
+    assert json.loads(json.dumps(plain(data), allow_nan=False)) == data
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        ({"a": [1.0, float("nan")]}, "data['a'][1] must be finite, got nan"),
+        ({"a": np.array([np.inf])}, "data['a'][0] must be finite, got inf"),
+        (Energies(-np.inf, np.zeros(0)), "data.strain must be finite, got -inf"),
+        ({"a": {1: 2}}, "keys of data['a'] must be strings, got 1"),
+        ({"a": object()}, "data['a'] must be a mapping, sequence"),
+        ({"a": b"bytes"}, "got a bytes"),
+        ({"a": 1j}, "got a complex"),
+    ],
+)
+def test_what_json_does_not_know_is_refused_by_its_place(data: Any, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "result.json"
+    path.write_text("old")
+    with pytest.raises(InvalidInputError, match=re.escape(message)):
+        write_json(path, data)
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]

@@ -1,33 +1,39 @@
-"""A material that contradicts itself is refused before anything is built on it, and told why."""
+"""Checks of material models, elastic, hyperelastic and with history."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 import ufl
 from mpi4py import MPI
 
-from fenics_contact import Body, Scene
+from fenics_contact import Body, Scene, check_history_material, check_hyperelastic
 from fenics_contact._fem.forms import FormLibrary
 from fenics_contact._fem.model_checks import check_kernel
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, UserCodeError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
     Elasticity,
     EnergyModel,
+    FinitePlasticity,
     HistoryMaterial,
+    Hyperelasticity,
     IsotropicElasticity,
+    J2Plasticity,
     Material,
     MaterialResponse,
+    MooneyRivlin,
+    Ogden,
     OrthotropicElasticity,
     PlaneStrain,
     rigid_body_modes,
     strain,
 )
+from tests.models.deformed import patch_of, skew_patch
 from tests.models.elements import CELLS, PLANE, by_node, element_stiffness, isotropic_matrix, one_cell, whole
 from tests.models.materials import Foundation
 
@@ -303,3 +309,175 @@ def test_the_typical_modulus_is_the_mean_diagonal_of_a_unit_cell(cell: str) -> N
     expected = np.diag(element_stiffness(sides, cell, isotropic_matrix(7.0, 0.3, dim))).mean()
     assert prepare(material, cell).typical_modulus(material, cell) == pytest.approx(expected, rel=1e-12)
     assert expected == pytest.approx(np.diag(by_node(one_cell(material, cell, sides))).mean(), rel=1e-12)
+
+
+# A material of a user's own that is not what the solver takes it for is told so.
+UNIT = np.einsum("ik,jl->ijkl", np.eye(3), np.eye(3))
+SYMMETRIC = 0.5 * (UNIT + UNIT.swapaxes(2, 3))
+
+
+@dataclass(frozen=True)
+class Damper(HistoryMaterial):
+    """A spring beside a damper, σ = ε + 3 ε̇; what is `spoilt` is wrong."""
+
+    spoilt: str = ""
+    history_size: ClassVar[int] = 9
+
+    def respond(self, gradient: Any, history: Any, duration: Any) -> Any:
+        n, rate = len(gradient), 3.0 / duration if duration else 0.0
+        strain = 0.5 * (gradient + gradient.swapaxes(1, 2))
+        stress = strain + rate * (strain - history.reshape(-1, 3, 3))
+        tangent = np.broadcast_to((1 + rate) * SYMMETRIC, (n, 3, 3, 3, 3)).copy()
+        end = strain.reshape(-1, 9).copy()
+        if duration and self.spoilt == "tangent":
+            tangent[np.abs(strain[:, 0, 0]) > 5e-4, 0, 1, 2, 2] += 0.01
+        if self.spoilt == "writing":
+            history[:] = end
+        if duration and self.spoilt == "mean":
+            stress = stress + strain.mean(axis=0) * np.arange(n)[:, None, None]
+        if duration and self.spoilt == "spin":
+            stress = stress + 0.1 * (gradient - gradient.swapaxes(1, 2))
+            tangent += 0.1 * (UNIT - UNIT.swapaxes(2, 3))
+        if duration and self.spoilt == "jumps":
+            stress = stress + 1e-3 * np.sin(1e12 * gradient[:, :1, :1] ** 2)
+        if self.spoilt == "raises":
+            raise ValueError("no such damper")
+        return MaterialResponse(stress, tangent, end)
+
+
+@dataclass(frozen=True)
+class TurningDamper(Damper):
+    """The same for large deformations, which it is not for."""
+
+    finite: ClassVar[bool] = True
+
+
+def test_sound_materials_pass() -> None:
+    check_history_material(Damper())
+    check_history_material(J2Plasticity(2e5, 0.3, 200.0, 1e3, 1e3, 300.0, 10.0), size=3e-3)
+    check_history_material(FinitePlasticity(2e5, 0.3, 200.0, 1e3), size=0.1)
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "message"),
+    [
+        ("tangent", r"at \d of 24 points: dP\[0,1\]/dH\[2,2\] is 0.01 in the tangent and 0 by difference"),
+        ("writing", "respond of Damper must leave its arguments as they are"),
+        ("mean", "respond of Damper must answer for each point by itself"),
+        ("spin", r"the stress of Damper \(finite = False\) must depend on the symmetric part"),
+        ("jumps", "the stress of Damper must be a continuous function"),
+    ],
+)
+def test_what_is_wrong_is_named(spoilt: str, message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        check_history_material(Damper(spoilt))
+
+
+def test_large_deformations_need_a_stress_that_turns() -> None:
+    with pytest.raises(InvalidInputError, match=r"TurningDamper \(finite = True\) must turn with the"):
+        check_history_material(TurningDamper())
+
+
+def test_errors_of_the_users_own_name_their_source() -> None:
+    with pytest.raises(UserCodeError, match="respond of material Damper failed with ValueError"):
+        check_history_material(Damper("raises"))
+
+
+# A hyperelastic model that contradicts itself is refused before a scene is solved, and told why.
+@dataclass(frozen=True)
+class Own(Hyperelasticity):
+    """A neo-Hookean model with one mistake."""
+
+    mistake: str = ""
+
+    @property
+    def parameters(self) -> tuple[float, float]:
+        return 1.0, 2.0
+
+    def energy(self, F: Any, parameters: Any) -> Any:
+        shear, lame = parameters
+        log_J = ufl.ln(ufl.det(F))
+        W = shear / 2 * (ufl.inner(F, F) - 3 - 2 * log_J) + lame / 2 * log_J**2
+        return W + {
+            "stress": 1e-6 * shear * log_J,
+            "root": ufl.sqrt(ufl.inner(F, F) - 3.0001),
+            "rotation": shear * (ufl.tr(F) - 3) ** 2,
+        }.get(self.mistake, 0)
+
+    def first_piola(self, F: Any, parameters: Any) -> Any:
+        P = super().first_piola(F, parameters)
+        return P + 1e-3 * (F[0, 0] - 1) ** 2 * F if self.mistake == "slope" else P
+
+    def tangent(self, u: Any, du: Any, v: Any, parameters: Any) -> Any:
+        K = super().tangent(u, du, v, parameters)
+        more = 1e-2 * ufl.grad(u)[0, 0] * ufl.grad(du)[0, 0] * ufl.grad(v)[0, 1]
+        return K + more if self.mistake == "tangent" else K
+
+
+@pytest.mark.parametrize(
+    ("mistake", "message"),
+    [
+        (
+            "stress",
+            r"must be free of stress at F = I, the forces on an undeformed cell of Own are .*subtract",
+        ),
+        (
+            "root",
+            r"must be finite at F = I and at strains of a few per cent, those of Own are not: check its",
+        ),
+        ("rotation", r"rotation of the deformed body must not change .* that of Own changes by .* FᵀF"),
+        (
+            "slope",
+            r"must be the derivatives of its energy, the stress of Own differs .*write the energy alone",
+        ),
+        pytest.param(
+            "tangent",
+            r"the tangent of Own differs from the difference quotient by",
+            marks=(pytest.mark.slow, pytest.mark.claim),
+        ),
+    ],
+)
+def test_a_mistake_is_named(mistake: str, message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        check_hyperelastic(Own(mistake), "triangle")
+
+
+def test_scenes_check_their_models_when_forms_are_prepared() -> None:
+    patch_of(Body(skew_patch("triangle"), Own()))
+    with pytest.raises(InvalidInputError, match="must be free of stress at F = I"):
+        patch_of(Body(skew_patch("triangle"), Own("stress")))
+
+
+@pytest.mark.parametrize(
+    "material",
+    [
+        MooneyRivlin(1e9, 2e8, 1e14),
+        MooneyRivlin(1e-9, 0.0, 1e-3, mean_dilatation=True),
+        Ogden((2.0, -0.4), (1.3, -2.0), 1e4),
+    ],
+)
+def test_models_of_the_package_pass_whatever_their_constants(material: Hyperelasticity) -> None:
+    check_hyperelastic(material, "quadrilateral")
+
+
+def test_an_energy_without_a_value_at_rest_is_named() -> None:
+    @dataclass(frozen=True)
+    class Singular(Own):
+        def energy(self, F: Any, parameters: Any) -> Any:
+            return parameters[0] / (ufl.det(F) - 1)
+
+    body = Body(rectangle((0, 0), (1, 1), (1, 1)), Singular())
+    with pytest.raises(
+        InvalidInputError, match=r"stiffness, Singular, quadrilateral must be UFL.*Division by"
+    ):
+        FormLibrary(MPI.COMM_SELF).prepare(Scene({"body": body}))
+
+
+def test_an_energy_that_raises_is_named() -> None:
+    @dataclass(frozen=True)
+    class Broken(Own):
+        def energy(self, F: Any, parameters: Any) -> Any:
+            return parameters[7] * ufl.tr(F)
+
+    with pytest.raises(UserCodeError, match=r"the UFL of material Broken failed with IndexError"):
+        check_hyperelastic(Broken(), "triangle")

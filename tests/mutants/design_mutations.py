@@ -5,7 +5,7 @@ from __future__ import annotations
 from tests.mutants.copy_of_package import Mutation
 
 GIVEN = "tests/shape/test_given_gap_sensitivity.py"
-MERIT, NONLINEAR = "tests/optimize/test_merit.py", "tests/optimize/test_nonlinear.py"
+MERIT, NONLINEAR = "tests/optimize/test_bundle.py", "tests/optimize/test_nonlinear.py"
 
 DESIGN_MUTATIONS = (
     Mutation(
@@ -45,7 +45,7 @@ DESIGN_MUTATIONS = (
         "by_edges = -scaled[..., None] * c[:, :, None]",
         "by_edges = -0.0 * scaled[..., None] * c[:, :, None]",
         (
-            "tests/shape/test_projection_derivative.py::test_each_term_agrees_with_central_differences",
+            "tests/shape/test_derivatives.py::test_each_term_agrees_with_central_differences",
             "tests/shape/test_chain_sensitivity.py::test_the_adjoint_agrees_with_central_differences",
         ),
     ),
@@ -100,16 +100,14 @@ DESIGN_MUTATIONS = (
         "design/remeshed.py",
         "    if name not in given:",
         "    if name in given:",
-        (
-            "tests/shape/test_remeshed_gaps.py::test_new_meshes_of_the_same_cells_have_the_same_objective[gap]",
-        ),
+        ("tests/shape/test_remeshed.py::test_new_meshes_of_the_same_cells_have_the_same_objective[gap]",),
     ),
     Mutation(
         "states of designs ignore the tolerance of Newton's method",
         "_equilibrium/problem.py",
         "return (self.steps or AutomaticSteps()).newton.tolerance",
         "return 1e-6",
-        ("tests/shape/test_design_states.py::test_states_of_rubber_are_solved_to_newtons_tolerance",),
+        ("tests/shape/test_design.py::test_states_of_rubber_are_solved_to_newtons_tolerance",),
     ),
     Mutation(
         "gradients of rubber hold weighted means where they are",

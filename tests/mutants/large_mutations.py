@@ -5,7 +5,8 @@ from __future__ import annotations
 from tests.mutants.copy_of_package import Mutation
 
 ONE_STEP = (
-    "tests/nonlinear/test_parts.py::test_friction_and_plastic_flow_do_not_depend_on_how_a_load_step_is_cut"
+    "tests/nonlinear/test_newton_steps.py::"
+    "test_friction_and_plastic_flow_do_not_depend_on_how_a_load_step_is_cut"
 )
 
 LARGE_MUTATIONS = (
@@ -15,7 +16,7 @@ LARGE_MUTATIONS = (
         "blocks[number] = blocks[number] + softening",
         "blocks[number] = blocks[number] + 0.97 * softening",
         (
-            "tests/nonlinear/test_following_pressure.py::test_newton_is_quadratic_where_rims_slide_in_planes_of"
+            "tests/nonlinear/test_prescribed_motion.py::test_newton_is_quadratic_where_rims_slide_in_planes_of"
             "_symmetry_and_neighbours_pass_forces_on",
         ),
     ),
@@ -25,7 +26,7 @@ LARGE_MUTATIONS = (
         "np.minimum(usual / np.abs(compliance[soft]), 1.0)",
         "np.ones(np.count_nonzero(soft))",
         (
-            "tests/nonlinear/test_following_pressure.py::test_soft_rows_of_rims_between_many_parts_neither_cost"
+            "tests/nonlinear/test_prescribed_motion.py::test_soft_rows_of_rims_between_many_parts_neither_cost"
             "_products_nor_accuracy",
         ),
     ),
@@ -56,7 +57,7 @@ LARGE_MUTATIONS = (
         "[((1.0 - part) * weight, each) for weight, each in first.following]",
         "[(weight, each) for weight, each in first.following]",
         (
-            "tests/nonlinear/test_parts.py::test_on_the_way_to_another_pressure_the_old_one_goes_as_the_new_one_comes",
+            "tests/nonlinear/test_newton_steps.py::test_on_the_way_to_another_pressure_the_old_one_goes_as_the_new_one_comes",
         ),
     ),
     Mutation(
@@ -65,7 +66,7 @@ LARGE_MUTATIONS = (
         "mixed = replace(mixed, torn=torn, following=now.following)",
         "mixed = replace(mixed, torn=torn)",
         (
-            "tests/nonlinear/test_parts.py::test_a_pressure_that_is_a_function_of_time_has_its_value_at_every_part",
+            "tests/nonlinear/test_newton_steps.py::test_a_pressure_that_is_a_function_of_time_has_its_value_at_every_part",
         ),
     ),
     Mutation(
@@ -98,7 +99,7 @@ LARGE_MUTATIONS = (
         "rubbed += self.end.evaluation.rubbing",
         "rubbed = 0.0",
         (
-            "tests/nonlinear/test_reported_values.py::test_friction_to_and_fro_within_a_load_step_is_the_sum"
+            "tests/nonlinear/test_prescribed_motion.py::test_friction_to_and_fro_within_a_load_step_is_the_sum"
             "_over_parts_with_histories_of_their_own",
         ),
     ),
@@ -108,7 +109,7 @@ LARGE_MUTATIONS = (
         "near[:] = True",
         "pass",
         (
-            "tests/pairing/test_sliding_given_gaps.py::"
+            "tests/pairing/test_sliding_derivatives.py::"
             "test_nodes_that_meet_their_master_later_have_the_gap_of_those_beside_them",
         ),
     ),
@@ -117,14 +118,14 @@ LARGE_MUTATIONS = (
         "_large_deformations/equations.py",
         "ROUNDED = 4.0 *",
         "ROUNDED = 4000.0 *",
-        ("tests/nonlinear/test_limits.py::test_rounding_alone_hides_nothing_of_a_small_load",),
+        ("tests/nonlinear/test_newton_steps.py::test_rounding_alone_hides_nothing_of_a_small_load",),
     ),
     Mutation(
         "a tenth of what would strain bodies by their displacement counts as no force",
         "_large_deformations/equations.py",
         "FORCE_FLOOR = 1e-4",
         "FORCE_FLOOR = 1e-1",
-        ("tests/nonlinear/test_limits.py::test_a_small_load_on_a_body_that_is_moved_far_is_balanced",),
+        ("tests/nonlinear/test_newton_steps.py::test_a_small_load_on_a_body_that_is_moved_far_is_balanced",),
     ),
     Mutation(
         "pressures of bodies that deform much are by undeformed area",

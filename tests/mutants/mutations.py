@@ -8,8 +8,8 @@ from tests.mutants.large_mutations import LARGE_MUTATIONS
 
 CONIC = "tests/contact/test_conic.py::test_energies_and_contact_forces_equal_those_of_a_conic_solver"
 
-PARTS = "tests/accuracy/test_certificate_parts.py"
-NARROW = "tests/surfaces/test_narrow_surfaces.py"
+PARTS = "tests/accuracy/test_certificate.py"
+NARROW = "tests/surfaces/test_true_surface.py"
 RIGID = "tests/contact/test_rigid_surfaces.py"
 
 MUTATIONS = (
@@ -62,7 +62,7 @@ MUTATIONS = (
         "_equilibrium/warnings.py",
         "if error > SHARE * moved:",
         "if error > 10.0 * SHARE * moved:",
-        ("tests/contact/test_contact_doubts.py::test_a_roller_is_told_of_by_facets_alone",),
+        ("tests/contact/test_unheld.py::test_a_roller_is_told_of_by_facets_alone",),
     ),
     Mutation(
         "no body is ever too loose",
@@ -83,14 +83,14 @@ MUTATIONS = (
         "results/fields.py",
         "ufl.sqrt(1.5 * ufl.inner(deviator, deviator))",
         "ufl.sqrt(1.49 * ufl.inner(deviator, deviator))",
-        ("tests/models/test_plane.py::test_a_plate_is_stretched_and_contracts",),
+        ("tests/models/test_loads.py::test_a_plate_is_stretched_and_contracts",),
     ),
     Mutation(
         "nodal stress forgets half of the shear",
         "results/fields.py",
         "if i == j else gradients[:, i, j] + gradients[:, j, i]",
         "if i == j else gradients[:, i, j]",
-        ("tests/contact/test_stress.py::test_the_stress_of_a_thick_cylinder_converges_to_lame",),
+        ("tests/contact/test_units.py::test_the_stress_of_a_thick_cylinder_converges_to_lame",),
     ),
     Mutation(
         "reactions contain what contact exerts on prescribed components",
@@ -156,7 +156,7 @@ MUTATIONS = (
         "_accuracy/discretisation.py",
         "return DiscretisationError(float(np.sqrt(sums.sum())), by_body",
         "return DiscretisationError(0.5 * float(np.sqrt(sums.sum())), by_body",
-        ("tests/accuracy/test_smooth.py::test_the_estimate_is_close_to_the_error_and_falls_at_its_rate",),
+        ("tests/accuracy/test_recovery.py::test_the_estimate_is_close_to_the_error_and_falls_at_its_rate",),
     ),
     Mutation(
         "a state is called balanced ten times too early",
@@ -198,7 +198,7 @@ MUTATIONS = (
         "materials/elastic.py",
         "return (3 * lame_parameter + 2 * shear) * expansion * ufl.Identity(self.dims[0])",
         "return -(3 * lame_parameter + 2 * shear) * expansion * ufl.Identity(self.dims[0])",
-        ("tests/models/test_thermal.py::test_a_free_body_expands_evenly_and_without_stress",),
+        ("tests/models/test_loads.py::test_a_free_body_expands_evenly_and_without_stress",),
     ),
     Mutation(
         "sliding ties are bonded",
@@ -240,7 +240,7 @@ MUTATIONS = (
         "_surfaces/projection.py",
         "start = master.points[nodes[:, 0]]",
         "start = 0.0 * master.points[nodes[:, 0]]",
-        ("tests/contact/test_far_from_origin.py::test_no_contact_point_is_lost_far_from_the_origin",),
+        ("tests/contact/test_units.py::test_no_contact_point_is_lost_far_from_the_origin",),
     ),
     Mutation(
         "the tangent of plastic flow forgets that its direction turns",
@@ -293,7 +293,7 @@ MUTATIONS = (
         "self.gather_displacement(name) if body.deforms_much else 0.0",
         "0.0",
         (
-            "tests/nonlinear/test_reported_values.py::"
+            "tests/nonlinear/test_prescribed_motion.py::"
             "test_forces_and_moments_balance_beside_bodies_of_small_strain",
         ),
     ),
@@ -302,30 +302,28 @@ MUTATIONS = (
         "_pairing/search.py",
         "np.where(lost, own, weight @ opposite)",
         "weight @ opposite",
-        (
-            "tests/shape/test_mortar_derivative.py::test_gaps_are_closable_from_both_sides_and_at_the_rim_means",
-        ),
+        ("tests/shape/test_derivatives.py::test_gaps_are_closable_from_both_sides_and_at_the_rim_means",),
     ),
     Mutation(
         "slip of earlier steps does not turn with the master",
         "_equilibrium/deformed.py",
         "points.carry_slip(before.contact.total_slip, old)",
         "points.carry_tangential(before.contact.total_slip, old)",
-        ("tests/nonlinear/test_reported_values.py::test_slip_of_earlier_steps_turns_about_the_normal",),
+        ("tests/nonlinear/test_prescribed_motion.py::test_slip_of_earlier_steps_turns_about_the_normal",),
     ),
     Mutation(
         "the dilatation of hexahedra27 is constant in a cell",
         "_fem/templates.py",
         'LINEAR = ("quadrilateral9", "hexahedron27")',
         'LINEAR = ("quadrilateral9",)',
-        ("tests/models/test_nearly_incompressible.py::test_only_rigid_motions_of_a_cell_are_without_energy",),
+        ("tests/models/test_hyperelasticity.py::test_only_rigid_motions_of_a_cell_are_without_energy",),
     ),
     Mutation(
         "quadratic tetrahedra do not feel what their mean dilatation leaves out",
         "_fem/templates.py",
         'UNSEEN = ("tetrahedron10",)',
         "UNSEEN = ()",
-        ("tests/models/test_nearly_incompressible.py::test_only_rigid_motions_of_a_cell_are_without_energy",),
+        ("tests/models/test_hyperelasticity.py::test_only_rigid_motions_of_a_cell_are_without_energy",),
     ),
     Mutation(
         "a yield stress that has fallen to zero still has a slope",
@@ -342,7 +340,7 @@ MUTATIONS = (
         "(0.75 * spread)",
         "(1.0 * spread)",
         (
-            "tests/contact/test_contact_area.py::"
+            "tests/contact/test_state.py::"
             "test_the_rim_lies_where_pressure_and_gap_of_a_smooth_contact_place_it",
         ),
     ),

@@ -1,15 +1,20 @@
-"""Rubber that slides far over rubber and over rigid bodies."""
+"""Ironing, and bodies that slide far."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
+from benchmarks.large_deformations.ironing import ironing as started_ironing
 from fenics_contact import (
     AutomaticSteps,
     Body,
@@ -17,10 +22,13 @@ from fenics_contact import (
     ContactProblem,
     Coulomb,
     DeformedState,
+    LoadSequence,
     LoadStep,
     MovingObstacle,
     RigidSphere,
     Scene,
+    State,
+    Status,
     Support,
     Surface,
     TangentNewton,
@@ -28,10 +36,15 @@ from fenics_contact import (
     solve_scene,
     solve_steps,
 )
-from fenics_contact.errors import LoadStepError
-from fenics_contact.gallery import half_disc, rectangle
-from tests.nonlinear.ironing import WAY, ironing
-from tests.nonlinear.scenes import RUBBER, pressed, rounded
+from fenics_contact._large_deformations.loading import RigidStart
+from fenics_contact.errors import InvalidInputError, LoadStepError
+from fenics_contact.errors.kinds import FoldedFacetsError
+from fenics_contact.gallery import block, half_disc, rectangle
+from fenics_contact.materials import HistoryMaterial, MaterialResponse, NeoHooke
+from tests.conftest import run_on_ranks
+from tests.nonlinear.ironing import WAY, die, ironing
+from tests.nonlinear.mortar_scenes import by_mortar, followed, pressed_and_pushed, stacked
+from tests.nonlinear.scenes import RUBBER, pressed, rounded, tilted
 
 
 @cache
@@ -158,3 +171,239 @@ def test_a_path_that_ends_where_nodes_leave_the_end_of_a_master_says_so(end: flo
         solve_steps(problem, [LoadStep(str(n), supports=each) for n, each in enumerate(held)])
     words = r"; 1 node of surface 'y0' presses on 'y1' from beyond its end with \d\d\.\d% of the normal force"
     assert bool(re.search(words, str(ended.value))) == told, ended.value
+
+
+# Where Newton's method starts in a load step of bodies that touch.
+
+#: Of the die: down, then along.
+SHORT_WAY = [(0.0, -0.8), (0.25, -0.8), (0.5, -0.8), (0.75, -0.8)]
+
+
+def drawn(columns: int, cells: int, count: int) -> list[State]:
+    """A die that is pressed into a block and drawn along it, without friction."""
+    bodies = {
+        "block": Body(rectangle((0.0, 0.0), (6.0, 4.0), (columns, columns // 2)), NeoHooke(1.0, 0.32)),
+        "die": Body(die(cells), NeoHooke(10.0, 0.32)),
+    }
+    held = [[Support("block", "y0"), Support("die", "y1", at)] for at in SHORT_WAY]
+    pair = ContactPair(Surface("die", "y0"), Surface("block", "y1"), discretisation="mortar")
+    steps = [LoadStep(f"{at}", supports=supports) for at, supports in zip(SHORT_WAY, held, strict=True)]
+    scene = Scene(bodies, held[0], contacts=[pair])
+    return list(solve_steps(ContactProblem(scene, MPI.COMM_SELF), steps[:count]))
+
+
+def without_moving_first(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(RigidStart, "moved", lambda *given: None)
+
+
+def begun_again(states: list[State]) -> list[bool]:
+    return ["begun again" in state.solution.history[0].note for state in states]
+
+
+def require_the_same(found: list[State], other: list[State]) -> None:
+    for one, two in zip(found, other, strict=True):
+        force = two.contact.force
+        assert np.abs(force).max() > 0.0
+        np.testing.assert_allclose(one.contact.force, force, atol=1e-6 * np.abs(force).max())
+
+
+def test_a_die_that_slides_starts_where_its_support_takes_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = drawn(16, 6, 4)
+    without_moving_first(monkeypatch)
+    other = drawn(16, 6, 4)
+    require_the_same(found, other)
+    assert not any(begun_again(found))
+    taken, usual = (sum(len(s.solution.history) for s in states[1:]) for states in (found, other))
+    assert taken <= 0.8 * usual, f"{taken} Newton steps where {usual} are usual"
+
+
+def test_a_start_whose_first_step_fails_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = drawn(12, 5, 2)
+    without_moving_first(monkeypatch)
+    other = drawn(12, 5, 2)
+    require_the_same(found, other)
+    assert begun_again(found) == [False, True]
+    assert not any(begun_again(other))
+    taken, usual = (len(states[-1].solution.history) for states in (found, other))
+    assert taken == usual + 1, "the step that failed, and no other"
+
+
+@pytest.mark.slow
+@pytest.mark.claim
+def test_ironing_by_five_millimetres_takes_the_newton_steps_of_the_study() -> None:
+    sequence = LoadSequence(ContactProblem(started_ironing(48, "mortar"), MPI.COMM_SELF))
+    places = [(0.0, 0.25 * k) for k in range(1, 5)] + [(0.25 * k, 1.0) for k in range(1, 21)]
+    taken = []
+    for across, down in places:
+        supports = [Support("bed", "y0"), Support("die", "y1", (across, -down))]
+        state = sequence.advance(LoadStep(f"{across} {down}", supports=supports))
+        taken.append(len(state.solution.history))
+    assert sum(taken) == pytest.approx(130, abs=6)
+    assert max(taken[8:]) <= 6
+
+
+@pytest.mark.parametrize("parts", [1, 2])
+def test_a_tool_that_meets_nothing_at_first_presses_later(parts: int) -> None:
+    """By then no force acts anywhere, with which what is to act could be compared."""
+
+    def pressed(*times: float) -> State:
+        tool = MovingObstacle(RigidSphere((1.0, 2.25), 1.0), lambda time: (None, (0.0, -0.2 * time)))
+        pad = Body(rectangle((0.0, 0.0), (2.0, 1.0), (7, 3)), NeoHooke(1.0, 0.3))
+        pair = ContactPair(Surface("pad", "y1"), tool)
+        scene = Scene({"pad": pad}, [Support("pad", "y0")], contacts=[pair])
+        problem = ContactProblem(scene, MPI.COMM_SELF, partitions={"pad": np.arange(21) * parts // 21})
+        return list(solve_steps(problem, [LoadStep(str(time), time=time) for time in times]))[-1]
+
+    assert pressed(1.0).contact.normal_force.sum() == 0.0
+    at_once, later = pressed(2.0), pressed(0.5, 1.0, 2.0)
+    assert at_once.contact.normal_force.sum() > 0.1
+    require_the_same([later], [at_once])
+    assert later.contact.gap.min() > -1e-8
+
+
+# Rubber that meets rubber by mortar where both lie now.
+@pytest.mark.parametrize(
+    ("cells", "held", "friction"),
+    [
+        ("quadrilateral", True, 0.0),
+        ("triangle", False, 0.0),
+        ("hexahedron", False, 0.3),
+        ("tetrahedron", True, 0.0),
+    ],
+)
+def test_patch_of_half_the_height(cells: str, held: bool, friction: float) -> None:
+    """At 50 % the state is homogeneous, however the meshes meet."""
+    scene = stacked(cells, 1.0, held=held, friction=friction)
+    (state,) = followed([scene], MPI.COMM_SELF)
+    stress = np.concatenate([state.gather_stress(body) for body in scene.bodies])
+    assert np.abs(stress[0]).max() > 0.5
+    assert np.abs(stress - stress[0]).max() < 1e-8 * np.abs(stress).max()
+    contact, across = state.contact, scene.dim - 1
+    grown = (1.0 + state.gather_displacement("high").max()) ** across
+    assert held or grown > 1.2
+    np.testing.assert_allclose(contact.pressure, -stress[0, across, across], rtol=1e-7)
+    np.testing.assert_allclose(contact.nominal_pressure, contact.pressure * grown, rtol=1e-7)
+    assert contact.area.sum() == pytest.approx(grown, rel=1e-7)
+
+
+def test_ironing_converges_quadratically() -> None:
+    states = followed([by_mortar(ironing(0.3, way)) for way in WAY[:3]], MPI.COMM_SELF)
+    assert states[1].contact.count(Status.STICK) > 3
+    assert states[-1].contact.count(Status.SLIP) > 3
+    for state in states:
+        worst = [line.residuals.worst for line in state.solution.history]
+        assert worst[-1] < max(10 * worst[-2] ** 1.8, 1e-10), "quadratic down to rounding"
+        assert any(new < 10 * old**1.8 < 1e-5 for old, new in pairwise(worst))
+
+
+def test_a_newton_step_that_folds_facets_cuts_the_load_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = 0
+
+    def folded_once(*_: object) -> None:
+        nonlocal calls
+        calls += 1
+        if calls == 3:
+            raise FoldedFacetsError("1 are folded")
+
+    monkeypatch.setattr("fenics_contact._pairing.mortar.coupling.check_convex", folded_once)
+    (state,) = followed([stacked("hexahedron", 0.3, held=True, friction=0.0)], MPI.COMM_SELF)
+    assert calls > 3
+    assert state.fractions == (0.5, 1.0)
+
+
+def test_two_blocks_turned_in_space_give_the_turned_answer() -> None:
+    rotation = tilted(1.1)
+    upright, turned = (
+        followed(pressed_and_pushed(each), MPI.COMM_SELF, 1e-11)[-1] for each in (np.eye(3), rotation)
+    )
+    assert turned.contact.count(Status.SLIP) > 3
+    forces = upright.contact.force @ rotation.T
+    assert np.abs(turned.contact.force - forces).max() < 1e-9 * np.abs(forces).max()
+    for name in ("low", "high"):
+        moved = upright.gather_displacement(name) @ rotation.T
+        assert np.abs(turned.gather_displacement(name) - moved).max() < 1e-9 * np.abs(moved).max()
+
+
+@pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.claim)])
+def test_ranks_find_the_same(ranks: int, tmp_path: Path) -> None:
+    script = Path(__file__).with_name("mortar_on_ranks.py")
+    run_on_ranks(script, ranks, tmp_path / "state.npz")
+    (serial,) = followed(pressed_and_pushed(np.eye(3))[1:], MPI.COMM_SELF)
+    with np.load(tmp_path / "state.npz") as found:
+        for name, values in found.items():
+            inside = name in ("low", "high")
+            expected = serial.gather_displacement(name) if inside else getattr(serial.contact, name)
+            assert np.abs(values - expected).max() < 1e-7 * np.abs(expected).max(), name
+
+
+# Materials that relax: load steps have a duration.
+UNIT = np.einsum("ik,jl->ijkl", np.eye(3), np.eye(3))
+SYMMETRIC = 0.5 * (UNIT + UNIT.swapaxes(2, 3))
+SPRING, DAMPED, TIME = 2.0, 3.0, 0.7
+
+
+@dataclass(frozen=True)
+class StandardSolid(HistoryMaterial):
+    """A spring beside a spring with a damper, by backward Euler; the history is strain and damped stress."""
+
+    spring: float
+    damped: float
+    relaxation_time: float
+    history_size = 18
+
+    def respond(self, gradient: Any, history: Any, duration: Any) -> MaterialResponse:
+        n = len(gradient)
+        strain = 0.5 * (gradient + gradient.swapaxes(1, 2))
+        before, stress = history.reshape(n, 2, 3, 3).swapaxes(0, 1)
+        decay = 1.0 / (1.0 + duration / self.relaxation_time)
+        damped = decay * (stress + self.damped * (strain - before))
+        tangent = np.broadcast_to((self.spring + decay * self.damped) * SYMMETRIC, (n, 3, 3, 3, 3))
+        after = np.concatenate([strain.reshape(n, 9), damped.reshape(n, 9)], axis=1)
+        return MaterialResponse(self.spring * strain + damped, tangent, after)
+
+
+def solid() -> Scene:
+    body = Body(block((0, 0, 0), (1, 1, 1), (2, 2, 2)), StandardSolid(SPRING, DAMPED, TIME))
+    return Scene({"body": body}, [Support("body", "x0"), Support("body", "x1", (0.0, 0.0, 0.0))])
+
+
+def held(stretch: float) -> list[Support]:
+    return [Support("body", "x0"), Support("body", "x1", (stretch, 0.0, 0.0))]
+
+
+def pull(state: State) -> float:
+    return float(state.reactions()[1].force[0])
+
+
+def relaxed(count: int, steps: AutomaticSteps | None = None) -> float:
+    """The force after stretching at once and holding for one unit of time, in some steps."""
+    problem = ContactProblem(solid(), MPI.COMM_SELF, tolerance=1e-11, steps=steps)
+    times = [0.0, *(np.arange(1, count + 1) / count)]
+    states = solve_steps(problem, [LoadStep(f"{t}", supports=held(0.01), time=t) for t in times])
+    # Without Poisson's effect the stress is even; a step of no duration is elastic.
+    assert pull(states[0]) == pytest.approx((SPRING + DAMPED) * 0.01)
+    return pull(states[-1])
+
+
+def test_relaxation_follows_the_closed_form_in_the_first_order() -> None:
+    exact = (SPRING + DAMPED * np.exp(-1.0 / TIME)) * 0.01
+    coarse, fine = (relaxed(count) / exact - 1.0 for count in (10, 20))
+    assert 0.0 < fine < 0.02
+    assert coarse / fine == pytest.approx(2.0, rel=0.05)
+
+
+@pytest.mark.parametrize("finer", [False, True])
+def test_a_load_step_has_its_duration_whole_and_in_parts_if_asked_for(finer: bool) -> None:
+    parts = (0.25, 0.375, 0.375) if finer else (1.0,)  # an easy part is followed by longer ones
+    decay = 1.0 / np.prod([1.0 + part / TIME for part in parts])
+    force = relaxed(1, AutomaticSteps(first=0.25, finer_history=finer))
+    assert force == pytest.approx((SPRING + DAMPED * decay) * 0.01, rel=1e-9)
+
+
+def test_time_must_not_run_backwards() -> None:
+    sequence = LoadSequence(ContactProblem(solid(), MPI.COMM_SELF))
+    sequence.advance(LoadStep("later", supports=held(0.01), time=2.0))
+    with pytest.raises(
+        InvalidInputError, match=r"time of load steps must not decrease .* got 1 after 2: give"
+    ):
+        sequence.advance(LoadStep("earlier", supports=held(0.01), time=1.0))

@@ -1,15 +1,27 @@
-"""Mortar coupling of flat surfaces is exact: areas, linear fields, transfer of forces, rigid motions."""
+"""Mortar coupling: weights, dual basis, clipping and curved surfaces."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from mpi4py import MPI
+from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from fenics_contact._pairing.mortar.coupling import MortarCoupling, mortar_coupling
-from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
+from fenics_contact._pairing.mortar.cells import Cells, clip, simplices
+from fenics_contact._pairing.mortar.coupling import CORNERS, MortarCoupling, dual_integrals, mortar_coupling
+from fenics_contact._pairing.mortar.derivatives import weight_derivatives
+from fenics_contact._pairing.mortar.planes import local_coordinates, measure, rule
+from fenics_contact._surfaces.facets import FacetedSurface, facet_shape_values, faceted_surface
 from fenics_contact.errors import InvalidInputError
-from tests.pairing.mortar_surfaces import KINDS, SOLID, moved, plate, rotation
+from tests.conftest import run_on_ranks
+from tests.pairing.mortar_on_ranks import collect, message_for_a_folded_facet
+from tests.pairing.mortar_surfaces import KINDS, SOLID, moved, plate, rotation, shell
 
 kinds = pytest.mark.parametrize(("slave_kind", "master_kind"), KINDS)
 solid = pytest.mark.parametrize(("slave_kind", "master_kind"), SOLID)
@@ -246,3 +258,356 @@ def test_the_size_of_chunks_does_not_matter(
     np.testing.assert_array_equal(cut.node, whole.node)
     np.testing.assert_allclose(cut.area, whole.area, rtol=1e-13)
     np.testing.assert_allclose(cut.weight.toarray(), whole.weight.toarray(), atol=1e-13)
+
+
+# Derivatives of mortar weights by both surfaces, one by one.
+def moved_surfaces(surface: FacetedSurface, by: np.ndarray) -> FacetedSurface:
+    return replace(surface, points=surface.points + by, relief=None)
+
+
+@pytest.mark.parametrize("kinds", KINDS, ids="-".join)
+@pytest.mark.parametrize("name", ["plates", "rim", "shells"])
+def test_weights_change_as_their_derivatives_say(name: str, kinds: tuple[str, str]) -> None:
+    """At the rim of the master and on quadrilaterals that warp, dual functions change as well."""
+    if name == "shells":
+        slave, master = (
+            shell(kind, cells, radius, convex=convex, span=span)
+            for kind, cells, radius, convex, span in (
+                (kinds[0], 9, 1.0, True, (0.2, 0.9)),
+                (kinds[1], 7, 1.02, False, (0.0, 1.0)),
+            )
+        )
+        # No rim of the master over a rim of the slave, where derivatives differ on both sides.
+        aside = 1.3 * master.points[:, 2:] - 0.15
+        master = replace(master, points=np.hstack([master.points[:, :2], aside]))
+    else:
+        low, high = (0.2, 0.9) if name == "plates" else (0.2, 1.2)
+        slave = plate(kinds[0], 5, height=0.01, up=False, low=low, high=high, turn=0.3)
+        master = plate(kinds[1], 7)
+    random, step = np.random.default_rng(5), 1e-6
+    ways = [random.standard_normal(each.points.shape) for each in (slave, master)]
+    coupling = mortar_coupling(slave, master)
+    found = weight_derivatives(slave, master, coupling, np.ones(len(coupling.node), dtype=bool))
+    slope = found.rows @ np.concatenate([way.ravel() for way in ways])
+    ahead, behind = (
+        mortar_coupling(
+            moved_surfaces(slave, sign * step * ways[0]), moved_surfaces(master, sign * step * ways[1])
+        ).weight
+        for sign in (1, -1)
+    )
+    quotient = np.asarray((ahead - behind)[found.point, found.node]).ravel() / (2 * step)
+    error = np.abs(slope - quotient).max() / np.abs(quotient).max()
+    assert np.abs(quotient).max() > 1.0
+    assert error < 1e-7
+
+
+# Mortar coupling of concentric cylinders and circles with different meshes tends to the true distance.
+GAP = 0.05
+
+
+def pair(slave_kind: str, master_kind: str, n: int, convex: bool) -> tuple[FacetedSurface, FacetedSurface]:
+    """A shaft in a hole as slave, or the hole as slave and the shaft as master."""
+    slave = shell(slave_kind, n, 1.0 if convex else 1 + GAP, convex=convex, span=(0.3, 1.5))
+    master = shell(
+        master_kind, 4 * n // 3, 1 + GAP if convex else 1.0, convex=not convex, span=(0.0, 2.0), uneven=-0.2
+    )
+    return slave, master
+
+
+@kinds
+@pytest.mark.parametrize("convex", [True, False])
+def test_gaps_between_concentric_shells_converge_with_second_order(
+    slave_kind: str, master_kind: str, convex: bool
+) -> None:
+    errors = []
+    for n in (6, 12, 24, 48):
+        slave, master = pair(slave_kind, master_kind, n, convex)
+        coupling = mortar_coupling(slave, master)
+        assert len(coupling.node) == len(slave.nodes)
+        assert coupling.area.sum() == pytest.approx(slave.areas.sum(), rel=1e-12)
+        errors.append(np.abs(coupling.gap - GAP).max())
+    rates = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    assert rates[-1] > 1.8, f"orders of the gap: {rates}"
+    assert errors[0] > 1e-4, "the coarse shells are too good: nothing was tested"
+
+
+@kinds
+def test_coarse_shells_give_bounded_weights_and_rows_that_add_up(slave_kind: str, master_kind: str) -> None:
+    coupling = mortar_coupling(*pair(slave_kind, master_kind, 3, True))
+    assert len(coupling.node) > 0
+    np.testing.assert_allclose(coupling.weight.sum(axis=1), 1.0, atol=1e-12)
+    assert np.abs(coupling.weight.toarray()).max() < 5
+
+
+@kinds
+def test_rigid_motions_of_shells_change_nothing(slave_kind: str, master_kind: str) -> None:
+    slave, master = pair(slave_kind, master_kind, 9, True)
+    turn, shift = rotation(slave.dim), np.arange(slave.dim) - 0.4
+    before: MortarCoupling = mortar_coupling(slave, master)
+    after = mortar_coupling(moved(slave, turn, shift), moved(master, turn, shift))
+    np.testing.assert_array_equal(after.node, before.node)
+    np.testing.assert_allclose(after.area, before.area, rtol=1e-10)
+    np.testing.assert_allclose(after.weight.toarray(), before.weight.toarray(), atol=1e-9)
+    np.testing.assert_allclose(after.gap, before.gap, atol=1e-12)
+
+
+@kinds
+def test_the_other_side_of_a_hole_is_not_met(slave_kind: str, master_kind: str) -> None:
+    hole = shell(master_kind, 60, 1.02, convex=False, span=(0.0, 6.2), uneven=0.0)
+    shaft = shell(slave_kind, 20, 1.0, convex=True, span=(0.2, 2.2))
+    coupling = mortar_coupling(shaft, hole)
+    assert len(coupling.node) == len(shaft.nodes)
+    met = np.unique(coupling.weight.indices)
+    assert np.arctan2(hole.points[met, 1], hole.points[met, 0]).min() > 0
+    np.testing.assert_allclose(coupling.gap, 0.02, atol=5e-3)
+
+
+# Dual functions are biorthogonal to the shape functions on whatever part of a facet is covered.
+def covered(corners: int, parts: np.ndarray, share_of_pairs: np.ndarray) -> Cells:
+    """Cells on one facet in its own local coordinates, coupled with the facet's own shape functions."""
+    barycentric, weights = rule(parts.shape[1])
+    local = barycentric @ parts
+    values = facet_shape_values(local, corners)
+    size = np.abs(measure(parts))[:, None] * weights
+    return Cells(np.zeros(len(parts), dtype=np.int64), share_of_pairs, size, local, local, values, values)
+
+
+def without_field(cells: Cells) -> tuple[np.ndarray, np.ndarray]:
+    """Integrals of shape functions alone."""
+    return dual_integrals(cells, np.zeros(cells.weight.shape))[:2]
+
+
+def inside(corners: int, seed: int, count: int, width: float) -> np.ndarray:
+    """Small simplices somewhere in a facet."""
+    rng = np.random.default_rng(seed)
+    dim = 2 if corners == 2 else 3
+    low, high = CORNERS[corners].min(), (0.5 if corners == 3 else 0.9)
+    middle = rng.uniform(low, high - width, dim - 1)
+    return middle + width * rng.uniform(0, 1, (count, dim, dim - 1))
+
+
+@given(
+    st.sampled_from([2, 3, 4]), st.integers(0, 10**6), st.integers(1, 5), st.sampled_from([0.01, 0.1, 0.4])
+)
+def test_dual_functions_are_biorthogonal_on_the_covered_part(
+    corners: int, seed: int, count: int, width: float
+) -> None:
+    cells = covered(corners, inside(corners, seed, count, width), np.arange(count))
+    coverage, integrals = without_field(cells)
+    scale = coverage.sum()
+    np.testing.assert_allclose(coverage[0], np.einsum("nq,nqk->k", cells.weight, cells.slave), rtol=1e-12)
+    # Thin triangles are slivers, in which only sums are kept.
+    np.testing.assert_allclose(integrals.sum(axis=(0, 2)), coverage[0], atol=1e-9 * scale)
+    np.testing.assert_allclose(integrals.sum(axis=(0, 1)), coverage[0], atol=1e-9 * scale)
+
+
+@pytest.mark.parametrize("corners", [2, 3, 4])
+@pytest.mark.parametrize("width", [1.0, 0.1, 0.01])
+def test_integrals_with_the_shape_functions_are_diagonal(corners: int, width: float) -> None:
+    corner = CORNERS[corners]
+    part = corner[[0, 1]] if corners == 2 else corner[[0, 1, 2]]
+    parts = (corner[0] + width * (part - corner[0]))[None]
+    coverage, integrals = without_field(covered(corners, parts, np.array([0])))
+    assert (coverage > 0).all()
+    np.testing.assert_allclose(integrals[0], np.diag(coverage[0]), atol=1e-13 * coverage.sum() / width**2)
+
+
+def test_slivers_are_not_extrapolated() -> None:
+    strip = np.array([[[-1.0, -1], [1, -1], [1, -1 + 1e-7]], [[-1, -1], [1, -1 + 1e-7], [-1, -1 + 1e-7]]])
+    cells = covered(4, strip, np.array([0, 0]))
+    coverage, integrals = without_field(cells)
+    values = integrals[0] / coverage[0][:, None]
+    # Along the strip all is linear; across it the far corners take the values of the near ones.
+    np.testing.assert_allclose(values[0], values[3], atol=1e-6)
+    np.testing.assert_allclose(values[0], [1, 0, 0, 0], atol=1e-6)
+    np.testing.assert_allclose(values.sum(axis=1), 1.0, atol=1e-12)
+
+
+def test_facets_do_not_mix() -> None:
+    rng = np.random.default_rng(8)
+    parts = [inside(4, seed, 3, 0.4) for seed in (1, 2)]
+    alone = [without_field(covered(4, part, np.array([0, 1, 1]))) for part in parts]
+    both = covered(4, np.concatenate(parts), np.array([0, 1, 1, 2, 3, 3]))
+    order = rng.permutation(6)
+    cells = Cells(
+        np.repeat([0, 1], 3)[order],
+        both.pair[order],
+        both.weight[order],
+        both.local[order],
+        both.opposite[order],
+        both.slave[order],
+        both.master[order],
+    )
+    coverage, integrals = without_field(cells)
+    np.testing.assert_allclose(coverage, np.concatenate([a[0] for a in alone]), rtol=1e-12)
+    np.testing.assert_allclose(integrals, np.concatenate([a[1] for a in alone]), atol=1e-10)
+
+
+def test_a_field_is_integrated_as_a_shape_function_is() -> None:
+    cells = covered(4, inside(4, 3, 4, 0.4), np.array([0, 0, 1, 2]))
+    _, integrals, of_field = dual_integrals(cells, cells.master @ [3.0, -1.0, 2.0, 0.5])
+    np.testing.assert_allclose(of_field, integrals @ [3.0, -1.0, 2.0, 0.5], rtol=1e-10)
+
+
+# Clipped polygons are the intersections that half-planes give; local coordinates and rules are exact.
+
+#: Coordinates that often coincide, so that corners meet corners and edges meet edges, and any others.
+coordinate = st.one_of(st.integers(-4, 4).map(lambda k: k / 4), st.floats(-1, 1))
+point = st.tuples(coordinate, coordinate)
+area_of = measure
+
+
+def convex(corners: int) -> st.SearchStrategy[np.ndarray]:
+    """Convex polygons, counterclockwise, as images of a regular one and triangles of any three points."""
+    if corners == 3:
+        return (
+            st.tuples(point, point, point).map(np.array).filter(lambda p: abs(doubled(p)) > 0.05).map(ordered)
+        )
+    return st.tuples(point, point, point, point).map(np.array).filter(is_convex).map(ordered)
+
+
+def doubled(p: np.ndarray) -> float:
+    return float(2 * measure(p[None])[0])
+
+
+def ordered(p: np.ndarray) -> np.ndarray:
+    return p if doubled(p) > 0 else p[::-1]
+
+
+def is_convex(p: np.ndarray) -> bool:
+    turned = [doubled(p[[i, (i + 1) % 4, (i + 2) % 4]]) for i in range(4)]
+    return min(turned) > 0.02 or max(turned) < -0.02
+
+
+def half_planes(p: np.ndarray) -> np.ndarray:
+    """Rows (a, b, c) with a x + b y + c ≤ 0 inside."""
+    along = np.roll(p, -1, axis=0) - p
+    outward = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
+    return np.column_stack([outward, -(outward * p).sum(axis=1)])
+
+
+def intersection_area(p: np.ndarray, q: np.ndarray) -> float:
+    """Area of the intersection by half-planes around the centre of its largest circle."""
+    planes = np.vstack([half_planes(p), half_planes(q)])
+    rows = np.column_stack([planes[:, :2], np.ones(len(planes))])
+    best = linprog([0, 0, -1], rows, -planes[:, 2], bounds=[(None, None)] * 2 + [(0, None)])
+    if not best.success or best.x[2] < 1e-7:
+        return 0.0
+    return float(ConvexHull(HalfspaceIntersection(planes, best.x[:2]).intersections).volume)
+
+
+def clipped_area(p: np.ndarray, q: np.ndarray) -> float:
+    vertices, count = clip(p[None], q[None])
+    triangles, *_ = simplices(vertices, count)
+    assert (measure(triangles) > -1e-15).all()
+    return float(measure(triangles).sum())
+
+
+polygon = st.sampled_from([3, 4]).flatmap(convex)
+
+
+@given(polygon, polygon)
+def test_clipping_finds_the_area_of_the_intersection(p: np.ndarray, q: np.ndarray) -> None:
+    area = clipped_area(p, q)
+    assert area == pytest.approx(intersection_area(p, q), abs=1e-6)
+    assert area == pytest.approx(clipped_area(q, p), abs=1e-13)
+    assert area <= min(measure(p[None])[0], measure(q[None])[0]) + 1e-13
+    assert area == pytest.approx(clipped_area(np.roll(p, 1, axis=0), q), abs=1e-13)
+
+
+@given(polygon, polygon)
+def test_vertices_of_the_intersection_lie_in_both(p: np.ndarray, q: np.ndarray) -> None:
+    vertices, count = clip(p[None], q[None])
+    assume(count[0] > 0)
+    homogeneous = np.column_stack([vertices[0], np.ones(len(vertices[0]))])
+    assert (homogeneous @ np.vstack([half_planes(p), half_planes(q)]).T).max() < 1e-10
+    np.testing.assert_array_equal(
+        vertices[0, count[0] :], np.tile(vertices[0, 0], (len(vertices[0]) - count[0], 1))
+    )
+
+
+def test_many_pairs_are_clipped_as_each_alone() -> None:
+    rng = np.random.default_rng(3)
+    shift = rng.uniform(-1.2, 1.2, (200, 1, 2))
+    square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    turned = square @ np.array([[0.8, 0.6], [-0.6, 0.8]])
+    subject, window = turned + shift, np.tile(square, (200, 1, 1))
+    vertices, count = clip(subject, window)
+    triangles, pair, _ = simplices(vertices, count)
+    together = np.bincount(pair, weights=measure(triangles), minlength=200)
+    alone = [clipped_area(p, q) for p, q in zip(subject, window, strict=True)]
+    np.testing.assert_allclose(together, alone, atol=1e-15)
+    assert (count == 0).any()
+    assert (count >= 6).any(), "too simple intersections"
+
+
+def test_intervals_are_clipped_too() -> None:
+    subject = np.array([[0.0, 1], [0.0, 1], [0.0, 1], [2.0, 5]])[:, :, None]
+    window = np.array([[0.5, 2], [-1, 3], [1, 2], [3, 4]])[:, :, None]
+    pieces, pair, _ = simplices(*clip(subject, window))
+    np.testing.assert_array_equal(pair, [0, 1, 3])
+    np.testing.assert_array_equal(pieces[:, :, 0], [[0.5, 1], [0, 1], [3, 4]])
+
+
+@given(convex(4), st.floats(-1, 1), st.floats(-1, 1), st.booleans())
+def test_local_coordinates_of_quadrilaterals_invert_the_bilinear_map(
+    p: np.ndarray, s: float, t: float, backwards: bool
+) -> None:
+    p = p[::-1] if backwards else p
+    local = np.array([[[s, t]]])
+    there = facet_shape_values(local, 4) @ p[None]
+    again = facet_shape_values(local_coordinates(there, p[None]), 4) @ p[None]
+    np.testing.assert_allclose(again, there, atol=1e-13)
+    np.testing.assert_allclose(local_coordinates(there, p[None]), local, atol=1e-9)
+
+
+@pytest.mark.parametrize("corners", [2, 3])
+def test_local_coordinates_of_simplices_invert_the_linear_map(corners: int) -> None:
+    rng = np.random.default_rng(5)
+    flat, local = rng.uniform(-1, 1, (50, corners, corners - 1)), rng.uniform(0, 0.5, (50, 4, corners - 1))
+    np.testing.assert_allclose(
+        local_coordinates(facet_shape_values(local, corners) @ flat, flat), local, atol=1e-10
+    )
+
+
+def test_the_rules_integrate_polynomials_of_degree_five() -> None:
+    barycentric, weights = rule(2)
+    x = barycentric[:, 1]
+    np.testing.assert_allclose([weights @ x**k for k in range(6)], 1 / np.arange(1, 7), rtol=1e-14)
+    barycentric, weights = rule(3)
+    x, y = barycentric[:, 1], barycentric[:, 2]
+    factorial = np.cumprod([1, *range(1, 8)])
+    powers = [(i, j) for i in range(6) for j in range(6 - i)]
+    exact = [2 * factorial[i] * factorial[j] / factorial[i + j + 2] for i, j in powers]
+    np.testing.assert_allclose([weights @ (x**i * y**j) for i, j in powers], exact, rtol=1e-13)
+
+
+@pytest.mark.parametrize("count", [0, 3])
+def test_nothing_is_left_of_no_pairs_and_of_pairs_apart(count: int) -> None:
+    square = np.tile(np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]), (count, 1, 1))
+    vertices, left = clip(square + 2, square)
+    np.testing.assert_array_equal(left, np.zeros(count))
+    triangles, pair, _ = simplices(vertices, left)
+    assert triangles.shape == (0, 3, 2)
+    assert len(pair) == 0
+
+
+# Mortar coupling is the same on any number of ranks, and all ranks raise what one of them meets.
+SCRIPT = Path(__file__).with_name("mortar_on_ranks.py")
+
+
+@pytest.mark.parametrize("ranks", [3])
+def test_coupling_and_errors_do_not_depend_on_the_number_of_ranks(ranks: int, tmp_path: Path) -> None:
+    run_on_ranks(SCRIPT, ranks, tmp_path / "numbers.npz", timeout=60)
+    with np.load(tmp_path / "numbers.npz") as stored:
+        parallel = dict(stored)
+    messages = parallel.pop("messages")
+    serial = collect(MPI.COMM_SELF)
+    assert set(parallel) == set(serial)
+    for name, numbers in serial.items():
+        assert numbers.size > 0, f"{name} is empty: nothing was compared"
+        np.testing.assert_allclose(parallel[name], numbers, rtol=1e-9, atol=1e-9 if " by " in name else 1e-12)
+    assert len(messages) == ranks
+    alone = message_for_a_folded_facet(MPI.COMM_SELF)
+    assert "convex facets on the slave surface, but 1 are folded" in alone
+    assert all(str(text).startswith(alone) for text in messages)

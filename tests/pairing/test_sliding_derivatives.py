@@ -1,18 +1,40 @@
-"""Derivatives of contact points in the current configuration agree with central differences."""
+"""Derivatives of contact on surfaces that slide, and Newton's method with them."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from functools import cache
+from pathlib import Path
+from typing import Any
 
+import dolfinx.fem
+import dolfinx.fem.petsc
 import numpy as np
 import pytest
+import scipy.sparse as sp
+import scipy.sparse.linalg
+from mpi4py import MPI
 
-from fenics_contact import Body, ContactPair, DistanceObstacle, RigidCylinder, RigidSphere, Scene, Surface
+from fenics_contact import (
+    Body,
+    ContactPair,
+    DistanceObstacle,
+    RigidCylinder,
+    RigidSphere,
+    Scene,
+    Surface,
+    _dolfinx,
+)
 from fenics_contact._pairing.sliding.contact import SlidingContact
 from fenics_contact._pairing.sliding.points import SlidingPoints
 from fenics_contact._pairing.sliding.stiffness import spread
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import NeoHooke
 from fenics_contact.mesh import quadratic
-from tests.pairing.sliding_scenes import KINDS, on_arch, ring, same_points, shaken, sliding
+from tests.conftest import run_on_ranks
+from tests.linear.monolithic import _forms
+from tests.pairing.sliding_on_ranks import collect
+from tests.pairing.sliding_scenes import KINDS, free, on_arch, ring, same_points, shaken, sliding
 
 STEP = 2e-6
 OBSTACLES = {
@@ -146,3 +168,207 @@ def test_slip_rows_are_the_derivative_of_slip(name: str) -> None:
     limit = LIMITS.get(name, 1e-7)
     found = now.slip_rows(start) @ way
     assert error(found, plus.slip(start).ravel(), minus.slip(start).ravel()) < limit
+
+
+# Newton's method on contact of moved bodies converges quadratically with all derivatives, else linearly.
+def residuals(coefficient: float, terms: Terms) -> tuple[list[float], Dragged]:
+    """Drag the block by most of its length over several facets; residuals of the last load step."""
+    dragged = Dragged(on_arch("hexahedron", master_cells=10), coefficient, terms)
+    facets = dragged.points.points.facet
+    steps = [dragged.advance(way) for way in WAY]
+    assert (dragged.points.points.facet != facets).mean() > 0.5
+    assert np.count_nonzero(dragged.force) >= 8
+    return steps[-1], dragged
+
+
+@pytest.mark.parametrize("coefficient", [0.0, 0.3])
+def test_newton_converges_quadratically(coefficient: float) -> None:
+    found, _ = residuals(coefficient, Terms())
+    assert found[-1] < 1e-10
+    assert len(found) <= 8
+    assert found[-2] < 20.0 * found[-3] ** 2 + 1e-11
+
+
+def test_without_the_turning_of_normal_forces_it_converges_linearly() -> None:
+    whole, _ = residuals(0.0, Terms())
+    found, _ = residuals(0.0, Terms(normal=False))
+    assert len(found) >= len(whole) + 4
+
+
+def test_without_the_turning_of_friction_forces_it_needs_more_steps() -> None:
+    whole, exact = residuals(0.3, Terms())
+    found, other = residuals(0.3, Terms(friction=False))
+    assert found[-1] < 1e-10
+    assert len(found) > len(whole)
+    assert other.u == pytest.approx(exact.u, abs=1e-8)
+
+
+# A block dragged over an arched one by Newton's method on one mesh, contact where the bodies lie.
+
+#: Prescribed motion of the upper block's upper side in each load step: down, then along the arch.
+WAY = np.array([[0.02, 0.0, -0.02], [0.12, 0.03, -0.02], [0.12, 0.03, -0.004]])
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Which derivatives of the contact forces Newton's method knows."""
+
+    normal: bool = True
+    friction: bool = True
+
+
+def stiffness(scene: Scene) -> sp.csr_matrix:
+    """Return the stiffness of all bodies, linear elastic."""
+    blocks = []
+    for name, body in scene.bodies.items():
+        mesh = _dolfinx.local_mesh(body.mesh.points, body.mesh.cells, body.mesh.cell_type)
+        V = _dolfinx.coefficient(mesh, "u").function_space
+        nodes, dofs = _dolfinx.node_dofs(V)
+        matrix = dolfinx.fem.petsc.assemble_matrix(dolfinx.fem.form(_forms(scene, name, V)[0]))
+        matrix.assemble()
+        start, column, value = matrix.getValuesCSR()
+        place = np.empty(body.mesh.n_nodes, dtype=np.int64)
+        place[nodes] = dofs
+        dof = (3 * place[:, None] + np.arange(3)).ravel()
+        blocks.append(sp.csr_matrix((value, column, start))[dof][:, dof])
+    return sp.block_diag(blocks, format="csr")
+
+
+class Dragged:
+    """Displacements and multipliers of the scene while it is dragged; all closed points slip."""
+
+    def __init__(self, scene: Scene, coefficient: float, terms: Terms) -> None:
+        self.scene, self.coefficient, self.terms = scene, coefficient, terms
+        first = scene.bodies["high"].mesh.n_nodes
+        self.driven = np.unique(scene.bodies["high"].mesh.surfaces["z1"])
+        self.fixed = np.zeros(scene.points.shape, dtype=bool)
+        self.fixed[self.driven] = True
+        self.fixed[first + np.unique(scene.bodies["low"].mesh.surfaces["z0"])] = True
+        self.matrix, self.contact = stiffness(scene), SlidingContact.of(scene, self.fixed)
+        self.u = np.zeros(scene.points.shape)
+        self.points = self.contact.at(scene.points)
+        self.force = np.zeros(self.points.points.count)
+
+    def advance(self, way: np.ndarray, most: int = 25) -> list[float]:
+        """Move the driven side on and find the equilibrium; return the residual of each iterate."""
+        self.u[self.driven] += way
+        start, residuals = self.points.material_points(), []
+        while len(residuals) < most:
+            now = self.contact.at(self.scene.points + self.u, self.points)
+            self.force, self.points = now.carry(self.force, self.points), now
+            start = start.extended(now.material_points())
+            residuals.append(self._step(now, now.slip(start), now.slip_rows(start)))
+            if residuals[-1] < 1e-10:
+                break
+        return residuals
+
+    def _step(self, now: SlidingPoints, slip: np.ndarray, slip_rows: sp.csr_matrix) -> float:
+        points, free = now.points, np.flatnonzero(~self.fixed.ravel())
+        closed = np.flatnonzero(self.force - 2.0 * points.gap > 0)
+        force = np.zeros(points.count)
+        force[closed] = self.force[closed]
+        length = np.maximum(np.linalg.norm(slip, axis=1), 1e-12)[:, None]
+        way = slip / length
+        friction = self.coefficient * force[:, None] * way
+        normal = -spread(points.normal, points.jump)
+        along = [spread(points.tangents[:, a], points.jump) for a in range(2)]
+        rubbing = sp.vstack(along).T.tocsr()
+        rest = self.matrix @ self.u.ravel() + normal.T @ force + rubbing @ friction.T.ravel()
+        error = max(np.abs(rest[free]).max(), np.abs(points.gap[closed]).max(initial=0.0))
+        matrix = self.matrix
+        if self.terms.normal:
+            matrix = matrix + now.stiffness(force).assembled()
+        if self.terms.friction:
+            turned = now.friction_stiffness(friction)
+            matrix = matrix + turned.left @ turned.right.T
+        across = np.eye(2) - way[:, :, None] * way[:, None]
+        bent = (self.coefficient * force[:, None] / length)[:, :, None] * across
+        by_slip = sp.bmat([[sp.diags(bent[:, a, b]) for b in range(2)] for a in range(2)])
+        matrix = matrix + rubbing @ by_slip @ sp.vstack([slip_rows[a::2] for a in range(2)])
+        columns = normal.T + rubbing @ sp.vstack([sp.diags(self.coefficient * way[:, a]) for a in range(2)])
+        system = [[matrix[free][:, free], columns.tocsr()[free][:, closed]], [normal[closed][:, free], None]]
+        right = np.concatenate([-rest[free], points.gap[closed]])
+        change = scipy.sparse.linalg.splu(sp.bmat(system, format="csc")).solve(right)
+        self.u.ravel()[free] += change[: len(free)]
+        force[closed] += change[len(free) :]
+        self.force = force
+        return float(error)
+
+
+# Contact of moved bodies is the same on any number of ranks, and all ranks raise what one of them meets.
+SCRIPT = Path(__file__).with_name("sliding_on_ranks.py")
+
+
+@pytest.mark.parametrize("ranks", [2, 4])
+def test_points_and_errors_do_not_depend_on_the_number_of_ranks(ranks: int, tmp_path: Path) -> None:
+    run_on_ranks(SCRIPT, ranks, tmp_path / "numbers.npz", timeout=60)
+    with np.load(tmp_path / "numbers.npz") as stored:
+        parallel = dict(stored)
+    messages = parallel.pop("messages")
+    serial = collect(MPI.COMM_SELF)
+    assert parallel.keys() == serial.keys()
+    for name, values in serial.items():
+        assert np.array_equal(parallel[name], values), name
+    assert all("no idea" in message for message in messages)
+
+
+# Gaps that pairs give in place of measured ones, between bodies that move far.
+DISCRETISATIONS = ("node", "mortar")
+
+
+def with_pair(scene: Scene, **given: Any) -> Scene:
+    (pair,) = scene.contacts
+    return replace(scene, contacts=[replace(pair, **given)])
+
+
+def from_beside(**given: Any) -> tuple[SlidingContact, np.ndarray]:
+    """A slider that overhangs the end of its bed, and coordinates that bring all of it onto the bed."""
+    bed, slider = rectangle((0, 0), (4, 1), (16, 4)), rectangle((-1, 1), (0.6, 1.6), (8, 3))
+    scene = Scene(
+        {"bed": Body(bed, NeoHooke(1.0, 0.3)), "slider": Body(slider, NeoHooke(1.0, 0.3))},
+        contacts=[ContactPair(Surface("slider", "y0"), Surface("bed", "y1"), **given)],
+    )
+    moved = scene.points.copy()
+    moved[bed.n_nodes :, 0] += 1.5
+    return sliding(scene), moved
+
+
+@pytest.mark.parametrize("discretisation", DISCRETISATIONS)
+@pytest.mark.parametrize("kind", ["hexahedron", "quadrilateral"])
+def test_the_given_gap_is_that_of_the_undeformed_bodies(kind: str, discretisation: str) -> None:
+    """Also where distances are means over facets, which differ from those of the true surfaces."""
+    scene = with_pair(on_arch(kind), discretisation=discretisation)
+    measured = sliding(scene).at(scene.points).points
+    assert np.ptp(measured.gap) > (1e-3 if discretisation == "mortar" else 1e-10), "not even by itself"
+    for given, wanted in (({"gap": 0.02}, 0.02), ({"interference": 0.01, "adjust": 0.1}, -0.01)):
+        points = sliding(with_pair(scene, **given)).at(scene.points).points
+        assert points.gap == pytest.approx(np.full(measured.count, wanted), abs=1e-15)
+        assert np.array_equal(points.distance, measured.distance)
+        assert points.given.all()
+    apart = sliding(with_pair(scene, gap=0.02, adjust=0.01)).at(scene.points).points
+    assert np.array_equal(apart.gap, measured.gap), "no node lies within adjust"
+    assert not apart.given.any()
+
+
+@pytest.mark.parametrize("discretisation", DISCRETISATIONS)
+def test_nodes_that_meet_their_master_later_have_the_gap_of_those_beside_them(discretisation: str) -> None:
+    for given, wanted in (({"interference": 0.02}, -0.02), ({"gap": 0.03}, 0.03), ({"adjust": 0.01}, 0.0)):
+        contact, moved = from_beside(discretisation=discretisation, **given)
+        now, then = contact.at(contact.scene.points), contact.at(moved)
+        assert now.points.count < then.points.count == 9
+        assert then.points.gap == pytest.approx(np.full(9, wanted), abs=1e-13)
+        declared = True if "adjust" not in given else np.isin(then.key, now.key)
+        assert np.array_equal(then.points.given, np.full(9, True) & declared)
+    contact, moved = from_beside(discretisation=discretisation, gap=lambda x: 0.01 * (2.0 + x[:, 0]))
+    points = contact.at(moved).points
+    assert points.gap == pytest.approx(0.01 * (2.0 + contact.scene.points[points.slave, 0]), abs=1e-13)
+
+
+def test_what_a_design_moves_is_added_to_the_given_gap() -> None:
+    scene = with_pair(on_arch("quadrilateral"), gap=0.02, discretisation="mortar")
+    mesh = scene.bodies["high"].mesh
+    moved = scene.reshaped({"high": mesh.points + 0.01 * np.sin(3.0 * mesh.points[:, :1])})
+    before, after = (SlidingContact.of(each, free(each)).at(each.points).points for each in (scene, moved))
+    change = after.distance - before.distance
+    assert np.abs(change).max() > 1e-3
+    assert after.gap - before.gap == pytest.approx(change, abs=1e-14)

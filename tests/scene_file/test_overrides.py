@@ -1,20 +1,29 @@
-"""Keys given elsewhere, lines of keys, and the schema."""
+"""Expressions, keys and overrides of scene files."""
 
 from __future__ import annotations
 
 import json
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import jsonschema
+import numpy as np
 import pytest
 from mpi4py import MPI
+from pydantic import Field, PositiveFloat, ValidationError
 
-from fenics_contact import read_scene_file
+from fenics_contact import Coulomb, read_scene_file
+from fenics_contact._scene_file.model import FRICTION_LAWS
+from fenics_contact._scene_file.part import Part, keys_of, table_of
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact._scene_file.source import SceneFileError, lines_of, nearest
 from fenics_contact._scene_file.validation import json_schema
+from fenics_contact._scene_file.values import Expression, VectorExpression, between
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import LinkShape
+from fenics_contact.materials import NeoHooke
 from tests.conftest import ROOT
 from tests.scene_file.mistakes import MISTAKES
 from tests.scene_file.texts import GOOD, changed
@@ -138,3 +147,147 @@ def test_editors_see_the_mistakes_that_a_schema_can_know(name: str) -> None:
     data: dict[str, Any] = tomllib.loads(changed((old, new)))
     found = list(jsonschema.Draft202012Validator(json_schema()).iter_errors(data))
     assert bool(found) == (name not in BEYOND)
+
+
+# Formulas as text: arithmetic in x, y, z, and nothing else.
+POINTS = np.array([[0.5, -1.0, 2.0], [0.0, 3.0, -4.0]])
+X, Y, Z = POINTS.T
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("2 * x + y - z / 4", 2 * X + Y - Z / 4),
+        ("-x**2 + 1e-3", -(X**2) + 1e-3),
+        ("sin(pi * x) * exp(-y)", np.sin(np.pi * X) * np.exp(-Y)),
+        ("where(z > 0, max(x, y), min(x, y))", np.where(Z > 0, np.maximum(X, Y), np.minimum(X, Y))),
+        ("sqrt(x**2 + y**2 + z**2) - 9", np.linalg.norm(POINTS, axis=1) - 9),
+        ("abs(y) * atan2(y, x)", np.abs(Y) * np.arctan2(Y, X)),
+        ("3", np.full(2, 3.0)),
+        ("+".join(["x"] * 400) + "-" + "-".join(["y"] * 400), 400 * X - 400 * Y),
+    ],
+)
+def test_a_formula_has_the_values_of_numpy(text: str, values: np.ndarray) -> None:
+    np.testing.assert_allclose(Expression(text)(POINTS), values, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "__import__('os').system('true')", "x.real", "(lambda: 1)()", "[1, 2]", "x if y else z", "open",
+        "sin", "sin(x, y)", "f'{x}'", "x; y", "x = 1", "True", "1j * x", "sinn(x)", "x @ y", "x << 2",
+        "max(x)", "where(x, y)", "'a'", "x and y", "0 < x < 1", "sin(x=1)", "w", "", "(x",
+        "-" * 60 + "x", "x" * 3000,
+    ],
+)  # fmt: skip
+def test_anything_else_is_refused_and_not_run(text: str) -> None:
+    with pytest.raises(InvalidInputError, match=r"a formula (may hold|must be arithmetic|must have at most)"):
+        Expression(text)
+
+
+def test_a_vector_mixes_numbers_and_formulas() -> None:
+    found = VectorExpression((Expression("x"), 0.0, Expression("2 * z")))(POINTS)
+    np.testing.assert_array_equal(found, np.column_stack([X, 0 * X, 2 * Z]))
+
+
+def test_equal_texts_are_equal_values() -> None:
+    assert Expression("x") == Expression("x")
+    assert len({Expression("x"), Expression("x"), Expression("y")}) == 2
+
+
+def test_z_is_refused_in_the_plane() -> None:
+    with pytest.raises(InvalidInputError, match="depends on z, but the bodies lie in the plane"):
+        Expression("x + z")(POINTS[:, :2])
+
+
+def test_on_the_way_from_one_formula_to_another_is_a_formula() -> None:
+    half = between(Expression("x"), Expression("3 * y"), 0.5)
+    assert callable(half)
+    np.testing.assert_allclose(half(POINTS), 0.5 * X + 1.5 * Y)
+    quarter = between(-2.0, Expression("z"), 0.25)
+    assert callable(quarter)
+    np.testing.assert_allclose(quarter(POINTS), -1.5 + 0.25 * Z)
+    assert between(1.0, 3.0, 0.25) == 1.5
+    assert between(0.1, 0.3, 1.0) == 0.3
+
+
+# Keys of scene files are the arguments of what is built from them.
+@dataclass
+class Spring:
+    """A spring.
+
+    Attributes:
+        stiffness: Of the wire, [force / length]. What follows is not for files.
+        axis: Direction.
+        turns: Windings.
+        hidden: No key.
+    """
+
+    stiffness: float
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    turns: int = 7
+    hidden: str = "x"
+
+
+@keys_of(Spring, without=["hidden"])
+class SpringPart(Part):
+    """A spring of a file."""
+
+    kind: Literal["spring"]
+    stiffness: PositiveFloat = Field(alias="rate")
+
+
+def test_types_defaults_and_words_are_those_of_the_class() -> None:
+    schema = SpringPart.model_json_schema(by_alias=True)
+    assert list(schema["properties"]) == ["kind", "rate", "axis", "turns"]
+    assert schema["required"] == ["kind", "rate"]
+    assert schema["properties"]["rate"]["description"] == "of the wire, [force / length]"
+    assert schema["properties"]["rate"]["exclusiveMinimum"] == 0
+    assert schema["properties"]["axis"]["maxItems"] == 3
+    assert schema["properties"]["turns"]["default"] == 7
+
+
+def test_a_table_makes_what_it_is_of() -> None:
+    part = SpringPart.model_validate({"kind": "spring", "rate": 2, "axis": [1, 0, 0]})
+    assert part.made() == Spring(2.0, (1.0, 0.0, 0.0))
+    assert part.made(turns=3) == Spring(2.0, (1.0, 0.0, 0.0), 3)
+
+
+def test_an_error_knows_the_keys_and_what_the_wrong_one_means() -> None:
+    with pytest.raises(ValidationError) as caught:
+        SpringPart.model_validate({"kind": "spring", "rate": -1.0, "stiffness": 1.0})
+    low, extra = caught.value.errors()
+    assert (low["loc"], low["ctx"]["kind"]) == (("rate",), "greater_than")
+    assert low["ctx"]["hint"] == "of the wire, [force / length]"
+    assert (extra["loc"], extra["ctx"]["kind"]) == (("stiffness",), "extra_forbidden")
+    assert extra["ctx"]["keys"] == ["kind", "rate", "axis", "turns"]
+
+
+def test_a_law_of_friction_is_built_by_its_own_arguments() -> None:
+    _, coulomb, _ = FRICTION_LAWS
+    part = coulomb.model_validate({"law": "coulomb", "coefficient": 0.25})
+    assert part.made() == Coulomb(0.25)
+
+
+def test_a_table_has_the_summary_of_its_class_and_the_limits_of_its_arguments() -> None:
+    schema = table_of(NeoHooke, model="neo_hooke").model_json_schema()
+    assert schema["description"].startswith("Compressible neo-Hookean elasticity")
+    assert schema["properties"]["model"]["const"] == "neo_hooke"
+    assert schema["properties"]["young_modulus"]["exclusiveMinimum"] == 0
+    assert schema["properties"]["poisson_ratio"]["exclusiveMaximum"] == 0.5
+
+
+def test_every_key_of_a_scene_file_is_described() -> None:
+    tables = json_schema()["$defs"]
+    keys = [
+        (table, key, what) for table, found in tables.items() for key, what in found["properties"].items()
+    ]
+    assert len(keys) > 150
+    assert [
+        (table, key) for table, key, what in keys if "const" not in what and not what["description"]
+    ] == []
+
+
+def test_defaults_of_links_are_those_of_the_library() -> None:
+    given = json_schema()["$defs"]["LinkMesh"]["properties"]
+    assert {name: given[name]["default"] for name in vars(LinkShape())} == vars(LinkShape())

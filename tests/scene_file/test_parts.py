@@ -1,7 +1,8 @@
-"""What the tables of a scene file become."""
+"""Parts of scene files: bodies, automatic contact, rigid surfaces and meshes from files."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import read_scene_file
+from fenics_contact import BodyMesh, Coulomb, read_scene_file
 from fenics_contact._scene import loads as loads_module
 from fenics_contact._scene import obstacles, pairs
 from fenics_contact._scene import supports as supports_module
@@ -18,7 +19,9 @@ from fenics_contact._scene_file.source import SceneFileError
 from fenics_contact._scene_file.values import Expression, VectorExpression
 from fenics_contact.gallery import LinkShape, block, chain, half_disc, hemisphere, rectangle
 from fenics_contact.materials import elastic, hyperelastic, orthotropic, plastic
-from tests.scene_file.texts import changed
+from fenics_contact.readers import gmsh_model, read_msh
+from tests.conftest import ROOT
+from tests.scene_file.texts import GOOD, changed
 
 SELF = MPI.COMM_SELF
 BLOCK = {"shape": "block", "lower": [0, 0, 0], "upper": [2, 1, 1], "counts": [4, 2, 2]}
@@ -393,3 +396,183 @@ def test_two_supports_cannot_have_one_name() -> None:
     twice = [{"name": "top", "body": "a", "surface": surface} for surface in ("z0", "z1")]
     with pytest.raises(SceneFileError, match=r'supports\.1\.name must be a name of its own, got "top" twice'):
         file_of(supports=twice)
+
+
+# Scene files whose contact pairs the scene finds.
+PAIR = re.compile(r"\[\[contacts\]\].*?\n\n", re.DOTALL)
+FOUND = '[automatic_contact]\nfriction = { law = "coulomb", coefficient = 0.2 }\n\n'
+
+
+def read(text: str, folder: Path) -> SceneFile:
+    path = folder / "scene.toml"
+    path.write_text(text)
+    return read_scene_file(path, SELF)
+
+
+def test_pairs_are_found_in_place_of_those_of_the_file(tmp_path: Path) -> None:
+    file = read(PAIR.sub(FOUND, GOOD), tmp_path)
+    (pair,) = file.scene.contacts
+    assert pair.place == "upper near lower on lower near upper"
+    assert pair.friction == Coulomb(0.2)
+    assert file.partitions.keys() == {"lower", "upper"}
+
+
+def test_files_name_bodies_that_may_meet_themselves(tmp_path: Path) -> None:
+    contact = '[automatic_contact]\nself_contact = ["lower"]\n\n'
+    with pytest.raises(SceneFileError, match="of body 'lower' with itself needs a material for large"):
+        _ = read(PAIR.sub(contact, GOOD), tmp_path).scene
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (GOOD + "\n" + FOUND, r"automatic_contact: .*got both, 1 of the latter: leave one of them out"),
+        (
+            PAIR.sub("[automatic_contact]\ndistance = 0.1\n\n", GOOD).replace(
+                "0.5, 0.5, 1.0]", "0.5, 0.5, 1.9]"
+            ),
+            r"automatic_contact: Automatic contact needs bodies that face each other .* finds none",
+        ),
+        (PAIR.sub("[automatic_contact]\ndistance = -1.0\n\n", GOOD), r"automatic_contact\.distance .*-1\.0"),
+    ],
+)
+def test_what_finds_no_pair_is_refused(text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(SceneFileError, match=message):
+        _ = read(text, tmp_path).scene
+
+
+# Rigid surfaces of scene files.
+RIGID_SURFACES_STEEL = {"young_modulus": 2.1e5, "poisson_ratio": 0.3}
+
+
+def file_with_rigid_surface(**parts: Any) -> SceneFile:
+    """A scene of one block "a"."""
+    return read_scene_file(
+        {
+            "meshes": {"m": {"shape": "block", "lower": [0, 0, 0], "upper": [2, 1, 1], "counts": [4, 2, 2]}},
+            "materials": {"s": RIGID_SURFACES_STEEL},
+            "bodies": {"a": {"mesh": "m", "material": "s"}},
+            **parts,
+        },
+        SELF,
+    )
+
+
+RIGID = {"kind": "rigid", "body": "a", "surface": "z1", "at": [1, 0.5, 3]}
+
+
+def test_a_rigid_surface_is_that_of_the_package() -> None:
+    moved = {**RIGID, "value": [0, "free", -1, "free", 0, 0.02], "moment": [3, 0, 0]}
+    loaded = {**RIGID, "force": [0, 0, -5]}
+    for given, expected in (
+        (
+            moved,
+            supports_module.RigidSurface(
+                "a", "z1", (1, 0.5, 3), (0, None, -1), (None, 0, 0.02), moment=(3, 0, 0)
+            ),
+        ),
+        (loaded, supports_module.RigidSurface("a", "z1", (1, 0.5, 3), (None,) * 3, (None,) * 3, (0, 0, -5))),
+    ):
+        assert list(file_with_rigid_surface(supports=[given]).scene.supports) == [expected]
+    plane = {
+        "meshes": {"m": {"shape": "rectangle", "lower": [0, 0], "upper": [2, 1], "counts": [4, 2]}},
+        "materials": {"s": {**RIGID_SURFACES_STEEL, "model": "plane_strain"}},
+        "bodies": {"a": {"mesh": "m", "material": "s"}},
+        "supports": [{**RIGID, "surface": "x1", "at": [2, 0.5], "value": [0, "free", 0.1]}],
+    }
+    (found,) = read_scene_file(plane, SELF).scene.supports
+    assert found == supports_module.RigidSurface("a", "x1", (2, 0.5), (0, None), 0.1)
+
+
+def test_steps_turn_a_rigid_surface() -> None:
+    supports = [{**RIGID, "name": "top", "value": [0, 0, "free", 0, 0, 0]}, {"body": "a", "surface": "z0"}]
+    steps: list[dict[str, Any]] = [
+        {"count": 2, "supports": {"top": [0.1, 0, "free", 0, 0, 0.04]}},
+        {"supports": {"top": [0.1, 0, "free", 0, 0, "0.01 * t"]}},
+    ]
+    found = [step.supports[0] for step in file_with_rigid_surface(supports=supports, steps=steps).steps]
+    assert [each.displacement for each in found] == [(0.05, 0.0, None), (0.1, 0.0, None), (0.1, 0.0, None)]
+    np.testing.assert_allclose([each.rotation for each in found], [(0, 0, 0.02), (0, 0, 0.04), (0, 0, 0.03)])
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (
+            {"value": [0, 0]},
+            "supports.0.value must be six numbers, formulas in t or 'free' in brackets: displac",
+        ),
+        ({"value": [0, 0, 0]}, "RigidSurface.rotation of surface 'z1' of body 'a' must be 3 finite numbers"),
+        ({"at": [0, 0]}, "RigidSurface"),
+        ({"kind": "stiff"}, "supports.0.kind must be one of 'rigid', got "),
+        ({"force": [0, 0]}, "RigidSurface.force of surface 'z1' of body 'a' must be 3 finite numbers"),
+        ({"surface": "top"}, "supports.0.surface must be a surface of the body 'a'"),
+    ],
+)
+def test_a_rigid_surface_that_is_none_is_refused(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(SceneFileError, match=words):
+        _ = file_with_rigid_surface(supports=[{**RIGID, **given}]).scene
+
+
+# Bodies from mesh files and CAD files in scene files.
+def mesh_from_file(mesh: dict[str, Any], **body: Any) -> BodyMesh:
+    """The mesh of the only body of a scene."""
+    data = {
+        "meshes": {"m": mesh},
+        "materials": {"s": {"young_modulus": 2.1e5, "poisson_ratio": 0.3}},
+        "bodies": {"a": {"mesh": "m", "material": "s", **body}},
+    }
+    return read_scene_file(data, MPI.COMM_SELF).scene.bodies["a"].mesh
+
+
+def test_bodies_come_from_mesh_files() -> None:
+    data = ROOT / "tests" / "data" / "two_boxes_41.msh"
+    known = read_msh(data)
+    name = sorted(known)[0]
+    found = mesh_from_file({"file": str(data)}, part=name)
+    np.testing.assert_array_equal(found.points, known[name].points)
+    with pytest.raises(SceneFileError, match="must be a body of the mesh 'm', one of"):
+        mesh_from_file({"file": str(data)}, part="nothing")
+    with pytest.raises(SceneFileError, match="labels and corners_only are for other formats than"):
+        mesh_from_file({"file": str(data), "labels": "sets"})
+    with pytest.raises(
+        SceneFileError, match=r"size and order are for CAD files \(.step, .*: leave it away, or mesh"
+    ):
+        mesh_from_file({"file": str(data), "size": 1.0})
+
+
+def test_bodies_come_from_cad_files_with_their_shapes(tmp_path: Path) -> None:
+    with gmsh_model("pin") as gmsh:
+        gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 2, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(tmp_path / "pin.brep"))
+    mesh = {"file": str(tmp_path / "pin.brep"), "size": 0.2, "surfaces": {"mantle": 1}, "scale": 2.0}
+    found = mesh_from_file(mesh)
+    there = np.array([[3.0, 0.0, 1.0], [0.0, 2.0, 3.0]])
+    np.testing.assert_allclose(found.shapes["mantle"].distance(there), [1.0, 0.0], atol=1e-12)
+    by_place = {"mantle": {"faces": "on_cylinder", "radius": 1.0, "axis": [0, 0, 1]}}
+    by_place["ends"] = [{"faces": "on_plane", "point": [0, 0, z], "normal": [0, 0, 1]} for z in (0, 2)]
+    chosen = mesh_from_file({**mesh, "surfaces": by_place})
+    np.testing.assert_array_equal(chosen.surfaces["mantle"], found.surfaces["mantle"])
+    assert set(chosen.points[chosen.surfaces["ends"]][..., 2].ravel()) == {0.0, 4.0}
+    for wrong, words in (
+        ({"faces": "on_cylinder", "radius": 3.0}, "'x' must have a face, .* cylinder of radius 3: it has 1 "),
+        ({"faces": "on_cylinder"}, r"surfaces\.x must have 'radius'"),
+        ({"faces": "in_sphere"}, "must .*'in_box', 'on_plane'"),
+        ({"faces": "on_cylinder", "radius": 1.0, "way": 1}, "way"),
+        ([1, 2.5], r"surfaces\.x\.1 must be the name or number of a group or face, a list"),
+        ([], r"surfaces\.x must"),
+    ):
+        with pytest.raises(SceneFileError, match=words):
+            mesh_from_file({**mesh, "surfaces": {"x": wrong}})
+    data = ROOT / "tests" / "data" / "two_boxes_41.msh"
+    with pytest.raises(
+        SceneFileError, match=r"faces are chosen by where they lie in CAD files .*: choose groups"
+    ):
+        mesh_from_file({"file": str(data), "surfaces": by_place})
+    curved = mesh_from_file({**mesh, "order": 2})
+    assert (curved.cell_type, found.cell_type) == ("tetrahedron10", "tetrahedron")
+    coarse = mesh_from_file({**mesh, "size": 0.7})
+    assert coarse.n_cells < found.n_cells
+    with pytest.raises(SceneFileError, match=r"labels and corners_only are for other formats than CAD"):
+        mesh_from_file({**mesh, "labels": "sets"})

@@ -1,4 +1,4 @@
-"""Hertz's formulas agree with published numbers and with the equations that they solve."""
+"""Contacts known by formula."""
 
 from __future__ import annotations
 
@@ -6,10 +6,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import trapezoid
+from scipy.integrate import quad, trapezoid
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.theory import PointContact, contact_modulus, hertz_line, hertz_point, relative_curvatures
+from fenics_contact.theory import (
+    PointContact,
+    contact_modulus,
+    hertz_line,
+    hertz_point,
+    pin_in_hole,
+    relative_curvatures,
+    roller_relief,
+)
 
 #: Semi-axes over those of a circle of the same mean curvature, by the angle whose cosine is the difference of
 #: the curvatures over their sum: Timoshenko and Goodier, Theory of elasticity, section 140.
@@ -120,3 +128,104 @@ def test_relative_curvatures_add_and_turn() -> None:
 def test_what_no_formula_takes_is_refused(function: Any, arguments: tuple[Any, ...], message: str) -> None:
     with pytest.raises(InvalidInputError, match=message):
         function(*arguments)
+
+
+# The pin in a hole fulfils the contact conditions, written down a second time as Fourier series.
+RADIUS, MODULUS = 10.0, 1e5
+PLACES = 2**17
+
+
+def opening(pressure: np.ndarray) -> np.ndarray:
+    """Return how far pressure of an even function of the angle parts hole and pin, but for a translation.
+
+    A pressure p cos nθ does so by 2 n / (n² − 1) R p / E* cos nθ, a constant one by R p / E* (elastic disc
+    and infinite plate with a hole, plane strain).
+    """
+    modes = np.fft.rfft(pressure)
+    n = np.arange(modes.size)
+    compliance = np.zeros(modes.size)
+    compliance[0], compliance[2:] = 1.0, 2.0 * n[2:] / (n[2:] ** 2 - 1.0)
+    return np.fft.irfft(compliance * modes, pressure.size) * RADIUS / MODULUS
+
+
+@pytest.mark.parametrize(("force", "degrees"), [(10.0, 2), (1e3, 20), (1e4, 50), (1e6, 84)])
+def test_the_gap_is_closed_in_the_contact_and_open_beside_it(force: float, degrees: float) -> None:
+    clearance = 0.02
+    contact = pin_in_hole(force, RADIUS, clearance, MODULUS)
+    assert np.degrees(contact.half_angle) > degrees
+    angle = 2.0 * np.pi * np.arange(PLACES) / PLACES
+    angle = np.where(angle > np.pi, angle - 2.0 * np.pi, angle)
+    pressure = contact.pressure(angle)
+    assert np.sum(pressure * np.cos(angle)) * RADIUS * 2.0 * np.pi / PLACES == pytest.approx(force, rel=1e-5)
+    inside = np.abs(angle) < 0.99 * contact.half_angle
+    parted = opening(pressure) + clearance
+    approach = parted[inside] @ np.cos(angle[inside]) / np.sum(np.cos(angle[inside]) ** 2)
+    gap = parted - approach * np.cos(angle)
+    scale = np.ptp(parted[inside])
+    assert np.abs(gap[inside]).max() < 1e-4 * scale
+    assert gap[np.abs(angle) > 1.05 * contact.half_angle].min() > 1e-4 * scale
+    assert pressure[inside].min() > 0.0
+
+
+def test_a_loose_pin_touches_as_hertz_has_it() -> None:
+    clearance = 0.5
+    contact = pin_in_hole(1.0, RADIUS, clearance, MODULUS)
+    strip = hertz_line(1.0, clearance / RADIUS**2, MODULUS)
+    assert RADIUS * contact.half_angle == pytest.approx(strip.half_width, rel=1e-4)
+    assert contact.peak_pressure == pytest.approx(strip.peak_pressure, rel=1e-4)
+    x = np.linspace(-0.9, 0.9, 7) * strip.half_width
+    assert contact.pressure(x / RADIUS) == pytest.approx(strip.pressure(x), rel=1e-3)
+
+
+def test_a_pin_without_clearance_touches_on_one_arc_whatever_its_load() -> None:
+    arcs = [np.degrees(pin_in_hole(force, RADIUS, 0.0, MODULUS).half_angle) for force in (1.0, 1e5)]
+    assert arcs == pytest.approx([84.83, 84.83], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"clearance": -0.1}, "clearance must lie between 0 and a tenth of the radius 10.0, got -0.1"),
+        ({"clearance": 2.0}, "got 2.0: take hertz_line for a loose pin"),
+        ({"force": -1.0}, "force must be positive, got -1.0"),
+        ({"radius": np.inf}, "radius must be a finite number, got inf"),
+    ],
+)
+def test_what_is_no_pin_in_a_hole_is_refused(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        pin_in_hole(**{"force": 1.0, "radius": RADIUS, "clearance": 0.1, "modulus": MODULUS, **change})
+
+
+# The relief of rollers: published closed forms, and an integral over the half space by other means.
+def test_under_a_line_it_is_that_of_lundberg() -> None:
+    found = roller_relief(np.array([0.0, -0.5, 0.9, 0.99, 1.0]), 2.0)
+    np.testing.assert_allclose(found, [0.0, 0.2876821, 1.6607312, 3.9170354, np.inf], rtol=1e-6)
+
+
+@pytest.mark.parametrize("half_length", [10.0, 50.0])
+def test_under_a_strip_the_end_sinks_as_johns_and_gohar_found(half_length: float) -> None:
+    (end,) = roller_relief(np.array([half_length]), 2.0 * half_length, 1.0)
+    assert end == pytest.approx(1.1932 + np.log(half_length), rel=1e-3)
+
+
+@pytest.mark.parametrize("place", [0.5, 0.9, 0.99])
+def test_it_is_an_integral_over_the_half_space(place: float) -> None:
+    half, b = 3.0, 0.3
+
+    def sunk(y: float) -> float:
+        """∫ p / r over the strip for p0 = 1, across first."""
+
+        def along(x: float) -> float:
+            return float(np.arcsinh((half - y) / x) + np.arcsinh((half + y) / x))
+
+        return 2.0 * quad(lambda x: np.sqrt(1.0 - (x / b) ** 2) * along(x), 0.0, b)[0]
+
+    wanted = (sunk(0.0) - sunk(place * half)) / (np.pi * b / 2)
+    assert roller_relief(np.array([place * half]), 2 * half, b)[0] == pytest.approx(wanted, rel=1e-6)
+
+
+def test_places_beyond_the_ends_are_refused() -> None:
+    with pytest.raises(InvalidInputError, match=r"within half the length, 1, from the middle .*, got 1\.5"):
+        roller_relief(np.array([0.0, 1.5]), 2.0)
+    with pytest.raises(InvalidInputError, match="half_width"):
+        roller_relief(np.array([0.0]), 2.0, 0.0)

@@ -3,17 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
-from fenics_contact import Status
+from fenics_contact import (
+    Body,
+    ContactPair,
+    Coulomb,
+    RigidPlane,
+    Scene,
+    State,
+    Status,
+    Support,
+    Surface,
+    solve_scene,
+)
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.pictures import Units, plot_contact_pressure, plot_stress
-from fenics_contact.pictures.section import component, contact_places, drawn_bodies, field_entries, refined
+from fenics_contact.gallery import block
+from fenics_contact.gallery.blocks import extrude
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.pictures import Units, plot_contact_pressure, plot_contact_status, plot_error, plot_stress
+from fenics_contact.pictures import drawing as painting
+from fenics_contact.pictures.canvas import ERROR_MAP, Frame, face_on, oblique_view
+from fenics_contact.pictures.section import (
+    Section,
+    Spot,
+    component,
+    contact_places,
+    cut,
+    drawn_bodies,
+    field_entries,
+    moved,
+    points_of,
+    refined,
+    section_frame,
+    sections_of,
+    strongest_contact,
+)
 from fenics_contact.pictures.states import chosen_scale, plot_field
-from fenics_contact.pictures.unrolled import contact_patches
+from fenics_contact.pictures.unrolled import Unrolling, contact_patches, unrolling_of
+from tests.viz.moving_states import pressed_by_a_lid
+from tests.viz.plane_states import flat_pad, plane_block, ring
 from tests.viz.states import contains, painted, pixels, pulled, touching_blocks
 
 SMALL = 320
@@ -190,3 +225,286 @@ def test_two_ranks_draw_the_same_pictures_and_share_their_errors(
         difference = pixels(tmp_path / f"{name}.png") - pixels(tmp_path / f"{name}_1.png")
         assert np.abs(difference).mean() < 0.002
     assert painted(pixels(tmp_path / "parts.png")) > 0.3
+
+
+# Pictures of the discretisation error show where it is.
+def as_hex(place: float) -> str:
+    return "#" + "".join(f"{round(255 * part):02x}" for part in ERROR_MAP(place)[:3])
+
+
+def test_cells_of_plane_bodies_have_the_colour_of_their_part(tmp_path: Path) -> None:
+    state = plane_block()
+    mesh = state.scene.bodies["block"].mesh
+    right = mesh.points[mesh.cells].mean(axis=1)[:, 0] > 1.0
+    given = {"block": np.where(right, 1e-2, 1e-4)}
+    # No edges are drawn over cells that are seen this small.
+    image = pixels(plot_error(state, tmp_path / "error.png", given, clim=(1e-5, 1e-1), width=2 * SMALL))
+    left_half, right_half = image[:, : SMALL - 60], image[:, SMALL - 40 : -140]
+    low, high = as_hex(0.25), as_hex(0.75)
+    assert contains(left_half, low, 0.06)
+    assert contains(right_half, high, 0.06)
+    assert not contains(left_half, high, 0.06)
+
+
+def test_the_label_of_the_colours_fits_beside_a_flat_picture(tmp_path: Path) -> None:
+    image = pixels(plot_error(flat_pad(), tmp_path / "error.png", width=1600))
+    assert image.shape[0] < 0.45 * image.shape[1]
+    edges = (image[:3], image[-3:], image[:, :3], image[:, -3:])
+    assert [bool((edge > 0.99).all()) for edge in edges] == [True] * 4
+
+
+def test_a_body_at_rest_is_drawn_too(tmp_path: Path) -> None:
+    state = plane_block()
+    nothing = {"block": np.zeros(state.scene.bodies["block"].mesh.n_cells)}
+    assert painted(pixels(plot_error(state, tmp_path / "rest.png", nothing, width=SMALL))) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("by_cell", "options", "message"),
+    [
+        ({}, {}, r"by_cell\['block'\] must hold 192 numbers, one per cell, .* got none: give the by_cell"),
+        ({"block": np.ones(3)}, {}, r"must hold 192 numbers, .* got shape \(3,\), the smallest 1.0"),
+        ({"block": np.full(192, -1.0)}, {}, r"finite and not negative, got shape \(192,\), the smallest -1"),
+        (None, {"clim": (0.0, 1.0)}, r"clim of a logarithmic scale must be positive, got \(0.0, 1.0\)"),
+        (None, {"clim": (1.0, 0.1)}, r"clim must be a finite range"),
+        (None, {"reach": 0.0}, r"reach must be positive"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(
+    by_cell: dict[str, np.ndarray] | None, options: dict[str, object], message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        plot_error(plane_block(), tmp_path / "error.png", by_cell, **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_nonlinear_materials_need_parts_that_are_given(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="errors need small strains and linear materials"):
+        plot_error(pressed_by_a_lid(), tmp_path / "error.png")
+
+
+# Sections run through the middle of the contact, and say where they are.
+SOFT = IsotropicElasticity(100.0, 0.3)
+
+
+@lru_cache(maxsize=4)
+def cut_model(cuts: str, floor: bool = False) -> State:
+    """A block pressed on another, or on a floor, cut at planes of symmetry: ``cuts`` is "y1" or "x0 y1"."""
+    bodies = {"upper": Body(block((0, 0, 1), (1, 1, 2), (2, 2, 2)), SOFT)}
+    if not floor:
+        bodies["lower"] = Body(block((0, 0, 0), (1, 1, 1), (3, 3, 2)), SOFT)
+    rollers = [
+        Support(name, side, tuple(0.0 if axis == side[0] else None for axis in "xyz"))
+        for name in bodies
+        for side in cuts.split()
+    ]
+    held = [] if floor else [Support("lower", "z0")]
+    master = RigidPlane((0.0, 0.0, 1.0), (0.0, 0.0, 1.0)) if floor else Surface("lower", "z1")
+    push = Support("upper", "z1", (0.0, 0.0, -0.01))
+    scene = Scene(bodies, [*rollers, *held, push], contacts=[ContactPair(Surface("upper", "z0"), master)])
+    return solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)
+
+
+def spot_of(state: State) -> Spot:
+    return strongest_contact(state.contact, contact_places(state, moved(drawn_bodies(state), 1.0)))
+
+
+def test_sections_cut_through_the_middle_of_the_contact_along_its_normal() -> None:
+    state = touching_blocks()
+    everything = state.scene.points
+    spot = spot_of(state)
+    np.testing.assert_allclose(spot.normal, [0, 0, 1], atol=0.1)
+    assert 0.1 < spot.centre[0] < 1.9
+    assert abs(spot.centre[2]) < 0.05
+    sections = sections_of(spot, oblique_view(everything))
+    assert abs(sections[0].view.towards @ sections[1].view.towards) < 1e-12
+    for section in sections:
+        view = section.view
+        assert abs(view.towards @ spot.normal) < 1e-12
+        assert view.up[2] > 0.9
+        np.testing.assert_array_equal(section.origin, spot.centre)
+        frame = section_frame(view, spot, everything)
+        assert frame.holds(view.project(spot.centre[None]))[0]
+        np.testing.assert_allclose(section_frame(view, spot, everything, 0.1).size, [0.28, 0.2])
+
+
+@pytest.mark.parametrize(("cuts", "floor"), [("y1", False), ("x0 y1", False), ("x0 y1", True)])
+def test_sections_of_parts_of_a_model_lie_in_its_planes_of_symmetry(cuts: str, floor: bool) -> None:
+    state = cut_model(cuts, floor)
+    bodies = moved(drawn_bodies(state), 1.0)
+    spot = spot_of(state)
+    assert spot.centre[1] == pytest.approx(1.0, abs=1e-12)
+    assert spot.inside[1] == -1.0
+    if "x0" in cuts:
+        assert spot.centre[0] == pytest.approx(0.0, abs=1e-12)
+    else:
+        assert 0.2 < spot.centre[0] < 0.8
+        assert spot.inside[0] == 0.0
+    sections = sections_of(spot, oblique_view(points_of(bodies)))
+    titles = {section.title(Frame(np.zeros(2), np.ones(2)), "mm"): section for section in sections}
+    across = titles["section at y = 1 mm"]
+    if "x0" in cuts:
+        assert "section at x = 0 mm" in titles
+    for face in cut(bodies, across).values():
+        assert face.n_points > 3, "shifted out of the bodies"
+        assert np.abs(face.points[:, 1] - 1.0).max() < 1e-4
+
+
+def test_a_section_that_misses_all_bodies_is_shifted_to_the_other_side() -> None:
+    bodies = drawn_bodies(touching_blocks())
+    edge = max(float(body.points[:, 1].max()) for body in bodies.values())
+    section = Section(face_on(np.array([0.0, 1.0, 0.0])), np.array([0, edge, 0]), np.array([0.0, 1.0, 0.0]))
+    assert any(face.n_points for face in cut(bodies, section).values())
+
+
+@pytest.mark.parametrize(
+    ("normal", "place", "words"),
+    [
+        ((0, -1, 0), -1e-9, "section at y = 0 mm"),
+        ((1, 0, 0), -12.34567, "section at x = −12.346 mm"),
+        ((1, 1, 0), 3.0, "section"),
+    ],
+)
+def test_a_section_says_where_it_is(normal: tuple[float, ...], place: float, words: str) -> None:
+    axis = np.array(normal, dtype=float)
+    section = Section(face_on(axis), np.full(3, place), axis)
+    assert section.title(Frame(np.zeros(2), np.full(2, 5.0)), "mm") == words
+
+
+def test_sections_have_axes_with_coordinates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[tuple[str, str, str]] = []
+    draw = painting.label_axes  # type: ignore[attr-defined]
+
+    def noted(axes: Any, view: Any, units: Any) -> None:
+        draw(axes, view, units)
+        assert axes.axison
+        drawn.append((axes.get_title(), axes.get_xlabel(), axes.get_ylabel()))
+
+    monkeypatch.setattr(painting, "label_axes", noted)
+    plot_stress(cut_model("x0 y1"), tmp_path / "stress.png", width=320)
+    # Which comes first is rounding: both have the same stress.
+    first, second = sorted(drawn)
+    assert first[0] == "section at x = 0 mm\ndisplacement × 1"
+    assert first[1:] == ("y (mm), runs to the left: seen from −x", "z (mm)")
+    assert second == ("section at y = 1 mm\ndisplacement × 1", "x (mm)", "z (mm)")
+
+
+# Surfaces around an axis are unrolled where parts that carry force face away, and nothing is lost.
+AROUND, LAYERS = 16, 2
+#: Fraction of a turn of a cell, by which the bore's nodes lie beside the seam for some states.
+CELL = 2 * np.pi / AROUND
+
+
+@lru_cache(maxsize=2)
+def fitted(shift: float = 0.0) -> State:
+    """A hub squeezed onto a shaft along z, also pushed along x by ``shift`` and turned a little."""
+    material = IsotropicElasticity(100.0, 0.3)
+    bodies = {
+        "shaft": Body(extrude(ring(0.5, 1.0, AROUND), np.linspace(0, 0.5, LAYERS + 1)), material),
+        "hub": Body(extrude(ring(1.0, 2.0, AROUND), np.linspace(0, 0.5, LAYERS + 1)), material),
+    }
+    squeeze = (
+        lambda x: shift - 0.01 * x[:, 0] - 0.02 * x[:, 1],
+        lambda x: 0.02 * x[:, 0] - 0.01 * x[:, 1],
+        0.0,
+    )
+    scene = Scene(
+        bodies,
+        [Support("shaft", "inner", (0.0, 0.0, 0.0)), Support("hub", "outer", squeeze)],
+        contacts=[ContactPair(Surface("hub", "inner"), Surface("shaft", "outer"), Coulomb(0.1))],
+    )
+    return solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)
+
+
+def test_a_bore_with_pressure_all_around_shows_all_points() -> None:
+    state = fitted()
+    (patch,) = contact_patches([state], 0, None)
+    unrolling = patch.unrolling
+    assert unrolling is not None
+    assert patch.hidden == 0
+    assert patch.behind == ""
+    assert len(patch.points) == len(np.unique(patch.points)) == AROUND * (LAYERS + 1)
+    np.testing.assert_array_equal(patch.status, state.contact.status)
+    np.testing.assert_allclose(patch.pressure[patch.points], state.contact.pressure)
+    assert unrolling.radius == pytest.approx(1.0)
+    np.testing.assert_allclose(unrolling.frame, np.eye(3), atol=1e-12)
+    assert np.ptp(patch.places[:, 0]) == pytest.approx(2 * np.pi)
+    assert np.ptp(patch.places[:, 1]) == pytest.approx(0.5)
+    assert len(patch.facets) == AROUND * LAYERS
+    widths = np.ptp(patch.places[patch.facets][..., 0], axis=1)
+    np.testing.assert_allclose(widths, CELL, err_msg="a facet is torn by the cut")
+    angles = patch.places[patch.points, 0]
+    places = state.scene.bodies["hub"].mesh.points[state.contact.points.slave - shaft_nodes(state)]
+    np.testing.assert_allclose(np.column_stack([np.cos(angles), np.sin(angles)]), places[:, :2], atol=1e-12)
+    assert unrolling.labels(Units()) == ("around z (mm), 0 towards x", "z (mm)")
+
+
+def shaft_nodes(state: State) -> int:
+    return state.scene.bodies["shaft"].mesh.n_nodes
+
+
+def test_slip_around_the_axis_runs_to_the_right() -> None:
+    state = fitted()
+    (patch,) = contact_patches([state], 0, None)
+    assert patch.unrolling is not None
+    slips = state.contact.status == Status.SLIP
+    assert np.count_nonzero(slips) > AROUND
+    sizes = np.linalg.norm(state.contact.slip_in_space[slips], axis=1)
+    np.testing.assert_allclose(np.linalg.norm(patch.slip[slips], axis=1), sizes, rtol=1e-6)
+    assert np.all(patch.slip[slips, 0] > 0.5 * sizes), "the hub turns from x to y on the shaft"
+
+
+def test_the_cut_is_opposite_of_the_largest_force() -> None:
+    (patch,) = contact_patches([fitted(-0.01)], 0, None)
+    assert patch.unrolling is not None
+    assert abs(patch.unrolling.middle) < 0.3, "pushed along −x, the hub presses where x is positive"
+    assert patch.places[:, 0].max() < np.pi + CELL
+    peak = patch.places[np.argmax(patch.pressure), 0]
+    assert abs(peak) < 1.0
+
+
+def test_states_in_one_picture_are_unrolled_alike() -> None:
+    patches = contact_patches([fitted(), fitted(-0.01)], 0, None)
+    assert patches[0].unrolling is patches[1].unrolling is not None
+    np.testing.assert_array_equal(patches[0].places, patches[1].places)
+
+
+def test_points_that_face_away_on_other_surfaces_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fenics_contact.pictures.unrolled.unrolling_of", lambda *_: None)
+    (patch,) = contact_patches([fitted()], 0, None)
+    assert patch.unrolling is None
+    total = AROUND * (LAYERS + 1)
+    assert 0.3 * total < patch.hidden < 0.6 * total
+    assert patch.hidden + len(patch.points) == total
+    assert patch.behind == f"; {patch.hidden} of {total} closed points face away"
+
+
+def square(turn: float) -> tuple[np.ndarray, np.ndarray]:
+    """The four sides of a square bar along y, nodes and facets."""
+    angles = turn + np.pi / 2 * np.arange(4)
+    corner = np.column_stack([np.cos(angles), 0 * angles, np.sin(angles)])
+    low = np.arange(4)
+    ahead = np.roll(low, -1)
+    return np.concatenate([corner, corner + np.eye(3)[1]]), np.column_stack([low, ahead, ahead + 4, low + 4])
+
+
+def test_only_what_runs_around_an_axis_is_unrolled() -> None:
+    points, facets = square(0.0)
+    force = np.ones(len(points))
+    found = unrolling_of(points, facets, points, force)
+    assert found is not None, "corners of a square lie on a circle"
+    assert found.labels(Units("m")) == ("around y (m), 0 towards z", "y (m)")
+    long = points * [1.0, 1.0, 2.0]
+    assert unrolling_of(long, facets, long, force) is None, "not round"
+    cube = np.concatenate([facets, [[0, 1, 2, 3], [4, 5, 6, 7]]])
+    assert unrolling_of(points, cube, points, force) is None, "with its ends"
+    slanted = Unrolling(np.zeros(3), np.array([[0.6, 0.8, 0], [0, 0, 1], [0.8, -0.6, 0]]), 1.0, 0.0)
+    assert slanted.labels(Units()) == ("around the axis (mm)", "along the axis (mm)")
+
+
+def test_unrolled_surfaces_are_drawn(tmp_path: Path) -> None:
+    state = fitted()
+    image = pixels(plot_contact_pressure(state, tmp_path / "pressure.png", width=800))
+    assert image.shape[1] == 800
+    assert painted(image[:, :600]) > 0.15
+    assert painted(pixels(plot_contact_status({"a": state}, tmp_path / "status.png", width=800))) > 0.05

@@ -1,4 +1,4 @@
-"""Values of pressures, stress, movement and work of friction, beside closed forms and plain sums."""
+"""Objectives of pressures and stresses: values, weighted sums and optima."""
 
 from __future__ import annotations
 
@@ -13,35 +13,45 @@ from fenics_contact import (
     Body,
     ContactPair,
     ContactProblem,
+    Coulomb,
     RigidPlane,
     Scene,
+    ShapeProblem,
     State,
     Status,
     Support,
     Surface,
+    SurfaceDesign,
     ThermalStrain,
     Traction,
+    minimize,
 )
 from fenics_contact.design import (
+    BundleTrust,
     ContactArea,
+    DesignPoint,
     FrictionWork,
     LargestPressure,
     LargestStress,
     Maximum,
     Movement,
     Objective,
+    Partials,
     PressureNorm,
     PressureUnevenness,
     StrainEnergy,
     TotalPotential,
 )
 from fenics_contact.design.forms import ShapeForms
+from fenics_contact.design.objective import WeightedSum
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
-from fenics_contact.gallery import block
-from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from tests.contact.gallery import FLOOR, crowned
 from tests.shape import moved_blocks
-from tests.shape.blocks import RUBBER
+from tests.shape.blocks import RUBBER, block_on_floor, problem
+from tests.shape.objectives import objectives
+from tests.shape.quotients import Remembering
 
 #: Of force and length in those of the numbers below; the last one's stresses are of the order 1e40.
 UNITS = {"N and mm": (1.0, 1.0), "N and m": (1.0, 1e-3), "tiny": (1e20, 1e-10)}
@@ -292,3 +302,126 @@ def test_strain_energy_of_a_heated_body_is_refused_and_its_stress_is_not() -> No
 def test_the_largest_of_what_are_no_objectives_is_refused(given: object) -> None:
     with pytest.raises(InvalidInputError, match="Maximum needs "):
         Maximum(given)  # type: ignore[arg-type]
+
+
+# A punch with a flat edge presses hardest at its corners: each objective takes away what it is about.
+AIMS_OPTIMISED_RUBBER, MEAN = PlaneStrain(100.0, 0.3), 2.0
+
+
+def punch() -> Scene:
+    return Scene(
+        {
+            "punch": Body(rectangle((1.03, 0.0), (2.97, 1.0), (16, 8)), AIMS_OPTIMISED_RUBBER),
+            "layer": Body(rectangle((0.0, -1.0), (4.0, 0.0), (24, 6)), AIMS_OPTIMISED_RUBBER),
+        },
+        [Support("layer", "y0")],
+        [Traction("punch", "y1", (0.0, -MEAN))],
+        [ContactPair(Surface("punch", "y0"), Surface("layer", "y1"), Coulomb(0.2), discretisation="node")],
+    )
+
+
+def designs(objective: Objective, scale: float = 1.0) -> tuple[DesignPoint, DesignPoint]:
+    """The first and the best design."""
+    contact = ContactProblem(punch(), MPI.COMM_SELF, tolerance=1e-8)
+    problem = ShapeProblem(contact, SurfaceDesign("punch", "y0", net=5), objective)
+    method = BundleTrust(tolerance=1e-3, value_scale=scale)
+    result = minimize(problem, np.zeros(5), method, bounds=(-0.05, 0.05))
+    assert result.reason.success
+    assert problem.first is not None
+    assert problem.best is not None
+    return problem.first, problem.best
+
+
+@pytest.mark.parametrize("objective", [LargestPressure(), PressureNorm(p=12.0)])
+def test_the_peak_falls_almost_to_the_mean_pressure(objective: Objective) -> None:
+    first, best = (point.state.contact.pressure.max() for point in designs(objective))
+    assert first > 1.9 * MEAN
+    assert MEAN < best < 1.1 * MEAN
+
+
+def test_the_larger_of_two_stresses_falls_until_both_are_equal() -> None:
+    both = (LargestStress("punch", p=12.0), 1.5 * LargestStress("layer", p=12.0))
+    first, best = designs(Maximum(both))
+    assert best.value < 0.9 * first.value
+    forms = ShapeForms(MPI.COMM_SELF)
+    before, after = ([judge.value(point.state, forms) for judge in both] for point in (first, best))
+    assert before[0] > 1.1 * before[1]
+    assert after[0] == pytest.approx(after[1], rel=0.02)
+
+
+def test_nothing_slips_any_more() -> None:
+    first, best = designs(FrictionWork(), 1e-4)
+    assert first.value > 3e-4
+    assert best.value < 1e-2 * first.value
+
+
+# Objectives can be added and scaled.
+ALL = objectives("block")
+ENERGY, STRESS, FORCES = ALL["energy"], ALL["stress"], ALL["friction forces"]
+DESIGN = 0.01 * np.random.default_rng(3).standard_normal(6)
+
+
+@cache
+def solved() -> Remembering:
+    return problem(block_on_floor(Coulomb(0.4), load=(0.4, 0.1, -2.0)))
+
+
+@cache
+def alone(name: str) -> tuple[float, np.ndarray]:
+    point = solved().evaluate_by(ALL[name], DESIGN)
+    return point.value, point.gradient
+
+
+class Own:
+    """The energy, by a class that knows of no sums."""
+
+    def value(self, state: State, forms: ShapeForms) -> float:
+        return TotalPotential().value(state, forms)
+
+    def partials(self, state: State, forms: ShapeForms) -> Partials:
+        return TotalPotential().partials(state, forms)
+
+
+SUMS: dict[str, tuple[Objective, dict[str, float]]] = {
+    "sum": (ENERGY + 2.0 * STRESS, {"energy": 1.0, "stress": 2.0}),
+    "three": (ENERGY + 2.0 * STRESS + 0.5 * FORCES, {"energy": 1.0, "stress": 2.0, "friction forces": 0.5}),
+    "difference": (ENERGY - STRESS * 3, {"energy": 1.0, "stress": -3.0}),
+    "negative": (-(ENERGY + STRESS), {"energy": -1.0, "stress": -1.0}),
+    "product of a sum": (2.0 * (ENERGY + STRESS), {"energy": 2.0, "stress": 2.0}),
+    "number of NumPy": (np.float64(2.0) * ENERGY, {"energy": 2.0}),
+    "own class": (Own() + STRESS, {"energy": 1.0, "stress": 1.0}),
+    "own class behind": (STRESS + Own(), {"energy": 1.0, "stress": 1.0}),
+}
+
+
+@pytest.mark.parametrize("name", SUMS)
+def test_value_and_gradient_are_those_of_the_terms(name: str) -> None:
+    objective, weights = SUMS[name]
+    point = solved().evaluate_by(objective, DESIGN)
+    assert point.value == pytest.approx(sum(w * alone(term)[0] for term, w in weights.items()), rel=1e-12)
+    wanted = sum(w * alone(term)[1] for term, w in weights.items())
+    assert np.linalg.norm(wanted) > 0.0
+    np.testing.assert_allclose(point.gradient, wanted, atol=1e-6 * np.abs(wanted).max())
+    assert solved().value_by(objective, DESIGN) == pytest.approx(point.value, rel=1e-12)
+
+
+def test_the_terms_count() -> None:
+    parts = [np.linalg.norm(weight * alone(term)[1]) for term, weight in SUMS["three"][1].items()]
+    assert min(parts) > 1e-4 * max(parts), "a term without weight would not be missed"
+
+
+@pytest.mark.parametrize("weight", [np.nan, np.inf, "2", None])
+def test_a_weight_that_is_no_finite_number_is_refused(weight: object) -> None:
+    with pytest.raises(InvalidInputError, match="multiplied by a finite number, got"):
+        weight * ENERGY  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("other", [1.0, "energy", None])
+def test_what_is_no_objective_is_not_added(other: object) -> None:
+    with pytest.raises(InvalidInputError, match=f"got {type(other).__name__}: add an object with"):
+        ENERGY + other  # type: ignore[operator]
+
+
+def test_a_sum_of_nothing_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match="WeightedSum needs a term, got none"):
+        WeightedSum(())
