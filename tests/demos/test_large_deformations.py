@@ -19,9 +19,13 @@ BALL = (3495.76, 0.0903567, 150.0533, 132.3761)
 #: Vertical and horizontal force on a die when it is pressed, half way, and at the bed's end, N/mm.
 IRONING = ((320.0, 67.0), (409.5, 143.8), (339.6, 82.8))
 
-#: Takes long; claims rest on two ranks.
+#: Takes long; claims rest on one rank or on two.
 pytestmark = pytest.mark.slow
-on_ranks = pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.claim)])
+
+
+def on_ranks(claimed: int) -> pytest.MarkDecorator:
+    marks = {claimed: [pytest.mark.claim]}
+    return pytest.mark.parametrize("ranks", [pytest.param(n, marks=marks.get(n, [])) for n in (1, 2)])
 
 
 def run(
@@ -41,7 +45,7 @@ def run(
     return more
 
 
-@on_ranks
+@on_ranks(2)
 def test_a_hook_snaps_in_and_holds_better_than_it_goes_in(demo: Callable[..., Any], ranks: int) -> None:
     more = run(demo, "snap_fit", ranks, {"force", "stress", "stress_on_top"})
     assert (more["inward"], more["outward"], more["snap"]) == pytest.approx(SNAP, rel=1e-3)
@@ -50,7 +54,7 @@ def test_a_hook_snaps_in_and_holds_better_than_it_goes_in(demo: Callable[..., An
     assert more["outward"] == pytest.approx(more["formula"]["out"][1], rel=0.2)
 
 
-@on_ranks
+@on_ranks(1)
 def test_a_seal_fills_its_groove_until_it_meets_itself(demo: Callable[..., Any], ranks: int) -> None:
     more = run(demo, "rubber_seal", ranks, {"force", "pressure", "free", "stress"})
     forces = {name: np.asarray(values) for name, values in more["forces"].items()}
@@ -60,7 +64,7 @@ def test_a_seal_fills_its_groove_until_it_meets_itself(demo: Callable[..., Any],
     assert forces["bore"][-4] == 0 < forces["bore"][-1]
 
 
-@on_ranks
+@on_ranks(1)
 def test_a_ball_leaves_an_imprint_in_metal_and_stress_around_it(demo: Callable[..., Any], ranks: int) -> None:
     pictures = {"force", "profile", "stress", "stress_under_load"}
     more = run(demo, "ball_imprint", ranks, pictures, steps=12)
@@ -72,7 +76,7 @@ def test_a_ball_leaves_an_imprint_in_metal_and_stress_around_it(demo: Callable[.
     assert more["residual"] > 300.0
 
 
-@on_ranks
+@on_ranks(1)
 def test_a_bed_is_ironed_from_end_to_end(demo: Callable[..., Any], ranks: int) -> None:
     more = run(demo, "shallow_ironing", ranks, {"forces", "stress", "stress_at_the_end"})
     found = [(more["vertical"][step], more["horizontal"][step]) for step in (3, 23, 43)]
