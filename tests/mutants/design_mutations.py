@@ -13,7 +13,7 @@ DESIGN_MUTATIONS = (
         "design/contact_derivatives.py",
         "points.distance[mine], by",
         "points.gap[mine], by",
-        (f"{GIVEN}::test_the_adjoint_agrees_with_central_differences",),
+        (f"{GIVEN}::test_the_adjoint_agrees_with_central_differences[blocks, gap-energy]",),
     ),
     Mutation(
         "the adjoint is solved a thousand times more loosely",
