@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -62,7 +63,6 @@ def test_one_rank_speaks_and_all_end_alike(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "state.vtm").exists()
 
 
-@pytest.mark.slow
 def test_the_program_ends_with_its_code_under_mpirun(tmp_path: Path) -> None:
     answer = launch(2, "-m", "fenics_contact", "run", tmp_path / "nowhere.toml")
     assert answer.returncode == 2
@@ -71,12 +71,25 @@ def test_the_program_ends_with_its_code_under_mpirun(tmp_path: Path) -> None:
     assert "MPI_ABORT" not in answer.stderr
 
 
-@pytest.mark.slow
+#: A scene of six steps, and their normal forces.
+SHEARED = (
+    "--set", "steps.1.count=3", "--set", "steps.2.count=1", "--set", "steps.3.count=1", "--no-pictures",
+    ROOT / "demos" / "scenes" / "sheared_block.toml",
+)  # fmt: skip
+FORCES = [193.665, 191.284, 181.971, 173.993, 171.657, 171.225]
+
+
+def assert_has_all_steps(output: Path) -> None:
+    steps = json.loads((output / "result.json").read_text())["more"]["steps"]
+    assert steps["number"] == list(range(6))
+    assert steps["normal_force"] == pytest.approx(FORCES, rel=1e-5)
+    assert (output / "history.pvd").read_text().count("timestep") == 6
+
+
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_run_that_is_terminated_goes_on(ranks: int, tmp_path: Path) -> None:
-    scene = ROOT / "demos" / "scenes" / "sheared_block.toml"
-    arguments = (scene, "-o", tmp_path, "--no-pictures", "--set", "steps.3.count=1")
-    command = [str(LAUNCH), str(ranks), sys.executable, "-m", "fenics_contact", "run", *map(str, arguments)]
+    arguments = ("-m", "fenics_contact", "run", *SHEARED, "-o", tmp_path)
+    command = [str(LAUNCH), str(ranks), sys.executable, *map(str, arguments)]
     stopped = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     while not (tmp_path / "history.pvd").exists() and stopped.poll() is None:
         time.sleep(0.05)
@@ -87,23 +100,13 @@ def test_a_run_that_is_terminated_goes_on(ranks: int, tmp_path: Path) -> None:
     assert "Traceback" not in words
     assert (tmp_path / "checkpoint.npz").exists()
     assert not (tmp_path / "result.json").exists()
-    again = launch(ranks, "-m", "fenics_contact", "run", *arguments, "--resume", timeout=300.0)
+    again = launch(ranks, *arguments, "--resume", timeout=300.0)
     assert again.returncode == 0, again.stderr
     assert "going on from" in again.stdout
-    steps = json.loads((tmp_path / "result.json").read_text())["more"]["steps"]
-    assert steps["number"] == list(range(20))
-    assert steps["friction_force"][18] == pytest.approx(85.52, rel=2e-3)
-    assert (tmp_path / "history.pvd").read_text().count("timestep") == 20
+    assert_has_all_steps(tmp_path)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("ranks", [1, 2, 4])
-def test_a_sheared_block_has_the_same_steps_on_any_ranks(ranks: int, tmp_path: Path) -> None:
-    settings = ("--set", "steps.1.count=3", "--set", "steps.2.count=1", "--set", "steps.3.count=1")
-    scene = ROOT / "demos" / "scenes" / "sheared_block.toml"
-    answer = launch(ranks, "-m", "fenics_contact", "run", scene, "-o", tmp_path, "--no-pictures", *settings)
-    assert answer.returncode == 0, answer.stderr
-    steps = json.loads((tmp_path / "result.json").read_text())["more"]["steps"]
-    assert steps["normal_force"] == pytest.approx(
-        [193.665, 191.284, 181.971, 173.993, 171.657, 171.225], rel=1e-5
-    )
+def test_a_sheared_block_has_the_same_steps_on_four_ranks(mpirun: Callable[..., str], tmp_path: Path) -> None:
+    run = "import sys; from mpi4py import MPI; from fenics_contact import _cli as cli"
+    mpirun(f"{run}; sys.exit(cli.main(MPI.COMM_WORLD, sys.argv[1:]))", 4, "run", *SHEARED, "-o", tmp_path)
+    assert_has_all_steps(tmp_path)

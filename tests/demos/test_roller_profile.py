@@ -19,7 +19,6 @@ def run(demo: Callable[..., Any], ranks: int, *size: str) -> dict[str, Any]:
 
 
 @pytest.mark.slow
-@pytest.mark.claim
 def test_a_coarse_roller_is_relieved_at_its_ends_and_more_so_where_it_tilts(
     demo: Callable[..., Any],
 ) -> None:
@@ -30,9 +29,11 @@ def test_a_coarse_roller_is_relieved_at_its_ends_and_more_so_where_it_tilts(
 
 
 @pytest.mark.slow
-@pytest.mark.claim
-def test_two_starts_end_with_even_pressure_and_lundbergs_profile(demo: Callable[..., Any]) -> None:
-    more = run(demo, 2)
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.claim), 2])
+def test_two_starts_end_with_even_pressure_and_lundbergs_profile(
+    ranks: int, demo: Callable[..., Any]
+) -> None:
+    more = run(demo, ranks)
     first, second = more["peaks"].values()
     assert first == pytest.approx(second, rel=1e-3)
     assert max(first, second) < 1.03 < more["peak_lundberg"]
