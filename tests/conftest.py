@@ -109,7 +109,7 @@ def waiting_ranks(ranks: int) -> WaitingRanks:
 def pytest_unconfigure() -> None:
     """End the ranks that wait."""
     for ranks in WAITING:
-        waiting_ranks(ranks).end()
+        waiting_ranks(ranks).end(5.0)
 
 
 def run_on_ranks(

@@ -111,14 +111,16 @@ class WaitingRanks:
                 command, stdin=none, stdout=none, stderr=errors, start_new_session=True
             )
 
-    def end(self) -> None:
-        """End the ranks, wherever they are."""
+    def end(self, patience: float = 0.0) -> None:
+        """Let the ranks come to their end for so many seconds, and kill those that are left."""
         if self.process is not None:
+            for descriptor in (self.answers, *self.requests):
+                os.close(descriptor)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self.process.wait(patience)
             kill_session(self.process.pid)
             self.process.wait()
             self.process = None
-            for descriptor in (self.answers, *self.requests):
-                os.close(descriptor)
             shutil.rmtree(self.folder)
 
     def __call__(
