@@ -238,7 +238,7 @@ def test_an_optimisation_that_did_not_happen_is_refused(tmp_path: Path) -> None:
     ("content", "message"),
     [
         (None, r"cannot be read: No such file or directory; give the file that write_result returned"),
-        ("{\"format\": \"fenics", r"must be a whole JSON file, .* is none .*it was cut or edited"),
+        ("{\"format\": \"fenics", r"must be a whole JSON file, .* is not one .*it was cut or edited"),
         ("", r"must be a whole JSON file"),
         ("[1, 2]", r"must have \"format\": 'fenics_contact result', .* has None: give a file that"),
         ("{\"format\": \"other\"}", r"has 'other'"),

@@ -171,7 +171,7 @@ def test_a_sweep_varies_one_setting_at_a_time_and_mesh_with_tolerance() -> None:
 
 # What a scene must offer to be studied.
 def test_a_study_without_anything_to_measure_is_refused() -> None:
-    with pytest.raises(InvalidInputError, match="a study needs at least one quantity, got none: say what"):
+    with pytest.raises(InvalidInputError, match="a study needs at least one quantity, got none: give what"):
         replace(find_study("hertz"), quantities=())
 
 
