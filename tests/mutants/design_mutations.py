@@ -22,7 +22,8 @@ DESIGN_MUTATIONS = (
         "ADJOINT_SHARE, ADJOINT_FLOOR = 1e2, 1e-8",
         (
             "tests/shape/test_units.py::"
-            "test_the_adjoint_of_a_state_at_default_tolerance_is_more_accurate_than_the_state",
+            "test_the_adjoint_of_a_state_at_default_tolerance_is_more_accurate_than_the_state"
+            "[energy-N and mm]",
         ),
     ),
     Mutation(

@@ -6,7 +6,10 @@ from tests.mutants.copy_of_package import Mutation
 from tests.mutants.design_mutations import DESIGN_MUTATIONS, GIVEN
 from tests.mutants.large_mutations import LARGE_MUTATIONS
 
-CONIC = "tests/contact/test_conic.py::test_energies_and_contact_forces_equal_those_of_a_conic_solver"
+CONIC = (
+    "tests/contact/test_conic.py::test_energies_and_contact_forces_equal_those_of_a_conic_solver"
+    "[block on plane, Tresca-hexahedron-face Newton]"
+)
 
 PARTS = "tests/accuracy/test_certificate.py"
 NARROW = "tests/surfaces/test_true_surface.py"
@@ -233,14 +236,19 @@ MUTATIONS = (
         "_equilibrium/static_admissibility.py",
         "bound = torn.tresca_bound / scale",
         "bound = torn.tresca_bound",
-        ("tests/contact/test_held.py::test_the_limit_of_friction_does_not_depend_on_the_units",),
+        (
+            "tests/contact/test_held.py::test_the_limit_of_friction_does_not_depend_on_the_units"
+            "[1e-06-1e-06-friction1]",
+        ),
     ),
     Mutation(
         "projections are sought from the origin",
         "_surfaces/projection.py",
         "start = master.points[nodes[:, 0]]",
         "start = 0.0 * master.points[nodes[:, 0]]",
-        ("tests/contact/test_units.py::test_no_contact_point_is_lost_far_from_the_origin",),
+        (
+            "tests/contact/test_units.py::test_no_contact_point_is_lost_far_from_the_origin[3-hexahedron-node]",
+        ),
     ),
     Mutation(
         "the tangent of plastic flow forgets that its direction turns",
@@ -278,14 +286,14 @@ MUTATIONS = (
         "_surfaces/fitting.py",
         "np.sqrt([comb(sum(power), power[-1]) for power in powers])",
         "np.ones(len(powers))",
-        (f"{NARROW}::test_a_narrow_strip_has_radial_normals_in_every_orientation",),
+        (f"{NARROW}::test_a_narrow_strip_has_radial_normals_in_every_orientation[2-quads-1]",),
     ),
     Mutation(
         "what the nodes of one layer leave open is fitted",
         "_surfaces/fitting.py",
         "explained[:, 0] |= narrow",
         "explained[:, 0] |= False",
-        (f"{NARROW}::test_the_normals_of_one_layer_lean_alike_in_every_orientation",),
+        (f"{NARROW}::test_the_normals_of_one_layer_lean_alike_in_every_orientation[cylinder-quads]",),
     ),
     Mutation(
         "moments are about undeformed places",
