@@ -346,7 +346,7 @@ COLUMNS = 3
 
 
 def plot_contact_status(
-    states: Mapping[str, State],
+    states: State | Mapping[str, State],
     path: str | Path | None = None,
     *,
     pair: int = 0,
@@ -361,7 +361,7 @@ def plot_contact_status(
     from inside the slave if the axes then run to the right.
 
     Args:
-        states: Name -> state of a scene in space, for instance after each load step.
+        states: A state of a scene in space, or name -> state, for instance after each load step.
         pair: Number of the contact pair in the scenes.
         reach: How far a map reaches around the contact's middle, [length]; chosen unless given.
 
@@ -369,8 +369,10 @@ def plot_contact_status(
         InvalidInputError: If there is no state, one has no such pair, or one is plane.
     """
     target = png_path(path)
+    if not isinstance(states, Mapping):
+        states = {"": states}
     if not states:
-        raise InvalidInputError("maps of the status need a state, got none: pass {'name': state}")
+        raise InvalidInputError("maps of the status need a state, got none: pass one, or {'name': state}")
     for name, state in states.items():
         if state.scene.dim == 2 or not 0 <= pair < len(state.scene.contacts):
             raise InvalidInputError(
@@ -398,7 +400,7 @@ def _draw_status(
         panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
         for axes, (name, patch) in zip(panels, patches.items(), strict=False):
             draw_status(axes, patch, counted=False)
-            axes.set_title(_words(patch, units) if name == title else f"{name}\n{_words(patch, units)}")
+            axes.set_title(_words(patch, units) if not name else f"{name}\n{_words(patch, units)}")
             label_patch(axes, patch, units, mirror=True)
         for axes in panels[len(patches) :]:
             axes.set_axis_off()

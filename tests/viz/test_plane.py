@@ -486,7 +486,7 @@ def test_of_a_quarter_of_a_bore_the_sections_are_those_of_the_whole() -> None:
 
 def test_status_maps_show_stick_and_slip_of_each_state(tmp_path: Path) -> None:
     state = touching_blocks()
-    one = pixels(plot_contact_status({"a": state}, tmp_path / "one.png", width=1200))
+    one = pixels(plot_contact_status(state, tmp_path / "one.png", width=1200))
     four = pixels(plot_contact_status(dict.fromkeys("abcd", state), tmp_path / "four.png", width=1200))
     for colour in ("#0072b2", "#d55e00"):
         assert contains(one, colour)
@@ -521,7 +521,7 @@ def test_a_map_of_one_state_says_its_title_once(monkeypatch: pytest.MonkeyPatch)
             texts.extend([title, *(axes.get_title() for axes in figure.axes)])
 
     monkeypatch.setattr(status, "sheet", kept)
-    plot_contact_status({"Pressed": state}, title="Pressed")
+    plot_contact_status(state, title="Pressed")
     assert sum(text.count("Pressed") for text in texts) == 1
     texts.clear()
     plot_contact_status({"first": state, "second": state}, title="Pressed")

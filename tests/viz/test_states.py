@@ -507,4 +507,4 @@ def test_unrolled_surfaces_are_drawn(tmp_path: Path) -> None:
     image = pixels(plot_contact_pressure(state, tmp_path / "pressure.png", width=800))
     assert image.shape[1] == 800
     assert painted(image[:, :600]) > 0.15
-    assert painted(pixels(plot_contact_status({"a": state}, tmp_path / "status.png", width=800))) > 0.05
+    assert painted(pixels(plot_contact_status(state, tmp_path / "status.png", width=800))) > 0.05
