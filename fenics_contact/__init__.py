@@ -108,7 +108,7 @@ if TYPE_CHECKING:
 
 requirements.check()  # checks that they exist; nothing is loaded or started before it is used
 
-__version__ = "0.2.0.dev0"
+__version__ = "0.2.0"
 
 #: Public modules.
 _ROOMS = (
