@@ -107,3 +107,11 @@ def rotation(dim: int, angle: float, axis: int = 1) -> np.ndarray:
 def same_points(one: SlidingPoints, other: SlidingPoints) -> bool:
     """Return whether two sets consist of the same nodes on the same facets."""
     return np.array_equal(one.key, other.key) and np.array_equal(one.points.facet, other.points.facet)
+
+
+def derivative_error(step: float, found: np.ndarray, plus: np.ndarray, minus: np.ndarray) -> float:
+    """Return the largest error of a derivative relative to the difference quotient."""
+    quotient = (plus - minus) / (2 * step)
+    size = np.abs(quotient).max()
+    assert size > 1e-2
+    return float(np.abs(found - quotient).max() / size)

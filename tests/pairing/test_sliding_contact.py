@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -23,6 +23,7 @@ from fenics_contact.errors import InvalidInputError
 from tests.pairing.sliding_scenes import (
     KINDS,
     arched,
+    derivative_error,
     free,
     half_on_arch,
     on_arch,
@@ -401,12 +402,7 @@ def forces(now: SlidingPoints) -> tuple[np.ndarray, np.ndarray]:
     return random.uniform(0.3, 1.0, count), random.uniform(-1.0, 1.0, (count, dim - 1))
 
 
-def error(found: np.ndarray, plus: np.ndarray, minus: np.ndarray) -> float:
-    """Return the largest error relative to the difference quotient."""
-    quotient = (plus - minus) / (2 * STEP)
-    size = np.abs(quotient).max()
-    assert size > 1e-2
-    return float(np.abs(found - quotient).max() / size)
+error = partial(derivative_error, STEP)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +34,16 @@ from fenics_contact.mesh import quadratic
 from tests.conftest import run_on_ranks
 from tests.linear.monolithic import _forms
 from tests.pairing.sliding_on_ranks import collect
-from tests.pairing.sliding_scenes import KINDS, free, on_arch, ring, same_points, shaken, sliding
+from tests.pairing.sliding_scenes import (
+    KINDS,
+    derivative_error,
+    free,
+    on_arch,
+    ring,
+    same_points,
+    shaken,
+    sliding,
+)
 
 STEP = 2e-6
 OBSTACLES = {
@@ -96,12 +105,7 @@ def beside(name: str) -> tuple[SlidingPoints, SlidingPoints, SlidingPoints, np.n
     return now, plus, minus, way.ravel()
 
 
-def error(found: np.ndarray, plus: np.ndarray, minus: np.ndarray) -> float:
-    """Return the largest error relative to the difference quotient."""
-    quotient = (plus - minus) / (2 * STEP)
-    size = np.abs(quotient).max()
-    assert size > 1e-2
-    return float(np.abs(found - quotient).max() / size)
+error = partial(derivative_error, STEP)
 
 
 @pytest.mark.parametrize("name", CASES)
