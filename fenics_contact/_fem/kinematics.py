@@ -294,7 +294,7 @@ class MeanDilatation:
         )
         foreseen = before + change[self._cells]
         points, reached = self._polynomials.at(foreseen), self._polynomials.at(actual)
-        possible = (points > flattened * reached).all(axis=1)
+        possible = np.all(points > flattened * reached, axis=1)
         self._set(np.where(possible[:, None], foreseen, actual))
 
     def stiffness(self) -> sp.csr_matrix:

@@ -112,7 +112,8 @@ class Configuration:
 
     def on(self, contact: ContactConfiguration) -> Configuration:
         """Return the configuration with its forces on the rows of other contact points. Collective."""
-        multiplier, diagonal = np.zeros(len(contact.torn.numbering.owned)), None
+        multiplier: Vector = np.zeros(len(contact.torn.numbering.owned))
+        diagonal: Vector | None = None
         if self.contact is not None:
             multiplier = contact.carried(self.multiplier, self.contact)
             if self.diagonal is not None:

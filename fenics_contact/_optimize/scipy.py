@@ -242,8 +242,10 @@ class ForScipy:
 
         allowed, scale = self._problem.allowed, self._problem.scale
         free = np.full(len(allowed.limit), -np.inf)
-        rows = [(allowed.matrix, free, allowed.limit)]
-        rows.append((allowed.equality_matrix, allowed.equality_value, allowed.equality_value))
+        rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = [
+            (allowed.matrix, free, allowed.limit),
+            (allowed.equality_matrix, allowed.equality_value, allowed.equality_value),
+        ]
         if with_box:
             rows.append((np.eye(scale.size), allowed.lower, allowed.upper))
             rows = [half for row in rows for half in _from_both_sides(*row)]

@@ -410,8 +410,8 @@ def unpaired(
     for body, into in (both, both[::-1]):
         before, wall = scene.bodies[body].mesh.points, scene.bodies[into].mesh.points
         facets, behind, _ = outlines[body]
-        mine = np.isin(facets, named[body]).all(axis=1)
-        own, mine = facets[mine], np.flatnonzero(~mine)[share]
+        by_name = np.all(np.isin(facets, named[body]), axis=1)
+        own, mine = facets[by_name], np.flatnonzero(~by_name)[share]
         facets, behind, inside = facets[mine], behind[mine], outlines[into][2]
         size = np.ptp(before[facets], axis=1).max(axis=1)
         here, there = _Facets.of(before, facets, behind), _Facets.of(before + moved[body], facets, behind)

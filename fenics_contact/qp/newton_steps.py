@@ -165,7 +165,7 @@ class Contradiction:
     def relieved(self, problem: DualProblem, face: Face, multiplier: Vector, trial: Vector) -> Vector:
         """Return the multiplier with each group moved until the first of its contacts changes. Collective."""
         layout, moved, law = problem.layout, self.direction, problem.law
-        longest = np.full(self.n_groups, np.inf)
+        longest: Vector = np.full(self.n_groups, np.inf)
         closed, discs = layout.normal[face.closed], layout.tangential[face.stick]
         pressing = law.growth[face.stick] * moved[layout.tangential_frictional[face.stick]]
         slipping = _until_slip(trial[discs], moved[discs], law.bound(multiplier)[face.stick], pressing)
