@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import sys
 import warnings
 from collections.abc import Iterator
@@ -31,12 +32,12 @@ def side_effects_undone() -> Iterator[None]:
 
     dolfinx 0.5 switches `sys.setdlopenflags` to RTLD_GLOBAL for good, after which VTK's own
     libraries clash with the system's; ffcx 0.5 configures the root logger and captures warnings. setuptools
-    lowers the root logger's level and has it log every command of the compiler; what the compiler itself says
-    reaches the terminal.
+    lowers the root logger's level, has it log every command of the compiler, and adds PLAT to the
+    environment; what the compiler itself says reaches the terminal.
     """
     root = logging.getLogger()
     handlers, level, setdlopenflags = list(root.handlers), root.level, sys.setdlopenflags
-    showwarning = warnings.showwarning
+    showwarning, platform_named = warnings.showwarning, "PLAT" in os.environ
     sys.setdlopenflags = lambda flags: None
     no_command = _NoCommand()  # one of its own, as these blocks are nested
     root.addFilter(no_command)
@@ -47,6 +48,8 @@ def side_effects_undone() -> Iterator[None]:
         sys.setdlopenflags = setdlopenflags
         root.handlers[:] = handlers
         root.setLevel(level)
+        if not platform_named:
+            os.environ.pop("PLAT", None)
         if warnings.showwarning is not showwarning:
             logging.captureWarnings(False)
 

@@ -39,7 +39,7 @@ CODE = """
 
 
 COMPILED = """
-    import logging, sys
+    import logging, os, sys
     logging.basicConfig(level=logging.WARNING, stream=sys.stdout)
     import numpy as np
     import ufl
@@ -50,6 +50,7 @@ COMPILED = """
         _dolfinx.CompiledForm(MPI.COMM_SELF, one**k * ufl.dx(domain=_dolfinx.template("triangle")))
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     _dolfinx.coefficient(_dolfinx.local_mesh(corners, np.array([[0, 1, 2]]), "triangle"), "u")
+    assert "PLAT" not in os.environ, "of setuptools"
     logging.warning("said")
 """
 
