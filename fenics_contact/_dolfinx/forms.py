@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import ufl
 from ufl.algorithms import expand_derivatives
-from ufl.algorithms.analysis import extract_type
-from ufl.differentiation import CoefficientDerivative
 
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.progress import Task
@@ -94,15 +92,14 @@ class CompiledForm:
 
 
 def _expanded(form: ufl.Form) -> ufl.Form:
-    """Return the form with its derivatives by coefficients worked out.
+    """Return the form with its derivatives worked out, where coefficients drop out of them.
 
-    Where coefficients drop out of a derivative, dolfinx 0.9 binds those left by wrong names. A derivative
-    that is zero leaves nothing to compile and no coefficient to be bound wrongly: it stays as it is written.
+    dolfinx 0.9 binds those that are left by wrong names otherwise. A derivative that is zero leaves nothing to
+    compile and no coefficient to be bound wrongly: it stays as it is written.
     """
-    if not extract_type(form, CoefficientDerivative):
-        return form
     expanded = expand_derivatives(form)
-    return form if expanded.empty() else expanded
+    alike = expanded.empty() or expanded.coefficients() == form.coefficients()
+    return form if alike else expanded
 
 
 def _facet_tags(mesh: dolfinx.mesh.Mesh, facets: Facets) -> dolfinx.mesh.MeshTags:
