@@ -111,6 +111,7 @@ def main(comm: MPI.Comm, arguments: Sequence[str] | None = None) -> int:
         with silence:
             return _run(given, comm)
     finally:
+        write_stderr("")  # what was logged and nobody has read would change Python's exit status
         logger.setLevel(level)  # a command may be more verbose than the program that called this function
 
 

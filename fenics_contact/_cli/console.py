@@ -142,10 +142,12 @@ def write_stdout(text: str) -> None:
 
 
 def write_stderr(text: str) -> None:
-    """Write to stderr with control characters escaped; a failure cannot be reported."""
-    with suppress(OSError):
+    """Write to stderr with control characters escaped; after a failure, which nobody sees, to nowhere."""
+    try:
         sys.stderr.write(visible(text))
         sys.stderr.flush()
+    except OSError:
+        redirect_to_devnull(sys.stderr)
 
 
 def output_error(error: OSError) -> OutputError:

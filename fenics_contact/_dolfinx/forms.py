@@ -94,8 +94,8 @@ class CompiledForm:
 def _expanded(form: ufl.Form) -> ufl.Form:
     """Return the form with its derivatives worked out, where coefficients drop out of them.
 
-    dolfinx 0.9 binds those that are left by wrong names otherwise. A derivative that is zero leaves nothing to
-    compile and no coefficient to be bound wrongly: it stays as it is written.
+    dolfinx 0.9 binds those that are left by wrong names otherwise. A derivative that is zero leaves nothing
+    to compile and no coefficient to be bound wrongly: it stays as it is written.
     """
     expanded = expand_derivatives(form)
     alike = expanded.empty() or expanded.coefficients() == form.coefficients()
