@@ -1,15 +1,14 @@
 """Requirements of the package, checked before they are used.
 
 dolfinx, petsc4py, mpi4py and gmsh come from the system and not from pip, so no installer has compared their
-versions with the requirements. Presence and versions are checked when the package is imported, features of a
-library when it is loaded.
+versions with the requirements. Presence and versions in metadata are checked when the package is imported,
+features of a library when it is loaded, as is the version of dolfinx: its distributions have several names.
 """
 
 from __future__ import annotations
 
 import importlib
 import importlib.util
-import logging
 import re
 import signal
 import sys
@@ -25,24 +24,19 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
 
-_log = logging.getLogger(__name__)
-
-
 @dataclass(frozen=True)
 class Requirement:
-    """A library, its oldest supported version, how to install it, and the versions it was tested with."""
+    """A library, its oldest supported version, and how to install it."""
 
     module: str
     oldest: str
     debian: str = ""
     conda: str = ""
-    distribution: str = ""
-    tested: tuple[str, ...] = ()
 
     def version(self) -> str | None:
         """Return the installed version without importing the library; None if it has no metadata."""
         try:
-            return metadata.version(self.distribution or self.module)
+            return metadata.version(self.module)
         except metadata.PackageNotFoundError:
             return None
 
@@ -60,7 +54,7 @@ _APT = "apt-get install --no-install-recommends"
 _FENICSX = f"{_APT} python3-dolfinx-real"
 _MPI4PY = Requirement("mpi4py", "3.1", _FENICSX)
 _PETSC4PY = Requirement("petsc4py", "3.18", _FENICSX, 'petsc4py "petsc=*=real*"')
-DOLFINX = Requirement("dolfinx", "0.5", _FENICSX, "fenics-dolfinx", "fenics-dolfinx", ("0.5", "0.9"))
+_DOLFINX = Requirement("dolfinx", "0.5", _FENICSX, "fenics-dolfinx")
 _NUMERICAL = [
     Requirement("numpy", "1.24", _FENICSX),
     Requirement("scipy", "1.10", _FENICSX),
@@ -71,7 +65,7 @@ _GMSH = Requirement("gmsh", "4.8", f"{_APT} python3-gmsh", "python-gmsh")
 
 def check() -> None:
     """Check all libraries that every part of the package needs, without loading or starting them."""
-    for requirement in [*_NUMERICAL, _MPI4PY, _PETSC4PY, DOLFINX]:
+    for requirement in [*_NUMERICAL, _MPI4PY, _PETSC4PY, _DOLFINX]:
         _check_installed(requirement)
 
 
@@ -95,6 +89,14 @@ def load_petsc(world: MPI.Comm | None = None) -> ModuleType:
     _restore_sigpipe()
     _check_petsc(_PETSC4PY, petsc)
     return petsc
+
+
+def load_dolfinx() -> ModuleType:
+    """Return ``dolfinx``."""
+    load_petsc()  # names what is wrong with it; dolfinx would fail in its own words
+    dolfinx = _load(_DOLFINX, "dolfinx")
+    _check_version(_DOLFINX, dolfinx.__version__)
+    return dolfinx
 
 
 def _restore_sigpipe() -> None:
@@ -131,16 +133,9 @@ def _check_installed(requirement: Requirement) -> None:
 
 
 def _check_version(requirement: Requirement, version: str) -> None:
-    """Raise if a version is too old, warn if it was never tested."""
+    """Raise if a version is too old."""
     if _numbers(version) < _numbers(requirement.oldest):
         raise requirement.error(version)
-    if requirement.tested and ".".join(map(str, _numbers(version)[:2])) not in requirement.tested:
-        _log.warning(
-            "%s %s was never tested with fenics_contact, only %s were: first compare a case you know",
-            requirement.module,
-            version,
-            " and ".join(requirement.tested),
-        )
 
 
 def _numbers(version: str) -> tuple[int, ...]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from fenics_contact import _dolfinx
 from fenics_contact._base import requirements as _requirements
 from fenics_contact._base.display import counted
 from fenics_contact._base.libraries import MPI
@@ -97,6 +98,8 @@ def _pictures(comm: MPI.Comm) -> str:
 
 
 def _advice(comm: MPI.Comm, libraries: list[str]) -> Iterator[str]:
+    if _dolfinx.untested():
+        yield _dolfinx.untested()
     if any(map(_REFERENCE.search, libraries)):
         yield (
             "the BLAS is the slow reference one: install OpenBLAS (Debian: apt-get install "

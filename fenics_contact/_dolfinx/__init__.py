@@ -17,7 +17,7 @@ from fenics_contact._dolfinx.assembly import (
 )
 from fenics_contact._dolfinx.cells import CELL_TYPES, degree, dimension, facet_vertices, shape
 from fenics_contact._dolfinx.forms import CompiledForm
-from fenics_contact._dolfinx.loading import fem, mesh, release, version
+from fenics_contact._dolfinx.loading import fem, mesh, release, untested, version, warn_if_untested
 from fenics_contact._dolfinx.meshes import local_mesh, rank_mesh
 from fenics_contact._dolfinx.numbering import (
     cell_dofs,
@@ -94,8 +94,10 @@ __all__ = [
     "shape",
     "tag_arrays",
     "template",
+    "untested",
     "update_coordinates",
     "version",
     "vtk_cell_dofs",
+    "warn_if_untested",
     "write_xdmf",
 ]

@@ -12,10 +12,23 @@ from functools import cache
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from fenics_contact._base.libraries import Late
-from fenics_contact._base.requirements import DOLFINX, load_petsc
+from fenics_contact._base.libraries import MPI, Late
+from fenics_contact._base.requirements import load_dolfinx
 
-__all__ = ["cpp", "dolfinx", "fem", "mesh", "old", "release", "side_effects_undone", "version"]
+__all__ = [
+    "cpp",
+    "dolfinx",
+    "fem",
+    "mesh",
+    "old",
+    "release",
+    "side_effects_undone",
+    "untested",
+    "version",
+    "warn_if_untested",
+]
+
+_log = logging.getLogger(__name__)
 
 
 class _NoCommand(logging.Filter):
@@ -56,8 +69,8 @@ def side_effects_undone() -> Iterator[None]:
 
 def _load() -> ModuleType:
     """Import dolfinx with the submodules that are used."""
-    load_petsc()  # names what is wrong with it; dolfinx would fail in its own words
     with side_effects_undone():
+        load_dolfinx()
         import dolfinx
         import dolfinx.fem
         import dolfinx.fem.petsc
@@ -87,7 +100,25 @@ def release() -> str:
 @cache
 def version() -> tuple[int, ...]:
     """Return the first two numbers of dolfinx's version."""
-    return tuple(int(part) for part in (DOLFINX.version() or dolfinx.__version__).split(".")[:2])
+    return tuple(int(part) for part in release().split(".")[:2])
+
+
+def untested(tested: tuple[tuple[int, ...], ...] = ((0, 5), (0, 9), (0, 11))) -> str:
+    """Return a warning if this version of dolfinx was never tested with the package, else nothing."""
+    if version() in tested:
+        return ""
+    known = ", ".join(".".join(map(str, numbers)) for numbers in tested)
+    return (
+        f"dolfinx {release()} was never tested with fenics_contact, only {known} were: "
+        "first compare a case you know"
+    )
+
+
+@cache
+def warn_if_untested() -> None:
+    """Warn once, on the first rank, of a dolfinx that was never tested with the package."""
+    if untested() and MPI.COMM_WORLD.rank == 0:
+        _log.warning(untested())
 
 
 def old() -> bool:

@@ -7,7 +7,7 @@ import ufl
 
 from fenics_contact._dolfinx.cache import compiled_once
 from fenics_contact._dolfinx.cells import NODE_ORDER, cell_type_named, facet_vertices
-from fenics_contact._dolfinx.loading import cpp, dolfinx, old, side_effects_undone
+from fenics_contact._dolfinx.loading import cpp, dolfinx, old, side_effects_undone, version
 from fenics_contact._dolfinx.templates import cellwise_element, scalar_element, vector_element
 
 
@@ -18,9 +18,15 @@ def _space(
         return dolfinx.fem.FunctionSpace(mesh, element) if old() else dolfinx.fem.functionspace(mesh, element)
 
 
+def geometry_degree(mesh: dolfinx.mesh.Mesh) -> int:
+    """Return the degree of the map from the reference cell to the cells of a mesh."""
+    geometry = mesh.geometry
+    return int((geometry.cmap if version() < (0, 11) else geometry.cmaps[0]).degree)
+
+
 def cell_type_of_mesh(mesh: dolfinx.mesh.Mesh) -> str:
     """Return which of `CELL_TYPES` the cells of a mesh are."""
-    return cell_type_named(mesh.topology.cell_name(), int(mesh.geometry.cmap.degree))
+    return cell_type_named(mesh.topology.cell_name(), geometry_degree(mesh))
 
 
 def coefficient(mesh: dolfinx.mesh.Mesh, name: str) -> dolfinx.fem.Function:
@@ -89,13 +95,14 @@ def _input_nodes(mesh: dolfinx.mesh.Mesh) -> np.ndarray:
 
 def cell_nodes(mesh: dolfinx.mesh.Mesh) -> np.ndarray:
     """Return the input nodes of this rank's cells, tensor-product order, shape (n_cells, nodes of a cell)."""
-    dofmap = table(mesh.geometry.dofmap, cell_count(mesh))
-    return _input_nodes(mesh)[dofmap]
+    return _input_nodes(mesh)[cell_geometry(mesh)]
 
 
 def cell_geometry(mesh: dolfinx.mesh.Mesh) -> np.ndarray:
     """Return the nodes in dolfinx's geometry of this rank's cells, shape (n_cells, nodes of a cell)."""
-    return table(mesh.geometry.dofmap, cell_count(mesh))
+    geometry = mesh.geometry
+    nodes = geometry.dofmap if version() < (0, 11) else geometry.dofmaps[0]
+    return table(nodes, cell_count(mesh))
 
 
 def cell_dofs(space: dolfinx.fem.FunctionSpace) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 from fenics_contact._base.libraries import MPI
 from fenics_contact._dolfinx.cells import NODE_ORDER, cell_type_named, facet_vertices
 from fenics_contact._dolfinx.loading import cpp, dolfinx, old
-from fenics_contact._dolfinx.numbering import cell_count, table
+from fenics_contact._dolfinx.numbering import cell_geometry, geometry_degree
 from fenics_contact.errors import InvalidInputError
 
 __all__ = ["MeshArrays", "TagArrays", "mesh_arrays", "read_mesh", "read_tags", "tag_arrays"]
@@ -124,10 +124,9 @@ def mesh_arrays(mesh: dolfinx.mesh.Mesh) -> MeshArrays:
     node = np.searchsorted(inputs, given)
     original = np.asarray(topology.original_cell_index[:owned], dtype=np.int64)
     every, place = np.unique(_from_all(mesh, original), return_index=True)
-    order = int((geometry.cmap if hasattr(geometry.cmap, "degree") else geometry.cmaps[0]).degree)
+    order = geometry_degree(mesh)
     kind = cell_type_named(name, order)
-    nodes = table(geometry.dofmap, cell_count(mesh))[:owned]
-    cells = _from_all(mesh, node[nodes])[place]
+    cells = _from_all(mesh, node[cell_geometry(mesh)[:owned]])[place]
     if kind in NODE_ORDER:
         cells = cells[:, np.argsort(NODE_ORDER[kind])]
     cell = np.searchsorted(every, original)

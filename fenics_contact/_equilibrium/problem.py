@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from fenics_contact import _dolfinx
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI, check_not_forked
 from fenics_contact._base.progress import PhaseTimer
@@ -407,6 +408,7 @@ class ContactProblem:
             ConvergenceError: If the solver does not reach its tolerance; the last solution stays unchanged.
         """
         check_not_forked()
+        _dolfinx.warn_if_untested()
         scene = self.scene if scene is None else scene
         time = 1.0 if step is None or step.time is None else step.time
         with together(self.comm):
