@@ -106,7 +106,8 @@ if TYPE_CHECKING:
     from fenics_contact.results.state import State as State
     from fenics_contact.results.state import Tolerance as Tolerance
 
-requirements.check()  # checks that they exist; nothing is loaded or started before it is used
+if not requirements.for_the_program():  # which reports what is missing as its other errors
+    requirements.check()  # that they exist; nothing is loaded or started before it is used
 
 __version__ = "0.2.0"
 

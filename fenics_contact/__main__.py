@@ -17,17 +17,19 @@ for _name in ("stdout", "stderr"):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command given by the arguments on all ranks; return the exit status."""
     from fenics_contact._base.libraries import MPI
-    from fenics_contact._base.requirements import require_extra
+    from fenics_contact._base.requirements import check, require_extra
     from fenics_contact.errors import MissingRequirementError
 
     try:
+        check()
         require_extra("commands", "cli", "pydantic", "rich", "tomlkit", "typer")
+        world = MPI.COMM_WORLD
     except MissingRequirementError as error:
         sys.stderr.write(f"error: {error}\n")
         return MISSING
     from fenics_contact import _cli as cli
 
-    return cli.main(MPI.COMM_WORLD, arguments)
+    return cli.main(world, arguments)
 
 
 if __name__ == "__main__":

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import os
 import re
 import signal
 import sys
 import threading
 from dataclasses import dataclass
 from importlib import metadata
+from itertools import pairwise
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
@@ -26,7 +29,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Requirement:
-    """A library, its oldest supported version, and how to install it."""
+    """A library, its oldest supported version, and how to install it.
+
+    `debian`: the command that brings it with FEniCSx or gmsh; pip where it is empty.
+    """
 
     module: str
     oldest: str
@@ -42,12 +48,24 @@ class Requirement:
 
     def error(self, found: str) -> MissingRequirementError:
         """Return the error that states what is needed, what was found and how to install it."""
+        where = hidden() if self.debian and found == "none" else ""
         return MissingRequirementError(
-            f"fenics_contact needs {self.module} {self.oldest} or newer, found {found}. "
+            f"fenics_contact needs {self.module} {self.oldest} or newer, found {found}. {where}"
             f"Debian: {self.debian or f'pip install {self.module}'}; "
             f"conda-forge: conda install -c conda-forge {self.conda or self.module}",
             name=self.module,
         )
+
+
+def hidden() -> str:
+    """Return what to do in a virtual environment that does not see the system's packages, or nothing."""
+    config = Path(sys.prefix, "pyvenv.cfg")
+    if not config.is_file() or re.search(r"include-system-site-packages\s*=\s*true", config.read_text()):
+        return ""
+    return (
+        f"The virtual environment {sys.prefix} does not see the packages of the system: make it with "
+        "python3 -m venv --system-site-packages, or install there what brings its own. "
+    )
 
 
 _APT = "apt-get install --no-install-recommends"
@@ -61,6 +79,12 @@ _NUMERICAL = [
     Requirement("clarabel", "0.11"),
 ]
 _GMSH = Requirement("gmsh", "4.8", f"{_APT} python3-gmsh", "python-gmsh")
+
+
+def for_the_program() -> bool:
+    """Return whether this process is that of `fenics-contact`, or of `python -m fenics_contact`."""
+    words = sys.orig_argv
+    return Path(sys.argv[0]).name == "fenics-contact" or ("-m", "fenics_contact") in pairwise(words)
 
 
 def check() -> None:
@@ -88,6 +112,7 @@ def load_petsc(world: MPI.Comm | None = None) -> ModuleType:
     petsc = _load(_PETSC4PY, "petsc4py.PETSc")
     _restore_sigpipe()
     _check_petsc(_PETSC4PY, petsc)
+    _check_one_mpi(_MPI4PY)
     return petsc
 
 
@@ -165,6 +190,25 @@ def _check_petsc(requirement: Requirement, petsc: ModuleType) -> None:
         raise requirement.error(f"{version} with complex numbers, where real ones are needed")
     if not (factors(petsc, "cholmod") or factors(petsc, "mumps")):
         raise requirement.error(f"{version} with neither CHOLMOD nor MUMPS, where one is needed")
+
+
+def loaded_libraries(pattern: str) -> list[str]:
+    """Return the shared libraries of this process whose paths match, as far as the system reports them."""
+    try:
+        maps = Path("/proc/self/maps").read_text()
+    except OSError:
+        return []
+    return sorted({os.path.realpath(file) for file in re.findall(rf"/\S*/{pattern}", maps)})
+
+
+def _check_one_mpi(requirement: Requirement) -> None:
+    """Raise where mpi4py and PETSc have loaded two MPIs, between which communicators cannot be passed."""
+    libraries = loaded_libraries(r"libmpi(?:ch)?\.so\S*")
+    if len(libraries) > 1:
+        raise requirement.error(
+            f"two MPIs in one process, {' and '.join(libraries)}: "
+            "take mpi4py, petsc4py and dolfinx from one source"
+        )
 
 
 def factors(petsc: ModuleType, package: str) -> bool:

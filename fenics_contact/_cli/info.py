@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-_BLAS = re.compile(r"/\S*/lib(?:openblas|mkl_rt|blis|atlas|satlas|tatlas|blas)[^/\s]*\.so\S*")
 _REFERENCE = re.compile(r"/blas/libblas|libblas\.so\.3\.\d")
 
 
@@ -70,11 +69,8 @@ def gathered(comm: MPI.Comm) -> dict[str, Any]:
 
 def loaded_blas() -> list[str]:
     """Return the files of the BLAS libraries in this process, as far as the system reports them."""
-    try:
-        maps = Path("/proc/self/maps").read_text()
-    except OSError:
-        return []
-    return sorted({os.path.realpath(file) for file in _BLAS.findall(maps)})
+    names = "openblas|scipy_openblas|mkl_rt|blis|atlas|satlas|tatlas|blas"
+    return _requirements.loaded_libraries(rf"lib(?:{names})[^/\s]*\.so\S*")
 
 
 def _packages() -> Iterator[str]:

@@ -10,14 +10,16 @@ import tomllib
 from collections.abc import Callable, Iterator
 from importlib import metadata
 from io import StringIO
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from fenics_contact import _dolfinx
+from fenics_contact import _dolfinx, clean_environment
 from fenics_contact._base import requirements as _requirements
+from fenics_contact._base.launching import finished
 from fenics_contact._base.progress import Log, _writer
 from fenics_contact._dolfinx import loading as loading_of_dolfinx
 from fenics_contact.errors import MissingRequirementError
@@ -237,6 +239,39 @@ def test_the_package_itself_reports_what_is_missing(module: str) -> None:
     assert answer.returncode == 1, answer.stderr
     last = answer.stderr.strip().splitlines()[-1]
     assert last.startswith("fenics_contact.errors.MissingRequirementError: fenics_contact needs " + module)
+
+
+@pytest.mark.parametrize("module", LIBRARIES)
+def test_the_program_reports_what_is_missing_in_one_line(module: str, tmp_path: Path) -> None:
+    (tmp_path / "sitecustomize.py").write_text(HIDING.format(module=module))
+    environment = {**clean_environment(), "PYTHONPATH": f"{tmp_path}:{ROOT}"}
+    answer = finished([sys.executable, "-m", "fenics_contact", "info"], 60.0, environment=environment)
+    assert answer.status == 5
+    (line,) = answer.errors.splitlines()
+    assert line.startswith(f"error: fenics_contact needs {module} ")
+    assert "found none" in line
+
+
+def test_a_virtual_environment_that_hides_the_system_is_named(
+    without: Callable[[str], None], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    without("dolfinx")
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    (tmp_path / "pyvenv.cfg").write_text("include-system-site-packages = false\n")
+    with pytest.raises(MissingRequirementError, match=r"does not see the packages .* --system-site-packages"):
+        _requirements.check()
+    (tmp_path / "pyvenv.cfg").write_text("include-system-site-packages = true\n")
+    with pytest.raises(MissingRequirementError, match=r"found none\. Debian"):
+        _requirements.check()
+
+
+def test_two_mpis_in_one_process_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    two = ["/usr/lib/libmpi.so.40.30.4", "/venv/lib/libmpi.so.12.3.4"]
+    found = _requirements.loaded_libraries(r"libmpi(?:ch)?\.so\S*")
+    assert len(found) == 1, "the one that this process has loaded"
+    monkeypatch.setattr(_requirements, "loaded_libraries", lambda _: two)
+    with pytest.raises(MissingRequirementError, match=r"two MPIs in one process, .*so\.40.* and .*so\.12"):
+        _requirements.load_petsc()
 
 
 #: What solves, and what it never loads.
