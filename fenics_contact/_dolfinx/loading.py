@@ -12,7 +12,7 @@ from functools import cache
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from fenics_contact._base.libraries import MPI, Late
+from fenics_contact._base.libraries import Late
 from fenics_contact._base.requirements import load_dolfinx
 
 __all__ = [
@@ -115,9 +115,9 @@ def untested(tested: tuple[tuple[int, ...], ...] = ((0, 5), (0, 9), (0, 11))) ->
 
 
 @cache
-def warn_if_untested() -> None:
+def warn_if_untested(rank: int) -> None:
     """Warn once, on the first rank, of a dolfinx that was never tested with the package."""
-    if untested() and MPI.COMM_WORLD.rank == 0:
+    if untested() and rank == 0:  # asking for the version loads dolfinx, which is collective
         _log.warning(untested())
 
 

@@ -408,7 +408,7 @@ class ContactProblem:
             ConvergenceError: If the solver does not reach its tolerance; the last solution stays unchanged.
         """
         check_not_forked()
-        _dolfinx.warn_if_untested()
+        _dolfinx.warn_if_untested(self.comm.rank)
         scene = self.scene if scene is None else scene
         time = 1.0 if step is None or step.time is None else step.time
         with together(self.comm):
