@@ -31,13 +31,15 @@ if TYPE_CHECKING:
 class Requirement:
     """A library, its oldest supported version, and how to install it.
 
-    `debian`: the command that brings it with FEniCSx or gmsh; pip where it is empty.
+    `debian`: the command that brings it with FEniCSx or gmsh; pip where it is empty. `in_wheel`: whether the
+    extra `wheel` brings it, too.
     """
 
     module: str
     oldest: str
     debian: str = ""
     conda: str = ""
+    in_wheel: bool = False
 
     def version(self) -> str | None:
         """Return the installed version without importing the library; None if it has no metadata."""
@@ -49,12 +51,27 @@ class Requirement:
     def error(self, found: str) -> MissingRequirementError:
         """Return the error that states what is needed, what was found and how to install it."""
         where = hidden() if self.debian and found == "none" else ""
+        return self.error_with(
+            found,
+            f"{where}Debian: {self.debian or f'pip install {self.module}'}; "
+            f"conda-forge: conda install -c conda-forge {self.conda or self.module}"
+            + (f"; without either: {_WHEEL}" if self.in_wheel and wheel_exists() else ""),
+        )
+
+    def error_with(self, found: str, cure: str) -> MissingRequirementError:
+        """Return the error that states what is needed, what was found and what to do."""
         return MissingRequirementError(
-            f"fenics_contact needs {self.module} {self.oldest} or newer, found {found}. {where}"
-            f"Debian: {self.debian or f'pip install {self.module}'}; "
-            f"conda-forge: conda install -c conda-forge {self.conda or self.module}",
+            f"fenics_contact needs {self.module} {self.oldest} or newer, found {found}. {cure}",
             name=self.module,
         )
+
+
+_WHEEL = "pip install 'fenics_contact[wheel]' in a virtual environment of its own (third party, alpha)"
+
+
+def wheel_exists() -> bool:
+    """Return whether the extra `wheel` brings anything here: the markers of pyproject.toml."""
+    return sys.platform == "linux" and os.uname().machine == "x86_64" and sys.version_info >= (3, 12)
 
 
 def hidden() -> str:
@@ -70,9 +87,9 @@ def hidden() -> str:
 
 _APT = "apt-get install --no-install-recommends"
 _FENICSX = f"{_APT} python3-dolfinx-real"
-_MPI4PY = Requirement("mpi4py", "3.1", _FENICSX)
-_PETSC4PY = Requirement("petsc4py", "3.18", _FENICSX, 'petsc4py "petsc=*=real*"')
-_DOLFINX = Requirement("dolfinx", "0.5", _FENICSX, "fenics-dolfinx")
+_MPI4PY = Requirement("mpi4py", "3.1", _FENICSX, in_wheel=True)
+_PETSC4PY = Requirement("petsc4py", "3.18", _FENICSX, 'petsc4py "petsc=*=real*"', in_wheel=True)
+_DOLFINX = Requirement("dolfinx", "0.5", _FENICSX, "fenics-dolfinx", in_wheel=True)
 _NUMERICAL = [
     Requirement("numpy", "1.24", _FENICSX),
     Requirement("scipy", "1.10", _FENICSX),
@@ -178,18 +195,67 @@ def _load(requirement: Requirement, module: str) -> ModuleType:
         return importlib.import_module(module)
     except (ImportError, OSError) as reason:
         version = requirement.version() or "one"
-        raise requirement.error(
+        found = (
             f"{version} that cannot be loaded ({reason}): a library under it is missing or of another version"
-        ) from reason
+        )
+        if re.search(r"libmpi|mpi_", str(reason), re.IGNORECASE):
+            raise requirement.error_with(found, one_source()) from reason
+        raise requirement.error(found) from reason
+
+
+def one_source() -> str:
+    """Return what to do where mpi4py, petsc4py and dolfinx use different MPIs."""
+    specs = {name: importlib.util.find_spec(name) for name in ("mpi4py", "petsc4py", "dolfinx")}
+    places = (f"{name} in {Path(it.origin).parents[1]}" for name, it in specs.items() if it and it.origin)
+    return (
+        "Take mpi4py, petsc4py and dolfinx from one source, which uses one MPI; here are "
+        f"{', '.join(places)}: make a virtual environment without --system-site-packages that has all three, "
+        "or with it and none"
+    )
 
 
 def _check_petsc(requirement: Requirement, petsc: ModuleType) -> None:
     """Raise where PETSc computes with complex numbers or cannot factor a sparse matrix."""
     version = requirement.version() or "one"
     if petsc.ScalarType(0).dtype.kind != "f":
-        raise requirement.error(f"{version} with complex numbers, where real ones are needed")
+        found = f"{version} with complex numbers, where real ones are needed"
+        if importlib.util.find_spec("dolfinx_solver") is None:
+            raise requirement.error(found)
+        # Wheels for both have files of the same names: one cannot replace the other in place.
+        raise requirement.error_with(found, f"Take dolfinx-solver-real, not dolfinx-solver-complex: {_WHEEL}")
     if not (factors(petsc, "cholmod") or factors(petsc, "mumps")):
         raise requirement.error(f"{version} with neither CHOLMOD nor MUMPS, where one is needed")
+
+
+def compiler_problem() -> str:
+    """Return why forms cannot be compiled here, or nothing: a C compiler and Python's headers are needed."""
+    import shlex
+    import sysconfig
+
+    from fenics_contact._base.launching import finished
+
+    command = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")
+    header = ["-I", sysconfig.get_paths()["include"], "-include", "Python.h"]
+    try:
+        tried = finished([*command, *header, "-fsyntax-only", "-x", "c", os.devnull], 60.0)
+    except OSError as error:
+        return str(error)
+    if tried.status == 0:
+        return ""
+    errors = [line for line in tried.errors.splitlines() if "error" in line]
+    return errors[0] if errors else f"{command[0]} does not work"
+
+
+def check_compiler() -> None:
+    """Raise unless forms can be compiled here."""
+    problem = compiler_problem()
+    if problem:
+        raise MissingRequirementError(
+            f"fenics_contact needs a C compiler and Python's headers, as FEniCSx compiles forms, found: "
+            f"{problem}. Debian: {_APT} gcc libc6-dev python3-dev; conda-forge: conda install -c conda-forge "
+            "c-compiler",
+            name="compiler",
+        )
 
 
 def loaded_libraries(pattern: str) -> list[str]:
@@ -205,10 +271,7 @@ def _check_one_mpi(requirement: Requirement) -> None:
     """Raise where mpi4py and PETSc have loaded two MPIs, between which communicators cannot be passed."""
     libraries = loaded_libraries(r"libmpi(?:ch)?\.so\S*")
     if len(libraries) > 1:
-        raise requirement.error(
-            f"two MPIs in one process, {' and '.join(libraries)}: "
-            "take mpi4py, petsc4py and dolfinx from one source"
-        )
+        raise requirement.error_with(f"two MPIs in one process, {' and '.join(libraries)}", one_source())
 
 
 def factors(petsc: ModuleType, package: str) -> bool:

@@ -62,6 +62,7 @@ def gathered(comm: MPI.Comm) -> dict[str, Any]:
         "threads": ", ".join(f"{name}={os.environ.get(name, 'not set')}" for name in THREADS),
         "BLAS": ", ".join(libraries) or "not found",
         "PETSc packages": ", ".join(_packages()),
+        "C compiler": comm.bcast(_requirements.compiler_problem() if comm.rank == 0 else "") or "works",
         "pictures": _pictures(comm),
     }
     return {"versions": versions(), "machine": machine, "advice": list(_advice(comm, libraries))}

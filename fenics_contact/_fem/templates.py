@@ -15,7 +15,9 @@ from ufl.core.expr import Expr
 from fenics_contact import _dolfinx
 from fenics_contact._base.fingerprint import require_alike
 from fenics_contact._base.libraries import MPI
+from fenics_contact._base.requirements import check_compiler
 from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors.ranks import made_once
 from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
 from fenics_contact.mesh.quality import jacobians
 
@@ -124,9 +126,10 @@ class Templates:
         try:
             return Template(self._comm, form, constants, coefficients)
         except Exception as error:  # on all ranks
+            made_once(self._comm, check_compiler)
             raise InvalidInputError(
                 f"{what} must be UFL that compiles, got {type(error).__name__}: {error}: check quotients, "
-                "roots and logarithms in it, also at rest (F = I), that the C compiler works, and that the "
+                "roots and logarithms in it, also at rest (F = I), and that the "
                 "directory of compiled forms, $XDG_CACHE_HOME/fenics or ~/.cache/fenics, can be written"
             ) from error
 

@@ -26,10 +26,10 @@ def normalised(name: str) -> str:
 
 
 def asked_for() -> set[str]:
-    """Return every distribution that pyproject.toml names."""
+    """Return every distribution that pyproject.toml names, but for the extra in place of the system's."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
     lists = [project["build-system"]["requires"], project["project"]["dependencies"]]
-    lists += project["project"]["optional-dependencies"].values()
+    lists += [lines for name, lines in project["project"]["optional-dependencies"].items() if name != "wheel"]
     named = {normalised(re.split(r"[^\w.-]", line)[0]) for lines in lists for line in lines}
     return named - {normalised(project["project"]["name"])}  # an extra may contain another
 

@@ -5,17 +5,22 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import logging
+import os
+import re
 import sys
+import sysconfig
 import tomllib
 from collections.abc import Callable, Iterator
 from importlib import metadata
 from io import StringIO
+from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from packaging.requirements import Requirement
 
 from fenics_contact import _dolfinx, clean_environment
 from fenics_contact._base import requirements as _requirements
@@ -270,8 +275,99 @@ def test_two_mpis_in_one_process_are_refused(monkeypatch: pytest.MonkeyPatch) ->
     found = _requirements.loaded_libraries(r"libmpi(?:ch)?\.so\S*")
     assert len(found) == 1, "the one that this process has loaded"
     monkeypatch.setattr(_requirements, "loaded_libraries", lambda _: two)
-    with pytest.raises(MissingRequirementError, match=r"two MPIs in one process, .*so\.40.* and .*so\.12"):
+    with pytest.raises(
+        MissingRequirementError,
+        match=r"two MPIs in one process, .*so\.40.* and .*so\.12\S*\. Take .* mpi4py in /.*dolfinx in /",
+    ):
         _requirements.load_petsc()
+
+
+def test_a_petsc_of_another_mpi_is_named_with_its_place(loading: Callable[[str, object], None]) -> None:
+    loading("petsc4py.PETSc", ImportError("libmpi.so.12: cannot open shared object file"))
+    with pytest.raises(MissingRequirementError, match=r"loaded \(libmpi.*one source.* petsc4py in /"):
+        _requirements.load_petsc()
+
+
+@pytest.mark.parametrize(("machine", "offered"), [("x86_64", True), ("aarch64", False)])
+@pytest.mark.parametrize("module", LIBRARIES)
+def test_the_wheel_is_offered_where_it_exists(
+    module: str, machine: str, offered: bool, without: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "uname", lambda: SimpleNamespace(machine=machine))
+    monkeypatch.setattr(sys, "version_info", (3, 12, 0))
+    without(module)
+    with pytest.raises(MissingRequirementError) as caught:
+        _requirements.check()
+    remedy = r"; without either: pip install 'fenics_contact\[wheel\]' .*\(third party, alpha\)$"
+    expected = offered and module in ("mpi4py", "petsc4py", "dolfinx")
+    assert bool(re.search(remedy, str(caught.value))) == expected
+
+
+def test_the_extra_has_the_conditions_under_which_it_is_offered(monkeypatch: pytest.MonkeyPatch) -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    lines = [Requirement(line) for line in project["optional-dependencies"]["wheel"]]
+    assert {line.name for line in lines} == {"dolfinx-solver-real", "gmsh"}
+    places = product(("linux", "darwin"), ("x86_64", "aarch64"), ("3.11", "3.12", "3.14"))
+    for system, machine, version in places:
+        there = {"sys_platform": system, "platform_machine": machine, "python_version": version}
+        monkeypatch.setattr(sys, "platform", system)
+        monkeypatch.setattr(os, "uname", lambda machine=machine: SimpleNamespace(machine=machine))
+        monkeypatch.setattr(sys, "version_info", tuple(map(int, version.split("."))))
+        brought = [line.marker is None or line.marker.evaluate(there) for line in lines]
+        assert brought == [_requirements.wheel_exists()] * 2, there
+
+
+def test_complex_numbers_of_the_wheel_are_named_with_the_real_one(
+    loading: Callable[[str, object], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = {"dolfinx_solver": find_spec("numpy")}
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: found.get(name) or find_spec(name))
+    loading("petsc4py.PETSc", petsc(np.complex128, ("cholmod", "mumps")))
+    with pytest.raises(MissingRequirementError, match=r"complex numbers.*Take dolfinx-solver-real.*wheel"):
+        _requirements.load_petsc()
+
+
+@pytest.mark.parametrize(
+    ("compiler", "found"),
+    [("no-such-gcc -O1", r"'no-such-gcc'"), ("false", r"false does not work"), ("gcc -O1", "")],
+)
+def test_a_c_compiler_that_does_not_work_is_named(
+    compiler: str, found: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CC", compiler)
+    if not found:
+        _requirements.check_compiler()
+        return
+    with pytest.raises(MissingRequirementError, match=rf"needs a C compiler .*{found}\. Debian: .* gcc"):
+        _requirements.check_compiler()
+
+
+def test_missing_headers_of_python_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(sysconfig, "get_paths", lambda: {"include": str(tmp_path)})
+    with pytest.raises(MissingRequirementError, match=r"found: .*Python\.h.*python3-dev"):
+        _requirements.check_compiler()
+
+
+COMPILED = """
+import os, sys
+from mpi4py import MPI
+from fenics_contact import Body, Scene, Support, gallery, materials, solve_scene
+from fenics_contact.errors import MissingRequirementError
+os.environ["CC"] = "no-such-gcc"
+block, soft = gallery.block((0, 0, 0), (1, 1, 1), (2, 2, 2)), materials.IsotropicElasticity(1.0, 0.3)
+scene = Scene({"a": Body(block, soft)}, [Support("a", "x0")])
+try:
+    solve_scene(scene, MPI.COMM_WORLD)
+except MissingRequirementError as error:
+    sys.stdout.write(str(error).count("needs a C compiler") * "named ")
+"""
+
+
+def test_forms_without_a_compiler_name_it_on_all_ranks(
+    mpirun: Callable[..., str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert mpirun(COMPILED, 2, fresh=True).split() == ["named"] * 2
 
 
 #: What solves, and what it never loads.
