@@ -94,7 +94,7 @@ class Console:
         what = Text(given) if isinstance(given, str) else given
         drawn, text = at_terminal(sys.stdout), io.StringIO()
         look: dict[str, Any] = {} if drawn else {"width": COLUMNS, "no_color": True}
-        console = rich.console.Console(file=text, force_terminal=drawn, highlight=False, **look)
+        console = rich.console.Console(file=text, force_terminal=drawn, highlight=False, markup=False, **look)
         console.print(_Visible(what), soft_wrap=isinstance(what, Text))
         lines = text.getvalue().split("\n")
         # Through sys.stdout itself, so that progress bars stay below.

@@ -181,7 +181,7 @@ def versions() -> dict[str, str]:
     entries = {"fenics_contact": _installed("fenics_contact"), "python": platform.python_version()}
     entries["dolfinx"] = _dolfinx.release()
     entries["petsc"] = ".".join(map(str, PETSc.Sys.getVersion()))
-    entries["mpi"] = MPI.Get_library_version().partition(",")[0].strip("\x00 \n")
+    entries["mpi"] = " ".join(re.split(r"[,\n\x00]", MPI.Get_library_version().strip())[0].split())
     return entries | {name: _installed(name) for name in _MODULES}
 
 

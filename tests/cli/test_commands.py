@@ -12,7 +12,7 @@ import pyvista as pv
 from mpi4py import MPI
 
 from fenics_contact import _cli as cli
-from fenics_contact._cli.console import Console
+from fenics_contact._cli.console import Console, facts
 from fenics_contact._cli.demos import folder_of_demos, shipped
 from fenics_contact._cli.info import gathered, loaded_blas
 from fenics_contact._cli.view import show_record
@@ -39,11 +39,17 @@ def test_info_knows_versions_petsc_blas_and_ranks(capsys: pytest.CaptureFixture[
     assert known["versions"]["dolfinx"].startswith("0.")
     assert known["machine"]["ranks"].startswith("1 on 1 node, ")
     assert "mumps" in known["machine"]["PETSc packages"]
+    assert known["machine"]["C compiler"] == "works"
     assert known["machine"]["pictures"].startswith("can")
     assert run("info") == 0
     printed = capsys.readouterr().out
     assert "OPENBLAS_NUM_THREADS=1" in printed
     assert "dolfinx" in printed
+
+
+def test_what_is_written_in_brackets_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    Console(MPI.COMM_SELF).write(facts({"pictures": "'fenics_contact[viz]'"}, "block[left]"))
+    assert capsys.readouterr().out.split() == ["block[left]", "pictures", "'fenics_contact[viz]'"]
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from enum import Enum
 from functools import lru_cache, partial
 from importlib import metadata
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -332,6 +333,12 @@ def test_versions_name_everything_that_computed(tmp_path: object) -> None:
     assert found["petsc"].startswith("3.")
     assert "MPI" in found["mpi"]
     write_json(f"{tmp_path}/versions.json", found)
+
+
+def test_the_version_of_mpi_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "MPICH Version:      5.0.2\nMPICH Release date: Fri Sep 25 20:45:26 UTC 2026\n\x00"
+    monkeypatch.setattr(provenance, "MPI", SimpleNamespace(Get_library_version=lambda: text))
+    assert versions()["mpi"] == "MPICH Version: 5.0.2"
 
 
 def test_a_library_that_is_not_there_is_said_to_be_missing(monkeypatch: pytest.MonkeyPatch) -> None:
