@@ -19,7 +19,7 @@ from tests.waiting_ranks import WaitingRanks, kill_session
 
 ROOT = Path(__file__).resolve().parents[1]
 #: Numbers of ranks that wait for scripts, once they were asked for.
-WAITING = (1, 2, 4)
+WAITING = (1, 2, 3, 4)
 
 
 def read_environment(path: Path) -> dict[str, str]:

@@ -40,12 +40,12 @@ class Browser:
     def _post(self, what: str, content: dict[str, Any]) -> Any:
         return answer(f"{self.url}/{what}", content)
 
-    def open(self, page: Path, width: int = 1280, height: int = 900) -> None:
+    def open(self, page: Path, width: int = 640, height: int = 480) -> None:
         """Open a page at a width of the screen and wait until it has drawn."""
         self.go(page, width, height)
         self.wait("return Number(document.getElementById('view').dataset.drawn || 0) > 0")
 
-    def go(self, page: Path, width: int = 1280, height: int = 900) -> None:
+    def go(self, page: Path, width: int = 640, height: int = 480) -> None:
         """Open a page and forget what was asked for and complained about before."""
         self.requests(), self.messages()
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
