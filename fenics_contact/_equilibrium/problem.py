@@ -408,13 +408,13 @@ class ContactProblem:
             ConvergenceError: If the solver does not reach its tolerance; the last solution stays unchanged.
         """
         check_not_forked()
-        _dolfinx.warn_if_untested(self.comm.rank)
         scene = self.scene if scene is None else scene
         time = 1.0 if step is None or step.time is None else step.time
         with together(self.comm):
             _require_obstacles_at(scene, time)
             wanted = checked_tolerance(self.tolerance if tolerance is None else tolerance)
         kind = self._kind(scene, sensitivity=design)
+        _dolfinx.warn_if_untested(self.comm.rank)  # once PETSc has started on the ranks that solve
         if kind is SolverKind.TANGENT_NEWTON:
             self._require_no_dual_solver()
             state: AnyState = self._deformed(scene).solve(scene, before, wanted, time, step, overlap=design)
