@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tarfile
 import tomllib
 import zipfile
 from pathlib import Path
@@ -26,6 +27,37 @@ def test_every_package_is_listed() -> None:
     there = [".".join(folder.relative_to(ROOT).parts) for folder in folders]
     assert len(there) > 10
     assert sorted(packages()) == sorted([*there, "fenics_contact.demos"])
+
+
+@pytest.mark.slow
+def test_the_source_distribution_is_the_project(tmp_path: Path) -> None:
+    def run(*command: object, folder: Path = tmp_path) -> str:
+        answer = subprocess.run(
+            list(map(str, command)), capture_output=True, text=True, cwd=folder, check=False,
+            env=clean_environment() | {"PYTHONPATH": str(tmp_path / "tools")},
+        )  # fmt: skip
+        assert answer.returncode == 0, answer.stdout + answer.stderr
+        return answer.stdout
+
+    source = tmp_path / "source"
+    run("git", "clone", "-q", "--no-hardlinks", ROOT, source)
+    tracked = set(run("git", "ls-files", folder=source).splitlines())
+    (source / "tests" / "__pycache__").mkdir()
+    (source / "tests" / "__pycache__" / "left.pyc").touch()
+    try:
+        run(sys.executable, "-m", "pip", "install", "-q", "--target", tmp_path / "tools", "setuptools>=77")
+    except AssertionError as error:
+        if "No matching distribution found for setuptools" in str(error):
+            pytest.skip("the build needs setuptools from a package index, which cannot be reached")
+        raise
+    build = f"from setuptools.build_meta import build_sdist; build_sdist({str(tmp_path)!r})"
+    run(sys.executable, "-c", build, folder=source)
+    (archive,) = tmp_path.glob("*.tar.gz")
+    files = [item.name.partition("/")[2] for item in tarfile.open(archive) if item.isfile()]
+    assert set(files) - tracked - {"PKG-INFO", "setup.cfg"} == {
+        name for name in files if name.startswith("fenics_contact.egg-info/")
+    }
+    assert {name for name in tracked - set(files) if not name.startswith((".ci/", ".git"))} == set()
 
 
 @pytest.mark.slow
