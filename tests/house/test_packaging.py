@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import re
 import tomllib
+from contextlib import suppress
+from importlib import metadata
 from pathlib import Path
 
 import pytest
 
+from fenics_contact._base import requirements
 from tests.conftest import ROOT
+from tests.docs.pages import links_of
 
 RELEASES = sorted((ROOT / "constraints").glob("*.txt"))
 
@@ -52,3 +56,74 @@ def test_releases_differ_only_in_what_debian_provides() -> None:
     bookworm, trixie = map(pins, RELEASES)
     differing = {name for name in bookworm.keys() | trixie.keys() if bookworm.get(name) != trixie.get(name)}
     assert differing == {"numpy", "scipy"}
+
+
+#: Names on conda-forge that differ from those of pip; what the system provides elsewhere is named there, too.
+CONDA = {"matplotlib": "matplotlib-base", "gmsh": "python-gmsh", "dolfinx": "fenics-dolfinx"}
+
+
+def oldest(lines: list[str]) -> dict[str, str]:
+    """Return the oldest versions of ``name>=version`` or ``name >=version``, by the name."""
+    split = (re.fullmatch(r"([\w-]+) ?>=([\d.]+)", line.partition(" #")[0]) for line in lines)
+    return {found[1]: found[2] for found in split if found}
+
+
+def test_the_recipe_asks_for_what_the_package_needs() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    recipe = (ROOT / "packaging" / "recipe.yaml").read_text()
+    run = recipe.partition("  run:\n")[2].partition("\n\n")[0]
+    asked = oldest(re.findall(r"^    - (.*)$", run, re.MULTILINE))
+    extras = project["optional-dependencies"]
+    needed = oldest([*project["dependencies"], *extras["cli"], *extras["viz"]])
+    others = requirements._MPI4PY, requirements._PETSC4PY, requirements._GMSH
+    needed |= {each.module: each.oldest for each in others} | {"dolfinx": asked["fenics-dolfinx"]}
+    assert len(needed) > 10
+    assert asked == {CONDA.get(name, name): version for name, version in needed.items()}
+    assert f'\n  version: {project["version"]}\n' in recipe
+    assert f'python_min: "{project["requires-python"].removeprefix(">=")}"' in recipe
+    assert "petsc * real*" in run
+    assert f"{project['scripts'].popitem()[1]}\n" in recipe
+
+
+def test_the_page_of_the_package_index_needs_no_file() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    page = (ROOT / project["readme"]).read_text()
+    assert links_of(page) == [], "an index shows no file of the project"
+    scene = re.compile(r"```python\n.*?```", re.DOTALL)
+    assert scene.findall(page) == scene.findall((ROOT / "README.md").read_text())
+    for extra in re.findall(r"fenics_contact\[([\w,]+)\]", page):
+        assert set(extra.split(",")) <= set(project["optional-dependencies"])
+
+
+@pytest.mark.parametrize("page", ["packaging/index_page.md", "docs/guide/installing.md", "docs/licences.md"])
+def test_the_wheel_is_offered_as_what_it_is(page: str) -> None:
+    paragraphs = (ROOT / page).read_text().replace("|\n", "|\n\n").split("\n\n")
+    offers = [words for words in paragraphs if "dolfinx-solver-real" in words]
+    assert offers != []
+    assert all("third part" in words.lower() and "alpha" in words for words in offers)
+
+
+def licences() -> dict[str, str]:
+    """Return the licence of every library that the page names."""
+    rows = re.findall(r"^\| ([^|]+) \| ([^|]+) \|", (ROOT / "docs" / "licences.md").read_text(), re.MULTILINE)
+    return {name: licence for names, licence in rows for name in re.split(r", |: ", names)}
+
+
+def test_the_licence_of_every_dependency_is_listed() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    lines = [*project["dependencies"], *extras["cli"], *extras["viz"], *extras["wheel"]]
+    assert {re.split(r"[^\w.-]", line)[0] for line in lines} - set(licences()) == set()
+
+
+def test_licences_are_those_of_the_metadata() -> None:
+    compared = 0
+    for name, licence in licences().items():
+        with suppress(metadata.PackageNotFoundError):
+            known = metadata.metadata(name)
+            fields = ("License-Expression", "License", "Classifier")
+            stated = " ".join(text for field in fields for text in known.get_all(field) or [])
+            kind = licence.partition("-")[0].partition(" ")[0]  # of "BSD-3-Clause" only "BSD" is everywhere
+            compared += 1
+            assert kind in stated or kind == "Matplotlib's", f"{name}: {licence}, but {stated[:300]}"
+    assert compared > 8
