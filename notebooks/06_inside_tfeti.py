@@ -266,7 +266,7 @@ import ufl
 
 class Bedded(materials.PlaneStrain):
     def stiffness(self, u, v, parameters):
-        return super().stiffness(u, v, parameters) + 1e-3 * ufl.inner(u, v)  # N/mm⁴
+        return super().stiffness(u, v, parameters) + 1e-2 * ufl.inner(u, v)  # N/mm⁴
 
     def kernel(self, points):
         return np.zeros((*points.shape, 0))
