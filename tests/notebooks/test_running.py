@@ -39,6 +39,7 @@ def test_the_first_notebook_finds_what_is_stored() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.claim
 @pytest.mark.parametrize("name", NAMES[1:])
 def test_a_notebook_finds_what_is_stored_in_two_minutes(name: str) -> None:
     assert compare(name) < SECONDS
