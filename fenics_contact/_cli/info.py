@@ -29,7 +29,7 @@ _REFERENCE = re.compile(r"/blas/libblas|libblas\.so\.3\.\d")
 
 def add_to(app: typer.Typer) -> None:
     """Add both commands to the program."""
-    app.command("info", short_help="versions, PETSc, BLAS, MPI, pictures")(info)
+    app.command("info", short_help="versions, PETSc, compiler, BLAS, MPI, pictures")(info)
     app.command("schema", short_help="JSON schema of scene files, for editors")(schema)
 
 
@@ -37,7 +37,7 @@ def info(
     context: typer.Context,
     as_json: Annotated[bool, typer.Option("--json", help="Write JSON, for programs.")] = False,
 ) -> None:
-    """Show versions, PETSc's packages, the BLAS, MPI, and whether pictures can be drawn."""
+    """Show versions, PETSc's packages, the C compiler, the BLAS, MPI, and whether pictures can be drawn."""
     console = console_of(context)
     known = gathered(console.comm)
     if as_json:
