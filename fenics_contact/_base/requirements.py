@@ -219,6 +219,8 @@ def _check_petsc(requirement: Requirement, petsc: ModuleType) -> None:
     version = requirement.version() or "one"
     if petsc.ScalarType(0).dtype.kind != "f":
         found = f"{version} with complex numbers, where real ones are needed"
+        if "PETSC_DIR" in os.environ:
+            found += f" (PETSC_DIR={os.environ['PETSC_DIR']} may select it: unset this variable first)"
         if importlib.util.find_spec("dolfinx_solver") is None:
             raise requirement.error(found)
         # Wheels for both have files of the same names: one cannot replace the other in place.

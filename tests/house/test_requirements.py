@@ -179,9 +179,15 @@ def test_a_library_that_does_not_load_is_named_with_the_reason(
         _requirements.load_petsc()
 
 
-def test_a_petsc_with_complex_numbers_is_refused(loading: Callable[[str, object], None]) -> None:
+def test_a_petsc_with_complex_numbers_is_refused(
+    loading: Callable[[str, object], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
     loading("petsc4py.PETSc", petsc(np.complex128, ("cholmod", "mumps")))
-    with pytest.raises(MissingRequirementError, match="with complex numbers, where real ones are needed"):
+    monkeypatch.delenv("PETSC_DIR", raising=False)
+    with pytest.raises(MissingRequirementError, match=r"with complex numbers, where real ones are needed\."):
+        _requirements.load_petsc()
+    monkeypatch.setenv("PETSC_DIR", "/opt/complex")
+    with pytest.raises(MissingRequirementError, match=r"needed \(PETSC_DIR=/opt/complex may select it"):
         _requirements.load_petsc()
 
 
