@@ -27,10 +27,12 @@ set -a
 # shellcheck source=scripts/environment
 . "$root/scripts/environment"
 set +a
+[ "$(uname -s)" = Linux ] || unset VTK_DEFAULT_OPENGL_WINDOW # no EGL elsewhere
 [ ${#settings[@]} -eq 0 ] || export "${settings[@]}"
 export PYTHONPATH=$root${PYTHONPATH:+:$PYTHONPATH} # so that a Python without the package installed finds it too
 
 # What MPI has left in the environment of the caller would make mpirun fail.
-start=$("$python" -P "$root/fenics_contact/_base/launching.py" "$ranks") || exit 2
-mapfile -t start <<<"$start"
+words=$("$python" -P "$root/fenics_contact/_base/launching.py" "$ranks") || exit 2
+start=()
+while IFS= read -r word; do start+=("$word"); done <<<"$words" # the bash of macOS has no mapfile
 exec "${start[@]}" "$python" "$@"

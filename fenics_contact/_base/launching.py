@@ -132,7 +132,8 @@ def main() -> None:
     except MissingRequirementError as error:
         sys.stderr.write(f"{error}\n")
         sys.exit(2)
-    sys.stdout.write("\n".join(["env", *(f"--unset={name}" for name in traces(os.environ)), *start]) + "\n")
+    unset = [word for name in traces(os.environ) for word in ("-u", name)]  # `--unset` is of GNU alone
+    sys.stdout.write("\n".join(["env", *unset, *start]) + "\n")
 
 
 if __name__ == "__main__":
