@@ -1,4 +1,5 @@
-# `make demo` and `make test` do all the set-up they need on Debian 12 and 13; elsewhere name a Python that has FEniCSx:
+# `make demo` and `make test` do all the set-up they need on Debian 12 or newer and Ubuntu 24.04 or newer, and on x86-64
+# Linux without root by a third party's wheel (WHEEL=1); elsewhere name a Python that has FEniCSx:
 #     make demo PYTHON=/path/to/python
 
 DEMO ?= chain_links
@@ -9,20 +10,24 @@ NP ?= 1
 BENCH ?= full
 STUDIES ?= hertz cattaneo_mindlin chain_links
 PYTHON ?=
+WHEEL ?=
 JOBS ?= 2
+export WHEEL
 
 ifeq ($(strip $(PYTHON)),)
 python := .venv/bin/python
 prepare := setup
+prepare_demo := setup-demo
 export PYTHONNOUSERSITE := 1
 else
 python := $(PYTHON)
 prepare :=
+prepare_demo :=
 endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos notebooks test test-slow test-hard test-claims mutants docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces study-large lint setup
+.PHONY: help demo demos notebooks test test-slow test-hard test-claims mutants docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces study-large lint setup setup-demo
 
 help: ## Show this list
 	@echo "Targets:"
@@ -37,11 +42,12 @@ help: ## Show this list
 	@echo "  BENCH=quick|full     small cases once, or all of them (full)"
 	@echo "  JOBS=4               tests at a time (2)"
 	@echo "  PYTHON=/some/python  use this Python and its FEniCSx instead of setting up .venv"
+	@echo "  WHEEL=1              set up FEniCSx without root, by a third party's wheel, which is alpha (0: by packages)"
 
-demo: $(prepare) ## Optimise the contact shape of two chain links, or run DEMO=...; results in output/
+demo: $(prepare_demo) ## Optimise the contact shape of two chain links, or run DEMO=...; results in output/
 	$(launch) $(NP) $(python) demos/demo_$(DEMO).py $(if $(SIZE),--size $(SIZE)) $(if $(OBJECTIVE),--objective $(OBJECTIVE))
 
-demos: $(prepare) ## Run every demo
+demos: $(prepare_demo) ## Run every demo
 	for demo in demos/demo_*.py; do $(launch) $(NP) $(python) $$demo || exit 1; done
 
 notebooks: $(prepare) ## Run the notebooks and store what they show, or NOTEBOOKS="01 04"; pages in output/notebooks/
@@ -94,5 +100,8 @@ lint: $(prepare) ## Check style (ruff) and types (mypy)
 	$(python) -m ruff check .
 	$(python) -m mypy
 
-setup: ## Install what is missing: Debian packages and .venv
+setup-demo: ## Install what the package and its demos need: packages of the system and .venv
 	@scripts/setup.sh
+
+setup: ## Install the tools of developers, too
+	@scripts/setup.sh --dev

@@ -1,27 +1,33 @@
-"""What pip installs is pinned, on both Debian releases."""
+"""What pip installs is pinned with hashes, for every Python of Debian and Ubuntu, and nothing is left out."""
 
 from __future__ import annotations
 
 import re
+import sys
 import tomllib
 from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 from fenics_contact._base import requirements
 from tests.conftest import ROOT
 from tests.docs.pages import links_of
 
-RELEASES = sorted((ROOT / "constraints").glob("*.txt"))
+PYTHONS = sorted((ROOT / "constraints").glob("python3.*"))
+SYSTEM = {"dolfinx-solver-real", "fenics-ffcx", "gmsh", "mpi4py", "mpich", "numpy", "scipy", "setuptools"}
+"""What the system has where its FEniCSx is used; pip must not put others over it."""
 
 
 def pins(path: Path) -> dict[str, str]:
-    """Return the versions that a constraints file gives, by the normalised name of the distribution."""
-    lines = [line for line in path.read_text().splitlines() if line and not line.startswith("#")]
-    assert [line for line in lines if not re.fullmatch(r"[\w.-]+==[\w.]+", line)] == [], "only name==version"
-    return {normalised(name): version for name, version in (line.split("==") for line in lines)}
+    """Return the versions that a list gives, by the normalised name of the distribution."""
+    text = re.sub(r"^#.*\n|^\n", "", path.read_text(), flags=re.MULTILINE)
+    pin = r"[\w.-]+==[\w.]+(?: \\\n    --hash=sha256:[0-9a-f]{64})+\n"
+    assert re.sub(pin, "", text) == "", "only name==version with hashes"
+    found = re.findall(r"^([\w.-]+)==([\w.]+)", text, re.MULTILINE)
+    return {normalised(name): version for name, version in found}
 
 
 def normalised(name: str) -> str:
@@ -29,33 +35,78 @@ def normalised(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
-def asked_for() -> set[str]:
-    """Return every distribution that pyproject.toml names, but for the extra in place of the system's."""
+def asked_for(*extras: str) -> set[str]:
+    """Return every distribution that pyproject.toml names for the build, the package and some extras."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
     lists = [project["build-system"]["requires"], project["project"]["dependencies"]]
-    lists += [lines for name, lines in project["project"]["optional-dependencies"].items() if name != "wheel"]
+    lists += [project["project"]["optional-dependencies"][extra] for extra in extras]
     named = {normalised(re.split(r"[^\w.-]", line)[0]) for lines in lists for line in lines}
     return named - {normalised(project["project"]["name"])}  # an extra may contain another
 
 
-def test_there_are_constraints_for_both_releases() -> None:
-    assert [path.stem for path in RELEASES] == ["bookworm", "trixie"]
+def test_every_python_of_debian_and_ubuntu_has_its_lists() -> None:
+    assert [path.name for path in PYTHONS] == ["python3.11", "python3.12", "python3.13", "python3.14"]
+    lists = [{path.stem for path in folder.iterdir()} for folder in PYTHONS]
+    every = {"build", "demo", "dev"}
+    assert lists == [every, *[every | {"wheel"}] * 3]  # the wheel needs Python 3.12
 
 
-@pytest.mark.parametrize("path", RELEASES, ids=lambda path: path.stem)
-def test_everything_asked_for_is_pinned(path: Path) -> None:
-    assert len(asked_for()) > 5
-    assert asked_for() - set(pins(path)) == set()
+@pytest.mark.parametrize("folder", PYTHONS, ids=lambda path: path.name)
+def test_everything_asked_for_is_pinned(folder: Path) -> None:
+    demo, dev = pins(folder / "demo.txt").keys(), pins(folder / "dev.txt").keys()
+    assert len(asked_for("cli", "viz") - SYSTEM) > 5
+    assert asked_for("cli", "viz") - SYSTEM <= demo
+    assert asked_for("notebooks", "docs", "test") - SYSTEM <= dev | demo
+    assert pins(folder / "build.txt").keys() == {"setuptools"}
 
 
-def test_what_the_system_provides_is_not_asked_for() -> None:
-    assert asked_for() & {"fenics-dolfinx", "petsc4py", "mpi4py", "gmsh"} == set()
+@pytest.mark.parametrize("folder", PYTHONS, ids=lambda path: path.name)
+def test_what_the_system_provides_is_installed_with_the_wheel_alone(folder: Path) -> None:
+    demo, dev = pins(folder / "demo.txt").keys(), pins(folder / "dev.txt").keys()
+    assert (demo | dev) & SYSTEM == set()
+    if (folder / "wheel.txt").exists():
+        assert pins(folder / "wheel.txt").keys() | demo >= SYSTEM | asked_for("wheel")
 
 
-def test_releases_differ_only_in_what_debian_provides() -> None:
-    bookworm, trixie = map(pins, RELEASES)
-    differing = {name for name in bookworm.keys() | trixie.keys() if bookworm.get(name) != trixie.get(name)}
-    assert differing == {"numpy", "scipy"}
+@pytest.mark.parametrize("folder", PYTHONS, ids=lambda path: path.name)
+def test_what_demos_need_is_free_of_the_tools_of_developers(folder: Path) -> None:
+    lists = [set(pins(path)) for path in folder.iterdir() if path.stem != "build"]
+    assert sum(map(len, lists)) == len(set.union(*lists)), "a distribution is in one list"
+    tools = {"pytest", "mypy", "ruff", "jupyterlab", "sphinx", "pymetis"}
+    assert tools & pins(folder / "demo.txt").keys() == set()
+    assert tools <= pins(folder / "dev.txt").keys()
+
+
+def closure(extras: set[str]) -> set[str]:
+    """Return all distributions that the package with some extras needs here, as what is installed says."""
+    waiting, seen = [(name, "") for name in asked_for(*extras) - SYSTEM], set()
+    while waiting:
+        name, extra = waiting.pop()
+        if (name, extra) in seen:
+            continue
+        seen.add((name, extra))
+        for requirement in map(Requirement, metadata.requires(name) or []):
+            if requirement.marker is None or requirement.marker.evaluate({"extra": extra}):
+                waiting += [(normalised(requirement.name), each) for each in ("", *requirement.extras)]
+    return {name for name, _ in seen}
+
+
+@pytest.mark.parametrize(
+    ("extras", "lists"),
+    [({"cli", "viz"}, ["demo"]), ({"cli", "docs", "notebooks", "test", "viz"}, ["demo", "dev"])],
+)
+def test_lists_contain_what_their_contents_need(extras: set[str], lists: list[str]) -> None:
+    folder = ROOT / "constraints" / f"python3.{sys.version_info.minor}"
+    if not folder.exists():
+        pytest.skip("no list for this Python")
+    needed = closure(extras)
+    assert len(needed) > 20
+    assert needed - SYSTEM <= {name for each in lists for name in pins(folder / f"{each}.txt")}
+
+
+def test_without_the_extra_no_dolfinx_is_asked_for() -> None:
+    named = asked_for("cli", "viz", "notebooks", "docs", "test", "dev")
+    assert named & SYSTEM == {"numpy", "scipy", "setuptools"}
 
 
 #: Names on conda-forge that differ from those of pip; what the system provides elsewhere is named there, too.
