@@ -49,6 +49,8 @@ def run(script: str, arguments: list[str]) -> int:
     try:
         runpy.run_path(script, run_name="__main__")
     except SystemExit as end:
+        if end.code is not None and not isinstance(end.code, int):
+            sys.stderr.write(f"{end.code}\n")
         return end.code if isinstance(end.code, int) else int(end.code is not None)
     except BaseException:
         traceback.print_exc()

@@ -231,7 +231,7 @@ def test_a_gmsh_without_metadata_is_judged_by_its_own_version(
 
 
 HIDING = """
-import importlib.abc, sys
+import importlib.abc, importlib.util, sys
 
 class Hidden(importlib.abc.MetaPathFinder):
     def find_spec(self, name, path, target=None):
