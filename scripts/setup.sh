@@ -84,7 +84,7 @@ install_packages() {
   local apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -o Acquire::Retries=3 -o DPkg::Lock::Timeout=600
     -o APT::Keep-Downloaded-Packages=false)
   say "installing packages of $system_words (up to 0.55 GB to download, some minutes): $*"
-  retry quietly "${apt[@]}" update || die "apt-get update failed: see the lines above; is the network reachable?"
+  retry quietly "${apt[@]}" update || die "apt-get update failed: see the lines above; is the network reachable?" "$offer"
   retry quietly "${apt[@]}" install -y --no-install-recommends "$@" ||
     die "apt-get install failed: see the lines above; on Ubuntu the component universe is needed"
 }
@@ -122,14 +122,14 @@ choose_way() {
   python=/usr/bin/python3 # never another python3 that comes first on PATH: only the system's sees its FEniCSx
   [ $way = wheel ] || missing=$(missing_packages "${packages[@]}")
   if [ -n "$missing" ] && [ -z "${WHEEL-}" ] && ! can_be_root && find_wheel_python; then
-    say "packages are missing, and user $(id -un) is without sudo; with root, run first" \
+    say "packages are missing, and user $(id -un) cannot become root; one who can runs" \
       "apt-get install --no-install-recommends" $missing
     way=wheel missing=
   fi
   if [ $way = wheel ] && has_packages && can_be_root; then missing=$(missing_packages "${wheel_packages[@]}"); fi
   missing="$missing $(missing_packages ${further[@]+"${further[@]}"})"
   [ -z "${missing// /}" ] || can_be_root ||
-    die "needs root for packages, got user $(id -un) without sudo: run as root" \
+    die "needs root for packages, got user $(id -un), who cannot become root: run as root" \
       "apt-get install --no-install-recommends $(echo $missing)" "$offer" ${obstacle:+"Here that needs $obstacle"}
 }
 
