@@ -173,8 +173,11 @@ def test_licences_are_those_of_the_metadata() -> None:
         with suppress(metadata.PackageNotFoundError):
             known = metadata.metadata(name)
             fields = ("License-Expression", "License", "Classifier")
-            stated = " ".join(text for field in fields for text in known.get_all(field) or [])
+            words = " ".join(text for field in fields for text in known.get_all(field) or []).split()
+            stated = " ".join(words).replace("GNU Lesser General Public License", "LGPL")
             kind = licence.partition("-")[0].partition(" ")[0]  # of "BSD-3-Clause" only "BSD" is everywhere
+            if not stated:  # Debian 13 leaves the field out
+                continue
             compared += 1
             assert kind in stated or kind == "Matplotlib's", f"{name}: {licence}, but {stated[:300]}"
     assert compared > 8
