@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from mpi4py import MPI
 
 from fenics_contact import Body, Scene, TotalForce, Traction, _dolfinx, solve_scene
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.feti import build_torn_system, decompose
+from fenics_contact.feti import build_torn_system, decompose, decomposition
 from fenics_contact.gallery import block
 from tests.feti.scenes import CELLS, STEEL, clamped_block, lone_block, touching_blocks
 
@@ -62,6 +63,28 @@ def test_a_partition_that_does_not_count_from_zero_is_refused(change: object, me
     scene, partitions = lone_block("hexahedron")
     with pytest.raises(InvalidInputError, match=message):
         decompose(scene, {"block": change(partitions["block"])}, MPI.COMM_SELF)  # type: ignore[operator]
+
+
+def test_subdomains_for_which_mpich_has_no_communicators_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beyond its last one MPICH ends all ranks."""
+    freed: list[int] = []
+
+    class Few:
+        left = 35
+
+        def Dup(self) -> SimpleNamespace:
+            self.left -= 1
+            if self.left < 0:
+                raise MPI.Exception(MPI.ERR_OTHER)
+            return SimpleNamespace(Free=lambda: freed.append(1))
+
+    mpich = SimpleNamespace(Get_library_version=lambda: "MPICH Version: 5.0", COMM_SELF=Few())
+    mpich.Exception = MPI.Exception
+    monkeypatch.setattr(decomposition, "MPI", mpich)
+    decomposition._check_communicators(3, each=10)
+    with pytest.raises(InvalidInputError, match="about 40 communicators of MPI, but MPICH has only 5 left"):
+        decomposition._check_communicators(4, each=10)
+    assert len(freed) == 35
 
 
 def test_every_form_is_compiled_once_for_all_subdomains_and_bodies(monkeypatch: pytest.MonkeyPatch) -> None:
