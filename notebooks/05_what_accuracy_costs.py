@@ -32,9 +32,7 @@
 # %%
 from pathlib import Path
 
-from fenics_contact import (
-    study,
-)
+from fenics_contact import study
 
 above = (Path.cwd(), *Path.cwd().parents)
 folder = next(path / "docs" / "studies" for path in above if (path / "docs" / "studies").is_dir())
@@ -153,13 +151,18 @@ for line in study.cost_table(errors).splitlines():
 
 # %%
 BUILD = """
+from fenics_contact import (
+    Body, ContactPair, RigidPlane, Scene, Support, Surface, Traction, gallery, materials
+)
+from fenics_contact.study import BALANCED, Parameters, Problem, Quantity, StudyScene, Sweep
+
 
 def build(parameters, comm):
-    mesh = rectangle((0.0, 0.0), (1.0, 1.0), (parameters.size, parameters.size), parameters.cell)
+    mesh = gallery.rectangle((0.0, 0.0), (1.0, 1.0), (parameters.size, parameters.size), parameters.cell)
     sides = [Support("plate", side, (0.0, None)) for side in ("x0", "x1")]
     floor = ContactPair(Surface("plate", "y0"), RigidPlane((0.0, 0.0), (0.0, 1.0)))
     load = Traction("plate", "y1", (0.0, -10.0))  # N/mm²
-    return Problem(Scene({"plate": Body(mesh, PlaneStress(1000.0, 0.3))}, sides, [load], [floor]))
+    return Problem(Scene({"plate": Body(mesh, materials.PlaneStress(1000.0, 0.3))}, sides, [load], [floor]))
 """
 
 # %% [markdown]
@@ -181,7 +184,6 @@ study = StudyScene(
 # Six runs in six processes, each once:
 
 # %%
-
 output = Path("output/notebooks/plate")
 output.mkdir(parents=True, exist_ok=True)
 (output / "plate.py").write_text(BUILD + STUDY)
