@@ -56,12 +56,13 @@ def gathered(comm: MPI.Comm) -> dict[str, Any]:
     first = local.rank == 0
     local.Free()
     nodes = comm.allreduce(int(first))
-    libraries = loaded_blas()
+    packages = ", ".join(_packages())
+    libraries = loaded_blas()  # now with that of PETSc, which may be its own
     machine = {
         "ranks": f"{comm.size} on {counted(nodes, 'node')}, {os.cpu_count()} cores on this one",
         "threads": ", ".join(f"{name}={os.environ.get(name, 'not set')}" for name in THREADS),
         "BLAS": ", ".join(libraries) or "not found",
-        "PETSc packages": ", ".join(_packages()),
+        "PETSc packages": packages,
         "C compiler": comm.bcast(_requirements.compiler_problem() if comm.rank == 0 else "") or "works",
         "pictures": _pictures(comm),
     }

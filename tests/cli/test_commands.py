@@ -64,6 +64,19 @@ def test_a_reference_blas_is_advised_against(file: str, slow: bool, monkeypatch:
     assert any("the BLAS is the slow reference one" in line for line in known["advice"]) == slow
 
 
+def test_the_blas_that_petsc_brings_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is loaded with PETSc, after NumPy's."""
+    loaded = ["numpy.libs/libscipy_openblas64_.so"]
+
+    def packages() -> list[str]:
+        loaded.append("petsc/lib/libopenblas.so.0")
+        return ["mumps works"]
+
+    monkeypatch.setattr("fenics_contact._cli.info._packages", packages)
+    monkeypatch.setattr("fenics_contact._cli.info.loaded_blas", lambda: list(loaded))
+    assert "petsc/lib/libopenblas.so.0" in gathered(MPI.COMM_SELF)["machine"]["BLAS"]
+
+
 def test_demos_are_listed_with_their_titles(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("demo") == 0
     printed = capsys.readouterr().out
