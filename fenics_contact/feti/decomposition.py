@@ -398,7 +398,7 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
                 "fewer ranks"
             )
         here = np.flatnonzero(tearing.subdomain_rank == comm.rank)
-        _check_communicators(len(here), each=20 if scene.is_nonlinear else 10)
+        _check_communicators(len(here), each=20 if scene.is_nonlinear else 14)
     with together(comm):
         meshes = tuple(_cut(scene, partitions, tearing, int(number)) for number in here)
         gluing = gluing_rows(tearing, ~np.isnan(prescribed_displacements(scene, tearing)))
@@ -446,8 +446,8 @@ def _check_communicators(subdomains: int, each: int) -> None:
     if len(found) < each * subdomains:
         raise InvalidInputError(
             f"{subdomains} subdomains of a rank need about {each * subdomains} communicators of MPI, but "
-            f"MPICH has only {len(found)} left: cut the bodies into fewer subdomains, use more ranks, or "
-            "take Open MPI"
+            f"MPICH has only {len(found)} left: let go of states that are not needed any more (del), cut the "
+            "bodies into fewer subdomains, use more ranks, or take Open MPI"
         )
 
 
