@@ -94,6 +94,7 @@ _NUMERICAL = [
     Requirement("numpy", "1.24", _FENICSX),
     Requirement("scipy", "1.10", _FENICSX),
     Requirement("clarabel", "0.11"),
+    Requirement("threadpoolctl", "3.1"),
 ]
 _GMSH = Requirement("gmsh", "4.8", f"{_APT} python3-gmsh", "python-gmsh")
 

@@ -1,4 +1,4 @@
-"""Sparse matrices: what they cost, factors that several ranks use, rounding, threads.
+"""Sparse matrices: what they cost, factors that several ranks use, rounding.
 
 The choice depends only on sizes, not on timings, so that a run is reproducible. `python -m benchmarks.prices`
 repeats the measurements and compares them with the predictions.
@@ -9,12 +9,9 @@ shared by several ranks on all of them in the same order.
 
 from __future__ import annotations
 
-import logging
-import os
 import weakref
 from collections import Counter
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -22,7 +19,6 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from fenics_contact._base.libraries import MPI, PETSc, check_not_forked, start
-from fenics_contact.errors.kinds import safe_log
 
 #: Products that a factored subdomain is expected to serve: a state with friction, and its adjoint.
 PRODUCTS = 100
@@ -310,24 +306,3 @@ def _first_ranks(comm: MPI.Comm, count: int) -> MPI.Comm:
     if key not in _subsets:
         _subsets[key] = comm.Split(0 if comm.rank < count else MPI.UNDEFINED)
     return _subsets[key]
-
-
-_LOG = logging.getLogger(__name__)
-
-#: Environment variables for the number of threads of OpenBLAS, MKL and OpenMP.
-SETTINGS = ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
-
-
-@lru_cache
-def warn_of_threads(ranks: int) -> None:
-    """Warn, once, if several ranks run and the number of their threads is unset.
-
-    The number itself is the user's choice: a library that changed it would affect the whole process.
-    """
-    if ranks > 1 and not any(os.environ.get(name) for name in SETTINGS):
-        safe_log(
-            _LOG.warning,
-            "%d ranks share the cores, and the BLAS of each may start threads on all of them, which can take "
-            "several times as long: export OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 before Python starts",
-            ranks,
-        )

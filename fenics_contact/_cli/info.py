@@ -13,6 +13,7 @@ from fenics_contact import _dolfinx
 from fenics_contact._base import requirements as _requirements
 from fenics_contact._base.display import counted
 from fenics_contact._base.libraries import MPI
+from fenics_contact._base.threads import SETTINGS, unlimited
 from fenics_contact._cli.console import console_of, facts
 from fenics_contact._scene_file.validation import json_schema
 from fenics_contact.errors import MissingRequirementError
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
-THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _REFERENCE = re.compile(r"/blas/libblas|libblas\.so\.3\.\d")
 
 
@@ -60,7 +60,7 @@ def gathered(comm: MPI.Comm) -> dict[str, Any]:
     libraries = loaded_blas()  # now with that of PETSc, which may be its own
     machine = {
         "ranks": f"{comm.size} on {counted(nodes, 'node')}, {os.cpu_count()} cores on this one",
-        "threads": ", ".join(f"{name}={os.environ.get(name, 'not set')}" for name in THREADS),
+        "threads": ", ".join(f"{name}={os.environ.get(name, 'not set')}" for name in SETTINGS),
         "BLAS": ", ".join(libraries) or "not found",
         "PETSc packages": packages,
         "C compiler": comm.bcast(_requirements.compiler_problem() if comm.rank == 0 else "") or "works",
@@ -104,10 +104,8 @@ def _advice(comm: MPI.Comm, libraries: list[str]) -> Iterator[str]:
             "libopenblas0-pthread) and choose it (update-alternatives --config "
             "libblas.so.3-x86_64-linux-gnu); factorisations take a fraction of the time"
         )
-    if comm.size > 1 and all(os.environ.get(name) != "1" for name in THREADS[:2]):
-        yield (
-            "several ranks, and BLAS may use threads on top: set OPENBLAS_NUM_THREADS=1 and OMP_NUM_THREADS=1"
-        )
+    if unlimited(comm.size):
+        yield unlimited(comm.size)
 
 
 def schema(

@@ -12,6 +12,7 @@ from fenics_contact import _dolfinx
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI, check_not_forked
 from fenics_contact._base.progress import PhaseTimer
+from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.followed_loads import FollowedLoads
 from fenics_contact._equilibrium.static_admissibility import check_held
 from fenics_contact._equilibrium.stored import Stored, restored_solution, with_stored_slip
@@ -415,16 +416,19 @@ class ContactProblem:
             wanted = checked_tolerance(self.tolerance if tolerance is None else tolerance)
         kind = self._kind(scene, sensitivity=design)
         _dolfinx.warn_if_untested(self.comm.rank)  # once PETSc has started on the ranks that solve
-        if kind is SolverKind.TANGENT_NEWTON:
-            self._require_no_dual_solver()
-            state: AnyState = self._deformed(scene).solve(scene, before, wanted, time, step, overlap=design)
-        else:
-            check_same_input(self.comm, scene, solver=self.solver, tolerance=wanted)
-            first = (self.state if start == "last" else start) or before
-            known = self._alike(scene, first)
-            state = self._linear(scene).solve(
-                scene, kind, wanted, start=first, before=before, known=known, design=design
-            )
+        with one_thread(self.comm):
+            if kind is SolverKind.TANGENT_NEWTON:
+                self._require_no_dual_solver()
+                state: AnyState = self._deformed(scene).solve(
+                    scene, before, wanted, time, step, overlap=design
+                )
+            else:
+                check_same_input(self.comm, scene, solver=self.solver, tolerance=wanted)
+                first = (self.state if start == "last" else start) or before
+                known = self._alike(scene, first)
+                state = self._linear(scene).solve(
+                    scene, kind, wanted, start=first, before=before, known=known, design=design
+                )
         self.state = state
         with self.timer.phase("state"):
             self._warnings.warn(state, design=design)

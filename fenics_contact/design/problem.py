@@ -13,6 +13,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.fingerprint import described
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import LAST_PLACES
+from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._scene.scene import Scene
 from fenics_contact.design.adjoint import WeakChoice, linearise_face, require_from_rest
@@ -417,12 +418,12 @@ class ShapeProblem(SingleProblem):
         before = products_of(state)
         if partials is None:
             partials = self.partials_of(self.objective, state)
-        with self._timer.phase("adjoint"):
+        with one_thread(self.comm), self._timer.phase("adjoint"):
             linearised = linearise_face(state, self.choice)
             start = None if known is None else known.adjoint_multiplier
             accuracy = max(ADJOINT_SHARE * tolerance, ADJOINT_FLOOR)
             adjoint, error = adjoint_of(state, partials, linearised, accuracy, start)
-        with self._timer.phase("gradient"):
+        with one_thread(self.comm), self._timer.phase("gradient"):
             by_points = by_nodes(state, adjoint, partials, linearised, self.geometry.forms)
             gradient = self.geometry.pull_back(by_points)
         spent = max(products_of(state) - before, adjoint.iterations)

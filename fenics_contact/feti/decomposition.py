@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._base.libraries import MPI, PETSc, start
-from fenics_contact._base.sparse import LAST_PLACES, dispose_with, expected_seconds, sent, warn_of_threads
+from fenics_contact._base.sparse import LAST_PLACES, dispose_with, expected_seconds, sent
 from fenics_contact._fem.forms import FormLibrary, cell_stiffness
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.scene import Scene
@@ -384,8 +384,6 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
     check_same_input(comm, scene, partitions=partitions)
     with together(comm):
         _check_partitions(scene, partitions)
-        if comm.rank == 0:
-            warn_of_threads(comm.size)
     forms = FormLibrary(comm)
     forms.prepare(scene)
     # Ranks agree on errors after each local stage, before the next collective one.

@@ -10,6 +10,7 @@ import numpy as np
 
 from fenics_contact._base.display import displayed
 from fenics_contact._base.progress import Task
+from fenics_contact._base.threads import one_thread
 from fenics_contact.errors import InvalidInputError, collectively
 from fenics_contact.feti.direct import DirectSolution, DirectSystem
 from fenics_contact.feti.dual import DualSystem
@@ -90,7 +91,7 @@ class LinearState(State):
         from fenics_contact._accuracy.discretisation import discretisation_error
         from fenics_contact._accuracy.state_errors import solver_errors, state_errors
 
-        with Task("errors"):
+        with Task("errors"), one_thread(comm_of(self)):
             errors = self.known_errors
             if errors is None:
                 solver = solver_errors(self.system, self.solution)

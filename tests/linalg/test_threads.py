@@ -1,39 +1,84 @@
-"""Several ranks whose BLAS may take all cores are warned of."""
+"""Scenes are solved with one thread of BLAS, unless the environment gives a number."""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
+from mpi4py import MPI
+from threadpoolctl import ThreadpoolController
 
-from fenics_contact._base.sparse import SETTINGS, warn_of_threads
+from fenics_contact import ContactProblem, ShapeProblem, SurfaceDesign
+from fenics_contact._base import threads
+from fenics_contact._base.threads import SETTINGS, libraries, one_thread
+from fenics_contact._cli.info import _advice
+from fenics_contact.design import StrainEnergy
+from tests.shape.bridges import bridge
+
+
+def numbers() -> set[int]:
+    """Return the numbers of threads of all libraries of BLAS in this process."""
+    return {library["num_threads"] for library in libraries().info() if library["user_api"] == "blas"}
 
 
 @pytest.fixture(autouse=True)
-def nothing_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    warn_of_threads.cache_clear()
+def two_threads(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Let BLAS have two threads, and the environment say nothing."""
     for name in SETTINGS:
         monkeypatch.delenv(name, raising=False)
+    with libraries().limit(limits=2):
+        assert numbers() == {2}
+        yield
+        assert numbers() == {2}, "what was there is there again"
 
 
-def test_several_ranks_with_unlimited_threads_are_warned_once(caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level(logging.WARNING):
-        warn_of_threads(2)
-        warn_of_threads(2)
-    (record,) = caplog.records
-    assert record.getMessage().startswith("2 ranks share the cores")
-    assert "export OPENBLAS_NUM_THREADS=1" in record.getMessage()
+def test_states_their_errors_and_derivatives_take_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    found: dict[str, set[int]] = {}
+
+    def watch(module: str, name: str) -> None:
+        whole: Any = getattr(__import__(module, fromlist=[name]), name)
+
+        def watched(*given: Any, **more: Any) -> Any:
+            found[name] = numbers()
+            return whole(*given, **more)
+
+        monkeypatch.setattr(f"{module}.{name}", watched)
+
+    watch("fenics_contact._equilibrium.problem", "check_same_input")
+    watch("fenics_contact.design.problem", "adjoint_of")
+    watch("fenics_contact.design.problem", "by_nodes")
+    watch("fenics_contact._accuracy.state_errors", "solver_errors")
+    contact = ContactProblem(bridge("hexahedron"), MPI.COMM_SELF, tolerance=1e-4)
+    problem = ShapeProblem(contact, SurfaceDesign("beam", "z1", net=(2, 1), transition=0.15), StrainEnergy())
+    problem.evaluate(np.zeros(problem.size)).state.estimate_errors(geometry=False)
+    assert found == {"check_same_input": {1}, "adjoint_of": {1}, "by_nodes": {1}, "solver_errors": {1}}
 
 
 @pytest.mark.parametrize("name", SETTINGS)
-def test_whoever_has_chosen_is_not_warned(
-    name: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_number_in_the_environment_is_kept(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(name, "2")
-    warn_of_threads(4)
-    assert caplog.records == []
+    with one_thread(MPI.COMM_SELF):
+        assert numbers() == {2}
 
 
-def test_one_rank_is_not_warned(caplog: pytest.LogCaptureFixture) -> None:
-    warn_of_threads(1)
-    assert caplog.records == []
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_ranks_are_warned_once_of_threads_that_cannot_be_limited(
+    ranks: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    comm: Any = SimpleNamespace(rank=0, size=ranks)
+    threads._warn.cache_clear()
+    with monkeypatch.context() as patch, caplog.at_level(logging.WARNING):
+        patch.setattr(threads, "libraries", lambda: ThreadpoolController().select(prefix="none"))
+        for _ in range(2):
+            with one_thread(comm):
+                pass
+        said = [record.getMessage() for record in caplog.records]
+        assert list(_advice(comm, [])) == said
+        patch.setenv("OMP_NUM_THREADS", "1")
+        assert list(_advice(comm, [])) == []
+    assert len(said) == ranks - 1
+    assert all("export OPENBLAS_NUM_THREADS=1" in each for each in said)
