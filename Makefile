@@ -27,7 +27,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos notebooks test test-slow test-hard test-claims mutants docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces study-large lint setup setup-demo
+.PHONY: help demo demos notebooks test test-core test-slow test-hard test-claims mutants docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces study-large lint setup setup-demo
 
 help: ## Show this list
 	@echo "Targets:"
@@ -56,6 +56,15 @@ notebooks: $(prepare) ## Run the notebooks and store what they show, or NOTEBOOK
 test: lint ## Check style and types, run the quick tests and the quick benchmark, of which counts are judged
 	$(launch) 1 $(python) -m pytest -n $(JOBS) --dist loadfile -m "not slow and not hard and not claim"
 	$(python) -m benchmarks --quick
+
+core := tests/dolfinx tests/contact/test_patch.py tests/contact/test_coulomb.py tests/contact/test_hertz.py \
+  tests/contact/test_quadratic_cells.py tests/contact/test_ranks.py tests/shape/test_adjoint.py \
+  tests/shape/test_derivatives.py tests/models/test_hyperelasticity.py tests/nonlinear/test_sliding.py \
+  tests/mesh_io/test_dolfinx_import.py tests/mesh_io/test_meshio_import.py tests/mesh_io/test_gmsh_import.py \
+  tests/house/test_starting.py
+
+test-core: $(prepare) ## Run the most telling tests: patches, Coulomb, derivatives, large deformations, meshes, ranks
+	$(launch) 1 $(python) -m pytest -n $(JOBS) --dist loadfile -m "not slow and not hard and not claim" $(core)
 
 test-slow: $(prepare) ## Run the tests that take long
 	$(launch) 1 $(python) -m pytest -m slow
