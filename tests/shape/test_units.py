@@ -234,6 +234,7 @@ def test_the_adjoint_of_a_multiple_is_that_multiple_of_the_adjoint(objective: st
 
 def test_the_gradient_of_a_small_multiple_is_that_multiple_of_the_gradient() -> None:
     here, objective = measured("N and mm"), "normal forces"
+    here.point(objective)  # so that all that follow start from its state, which they keep
     expected = here.gradient(objective)
     for factor in FACTORS:
 
