@@ -1,4 +1,4 @@
-# `make demo` and `make test` do all the set-up they need on Debian 12 or newer and Ubuntu 24.04 or newer, and on x86-64
+# `make demo` and `make test` do all the set-up they need on Debian 12 or newer and Ubuntu 25.04 or newer, and on x86-64
 # Linux without root by a third party's wheel (WHEEL=1); elsewhere name a Python that has FEniCSx:
 #     make demo PYTHON=/path/to/python
 

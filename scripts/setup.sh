@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Set up FEniCSx, gmsh and .venv in one of two ways:
-#   packages  Debian 12 or newer (sid too) and Ubuntu 24.04 or newer: the system's own, and .venv on top of its Python.
-#             Ubuntu was not tried: its archive (universe) has the same packages.
-#   wheel     x86-64 Linux without root: .venv alone, FEniCSx by the wheel of a third party, which is alpha.
+#   packages  Debian 12 or newer (sid too) and Ubuntu 25.04 or newer: the system's own, and .venv on top of its Python.
+#             Ubuntu 24.04 has no FEniCSx in its archive, only in that of the FEniCS project (ppa:fenics-packages/fenics).
+#   wheel     x86-64 Linux without these or without root: .venv alone, FEniCSx by the wheel of a third party, which is
+#             alpha.
 # WHEEL=1 or WHEEL=0 chooses; by default it is the way that .venv was made, else packages, else, where these are
 # missing and there is no root, the wheel. What is already there is left alone; an interrupted run is repaired by
 # the next one.
@@ -63,10 +64,11 @@ read -r system_name system_version system_words <<<"$(system)"
 has_packages() {
   case $system_name in
     debian) [ "${system_version%%.*}" -ge 12 ] ;;
-    ubuntu) [ "${system_version%%.*}" -ge 24 ] ;;
+    ubuntu) [ "${system_version%%.*}" -ge 25 ] || apt-cache show python3-dolfinx-real >/dev/null 2>&1 ;;
     *) false ;;
   esac
 }
+names_packages_alike() { [ "$system_name" = debian ] || [ "$system_name" = ubuntu ]; }
 
 missing_packages() {
   local package
@@ -107,7 +109,7 @@ base_of() { "$1" -c 'import os, sys; print(os.path.realpath(sys._base_executable
 
 elsewhere="Elsewhere, install FEniCSx with real PETSc (CHOLMOD or MUMPS) and gmsh yourself, for instance from conda-forge,
 set-up: then pip install -e '.[dev]' there, and name that Python: make ... PYTHON=/path/to/python"
-offer="Without root, on x86-64 Linux with Python 3.12 or newer: make ... WHEEL=1, which takes FEniCSx from PyPI by
+offer="Without these or without root, on x86-64 Linux with Python 3.12 or newer: make ... WHEEL=1, which takes FEniCSx from PyPI by
 set-up: dolfinx-solver-real, the wheel of a third party, which is alpha"
 
 choose_way() {
@@ -118,7 +120,8 @@ choose_way() {
     *) die "needs WHEEL=1, WHEEL=0 or none, got WHEEL=$WHEEL" ;;
   esac
   [ $way = wheel ] || has_packages ||
-    die "needs Debian 12 or newer or Ubuntu 24.04 or newer, got $system_words." "$elsewhere" "$offer"
+    die "needs Debian 12 or newer or Ubuntu 25.04 or newer (24.04 with ppa:fenics-packages/fenics), got $system_words." \
+      "$elsewhere" "$offer"
   python=/usr/bin/python3 # never another python3 that comes first on PATH: only the system's sees its FEniCSx
   [ $way = wheel ] || missing=$(missing_packages "${packages[@]}")
   if [ -n "$missing" ] && [ -z "${WHEEL-}" ] && ! can_be_root && find_wheel_python; then
@@ -126,7 +129,7 @@ choose_way() {
       "apt-get install --no-install-recommends" $missing
     way=wheel missing=
   fi
-  if [ $way = wheel ] && has_packages && can_be_root; then missing=$(missing_packages "${wheel_packages[@]}"); fi
+  if [ $way = wheel ] && names_packages_alike && can_be_root; then missing=$(missing_packages "${wheel_packages[@]}"); fi
   missing="$missing $(missing_packages ${further[@]+"${further[@]}"})"
   [ -z "${missing// /}" ] || can_be_root ||
     die "needs root for packages, got user $(id -un), who cannot become root: run as root" \

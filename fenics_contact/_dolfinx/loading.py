@@ -103,7 +103,7 @@ def version() -> tuple[int, ...]:
     return tuple(int(part) for part in release().split(".")[:2])
 
 
-def untested(tested: tuple[tuple[int, ...], ...] = ((0, 5), (0, 9), (0, 11))) -> str:
+def untested(tested: tuple[tuple[int, ...], ...] = ((0, 5), (0, 9), (0, 10), (0, 11))) -> str:
     """Return a warning if this version of dolfinx was never tested with the package, else nothing."""
     if version() in tested:
         return ""

@@ -29,6 +29,7 @@ class Machine:
         self.program("sudo", "exit 1")
         self.program("id", "echo 1000")
         self.program("python3", "exit 1")
+        self.program("apt-cache", "exit 100")
         self.has_packages("")
         self.system('ID=debian\nVERSION_ID="13"\nPRETTY_NAME="Debian 13"\n')
 
@@ -70,7 +71,7 @@ def machine(tmp_path: Path) -> Machine:
         'ID=debian\nVERSION_ID="12"\n',
         'ID=debian\nVERSION_ID="14"\n',
         'ID=debian\nPRETTY_NAME="forky/sid"\n',
-        'ID=ubuntu\nVERSION_ID="24.04"\n',
+        'ID=ubuntu\nVERSION_ID="25.04"\n',
         'ID=ubuntu\nVERSION_ID="26.10"\n',
     ],
 )
@@ -82,15 +83,26 @@ def test_debian_and_ubuntu_take_their_packages(machine: Machine, release: str) -
 
 @pytest.mark.parametrize(
     "release",
-    ['ID=debian\nVERSION_ID="11"\n', 'ID=ubuntu\nVERSION_ID="22.04"\n', 'ID=fedora\nVERSION_ID="43"\n', ""],
+    ['ID=debian\nVERSION_ID="11"\n', 'ID=ubuntu\nVERSION_ID="24.04"\n', 'ID=fedora\nVERSION_ID="43"\n', ""],
 )
 def test_another_system_is_refused_with_both_cures(machine: Machine, release: str) -> None:
     machine.system(release)
     answer = machine.plan()
     assert (answer.status, answer.output) == (1, "")
-    assert "Debian 12 or newer or Ubuntu 24.04 or newer" in answer.errors
+    assert "Debian 12 or newer or Ubuntu 25.04 or newer (24.04 with ppa:" in answer.errors
     for part in ("PYTHON=/path/to/python", "WHEEL=1", "third party"):
         assert part in answer.errors
+
+
+def test_ubuntu_24_takes_packages_of_another_archive_or_the_wheel_with_all_it_needs(machine: Machine) -> None:
+    machine.system('ID=ubuntu\nVERSION_ID="24.04"\n')
+    machine.has_python_for_the_wheel()
+    machine.program("sudo", "exit 0")
+    needed = machine.plan(wheel="1").output
+    assert needed.startswith("wheel with /")
+    assert "python3-dev" in needed
+    machine.program("apt-cache", '[ "$1 $2" = "show python3-dolfinx-real" ]')
+    assert machine.plan().output.startswith("packages with /usr/bin/python3; missing: python3-dolfinx-real ")
 
 
 def test_another_system_takes_the_wheel_where_asked(machine: Machine) -> None:
