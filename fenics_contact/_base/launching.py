@@ -5,13 +5,14 @@ takes itself for that process, and an mpirun among them ends with status 1 witho
 users (a component, the prefix of the installation) are kept.
 
 Also a program, for shells: ``python -P launching.py RANKS`` prints the beginning of the command, one word per
-line.
+line, by which ranks may share cores.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
+import re
 import shlex
 import shutil
 import signal
@@ -65,6 +66,17 @@ def launcher(ranks: int) -> list[str]:
             name="mpirun",
         )
     return [candidates[0], "-n", str(ranks)]
+
+
+def sharing_cores(mpirun: str) -> list[str]:
+    """Return the options by which ranks of Open MPI may outnumber the cores; MPICH's may without.
+
+    The names of these settings in the environment differ from version to version of Open MPI, and some warn
+    of those of others.
+    """
+    # Open MPI's on Ubuntu 26.04 does not find its own name.
+    named = re.search("HYDRA|MPICH|Intel", finished([mpirun, "--version"], 60.0).output)
+    return [] if named else ["--oversubscribe", "--bind-to", "none"]
 
 
 @dataclass(frozen=True)
@@ -129,6 +141,7 @@ def main() -> None:
     """Print the beginning of the command for the number of ranks given as the only argument."""
     try:
         start = launcher(int(sys.argv[1]))
+        start[1:1] = sharing_cores(start[0]) if start else []
     except MissingRequirementError as error:
         sys.stderr.write(f"{error}\n")
         sys.exit(2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -81,6 +82,32 @@ def test_several_ranks_need_mpirun(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(SystemExit) as ended:
         launching.main()
     assert ended.value.code == 2
+
+
+@pytest.mark.parametrize(
+    ("version", "options"),
+    [
+        ("mpirun (Open MPI) 5.0.7", ["--oversubscribe", "--bind-to", "none"]),
+        ("", ["--oversubscribe", "--bind-to", "none"]),  # as Ubuntu 26.04 has it
+        ("HYDRA build details:", []),
+        ("Intel(R) MPI Library for Linux* OS, Version 2021.13", []),
+    ],
+)
+def test_ranks_may_outnumber_the_cores(
+    version: str,
+    options: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    mpirun = tmp_path / "mpirun"
+    mpirun.write_text(f"#!/bin/sh\necho '{version}'\n")
+    mpirun.chmod(0o755)
+    monkeypatch.setattr(launching, "launcher", lambda ranks: [str(mpirun), "-n", str(ranks)])
+    monkeypatch.setattr(launching.sys, "argv", ["launching.py", "4"])  # type: ignore[attr-defined]
+    launching.main()
+    words = capsys.readouterr().out.split()
+    assert words[words.index(str(mpirun)) + 1 :] == [*options, "-n", "4"]
 
 
 def test_a_process_without_a_word_gets_some(monkeypatch: pytest.MonkeyPatch) -> None:
