@@ -128,7 +128,7 @@ def load_petsc(world: MPI.Comm | None = None) -> ModuleType:
     if world is not None:
         _load(_PETSC4PY, "petsc4py").init(comm=world)
     petsc = _load(_PETSC4PY, "petsc4py.PETSc")
-    _restore_sigpipe()
+    _restore_handlers()
     _check_petsc(_PETSC4PY, petsc)
     _check_one_mpi(_MPI4PY)
     return petsc
@@ -142,11 +142,16 @@ def load_dolfinx() -> ModuleType:
     return dolfinx
 
 
-def _restore_sigpipe() -> None:
-    """Let writes to closed pipes raise errors of Python again: PETSc's handler would end all ranks."""
-    handler = signal.getsignal(signal.SIGPIPE)
-    if handler is not None and threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGPIPE, handler)
+def _restore_handlers() -> None:
+    """Give signals that were handled or ignored back to Python: PETSc's handlers would end all ranks.
+
+    Python ignores SIGPIPE, so that writes to closed pipes raise errors.
+    """
+    if threading.current_thread() is threading.main_thread():
+        for number in signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP}:
+            handler = signal.getsignal(number)
+            if handler not in (None, signal.SIG_DFL):
+                signal.signal(number, handler)
 
 
 def require_extra(use: str, extra: str, *modules: str) -> None:

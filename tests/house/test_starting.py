@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 
 import pytest
@@ -61,10 +63,30 @@ def test_a_rank_that_worked_alone_works_with_others(mpirun: Callable[..., str]) 
     assert ratios == pytest.approx(3 * [1.0], rel=1e-5)
 
 
+def test_signals_keep_the_handlers_that_they_have_when_petsc_starts(mpirun: Callable[..., str]) -> None:
+    """As those of an interruptible run. PETSc takes SIGHUP from all, SIGTERM under MPICH."""
+    script = """
+        import os, signal, sys
+        heard = []
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, lambda number, frame: heard.append(number))
+        from mpi4py import MPI
+        from tests.house.pressed_block import solve
+        solve(MPI.COMM_SELF)
+        os.kill(os.getpid(), signal.SIGHUP)
+        os.kill(os.getpid(), signal.SIGTERM)
+        sys.stdout.write(str(heard == [signal.SIGHUP, signal.SIGTERM]))
+    """
+    assert mpirun(script, 1, fresh=True) == "True"
+
+
 @pytest.mark.parametrize("loaded", ["sys", "dolfinx"])
 def test_processes_forked_before_anything_is_computed_compute(
     loaded: str, mpirun: Callable[..., str]
 ) -> None:
+    alone = subprocess.run([sys.executable, "-c", f"import {loaded}"], capture_output=True, check=False)
+    if alone.returncode != 0:
+        pytest.skip("a script loads this dolfinx after MPI alone")
     script = f"""{FORK}
     import {loaded}
     from tests.house.pressed_block import ENERGY, solve
