@@ -73,7 +73,7 @@ def collected_garbage() -> Iterator[None]:
         gc.collect()
 
 
-def communicators_are_few(few: int = 1200) -> bool:
+def communicators_are_few(few: int = 1800) -> bool:
     """Tell whether MPICH, which has 2048 communicators a process and aborts beyond, has few left."""
     mpi: Any = sys.modules.get("mpi4py.MPI")  # a test that needs no MPI does not start it
     if mpi is None or not mpi.Get_library_version().startswith("MPICH"):

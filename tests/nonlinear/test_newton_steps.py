@@ -38,6 +38,8 @@ from fenics_contact import (
     solve_scene,
     solve_steps,
 )
+from fenics_contact._base.libraries import PETSc
+from fenics_contact._base.requirements import factors
 from fenics_contact._fem.mechanics import HyperelasticMechanics, MaterialStep
 from fenics_contact._large_deformations import moving_contact as meeting
 from fenics_contact._large_deformations import newton
@@ -578,9 +580,12 @@ def test_a_matrix_that_is_not_positive_definite_is_told_by_an_error_alone(capfd)
     orders = ((line, one, one), (one, line, one), (one, one, line))
     whole = sum(sp.kron(sp.kron(a, b), c) for a, b, c in orders)
     matrix = (whole - 0.5 * sp.identity(12**3)).tocsr()
-    assert isinstance(mostly_positive(matrix, None), IndefiniteFactor)
-    with pytest.raises(ConvergenceError, match=r"must have factors, but .* not positive definite"):
-        RefillableFactor(matrix)
+    factor = mostly_positive(matrix, None)
+    assert factor.fits(matrix)
+    if factors(PETSc, "cholmod"):  # MUMPS has signs of pivots, too, and goes on
+        assert isinstance(factor, IndefiniteFactor)
+        with pytest.raises(ConvergenceError, match=r"must have factors, but .* not positive definite"):
+            RefillableFactor(matrix)
     assert capfd.readouterr() == ("", "")
 
 
