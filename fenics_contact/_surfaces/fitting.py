@@ -92,7 +92,7 @@ def _determined(sums: np.ndarray, degree: np.ndarray, narrow: np.ndarray) -> np.
     width = int(np.count_nonzero(degree == 1))
     kept[:, :width, :width] = np.eye(width)
     for order in range(2, int(degree.max()) + 1):
-        low, high = np.count_nonzero(degree < order), np.count_nonzero(degree <= order)
+        low, high = int(np.count_nonzero(degree < order)), int(np.count_nonzero(degree <= order))
         own = slice(low, high)
         lost = _explained(matrix[:, :high, :high], kept[:, :low, :low], narrow & (order == 2))
         kept[:, own, own] = np.eye(high - low) - lost @ np.swapaxes(lost, 1, 2)

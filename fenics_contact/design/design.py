@@ -141,7 +141,7 @@ class SurfaceDesign:
         at = np.flatnonzero(cut[surface.nodes].any(axis=1))
         inside = np.where(cut[surface.nodes[at]], 0.0, surface.directions[at])
         length = np.linalg.norm(inside, axis=1)
-        leaving = np.count_nonzero(length <= LAST_PLACES)
+        leaving = int(np.count_nonzero(length <= LAST_PLACES))
         if leaving:
             raise InvalidInputError(
                 f"a design surface may end at a plane of symmetry, but {counted(leaving, 'node')} of that on "

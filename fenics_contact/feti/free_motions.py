@@ -109,7 +109,7 @@ def _require_flexible_slaves(scene: Scene, tearing: Tearing, moving: np.ndarray)
         nodes = tearing.global_nodes(pair.slave.body, np.unique(scene.facets(pair.slave)))
         if moving[nodes].any():
             surface = f"of surface {pair.slave.name!r} of body {pair.slave.body!r}"
-            lie = counted(np.count_nonzero(moving[nodes]), f"node {surface} lies", f"nodes {surface} lie")
+            lie = counted(int(moving[nodes].sum()), f"node {surface} lies", f"nodes {surface} lie")
             raise InvalidInputError(
                 f"slaves must be flexible, but {lie} on a rigid surface with free components: exchange slave "
                 "and master, or let the rigid surface end before the slave begins"

@@ -318,7 +318,7 @@ def upper_triangle(matrix: np.ndarray) -> tuple[float, ...]:
 def symmetric_product(entries: tuple[ufl.Constant, ...], vector: list[Expr]) -> list[Expr]:
     """Return the product of a symmetric matrix, given by its upper triangle, with a vector (UFL)."""
     n = len(vector)
-    place = {(i, j): k for k, (i, j) in enumerate(zip(*np.triu_indices(n), strict=True))}
+    place = {(int(i), int(j)): k for k, (i, j) in enumerate(zip(*np.triu_indices(n), strict=True))}
     return [sum(entries[place[min(i, j), max(i, j)]] * vector[j] for j in range(n)) for i in range(n)]
 
 

@@ -274,7 +274,7 @@ def draw_cell_edges(axes: Axes, points: np.ndarray, cells: np.ndarray, frame: Fr
     length = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).min(axis=1)
     strength = 0.25 * np.minimum(1.0, (length / (CLOSEST * float(np.max(frame.size)))) ** 2)
     seen = inside & (strength > 0.01)
-    colours = np.column_stack([np.tile(to_rgb(INK), (np.count_nonzero(seen), 1)), strength[seen]])
+    colours = np.column_stack([np.tile(to_rgb(INK), (int(np.count_nonzero(seen)), 1)), strength[seen]])
     look = {"facecolors": "none", "edgecolors": colours, "linewidths": 0.4}
     axes.add_collection(PolyCollection(corners[seen], **look))
 

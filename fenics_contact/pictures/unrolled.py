@@ -375,7 +375,7 @@ def _curve(axes: Axes, trace: ContactTrace, values: np.ndarray, colour: str) -> 
 
 def _symbols(axes: Axes, trace: ContactTrace, values: np.ndarray) -> None:
     low, high = trace.window(None)
-    seen = np.count_nonzero((trace.places > low) & (trace.places < high))
+    seen = int(np.count_nonzero((trace.places > low) & (trace.places < high)))
     size = float(np.clip(60 / max(seen, 1), 0.12, 0.6))
     for status, (name, look) in symbols_of(trace.rubs).items():
         chosen = trace.points[trace.status == status]

@@ -399,7 +399,7 @@ def beside(kind: str) -> tuple[SlidingPoints, SlidingPoints, SlidingPoints, np.n
 def forces(now: SlidingPoints) -> tuple[np.ndarray, np.ndarray]:
     random = np.random.default_rng(2)
     count, dim = now.points.normal.shape
-    return random.uniform(0.3, 1.0, count), random.uniform(-1.0, 1.0, (count, dim - 1))
+    return np.asarray(random.uniform(0.3, 1.0, count)), random.uniform(-1.0, 1.0, (count, dim - 1))
 
 
 error = partial(derivative_error, STEP)
