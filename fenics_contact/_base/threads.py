@@ -23,8 +23,8 @@ SETTINGS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 def one_thread(comm: MPI.Comm) -> Iterator[None]:
     """Limit BLAS to one thread in a block, unless the environment gives a number. PETSc must be loaded.
 
-    On two idle cores two threads take 4 to 18 % less time than one and twice the processor time; where other
-    programs or ranks use the cores, two to five times as long.
+    On two idle cores two threads take 3 to 20 % less time than one and twice the processor time; where other
+    programs or ranks use the cores, up to five times as long.
     """
     if _given():
         yield
