@@ -68,15 +68,17 @@ def launcher(ranks: int) -> list[str]:
     return [candidates[0], "-n", str(ranks)]
 
 
-def sharing_cores(mpirun: str) -> list[str]:
-    """Return the options by which ranks of Open MPI may outnumber the cores; MPICH's may without.
+def sharing_launcher(ranks: int) -> list[str]:
+    """Return a launcher by which ranks may outnumber the cores: with options of Open MPI, MPICH needs none.
 
     The names of these settings in the environment differ from version to version of Open MPI, and some warn
     of those of others.
     """
+    start = launcher(ranks)
     # Open MPI's on Ubuntu 26.04 does not find its own name.
-    named = re.search("HYDRA|MPICH|Intel", finished([mpirun, "--version"], 60.0).output)
-    return [] if named else ["--oversubscribe", "--bind-to", "none"]
+    if start and not re.search("HYDRA|MPICH|Intel", finished([start[0], "--version"], 60.0).output):
+        start[1:1] = ["--oversubscribe", "--bind-to", "none"]
+    return start
 
 
 @dataclass(frozen=True)
@@ -140,8 +142,7 @@ def last_words(command: Sequence[str], output: str, most: int = 2000) -> str:
 def main() -> None:
     """Print the beginning of the command for the number of ranks given as the only argument."""
     try:
-        start = launcher(int(sys.argv[1]))
-        start[1:1] = sharing_cores(start[0]) if start else []
+        start = sharing_launcher(int(sys.argv[1]))
     except MissingRequirementError as error:
         sys.stderr.write(f"{error}\n")
         sys.exit(2)

@@ -15,7 +15,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, TextIO
 
-from fenics_contact._base.launching import FinishedProcess, finished, last_words, launcher
+from fenics_contact._base.launching import FinishedProcess, finished, last_words, launcher, sharing_launcher
 from fenics_contact._base.progress import Task, duration, show_progress
 from fenics_contact.output.files import write_json
 from fenics_contact.output.result import versions
@@ -76,7 +76,7 @@ def measure(job: Job, *, first: bool = True) -> Record:
         arguments = {**job.arguments, **(job.first if first else {})}
         words = json.dumps({"function": job.function, "arguments": arguments, "file": str(file)})
         program = PROGRAM if job.ranks else WITHOUT_MPI
-        command = [*launcher(max(1, job.ranks)), sys.executable, "-c", program, words]
+        command = [*sharing_launcher(max(1, job.ranks)), sys.executable, "-c", program, words]
         environment = _environment(job.threads)
         ending = finished(command, job.limit, environment=environment)
         record = _read(file)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import logging
+import os
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -58,7 +59,7 @@ def test_ranks_of_a_study_start_where_mpi_has_left_its_traces(monkeypatch: pytes
 
 
 def test_a_launcher_that_says_nothing_is_told_with_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runner, "launcher", lambda ranks: ["false", str(ranks)])
+    monkeypatch.setattr(runner, "sharing_launcher", lambda ranks: ["false", str(ranks)])
     message = measure(replace(JOB, ranks=2))["failed"]["message"]
     assert message.startswith("it ended with exit status 1: it printed nothing and probably could not start")
     assert "`false 2 " in message
@@ -195,3 +196,10 @@ def test_counts_that_change_from_run_to_run_are_refused() -> None:
     runs = [record(), record(counts={"f_products": 51})]
     with pytest.raises(ValueError, match=r"counts of chain must be equal in all repetitions, got .*51"):
         summarised("chain", runs)
+
+
+def test_ranks_of_a_run_may_outnumber_the_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    ranks = (os.cpu_count() or 1) + 1
+    code = "import sys; from mpi4py import MPI; sys.stderr.write('one of %d ranks\\n' % MPI.COMM_WORLD.size)"
+    monkeypatch.setattr(runner, "PROGRAM", code)
+    assert f"one of {ranks} ranks" in measure(replace(JOB, ranks=ranks))["failed"]["message"]
