@@ -16,7 +16,7 @@ from fenics_contact.errors.kinds import safe_log
 _LOG = logging.getLogger(__name__)
 
 #: Environment variables for the number of threads of OpenBLAS, MKL and OpenMP.
-SETTINGS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+SETTINGS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "GOTO_NUM_THREADS")
 
 
 @contextmanager

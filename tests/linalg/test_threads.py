@@ -67,6 +67,8 @@ def test_a_number_in_the_environment_is_kept(
     monkeypatch.setenv(name, "2")
     with one_thread(MPI.COMM_SELF):
         assert numbers() == two_threads
+    monkeypatch.setattr(threads, "libraries", lambda: ThreadpoolController().select(prefix="none"))
+    assert threads.unlimited(4) == "", "whoever has chosen is not warned"
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
@@ -85,4 +87,5 @@ def test_ranks_are_warned_once_of_threads_that_cannot_be_limited(
         patch.setenv("OMP_NUM_THREADS", "1")
         assert list(_advice(comm, [])) == []
     assert len(said) == ranks - 1
+    assert all(each.startswith("2 ranks share the cores") for each in said)
     assert all("export OPENBLAS_NUM_THREADS=1" in each for each in said)
