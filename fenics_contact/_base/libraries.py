@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from fenics_contact._base import requirements as _requirements
 from fenics_contact.errors import ForkedProcessError
 
-__all__ = ["MPI", "Late", "PETSc", "check_not_forked", "start"]
+__all__ = ["MPI", "Late", "PETSc", "check_not_forked", "free_communicators", "start"]
 
 
 class Late(ModuleType):
@@ -55,6 +56,22 @@ def start(comm: MPI.Comm) -> None:
         world = comm.Split(MPI.UNDEFINED if ready else 0, comm.rank)
         if not ready:
             _requirements.load_petsc(world)  # which holds it: it is never freed
+
+
+def free_communicators(most: int) -> int:
+    """Return how many communicators of this rank MPI can make, ``most`` at the most.
+
+    MPICH has 2048 a process and aborts beyond; other MPIs have no limit.
+    """
+    if not MPI.Get_library_version().startswith("MPICH"):
+        return most
+    found: list[MPI.Comm] = []
+    with suppress(MPI.Exception):
+        while len(found) < most:
+            found.append(MPI.COMM_SELF.Dup())
+    for one in found:
+        one.Free()
+    return len(found)
 
 
 _forked = False

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -12,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.display import counted, displayed
-from fenics_contact._base.libraries import MPI, PETSc, start
+from fenics_contact._base.libraries import MPI, PETSc, free_communicators, start
 from fenics_contact._base.sparse import LAST_PLACES, dispose_with, expected_seconds, sent
 from fenics_contact._fem.forms import FormLibrary, cell_stiffness
 from fenics_contact._pairing.points import NodeNumbers
@@ -433,18 +432,12 @@ def _check_communicators(subdomains: int, each: int) -> None:
 
     `each`: what meshes, fields and factors of a subdomain take, measured with dolfinx 0.11 and MUMPS.
     """
-    if not MPI.Get_library_version().startswith("MPICH"):
-        return
-    found: list[MPI.Comm] = []
-    with suppress(MPI.Exception):
-        while len(found) < each * subdomains:
-            found.append(MPI.COMM_SELF.Dup())
-    for one in found:
-        one.Free()
-    if len(found) < each * subdomains:
+    needed = each * subdomains
+    left = free_communicators(needed)
+    if left < needed:
         raise InvalidInputError(
-            f"{subdomains} subdomains of a rank need about {each * subdomains} communicators of MPI, but "
-            f"MPICH has only {len(found)} left: let go of states that are not needed any more (del), cut the "
+            f"{subdomains} subdomains of a rank need about {needed} communicators of MPI, but "
+            f"MPICH has only {left} left: let go of states that are not needed any more (del), cut the "
             "bodies into fewer subdomains, use more ranks, or take Open MPI"
         )
 

@@ -10,6 +10,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import Body, Scene, TotalForce, Traction, _dolfinx, solve_scene
+from fenics_contact._base import libraries
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import build_torn_system, decompose, decomposition
 from fenics_contact.gallery import block
@@ -80,7 +81,7 @@ def test_subdomains_for_which_mpich_has_no_communicators_are_refused(monkeypatch
 
     mpich = SimpleNamespace(Get_library_version=lambda: "MPICH Version: 5.0", COMM_SELF=Few())
     mpich.Exception = MPI.Exception
-    monkeypatch.setattr(decomposition, "MPI", mpich)
+    monkeypatch.setattr(libraries, "MPI", mpich)
     decomposition._check_communicators(3, each=10)
     with pytest.raises(InvalidInputError, match="about 40 communicators of MPI, but MPICH has only 5 left"):
         decomposition._check_communicators(4, each=10)
