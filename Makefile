@@ -53,8 +53,10 @@ demos: $(prepare_demo) ## Run every demo
 notebooks: $(prepare) ## Run the notebooks and store what they show, or NOTEBOOKS="01 04"; pages in output/notebooks/
 	$(launch) 1 $(python) notebooks/execute.py $(NOTEBOOKS)
 
+quick = $(launch) 1 $(python) -m pytest -n $(JOBS) --dist loadfile -m "not slow and not hard and not claim"
+
 test: lint ## Check style and types, run the quick tests and the quick benchmark, of which counts are judged
-	$(launch) 1 $(python) -m pytest -n $(JOBS) --dist loadfile -m "not slow and not hard and not claim"
+	$(quick)
 	$(python) -m benchmarks --quick
 
 core := tests/dolfinx tests/contact/test_patch.py tests/contact/test_coulomb.py tests/contact/test_hertz.py \
@@ -64,7 +66,7 @@ core := tests/dolfinx tests/contact/test_patch.py tests/contact/test_coulomb.py 
   tests/house/test_starting.py
 
 test-core: $(prepare) ## Run the most telling tests: patches, Coulomb, derivatives, large deformations, meshes, ranks
-	$(launch) 1 $(python) -m pytest -n $(JOBS) --dist loadfile -m "not slow and not hard and not claim" $(core)
+	$(quick) $(core)
 
 test-slow: $(prepare) ## Run the tests that take long
 	$(launch) 1 $(python) -m pytest -m slow
