@@ -83,7 +83,13 @@ def test_debian_and_ubuntu_take_their_packages(machine: Machine, release: str) -
 
 @pytest.mark.parametrize(
     "release",
-    ['ID=debian\nVERSION_ID="11"\n', 'ID=ubuntu\nVERSION_ID="24.04"\n', 'ID=fedora\nVERSION_ID="43"\n', ""],
+    [
+        'ID=debian\nVERSION_ID="11"\n',
+        'ID=ubuntu\nVERSION_ID="22.04"\n',
+        'ID=ubuntu\nVERSION_ID="24.04"\n',
+        'ID=fedora\nVERSION_ID="43"\n',
+        "",
+    ],
 )
 def test_another_system_is_refused_with_both_cures(machine: Machine, release: str) -> None:
     machine.system(release)
