@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
@@ -32,6 +33,11 @@ class Surface:
 
     body: str
     name: str
+
+    @property
+    def in_words(self) -> str:
+        """Body and surface, by which results are found: "upper z0"."""
+        return f"{self.body} {self.name}"
 
 
 @dataclass(frozen=True)
@@ -298,5 +304,36 @@ def _in_words(value: float | OfPosition | str) -> str:
 
 def _place(slave: Surface, master: Surface | RigidObstacle) -> str:
     if isinstance(master, Surface):
-        return f"{slave.body} {slave.name} on {master.body} {master.name}"
-    return f"{slave.body} {slave.name} on {name_in_words(type(master).__name__)}"
+        return f"{slave.in_words} on {master.in_words}"
+    return f"{slave.in_words} on {name_in_words(type(master).__name__)}"
+
+
+def named(which: str, surfaces: Sequence[str], places: Sequence[str]) -> list[int]:
+    """Return the numbers of all entries of a list that are on a surface, or on a pair of surfaces."""
+    found = [k for k, names in enumerate(zip(surfaces, places, strict=True)) if which in names]
+    if not found:
+        known = ", ".join(dict.fromkeys(map(repr, places))) or "no entry"
+        raise InvalidInputError(
+            f"a result by name needs the body and the surface of one of the list, which has {known}; got "
+            f"{which!r}: name one of them"
+        )
+    return found
+
+
+def pair_number(contacts: Sequence[ContactPair], which: int | str) -> int:
+    """Return the number of a contact pair that is given by it, by its slave, or by both surfaces."""
+    if isinstance(which, str):
+        places = [pair.place for pair in contacts]
+        first, *others = named(which, [pair.slave.in_words for pair in contacts], places)
+        if others:
+            raise InvalidInputError(
+                f"one contact pair is needed, {which!r} is the slave of {1 + len(others)}: "
+                f"give {places[first]!r}, or another of {[places[k] for k in others]}, or a number from 0"
+            )
+        return first
+    if which not in range(len(contacts)):
+        raise InvalidInputError(
+            f"a contact pair has a number from 0 to {len(contacts) - 1}, or the name of its slave, got "
+            f"{which!r}: the scene has {', '.join(repr(pair.place) for pair in contacts) or 'no pair'}"
+        )
+    return int(which)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
-from fenics_contact._scene.pairs import Surface
+from fenics_contact._scene.pairs import ContactPair, Surface, Tie, named
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import RigidSurface
 from fenics_contact._surfaces.facets import share_areas, surface_moments
@@ -184,18 +184,41 @@ class Resultants:
     Attributes:
         kind: What they are, such as "reaction".
         entries: One for each entry of that list.
+        places: Where each acts: "lid top", of a contact pair "lid bottom on pot rim".
+
+    Example:
+        >>> state.reactions()["lid top"].force  # of all supports of this surface  # doctest: +SKIP
+        >>> state.resultants().contacts["lid bottom on pot rim"].force  # doctest: +SKIP
     """
 
     kind: str
     entries: tuple[Resultant, ...]
+    places: tuple[str, ...]
 
     def __len__(self) -> int:
         """Return the number of entries."""
         return len(self.entries)
 
-    def __getitem__(self, number: int) -> Resultant:
-        """Return the entry of a place in the list."""
-        return self.entries[number]
+    def __getitem__(self, which: int | str) -> Resultant:
+        """Return an entry by its number, or the sum of the entries of a name, about the point of the first.
+
+        Args:
+            which: Number in the list, or body and surface as in "lid top"; of pairs also both surfaces, as
+                in "lid bottom on pot rim".
+
+        Raises:
+            InvalidInputError: If no entry has this name; lists those that exist.
+        """
+        if not isinstance(which, str):
+            return self.entries[which]
+        first, *others = (self.entries[number] for number in named(which, self._surfaces, self.places))
+        for other in others:
+            first += Resultant(other.force, other.moment_about(first.about), first.about)
+        return first
+
+    @property
+    def _surfaces(self) -> list[str]:
+        return [each.surface.in_words if each.surface else "" for each in self.entries]
 
     def __iter__(self) -> Iterator[Resultant]:
         """Return the entries in their order."""
@@ -203,8 +226,7 @@ class Resultants:
 
     def __str__(self) -> str:
         """Return a table with one line for each entry."""
-        names = [f"{each.surface.body}/{each.surface.name}" if each.surface else "" for each in self.entries]
-        return table([(f"{self.kind} {i}", name) for i, name in enumerate(names)], self.entries)
+        return table([(f"{self.kind} {i}", name) for i, name in enumerate(self._surfaces)], self.entries)
 
 
 def table(
@@ -298,7 +320,8 @@ def support_reactions(
         point = own if about is None else point_of(about, scene.dim)
         total = resultant(share * forces.reaction, forces.places, point, surface)
         entries.append(total - point_load(support, point) if isinstance(support, RigidSurface) else total)
-    return Resultants("reaction", tuple(entries))
+    places = tuple(Surface(each.body, each.surface).in_words for each in scene.supports)
+    return Resultants("reaction", tuple(entries), places)
 
 
 def point_load(support: RigidSurface, about: np.ndarray) -> Resultant:
@@ -461,10 +484,12 @@ class PairResultants:
 
     Attributes:
         contacts: One for each contact pair of the scene, in its order.
+        friction: The part of friction in each of these.
         ties: One for each tie of the scene, in its order.
     """
 
     contacts: Resultants
+    friction: Resultants
     ties: Resultants
 
     def __str__(self) -> str:
@@ -479,11 +504,21 @@ def pair_resultants(
     """Return force and moment on the slave of every pair, about a point or the centroid of its surface."""
     scene = torn.scene
 
-    def of_pair(points: ContactPoints, force: np.ndarray, number: int, slave: Surface) -> Resultant:
-        mine = np.flatnonzero(points.pair == number)
-        point = centroid(scene, slave) if about is None else point_of(about, scene.dim)
-        return resultant(force[mine], forces.places[points.slave[mine]], point, slave)
+    def of(
+        kind: str, pairs: Sequence[ContactPair | Tie], points: ContactPoints, force: np.ndarray
+    ) -> Resultants:
+        found = []
+        for number, pair in enumerate(pairs):
+            mine = np.flatnonzero(points.pair == number)
+            point = centroid(scene, pair.slave) if about is None else point_of(about, scene.dim)
+            found.append(resultant(force[mine], forces.places[points.slave[mine]], point, pair.slave))
+        return Resultants(kind, tuple(found), tuple(pair.place for pair in pairs))
 
-    contacts = (of_pair(torn.points, forces.contact, k, pair.slave) for k, pair in enumerate(scene.contacts))
-    ties = (of_pair(torn.ties, forces.tie, k, tie.slave) for k, tie in enumerate(scene.ties))
-    return PairResultants(Resultants("contact", tuple(contacts)), Resultants("tie", tuple(ties)))
+    normal = torn.points.normal
+    tangential = forces.contact - np.einsum("nd,nd->n", forces.contact, normal)[:, None] * normal
+    rubs = np.array([pair.has_friction for pair in scene.contacts], dtype=bool)[torn.points.pair]
+    return PairResultants(
+        of("contact", scene.contacts, torn.points, forces.contact),
+        of("friction", scene.contacts, torn.points, np.where(rubs[:, None], tangential, 0.0)),
+        of("tie", scene.ties, torn.ties, forces.tie),
+    )

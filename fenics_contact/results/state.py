@@ -403,10 +403,11 @@ class State(ABC):
 
     @collectively("State.reactions", comm_of)
     def reactions(self, about: GivenVector | np.ndarray | None = None) -> Resultants:
-        """Return force and moment that every support exerts on its body, in the scene's order. Collective.
+        """Return force and moment that every support exerts on its body. Collective.
 
-        They balance the other forces (see `balance`), and are as accurate as the tolerance of the solver. A
-        component that several supports prescribe at a node is shared by its areas on their surfaces.
+        By number in the scene's order, or by name: all supports of a surface together. They balance the other
+        forces (see `balance`), and are as accurate as the tolerance of the solver. A component that several
+        supports prescribe at a node is shared by its areas on their surfaces.
 
         Args:
             about: Point for all moments, shape (dim,), [length]; by default the centroid of the surface of
@@ -414,6 +415,7 @@ class State(ABC):
 
         Example:
             >>> print(state.reactions())  # doctest: +SKIP
+            >>> state.reactions()["lid top"].force  # of the surface "top" of the body "lid"  # doctest: +SKIP
             >>> state.reactions()[0].torque((0, 0, 0), (0, 0, 1))  # doctest: +SKIP
         """
         return support_reactions(self.scene, self._nodal_forces, about)
@@ -431,9 +433,15 @@ class State(ABC):
     def resultants(self, about: GivenVector | np.ndarray | None = None) -> PairResultants:
         """Return force and moment on the slave of every contact pair and tie. Collective.
 
+        By number in the scene's order, or by name: that of the slave, or of both surfaces.
+
         Args:
             about: Point for all moments, shape (dim,), [length]; by default the centroid of each slave
                 surface.
+
+        Example:
+            >>> grip = state.resultants().friction["hub bore"]  # doctest: +SKIP
+            >>> grip.torque((0, 0, 0), (0, 0, 1))  # friction torque about an axis  # doctest: +SKIP
         """
         return pair_resultants(self.torn, self._nodal_forces, about)
 
