@@ -5,7 +5,7 @@ What a script needs is here; nothing is loaded before it is used:
 Scenes: Scene, Body, BodyMesh, Surface, Support, RigidSurface, ContactPair, Tie, AutomaticContact, LoadStep,
     box_partition
 
-Friction laws: Coulomb, Tresca
+Friction laws: Coulomb, Tresca, FrictionTable, FrictionCurve
 
 Rigid obstacles: RigidPlane, RigidSphere, RigidCylinder, DistanceObstacle, MovingObstacle
 
@@ -88,6 +88,8 @@ if TYPE_CHECKING:
     from fenics_contact._scene.scene import Scene as Scene
     from fenics_contact._scene.supports import RigidSurface as RigidSurface
     from fenics_contact._scene.supports import Support as Support
+    from fenics_contact._scene.surface_laws import FrictionCurve as FrictionCurve
+    from fenics_contact._scene.surface_laws import FrictionTable as FrictionTable
     from fenics_contact._scene_file.reading import read_scene_file as read_scene_file
     from fenics_contact.design.design import SurfaceDesign as SurfaceDesign
     from fenics_contact.design.problem import ShapeProblem as ShapeProblem

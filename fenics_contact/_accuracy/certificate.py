@@ -465,7 +465,7 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
         2008, chapter 3.
     """
     problem, residual, moved = system.problem, solution.residual, 0.0
-    follows = system.torn.friction_coefficient[system.torn.owned_discs] > 0.0
+    follows = system.torn.law.growth(solution.multiplier) > 0.0
     known = admissible(problem, solution.slip_bound, follows, solution.multiplier, residual)
     change = known.multiplier - solution.multiplier
     if problem.norm(change) > LAST_PLACES * problem.norm(solution.multiplier):

@@ -33,7 +33,7 @@ def friction_error(system: DualSystem, solution: DualSolution, certificate: Cert
     Returns energy norm of the change, [√(force · length)].
     """
     torn, layout, known = system.torn, system.problem.layout, certificate.known
-    coefficient = torn.friction_coefficient[system.torn.owned_discs]
+    coefficient = torn.law.growth(solution.multiplier)
     change = np.where(known.statuses.slip, coefficient * certificate.error[layout.tangential_frictional], 0.0)
     raised = known.slip_bound - solution.slip_bound
     flexibility = system.problem.diagonal[layout.tangential].mean(axis=1)

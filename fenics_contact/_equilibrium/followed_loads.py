@@ -10,6 +10,7 @@ from fenics_contact._base.progress import PhaseTimer
 from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.torn import TornSystem
+from fenics_contact.qp.cones import TrescaLaw
 from fenics_contact.qp.solution import DualSolution
 from fenics_contact.qp.solve import DualSolver, may_grip
 from fenics_contact.results.dual_solve import solve_dual
@@ -71,18 +72,18 @@ class FollowedLoads:
 
     def _may_hold(self, system: DualSystem, start: np.ndarray) -> bool:
         """Return whether loads change on bodies that rub on each other. Collective."""
-        _, coefficient = system.torn.friction
-        if coefficient is None:
+        law = system.torn.law
+        if isinstance(law, TrescaLaw):
             return False
         pressed = np.maximum(start[system.problem.layout.tangential_frictional], 0.0)
         change = system.torn.load - self.before.torn.load
-        sizes = (np.sum(coefficient * pressed), np.abs(change).sum())
+        sizes = (np.sum(law.growth(start) * pressed), np.abs(change).sum())
         rubs, changes = system.torn.numbering.comm.allreduce(np.array(sizes))
         moved = np.abs(system.torn.free.load - self.before.torn.free.load).sum()
         if rubs == 0.0 or changes + moved == 0.0:
             return False
         problem = system.problem
-        return problem.is_loaded or may_grip(problem.with_law(system.torn.law), start)
+        return problem.is_loaded or may_grip(problem.with_law(law), start)
 
     @staticmethod
     def _falls(system: DualSystem, before: np.ndarray, after: np.ndarray, held: float = 0.05) -> bool:

@@ -116,7 +116,7 @@ def tangent_step(
     ratio = step if factor is None else np.asarray(step / factor**2, dtype=np.float64)
     face = classify(problem.layout, bound, at.multiplier, at.residual, ratio)
     operator = CountedOperator(problem.operator)
-    moving, fixed = growing_basis(problem.comm, face, problem.law.growth, at.multiplier)
+    moving, fixed = growing_basis(problem.comm, face, problem.law.growth(at.multiplier), at.multiplier)
     solved = _StiffFace.build(at, face, face.restriction if moving is None else moving, operator)
     if solved is None:
         return None
@@ -137,8 +137,7 @@ def whole_step(system: TangentSystem, multiplier: Vector, step: Vector, solver: 
     load = problem.coarse.load + problem.coarse.apply(multiplier)
     flexed = apply_unless_zero(problem, system.apply, multiplier)
     problem = replace(problem.with_load(problem.rhs + flexed, load), reach=None)
-    tresca, coefficient = torn.friction
-    solution = solve(problem, tresca, solver, multiplier, friction_coefficient=coefficient)
+    solution = solve(problem, None, solver, multiplier, law=torn.law)
     bound = torn.law.bound(solution.multiplier)
     face = classify(problem.layout, bound, solution.multiplier, solution.residual, step)
     products = system.products - before

@@ -17,6 +17,7 @@ from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tie, Tres
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import together
 from fenics_contact.errors.kinds import safe_log
+from fenics_contact.qp.cones import Strengths
 
 #: Weights of nodes below this fraction of all are rounding, which must not keep a supported point free.
 HELD = 1e-6
@@ -176,11 +177,11 @@ def tangent_frames(normals: np.ndarray, axes: np.ndarray | None = None) -> np.nd
 
 def friction_data(
     scene: Scene, points: ContactPoints, comm: MPI.Comm
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, Strengths | None]:
     """Return the friction data of each contact point. Collective on ``comm``.
 
     Returns whether it has friction, shape (n,); its Coulomb coefficient (zero under Tresca), shape (n,); its
-    Tresca bound as a nodal force (zero under Coulomb), shape (n,), [force].
+    Tresca bound as a nodal force (zero under Coulomb), shape (n,), [force]; and limits and curves, if any.
     """
     has, coefficient, bound = np.zeros(points.count, dtype=bool), *np.zeros((2, points.count))
     places = scene.points[points.slave]
@@ -195,7 +196,28 @@ def friction_data(
     if comm.size > 1 and any(pair.friction_varies for pair in scene.contacts):
         values = np.stack([coefficient, bound])
         require_alike(comm, described(values, "friction given as functions of position"))
-    return has, coefficient, bound
+    return has, coefficient, bound, _strengths(scene, points, comm, coefficient)
+
+
+def _strengths(
+    scene: Scene, points: ContactPoints, comm: MPI.Comm, coefficient: np.ndarray
+) -> Strengths | None:
+    """Return limits of friction and its curves under pressure, None where there are none. Collective."""
+    curves = [pair.friction_curve for pair in scene.contacts]
+    limits = [pair.shear_limit for pair in scene.contacts]
+    if all(each is None for each in (*curves, *limits)):
+        return None
+    limit, places = np.full(points.count, np.inf), scene.points[points.slave]
+    with together(comm):
+        for number, pair in enumerate(scene.contacts):
+            mine = np.flatnonzero(points.pair == number)
+            limit[mine] = pair.limit_at(places[mine]) * points.area[mine]
+    if comm.size > 1 and any(map(callable, limits)):
+        require_alike(comm, described(limit, "shear limits given as functions of position"))
+    known = tuple(curve for curve in curves if curve is not None)
+    number_of = np.cumsum([curve is not None for curve in curves]) - 1
+    curve = np.where([each is not None for each in curves], number_of, -1)[points.pair]
+    return Strengths(coefficient, limit, points.area, curve, known)
 
 
 @displayed

@@ -12,6 +12,7 @@ from fenics_contact._base.checks import checked
 from fenics_contact._base.display import name_in_words
 from fenics_contact._scene.fields import OfPosition, evaluate
 from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact._scene.surface_laws import FrictionCurve, check_rising
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 
@@ -43,21 +44,37 @@ class Surface:
 @dataclass(frozen=True)
 @checked()
 class Coulomb:
-    """Coulomb friction: ‖τ‖ ≤ friction_coefficient · λ_N.
+    """Coulomb friction: ‖τ‖ ≤ friction_coefficient · λ_N, as long as that is below a shear limit.
 
     Slip is that of the whole load step, of points that were open at its start as well, see `LoadStep`.
 
     Attributes:
         friction_coefficient: Friction coefficient μ ≥ 0, dimensionless. Zero is frictionless contact. A
-            function receives points of the slave, shape (n, dim), and returns μ there, shape (n,).
+            function receives points of the slave, shape (n, dim), and returns μ there, shape (n,). One that
+            depends on the pressure is a `FrictionTable`, or a `FrictionCurve` of your own.
+        shear_limit: Largest friction traction by undeformed area, > 0, whatever the pressure, [force /
+            length²], such as the shear strength of the softer body; a number, or a function of points as
+            before. None: no limit.
+
+    Example:
+        >>> hot_rolling = Coulomb(0.3, shear_limit=80.0)
+        >>> dry = Coulomb(FrictionTable(pressure=(0.0, 100.0), coefficient=(0.3, 0.2)))
     """
 
-    friction_coefficient: float | OfPosition
+    friction_coefficient: float | OfPosition | FrictionCurve
+    shear_limit: float | OfPosition | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a negative coefficient."""
-        given = self.friction_coefficient
-        if not (callable(given) or (np.isfinite(given) and given >= 0)):
+        """Refuse negative coefficients and limits, and laws that fall."""
+        given, limit = self.friction_coefficient, self.shear_limit
+        if not (limit is None or callable(limit) or (np.isfinite(limit) and limit > 0)):
+            raise InvalidInputError(
+                f"shear_limit must be positive and finite, got {limit!r}: give the largest friction force "
+                "per area, leave it out for none, or omit friction for a frictionless pair"
+            )
+        if isinstance(given, FrictionCurve):
+            check_rising(given)
+        elif not (callable(given) or (np.isfinite(given) and given >= 0)):
             raise InvalidInputError(
                 f"friction_coefficient must be zero or positive, got {given!r}: "
                 "steel on steel has about 0.3; omit friction for a frictionless pair"
@@ -209,9 +226,22 @@ class ContactPair:
         return callable(self.friction_value)
 
     @property
+    def friction_curve(self) -> FrictionCurve | None:
+        """How friction follows the pressure where it is not proportional to it."""
+        given = self.friction.friction_coefficient if isinstance(self.friction, Coulomb) else None
+        return given if isinstance(given, FrictionCurve) else None
+
+    @property
+    def shear_limit(self) -> float | OfPosition | None:
+        """Largest friction traction, whatever the pressure; None if there is none."""
+        return self.friction.shear_limit if isinstance(self.friction, Coulomb) else None
+
+    @property
     def friction_value(self) -> Any:
-        """Friction coefficient, or Tresca's traction, as given; zero without friction."""
+        """Friction coefficient, the largest of any pressure, or Tresca's traction; zero without friction."""
         match self.friction:
+            case Coulomb(friction_coefficient=FrictionCurve() as curve):
+                return curve.largest_coefficient
             case Coulomb(friction_coefficient=value) | Tresca(traction=value):
                 return value
         return 0.0
@@ -223,6 +253,15 @@ class ContactPair:
             InvalidInputError: If a function returns something other than numbers of at least zero.
         """
         return _not_negative(f"friction of {self.place}", self.friction_value, points)
+
+    def limit_at(self, points: np.ndarray) -> np.ndarray:
+        """Return the shear limit at points of the slave, infinite where there is none, shape (n,).
+
+        Raises:
+            InvalidInputError: If a function returns something other than numbers of at least zero.
+        """
+        limit = np.inf if self.shear_limit is None else self.shear_limit
+        return _not_negative(f"shear limit of {self.place}", limit, points)
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,7 @@ class EffectName(StrEnum):
     CONTACT = "contact"
     TRESCA = "Tresca friction"
     COULOMB = "Coulomb friction"
+    FRICTION_CURVE = "friction that pressure limits or changes"
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,7 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
     thermal = sum(isinstance(load, ThermalStrain) for load in loads)
     rubbing = [pair.friction for pair in scene.contacts if pair.has_friction]
     tresca, coulomb = (sum(isinstance(law, kind) for law in rubbing) for kind in (Tresca, Coulomb))
+    curved = sum(pair.friction_curve is not None or pair.shear_limit is not None for pair in scene.contacts)
     fixed, rough = "has a fixed slip bound", "has a friction coefficient above zero"
     found = (
         (names.ELASTICITY, len(scene.bodies), "elastic body", "elastic bodies"),
@@ -74,6 +76,7 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
         (names.CONTACT, len(scene.contacts), "pair may touch", "pairs may touch"),
         (names.TRESCA, tresca, f"pair {fixed}", f"pairs {fixed.replace('has', 'have')}"),
         (names.COULOMB, coulomb, f"pair {rough}", f"pairs {rough.replace('has', 'have')}"),
+        (names.FRICTION_CURVE, curved, "pair has a shear limit or a table", "pairs have one"),
     )  # fmt: skip
     return tuple(Effect(name, counted(count, *words)) for name, count, *words in found if count)
 

@@ -254,6 +254,7 @@ def check_pair(pair: ContactPair, key: str, bodies: Mapping[str, Body]) -> None:
     nodes = _nodes(bodies[pair.slave.body], pair.slave.name)
     if key == "friction":
         pair.friction_at(nodes)
+        pair.limit_at(nodes)
     elif getattr(pair, key) is not None:
         pair.gap_at(nodes)
 

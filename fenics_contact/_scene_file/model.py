@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import AfterValidator, Field
 from scipy.spatial.transform import Rotation
 
-from fenics_contact._scene import automatic, loads, pairs
+from fenics_contact._scene import automatic, loads, pairs, surface_laws
 from fenics_contact._scene import obstacles as obstacles_module
 from fenics_contact._scene.loads import Load
 from fenics_contact._scene.obstacles import MovingObstacle
@@ -29,6 +29,7 @@ from fenics_contact._scene_file.values import (
     Vector,
     VectorExpression,
     at_time,
+    field_or,
     one_of,
 )
 from fenics_contact.errors import InvalidInputError
@@ -133,7 +134,19 @@ class NoFriction(Part):
 FRICTION_LAWS = (
     NoFriction,
     table_of(
-        pairs.Coulomb, law="coulomb", friction_coefficient=(NotNegativeField, Field(alias="coefficient"))
+        pairs.Coulomb,
+        law="coulomb",
+        friction_coefficient=(
+            field_or(table_of(surface_laws.FrictionTable), "{pressure = [...], coefficient = [...]}"),
+            Field(
+                alias="coefficient",
+                description="friction coefficient; a table is linear between pressures, constant beyond",
+            ),
+        ),
+        shear_limit=(
+            NotNegativeField | None,
+            Field(None, description="largest friction traction, [force/length²]; without it no limit"),
+        ),
     ),
     table_of(pairs.Tresca, law="tresca", traction=NotNegativeField),
 )

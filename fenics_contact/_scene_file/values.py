@@ -460,6 +460,15 @@ NotNegativeField: TypeAlias = Annotated[
     Annotated[float, Field(ge=0)] | Formula | FieldFile,
     with_message(f"a number of at least 0, a formula in x, y and z in quotes, {_FIELD}"),
 ]
+
+
+def field_or(table: Any, keys: str) -> Any:
+    """Return the type of such a field or of a table, whose keys errors show."""
+    kinds = Annotated[float, Field(ge=0)] | Formula | FieldFile | table
+    words = f"a number of at least 0, a formula in x, y and z in quotes, {_FIELD}, or {keys}"
+    return Annotated[kinds, with_message(words)]
+
+
 FieldOrMeasured: TypeAlias = Annotated[
     Literal["measured"] | Annotated[float, Field(ge=0)] | Formula | FieldFile,
     with_message(f"'measured', a number of at least 0, a formula in x, y and z in quotes, {_FIELD}"),

@@ -109,7 +109,7 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
     torn, rows = state.torn, state.rows
     layout, bound, step = torn.layout, rows.slip_bound, rows.step
     trial = rows.multiplier - step * rows.residual
-    coefficient = torn.friction_coefficient[torn.owned_discs]
+    coefficient = torn.law.growth(rows.multiplier)
     length = np.linalg.norm(trial[layout.tangential], axis=1)
     # Two slacks: every point that may be weak is counted, but only one that leans to no side is reassigned.
     uncertainty, closest = _uncertainty(torn.decomposition.comm, rows)

@@ -49,16 +49,21 @@ def bound_sensitivity(
     return np.asarray(torn.decomposition.comm.allreduce(result))
 
 
-def bounds_by_area(torn: TornSystem, by_bound: np.ndarray) -> np.ndarray:
+def bounds_by_area(torn: TornSystem, normal_force: np.ndarray, by_bound: np.ndarray) -> np.ndarray:
     """Vector-Jacobian product of the slip bounds with respect to the areas of the points, (n_points,).
 
-    Tresca's bound is a traction times a nodal area, which moves with the nodes.
+    Tresca's bound is a traction times a nodal area, which moves with the nodes; so is a limit, and a curve
+    gives tractions at pressures.
 
-    `by_bound`: derivative by each frictional point's slip bound, shape (n_friction,).
+    `normal_force`: λ_N of the points, shape (n_points,), [force]; `by_bound`: derivative by each frictional
+    point's slip bound, shape (n_friction,).
     """
     by_area = np.zeros(torn.points.count)
     area = torn.points.area[torn.frictional]
-    by_area[torn.frictional] = by_bound * torn.tresca_bound / np.where(area > 0.0, area, 1.0)
+    slope = torn.tresca_bound / np.where(area > 0.0, area, 1.0)
+    if torn.strengths is not None:
+        slope = slope + torn.strengths.by_area(normal_force[torn.frictional])
+    by_area[torn.frictional] = by_bound * slope
     return by_area
 
 
@@ -74,13 +79,20 @@ def bounds_by_place(torn: TornSystem, normal_force: np.ndarray, by_bound: np.nda
     points = torn.points
     result, by_all = np.zeros((points.count, torn.dim)), np.zeros(points.count)
     by_all[torn.frictional] = by_bound
+    limited = np.zeros(points.count, dtype=bool)
+    if torn.strengths is not None:
+        limited[torn.frictional] = torn.strengths.limited(normal_force[torn.frictional])
     places = torn.scene.points[points.slave]
     for index, pair in enumerate(torn.scene.contacts):
         if pair.friction_varies:
             mine = np.flatnonzero(points.pair == index)
             size = points.area if isinstance(pair.friction, Tresca) else normal_force
             slope = gradients_of(f"friction of {pair.place}", pair.friction_value, places[mine], ())
-            result[mine] = (size * by_all)[mine, None] * slope
+            result[mine] = np.where(limited, 0.0, size * by_all)[mine, None] * slope
+        if callable(pair.shear_limit):
+            mine = np.flatnonzero(points.pair == index)
+            slope = gradients_of(f"shear limit of {pair.place}", pair.shear_limit, places[mine], ())
+            result[mine] += np.where(limited, points.area * by_all, 0.0)[mine, None] * slope
     return result
 
 
@@ -255,7 +267,7 @@ def contact_by_shape(
     if points.count == 0:
         return result
     rows = _row_fields(torn, fields)
-    by_area = bounds_by_area(torn, by_bound) + by_area
+    by_area = bounds_by_area(torn, rows.normal[0], by_bound) + by_area
     with together(torn.decomposition.comm):
         np.add.at(result, points.slave, bounds_by_place(torn, rows.normal[0], by_bound))
     for index, pair in enumerate(torn.scene.contacts):

@@ -86,7 +86,8 @@ def solve_deformed_adjoint(
     exact = evaluation.linearised(PhaseTimer(), state.equilibrium.linearisation)
     system, tangent = exact.system, exact.problem(evaluation)
     face = replace(linearised.face, layout=tangent.problem.layout)
-    coupling = growth_of(face, linearised.growing, torn.friction_coefficient[torn.owned_discs])
+    growth = torn.law.growth(state.rows.multiplier)
+    coupling = growth_of(face, linearised.growing, growth)
     by_multiplier = np.concatenate([partials.by_multiplier, np.zeros(exact.further.count)])
     right = system.jump(system.inverse(partials.by_displacement)) - by_multiplier
     load = np.asarray(tangent.problem.comm.allreduce(system.kernel.T @ partials.by_displacement))
@@ -144,7 +145,7 @@ def deformed_contact_by_shape(
         rows = points.slip_rows(start.material_points()) + points.slip_by_start(start)
         by_nodes -= rows.T @ by_slip.ravel()
     result += by_nodes.reshape(result.shape)
-    by_area = bounds_by_area(torn, by_bound) + by_area
+    by_area = bounds_by_area(torn, normal, by_bound) + by_area
     with together(torn.decomposition.comm):
         np.add.at(result, torn.points.slave, bounds_by_place(torn, normal, by_bound))
     for index in range(len(torn.scene.contacts)):

@@ -36,7 +36,7 @@ from fenics_contact.feti.decomposition import (
 )
 from fenics_contact.feti.free_motions import NO_MOTIONS, FreeMotions, free_motions
 from fenics_contact.feti.subdomain import Subdomain, assemble
-from fenics_contact.qp.cones import CoulombLaw, SlipLaw, TrescaLaw
+from fenics_contact.qp.cones import CoulombLaw, SlipLaw, Strengths, TrescaLaw
 from fenics_contact.qp.layout import ContactLayout
 
 #: Penetration attributable to faceting, relative to the size of a slave facet.
@@ -145,6 +145,8 @@ class TornSystem:
         frictional: Numbers of the contact points with friction, replicated, shape (n_friction,).
         friction_coefficient: μ of each frictional point (zero under Tresca), replicated, shape (n_friction,).
         tresca_bound: Fixed slip bound of each frictional point, replicated, shape (n_friction,), [force].
+        strengths: Slip bounds with limits or on curves in place of μ λ_N, whose μ is then the largest ratio,
+            replicated; None where there are none.
         numbering: Owners and exchange of multipliers.
         relations: The relative displacements in the rows of ties and contacts, in their order, replicated.
         B: This rank's part of B, shape (n_local_rows, torn_size); rows of ties and contacts act on free
@@ -166,6 +168,7 @@ class TornSystem:
     frictional: np.ndarray
     friction_coefficient: np.ndarray
     tresca_bound: np.ndarray
+    strengths: Strengths | None
     numbering: DualNumbering
     relations: tuple[Relations, ...]
     B: sp.csr_matrix
@@ -306,17 +309,19 @@ class TornSystem:
         return np.flatnonzero(self.numbering.owned_index(self.tangential_rows[:, 0]) >= 0)
 
     @property
-    def friction(self) -> tuple[np.ndarray, np.ndarray | None]:
-        """The given slip bounds of this rank's discs, [force], and coefficients, None if zero everywhere."""
-        discs = self.owned_discs
-        coefficient = self.friction_coefficient[discs] if np.any(self.friction_coefficient > 0) else None
-        return self.tresca_bound[discs], coefficient
-
-    @property
     def law(self) -> SlipLaw:
         """The law of friction of this rank's discs."""
-        given, coefficient, layout = *self.friction, self.layout
-        return TrescaLaw(layout, given) if coefficient is None else CoulombLaw(layout, coefficient, given)
+        discs, layout, coefficient = self.owned_discs, self.layout, self.friction_coefficient
+        if not np.any(coefficient > 0):
+            return TrescaLaw(layout, self.tresca_bound[discs])
+        strengths = None if self.strengths is None else self.strengths.part(discs)
+        return CoulombLaw(layout, coefficient[discs], self.tresca_bound[discs], strengths)
+
+    def slip_bound(self, normal_force: np.ndarray) -> np.ndarray:
+        """Return Ψ at normal forces of the frictional points, shape (n_friction,), [force]."""
+        if self.strengths is not None:
+            return self.tresca_bound + self.strengths.bound(normal_force)
+        return np.asarray(self.tresca_bound + self.friction_coefficient * np.maximum(normal_force, 0))
 
     @property
     def load(self) -> np.ndarray:
@@ -436,7 +441,7 @@ def _with_rows(
 ) -> TornSystem:
     """Build B for contact points and tied ones; the right side is left empty. Collective."""
     points, ties = met
-    has_friction, coefficient, tresca = friction_data(scene, points, decomposition.comm)
+    has_friction, coefficient, tresca, strengths = friction_data(scene, points, decomposition.comm)
     frictional = np.flatnonzero(has_friction)
     gluing, tearing, fixed = decomposition.gluing.rows, decomposition.tearing, decomposition.fixed
     tied = tied_relations(ties, scene.ties, fixed)
@@ -445,8 +450,9 @@ def _with_rows(
     numbering, B = _own_part(rows, decomposition, known)
     return TornSystem(
         scene, decomposition, subdomains, points, ties, gluing.count + tied.count, frictional,
-        coefficient[frictional], tresca[frictional], numbering, relations, B, np.zeros(0), np.zeros(0),
-        np.zeros((0, scene.dim - 1)), NO_MOTIONS,
+        coefficient[frictional], tresca[frictional],
+        None if strengths is None else strengths.part(frictional), numbering, relations, B,
+        np.zeros(0), np.zeros(0), np.zeros((0, scene.dim - 1)), NO_MOTIONS,
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -140,14 +140,20 @@ class SlipLaw(Protocol):
         """Return Ψ, a nodal force per friction disc, shape (n_friction,), owned."""
 
     @property
-    def growth(self) -> Vector:
-        """dΨ/dλ_N of each disc, shape (n_friction,), owned."""
+    def grows(self) -> bool:
+        """Whether the bound of some disc of this rank follows its normal force."""
+
+    def growth(self, multiplier: Vector) -> Vector:
+        """Return dΨ/dλ_N ≥ 0 of each disc, shape (n_friction,), owned."""
 
     def feasible(self, multiplier: Vector) -> FeasibleSet:
         """Return Λ(Ψ) for the slip bound that belongs to the multiplier."""
 
     def admit(self, multiplier: Vector) -> Vector:
-        """Return the nearest multiplier that the law admits with the slip bound of its own normal force."""
+        """Return the nearest multiplier that the law admits with the slip bound of its own normal force.
+
+        Where these are no convex set, that of the smallest convex cones that contain it.
+        """
 
     def scaled(self, factor: Vector) -> SlipLaw:
         """Return the law for μ where λ = s μ, with the factor s of each disc, shape (n_friction,), owned."""
@@ -169,8 +175,12 @@ class TrescaLaw:
         return self.slip_bound
 
     @property
-    def growth(self) -> Vector:
-        """Zero, as the bounds are given."""
+    def grows(self) -> bool:
+        """False, as the bounds are given."""
+        return False
+
+    def growth(self, multiplier: Vector) -> Vector:
+        """Return zeros."""
         return np.zeros_like(self.slip_bound)
 
     def feasible(self, multiplier: Vector) -> FeasibleSet:
@@ -186,6 +196,79 @@ class TrescaLaw:
         return TrescaLaw(self.layout, self.slip_bound / factor)
 
 
+class StrengthCurve(Protocol):
+    """The largest friction traction as a function of the pressure, which never falls."""
+
+    def strength(self, pressure: Vector) -> Vector:
+        """Return the traction, shape (n,), [force / area]; zero without pressure."""
+
+    def growth(self, pressure: Vector) -> Vector:
+        """Return its derivative, shape (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Strengths:
+    """Ψ(λ_N) = min(h(λ_N), Ψ_max) of friction discs, with h = μ λ_N or h = A t(λ_N / A).
+
+    Attributes:
+        coefficient: μ, shape (n,); where there is a curve the least one with t(p) ≤ μ p.
+        limit: Ψ_max, shape (n,), [force]; infinite where there is none.
+        area: A, shape (n,).
+        curve: Number of the curve t, −1 where there is none, shape (n,).
+        curves: The curves.
+    """
+
+    coefficient: Vector
+    limit: Vector
+    area: Vector
+    curve: npt.NDArray[np.int64]
+    curves: tuple[StrengthCurve, ...] = ()
+
+    def part(self, chosen: npt.NDArray[np.int64]) -> Strengths:
+        """Return those of some discs."""
+        return replace(
+            self,
+            coefficient=self.coefficient[chosen],
+            limit=self.limit[chosen],
+            area=self.area[chosen],
+            curve=self.curve[chosen],
+        )
+
+    def scaled(self, factor: Vector) -> Strengths:
+        """Return the bounds Ψ(s μ) / s of scaled normal forces."""
+        return replace(self, limit=self.limit / factor, area=self.area / factor)
+
+    def bound(self, normal: Vector) -> Vector:
+        """Return Ψ at normal forces λ_N, shape (n,), [force]."""
+        return np.minimum(self._rough(normal)[0], self.limit)
+
+    def growth(self, normal: Vector) -> Vector:
+        """Return dΨ/dλ_N, zero at the limit, shape (n,)."""
+        bound, growth = self._rough(normal)
+        return np.where(bound < self.limit, growth, 0.0)
+
+    def limited(self, normal: Vector) -> npt.NDArray[np.bool_]:
+        """Return which discs are at their limit, shape (n,)."""
+        return np.asarray(self._rough(normal)[0] >= self.limit)
+
+    def by_area(self, normal: Vector) -> Vector:
+        """Return dΨ/dA at given normal forces, shape (n,); limits are proportional to areas."""
+        bound, growth = self._rough(normal)
+        limited = bound >= self.limit
+        force = np.where(limited, self.limit, bound - growth * np.maximum(normal, 0.0))
+        return np.where((self.curve >= 0) | limited, force / np.where(self.area > 0.0, self.area, 1.0), 0.0)
+
+    def _rough(self, normal: Vector) -> tuple[Vector, Vector]:
+        """Return h and dh/dλ_N."""
+        force = np.maximum(normal, 0.0)
+        bound, growth = self.coefficient * force, self.coefficient.copy()
+        for number, curve in enumerate(self.curves):
+            mine = self.curve == number
+            pressure = force[mine] / self.area[mine]
+            bound[mine], growth[mine] = self.area[mine] * curve.strength(pressure), curve.growth(pressure)
+        return bound, growth
+
+
 @dataclass(frozen=True, eq=False)
 class CoulombLaw:
     """Slip bounds Ψ = Ψ₀ + μ max(λ_N, 0): a given part, zero by default, and one that follows λ_N.
@@ -195,11 +278,14 @@ class CoulombLaw:
     Attributes:
         friction_coefficient: μ per friction disc, shape (n_friction,), owned.
         given: Ψ₀ per friction disc, shape (n_friction,), owned, or one number for all, [force].
+        strengths: What follows λ_N in place of μ λ_N, owned: with a limit, or on a curve. Its coefficients
+            are those above.
     """
 
     layout: ContactLayout
     friction_coefficient: Vector
     given: Vector | float = 0.0
+    strengths: Strengths | None = None
 
     def __post_init__(self) -> None:
         """Check coefficients and given bounds."""
@@ -221,11 +307,19 @@ class CoulombLaw:
     def bound(self, multiplier: Vector) -> Vector:
         """Return Ψ₀ + μ max(λ_N, 0)."""
         normal = multiplier[self.layout.tangential_frictional]
+        if self.strengths is not None:
+            return self.given + self.strengths.bound(normal)
         return self.given + self.friction_coefficient * np.maximum(normal, 0.0)
 
     @property
-    def growth(self) -> Vector:
-        """The friction coefficient."""
+    def grows(self) -> bool:
+        """Whether any coefficient is positive."""
+        return bool(np.any(self.friction_coefficient > 0.0))
+
+    def growth(self, multiplier: Vector) -> Vector:
+        """Return the friction coefficient, or the slope of the curve; zero at a limit."""
+        if self.strengths is not None:
+            return self.strengths.growth(multiplier[self.layout.tangential_frictional])
         return self.friction_coefficient
 
     def feasible(self, multiplier: Vector) -> FeasibleSet:
@@ -243,11 +337,20 @@ class CoulombLaw:
         outside = (length > self.given + mu_f * normal) & (length > 0.0)
         # The nearest point of the mantle; where it has no normal force, of the disc at the cone's end.
         peak = np.maximum((normal + mu_f * (length - self.given)) / (1.0 + mu_f**2), 0.0)
-        shrink = np.divide(self.given + mu_f * peak, length, out=np.ones_like(length), where=outside)
+        radius = self.given + mu_f * peak
+        if self.strengths is not None:
+            # Cones end in cylinders: beyond their edge the normal force stays, or is that of the edge.
+            limit = self.strengths.limit
+            edge = np.divide(limit, mu_f, out=np.full_like(mu_f, np.inf), where=mu_f > 0.0)
+            peak = np.where(peak > edge, np.maximum(normal, edge), peak)
+            radius = self.given + np.minimum(mu_f * peak, limit)
+            outside |= length > self.given + limit
+        shrink = np.divide(radius, length, out=np.ones_like(length), where=outside)
         admitted[layout.tangential_frictional[outside]] = peak[outside]
         admitted[layout.tangential] = np.minimum(shrink, 1.0)[:, None] * tau
         return admitted
 
     def scaled(self, factor: Vector) -> CoulombLaw:
         """Return the law with the given part Ψ₀ / s; μ is unchanged, as s is that of the whole contact."""
-        return CoulombLaw(self.layout, self.friction_coefficient, np.asarray(self.given / factor))
+        strengths = None if self.strengths is None else self.strengths.scaled(factor)
+        return CoulombLaw(self.layout, self.friction_coefficient, np.asarray(self.given / factor), strengths)

@@ -162,7 +162,7 @@ class FrictionAlone:
         Collective on first use.
         """
         problem = self.problem
-        if global_max(problem.comm, float(problem.law.growth.max(initial=0.0))) == 0.0:
+        if global_max(problem.comm, float(problem.law.grows)) == 0.0:
             return None
         return self._pressed(np.zeros(problem.layout.size))
 

@@ -167,7 +167,7 @@ class Contradiction:
         layout, moved, law = problem.layout, self.direction, problem.law
         longest: Vector = np.full(self.n_groups, np.inf)
         closed, discs = layout.normal[face.closed], layout.tangential[face.stick]
-        pressing = law.growth[face.stick] * moved[layout.tangential_frictional[face.stick]]
+        pressing = law.growth(multiplier)[face.stick] * moved[layout.tangential_frictional[face.stick]]
         slipping = _until_slip(trial[discs], moved[discs], law.bound(multiplier)[face.stick], pressing)
         opening = _until_open(trial[closed], moved[closed])
         for rows, length in ((closed, opening), *((component, slipping) for component in discs.T)):
@@ -398,7 +398,8 @@ class FaceSteps:
         """Solve the linear system of a face, in which slipping forces grow with normal forces. Collective."""
         problem = self.problem
         system = self.systems.build(face)
-        linear = couple(system, problem.coarse, problem.law.growth, before.multiplier) or system
+        growth = problem.law.growth(before.multiplier)
+        linear = couple(system, problem.coarse, growth, before.multiplier) or system
         # Onto the face and into equilibrium; the Krylov method preserves both.
         entered = linear.enter(before.multiplier)
         product = before.product + apply_unless_zero(problem, self.operator, entered - before.multiplier)

@@ -222,7 +222,7 @@ def _coupled(springs: _Springs, balance: _Balance, target: float) -> _Balance:
     for _ in range(springs.coupled_steps):
         if balance.size <= target:
             break
-        slope = springs.slope(balance, springs.problem.law.growth)
+        slope = springs.slope(balance, springs.problem.law.growth(balance.trial))
         step = np.linalg.lstsq(slope, balance.imbalance, rcond=None)[0]
         following = springs.at(balance.motion - step)
         if not following.size < 0.5 * balance.size:

@@ -104,7 +104,7 @@ def may_grip(problem: DualProblem, multiplier: Vector) -> bool:
     `multiplier`: forces of the last load, owned; only the sum of the normal ones counts.
     """
     coarse, layout, comm = problem.coarse, problem.layout, problem.comm
-    if global_max(comm, float(problem.law.growth.max(initial=0.0))) == 0.0:
+    if global_max(comm, float(problem.law.grows)) == 0.0:
         return False
     rows, normal = layout.normal, multiplier[layout.normal]
     squares, count, pressed = global_sum(
@@ -150,6 +150,7 @@ def solve(
     start: DualSolution | Vector | None = None,
     *,
     friction_coefficient: Vector | None = None,
+    law: SlipLaw | None = None,
 ) -> DualSolution:
     """Solve min ½ λᵀF λ − dᵀλ subject to G λ = e, λ_N ≥ 0 and ‖τ_i‖ ≤ Ψ_i. Collective.
 
@@ -161,6 +162,7 @@ def solve(
         start: An earlier solution (of this problem or of one with the same rows) or a multiplier, owned.
         friction_coefficient: μ, shape (n_friction,), owned: Coulomb's law, Ψ = Ψ₀ + μ λ_N; then λ is a
             fixed point and not a minimiser.
+        law: Another law of the slip bounds, in place of both.
 
     Returns:
         The solution; its residuals were recomputed and are all below ``solver.tolerance``.
@@ -173,7 +175,7 @@ def solve(
     """
     problem.check()
     with together(problem.comm):
-        under_law = problem.with_law(_slip_law(problem, slip_bound, friction_coefficient))
+        under_law = problem.with_law(law or _slip_law(problem, slip_bound, friction_coefficient))
     same = isinstance(start, DualSolution) and start.problem is problem
     find = _solve_scaled if problem.scaling is not None else _solve_as_given
     return replace(find(under_law, solver, start, same), problem=problem)

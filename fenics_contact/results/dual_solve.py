@@ -6,6 +6,7 @@ import numpy as np
 
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.torn import TornSystem
+from fenics_contact.qp.cones import TrescaLaw
 from fenics_contact.qp.face_newton import SlidingError
 from fenics_contact.qp.fixed_point import FixedPoint
 from fenics_contact.qp.smalse import Smalse
@@ -22,11 +23,11 @@ def solve_dual(
 
     `start`: earlier solution, or multiplier to start from, owned, or None.
     """
-    tresca, coefficient = system.torn.friction
-    if coefficient is not None and isinstance(solver, Smalse):
+    law = system.torn.law
+    if not isinstance(law, TrescaLaw) and isinstance(solver, Smalse):
         solver = FixedPoint(solver)
     try:
-        return solve(system.problem, tresca, solver, start, friction_coefficient=coefficient)
+        return solve(system.problem, None, solver, start, law=law)
     except SlidingError as error:
         (motion,) = rigid_motions(system.torn, (system.kernel @ error.motion)[:, None])
         rounded = {name: np.round(own, 3) + 0.0 for name, own in motion.bodies.items()}
@@ -53,7 +54,7 @@ def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray
     tau, minus_slip, tangential_step = (x[count:].reshape(-1, torn.dim - 1) for x in gathered)
     trial_normal = normal - normal_step * gap
     trial_tangential = tau - tangential_step * minus_slip
-    bound = torn.tresca_bound + torn.friction_coefficient * np.maximum(normal[frictional], 0)
+    bound = torn.slip_bound(normal[frictional])
     status = np.where(trial_normal > 0, Status.SLIP, Status.OPEN).astype(int)
     sticks = (np.linalg.norm(trial_tangential, axis=1) < bound) & (trial_normal[frictional] > 0)
     status[frictional[sticks]] = Status.STICK

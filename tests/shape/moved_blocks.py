@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from fenics_contact import Coulomb, Scene, Tresca
+from fenics_contact import Coulomb, FrictionTable, Scene, Tresca
 from tests.shape.blocks import block_on_block, block_on_floor, problem
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Line
@@ -20,6 +20,12 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "floor, Tresca, tetrahedra": lambda: block_on_floor(Tresca(0.6), "tetrahedron", load=PUSH),
     "blocks, Tresca": lambda: block_on_block(Tresca(0.8), load=DRAG),
     "blocks, tetrahedra": lambda: block_on_block(Coulomb(0.38), "tetrahedron", load=DRAG),
+    "floor, shear limit": lambda: block_on_floor(
+        Coulomb(0.3, shear_limit=lambda x: 0.5 + 0.05 * x[:, 0]), load=PUSH
+    ),
+    "floor, table": lambda: block_on_floor(
+        Coulomb(FrictionTable((0.5, 2.5, 4.0), (0.35, 0.25, 0.22))), load=PUSH
+    ),
     "weight alone": lambda: block_on_block(Coulomb(0.25), load=(0.0, 0.0, 0.0)),
 }
 
