@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, PositiveFloat
 from scipy.spatial.transform import Rotation
 
 from fenics_contact._scene import automatic, loads, pairs, surface_laws
@@ -23,6 +24,7 @@ from fenics_contact._scene_file.values import (
     FieldOrMeasured,
     Motion,
     NotNegativeField,
+    PlaceOfFile,
     Scalar,
     ScalarField,
     Triple,
@@ -33,6 +35,12 @@ from fenics_contact._scene_file.values import (
     one_of,
 )
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.readers.triangulation import read_triangulation
+from fenics_contact.shapes.rounded import Box, Cone
+from fenics_contact.shapes.triangulation import Triangulation
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 
 @dataclass(frozen=True)
@@ -71,7 +79,9 @@ class ObstaclePart(Part):
 
     def made(self, **other: Any) -> Any:
         """Build the obstacle, one that moves if there is a motion."""
-        still = super().made(**other)
+        return self._moving(super().made(**other))
+
+    def _moving(self, still: Any) -> Any:
         if self.motion is None:
             return still
         dim = 2 if len(self.motion) == 3 else 3
@@ -82,6 +92,23 @@ class ObstaclePart(Part):
                 f"{dim} coordinates, got {self.motion!r} about {about!r}: prescribe all of it"
             )
         return MovingObstacle(still, ObstaclePath(self.motion, tuple(about)))
+
+
+@keys_of(Triangulation, only=("smooth",))
+class TriangulationPart(ObstaclePart):
+    """A body bounded by the triangles of a file."""
+
+    obstacle: Literal["triangulation"]
+    file: PlaceOfFile = Field(
+        description="the file, STL or another that meshio reads, relative to the folder of the scene file"
+    )
+    scale: PositiveFloat = Field(1.0, description="factor of its coordinates")
+
+    def read(self, folder: Path, comm: MPI.Comm) -> Any:
+        """Return the obstacle, with its triangles read on rank 0. Collective."""
+        smooth: float = self.smooth  # type: ignore[attr-defined]
+        still = read_triangulation(folder / self.file, scale=self.scale, smooth=smooth, comm=comm)
+        return self._moving(still)
 
 
 @keys_of(Surface)
@@ -105,6 +132,9 @@ OBSTACLES = (
     table_of(obstacles_module.RigidPlane, ObstaclePart, obstacle="plane"),
     table_of(obstacles_module.RigidSphere, ObstaclePart, obstacle="sphere"),
     table_of(obstacles_module.RigidCylinder, ObstaclePart, obstacle="cylinder", point=Triple, axis=Triple),
+    table_of(Cone, ObstaclePart, obstacle="cone", tip=Triple, axis=Triple),
+    table_of(Box, ObstaclePart, obstacle="box"),
+    TriangulationPart,
     table_of(
         obstacles_module.DistanceObstacle,
         ObstaclePart,

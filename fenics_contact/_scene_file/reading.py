@@ -22,7 +22,7 @@ from fenics_contact._optimize.nonlinear import NonlinearConstraint
 from fenics_contact._optimize.progress import Callback
 from fenics_contact._optimize.result import Result
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.fields import SampledField, read_field
+from fenics_contact._scene.fields import read_field
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene_file.bodies import Shaped
 from fenics_contact._scene_file.design import (
@@ -36,6 +36,7 @@ from fenics_contact._scene_file.design import (
     objective_of,
 )
 from fenics_contact._scene_file.document import Document, load_steps, refused_python
+from fenics_contact._scene_file.model import TriangulationPart
 from fenics_contact._scene_file.source import (
     Mistake,
     SceneFileError,
@@ -178,29 +179,34 @@ AnyDocument = TypeVar("AnyDocument", bound=BaseModel)
 
 
 def with_fields_read(source: Source, document: AnyDocument, comm: MPI.Comm) -> AnyDocument:
-    """Return a document in which every field from a file is a function of position. Collective on ``comm``.
+    """Return a document with the fields and obstacles of the files that it names. Collective on ``comm``.
 
     Each file is read once, on rank 0.
     """
     mistakes: list[Mistake] = []
-    read: dict[tuple[Any, ...], SampledField] = {}
+    read: dict[tuple[Any, ...], Any] = {}
     for path, part in branches(document):
         if isinstance(part, FieldFile) and _key(part) not in read:
             with located(source, path, mistakes):
                 read[_key(part)] = read_field(source.folder / part.file, part.field, comm=comm)
+        if isinstance(part, TriangulationPart):
+            with located(source, path, mistakes):
+                read[_key(part)] = part.read(source.folder, comm)
     with together(comm):
         if mistakes:
             raise SceneFileError(source.name, mistakes)
     return _replaced(document, read) if read else document
 
 
-def _key(part: FieldFile) -> tuple[Any, ...]:
+def _key(part: FieldFile | TriangulationPart) -> tuple[Any, ...]:
+    if isinstance(part, TriangulationPart):
+        return (id(part),)
     return part.file, tuple(part.field) if isinstance(part.field, list) else part.field
 
 
-def _replaced(value: Any, read: Mapping[tuple[Any, ...], SampledField]) -> Any:
-    """Return a copy of a part of a document with its fields."""
-    if isinstance(value, FieldFile):
+def _replaced(value: Any, read: Mapping[tuple[Any, ...], Any]) -> Any:
+    """Return a copy of a part of a document with what was read from files."""
+    if isinstance(value, FieldFile | TriangulationPart):
         return read[_key(value)]
     if isinstance(value, BaseModel):
         own = {name: (part, _replaced(part, read)) for name, part in value}

@@ -5,6 +5,7 @@ from fenics_contact.readers.dolfinx import DolfinxBodies, from_dolfinx, read_xdm
 from fenics_contact.readers.gmsh import from_gmsh_model, read_msh, refilled
 from fenics_contact.readers.gmsh_session import gmsh_model
 from fenics_contact.readers.meshio import from_meshio
+from fenics_contact.readers.triangulation import read_triangulation
 
 __all__ = [
     "CadFace",
@@ -17,6 +18,7 @@ __all__ = [
     "from_meshio",
     "gmsh_model",
     "read_msh",
+    "read_triangulation",
     "read_xdmf",
     "refilled",
 ]

@@ -2,6 +2,7 @@
 
 from fenics_contact.shapes.parametric import Parametric, SplinePatch
 from fenics_contact.shapes.profile import Profile
+from fenics_contact.shapes.rounded import Box, Cone
 from fenics_contact.shapes.simple import (
     Circle,
     Cylinder,
@@ -13,9 +14,12 @@ from fenics_contact.shapes.simple import (
     SurfaceShape,
     Torus,
 )
+from fenics_contact.shapes.triangulation import Triangulation
 
 __all__ = [
+    "Box",
     "Circle",
+    "Cone",
     "Cylinder",
     "Extruded",
     "Parametric",
@@ -27,4 +31,5 @@ __all__ = [
     "SplinePatch",
     "SurfaceShape",
     "Torus",
+    "Triangulation",
 ]

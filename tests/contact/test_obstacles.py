@@ -39,6 +39,7 @@ from fenics_contact.gallery import block, hemisphere, rectangle
 from fenics_contact.materials import IsotropicElasticity, J2Plasticity, Material, PlaneStrain
 from fenics_contact.mesh import bisection_partition, quadratic
 from fenics_contact.qp import FaceNewton
+from fenics_contact.shapes import Triangulation
 from tests.contact.bedded import FORCE, Bedded, pushed
 from tests.contact.checks import assert_solved
 from tests.contact.press_fits import (
@@ -51,6 +52,7 @@ from tests.contact.press_fits import (
     press_fit,
     thick_press_fit,
 )
+from tests.surface_shapes.bodies import ball
 
 RUBBER = IsotropicElasticity(100.0, 0.3)
 TOLERANCE = 1e-9
@@ -102,6 +104,21 @@ def test_a_distance_function_holds_up_a_block_as_the_shape_itself_does(
     np.testing.assert_allclose(other.contact.force, contact.force, atol=1e-6 * size)
     u = given.gather_displacement("block")
     np.testing.assert_allclose(other.gather_displacement("block"), u, atol=1e-7 * np.abs(u).max())
+
+
+def test_a_tool_of_triangles_presses_as_the_ball_that_it_approximates() -> None:
+    """Its facets miss the ball by their height over the indentation, and so does the force."""
+    true, errors = pressed(BELOW["ball"], 3), []
+    size = np.linalg.norm(true.contact.force.sum(axis=0))
+    for count in (2000, 8000):
+        points, triangles = ball(count, BUMP)
+        state = pressed(Triangulation(points + np.array([1.0, 0.5, -BUMP]), triangles), 3)
+        assert_solved(state, TOLERANCE)
+        errors.append(np.linalg.norm((state.contact.force - true.contact.force).sum(axis=0)) / size)
+        deep = np.abs(state.contact.points.gap - true.contact.points.gap).max()
+        # Middle of an equilateral facet: a third of its squared edge over twice the radius.
+        assert deep < 1.5 * (4.0 * np.pi * BUMP**2 / count) * 2.0 / np.sqrt(3.0) / (6.0 * BUMP)
+    assert errors[1] < 0.4 * errors[0] < 0.04
 
 
 @pytest.mark.parametrize("name", ["ball", "bar", "disc"])

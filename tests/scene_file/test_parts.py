@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -20,8 +21,10 @@ from fenics_contact._scene_file.values import Expression, VectorExpression
 from fenics_contact.gallery import LinkShape, block, chain, half_disc, hemisphere, rectangle
 from fenics_contact.materials import elastic, hyperelastic, orthotropic, plastic
 from fenics_contact.readers import gmsh_model, read_msh
+from fenics_contact.shapes import Box, Cone
 from tests.conftest import ROOT
 from tests.scene_file.texts import GOOD, changed
+from tests.surface_shapes.bodies import CUBE, SIDES
 
 SELF = MPI.COMM_SELF
 BLOCK = {"shape": "block", "lower": [0, 0, 0], "upper": [2, 1, 1], "counts": [4, 2, 2]}
@@ -248,23 +251,44 @@ def test_obstacles_and_laws_of_friction_are_those_of_the_package() -> None:
         {"obstacle": "sphere", "centre": [0, 0, -9], "radius": 9, "hollow": False},
         {"obstacle": "cylinder", "point": [0, 0, -9], "axis": [1, 0, 0], "radius": 9},
         {"obstacle": "distance", "formula": "z"},
+        {"obstacle": "cone", "tip": [0, 0, -1], "axis": [0, 0, -1], "half_angle": 1.2, "radius": 0.5},
+        {"obstacle": "box", "centre": [0, 0, -2], "size": [3, 3, 2], "radius": 0.5, "rotation": [0, 0, 0.1]},
     ]
     laws: list[dict[str, Any]] = [
         {"law": "none"}, {"law": "coulomb", "coefficient": 0.2}, {"law": "tresca", "traction": 3},
-        {"law": "none"},
+        {"law": "none"}, {"law": "none"}, {"law": "none"},
     ]  # fmt: skip
     contacts = [
         {"slave": {"body": "a", "surface": "z0"}, "master": master, "friction": law}
         for master, law in zip(masters, laws, strict=True)
     ]
     found = file_of(contacts=contacts).scene.contacts
-    assert [pair.friction for pair in found] == [None, pairs.Coulomb(0.2), pairs.Tresca(3.0), None]
+    assert [pair.friction for pair in found] == [None, pairs.Coulomb(0.2), pairs.Tresca(3.0), *[None] * 3]
     assert [pair.master for pair in found] == [
         obstacles.RigidPlane((0, 0, 0), (0, 0, 1)),
         obstacles.RigidSphere((0, 0, -9), 9.0),
         obstacles.RigidCylinder((0, 0, -9), (1, 0, 0), 9.0),
         obstacles.DistanceObstacle(Expression("z")),
+        Cone((0, 0, -1), (0, 0, -1), 1.2, 0.5),
+        Box((0, 0, -2), (3, 3, 2), 0.5, (0, 0, 0.1)),
     ]
+
+
+def test_an_obstacle_of_triangles_comes_from_a_file(tmp_path: Path) -> None:
+    meshio.write_points_cells(tmp_path / "tool.stl", CUBE, [("triangle", SIDES)])
+    table = 'master = { obstacle = "triangulation", file = "tool.stl", scale = 2.0'
+    moved = ', motion = [0.0, 0.0, "t", 0.0, 0.0, 0.0] }'
+    body = 'master = { body = "lower", surface = "z1" }'
+    for end in (" }", moved):
+        (tmp_path / "scene.toml").write_text(changed((body, table + end)))
+        (pair,) = read_scene_file(tmp_path / "scene.toml", MPI.COMM_SELF).scene.contacts
+        assert pair.master.distance(np.array([[1.0, 1.0, 2.5]])) == pytest.approx(0.5)  # type: ignore[union-attr]
+    assert pair.master.at(0.25).distance(np.array([[1.0, 1.0, 2.5]])) == pytest.approx(0.25)
+    meshio.write_points_cells(tmp_path / "tool.stl", CUBE, [("triangle", SIDES[1:])])
+    with pytest.raises(
+        SceneFileError, match=r"contacts\.0\.master: file .*tool.stl.* got 3 open edges of 18"
+    ):
+        _ = read_scene_file(tmp_path / "scene.toml", MPI.COMM_SELF).scene
 
 
 @pytest.mark.parametrize("geometry", ["best", "reconstructed", "faceted"])

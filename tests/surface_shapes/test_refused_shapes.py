@@ -9,6 +9,8 @@ import pytest
 
 from fenics_contact.errors import InvalidInputError, UserCodeError
 from fenics_contact.shapes import (
+    Box,
+    Cone,
     Extruded,
     Parametric,
     Plane,
@@ -46,6 +48,22 @@ def circle(u: np.ndarray) -> np.ndarray:
             "^Torus.axis must be 3 finite numbers, not all zero",
         ),
         (lambda: Torus((0.0, 0.0), AXIS, 2.0, 1.0), "^Torus must be placed by 3 finite numbers"),
+        (
+            lambda: Cone(CENTRE, AXIS, 1.6),
+            "^Cone.half_angle must lie between 0 and π/2 = 1.5708, got 1.6: it is",
+        ),
+        (lambda: Cone(CENTRE, AXIS, 1.0, -0.1), "^Cone.radius must be zero or positive, got -0.1"),
+        (lambda: Box(CENTRE, (1.0, 2.0)), r"^Box.size must be 3 positive numbers, got \(1.0, 2.0\)"),
+        (lambda: Box(CENTRE, (1.0, 2.0, 0.0)), "^Box.size must be 3 positive numbers"),
+        (
+            lambda: Box(CENTRE, (1.0, 2.0, 3.0), 0.6),
+            "^Box.radius must be at most half of the smallest length, 0.5, got 0.6: give a smaller",
+        ),
+        (
+            lambda: Box(CENTRE, (1.0, 2.0, 3.0), rotation=0.6),
+            "^Box.rotation must be three finite numbers, in",
+        ),
+        (lambda: Box((0.0, 0.0), (1.0, 2.0), rotation=AXIS), "^Box.rotation must be one finite number"),
         (lambda: Sphere(CENTRE, -1.0), "^Sphere.radius must be a positive number, got -1.0"),
         (
             lambda: Extruded(Sphere((0.0, 0.0), 1.0), CENTRE, AXIS, AXIS),

@@ -10,6 +10,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from fenics_contact.shapes import (
+    Box,
+    Cone,
     Cylinder,
     Extruded,
     Parametric,
@@ -64,6 +66,10 @@ SHAPES: dict[str, SurfaceShape] = {
     "groove": Torus(CENTRE, AXIS, 1.5, 0.4, hollow=True),
     "prism": Extruded(Sphere((0.3, 0.1), 0.7), CENTRE, AXIS, (1.0, 0.0, 0.0)),
     "cone": Revolved(Plane((1.5, 0.0), (2.0, 1.0)), CENTRE, AXIS),
+    "round cone": Cone(CENTRE, AXIS, 0.7, 0.3),
+    "sharp cone": Cone(CENTRE, AXIS, 0.7),
+    "box": Box(CENTRE, (1.0, 1.4, 1.2), 0.3, (0.3, -0.5, 0.2)),
+    "rectangle": Box((0.1, -0.2), (1.0, 1.4), 0.3, 0.4),
     "spindle": Revolved(Sphere((0.0, 0.2), 0.6), CENTRE, AXIS),
     "ball turned": placed(Torus(CENTRE, AXIS, 1.5, 0.4), TURN, (0.3, 0.1, -0.2), 1.3),
     "circle": Parametric(circle, (0.0,), (2 * np.pi,), periodic=(True,)),
