@@ -16,7 +16,8 @@ Values of loads: SampledField, read_field, Ufl
 Equilibrium: solve_scene, solve_steps, ContactProblem, LoadSequence, AutomaticSteps, TangentNewton,
     FixedPoint, Tolerance
 
-Results: State, LinearState, DeformedState, NewtonSteps, Status, contact_area
+Results: State, LinearState, DeformedState, NewtonSteps, Status, contact_area,
+    contact_width
 
 Shape optimisation: ShapeProblem, SurfaceDesign, minimize
 
@@ -101,6 +102,7 @@ if TYPE_CHECKING:
     from fenics_contact.readers.cad import read_cad as read_cad
     from fenics_contact.readers.meshio import read_mesh as read_mesh
     from fenics_contact.results.area import contact_area as contact_area
+    from fenics_contact.results.area import contact_width as contact_width
     from fenics_contact.results.contact import Status as Status
     from fenics_contact.results.deformed_state import DeformedState as DeformedState
     from fenics_contact.results.deformed_state import NewtonSteps as NewtonSteps

@@ -23,7 +23,6 @@ from rich.text import Text
 
 from fenics_contact._base.display import COLUMNS, counted, force_units
 from fenics_contact._base.progress import at_terminal, visible
-from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact.errors import (
     ConvergenceError,
@@ -34,7 +33,7 @@ from fenics_contact.errors import (
 )
 from fenics_contact.output.files import OutputError
 from fenics_contact.output.result import listed_forces, scales_of
-from fenics_contact.results.contact import Status
+from fenics_contact.output.tables import rounded
 from fenics_contact.results.state import State, pairs_in_words
 
 if TYPE_CHECKING:
@@ -242,16 +241,10 @@ def forces_table(forces: Mapping[str, Any], units: Mapping[str, str] | None = No
     scales = scales_of(forces)
     for what, entry in listed_forces(forces):
         where = f"{entry['body']} {entry['surface']}" if "surface" in entry else ""
-        numbers = np.hstack([_rounded(entry[kind], scale) for kind, scale in scales.items()])
+        numbers = np.hstack([rounded(entry[kind], scale) for kind, scale in scales.items()])
         if where or numbers.any():
             table.add_row(what, where, *(f"{number:.5g}" for number in numbers))
     return table
-
-
-def _rounded(values: Any, scale: float) -> np.ndarray:
-    """Return numbers with rounding set to zero."""
-    numbers = np.atleast_1d(np.asarray(values, dtype=float))
-    return np.where(np.abs(numbers) > ROUNDING * scale, numbers, 0.0)
 
 
 def _place(point: Any) -> str:
@@ -283,21 +276,6 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
     return {name: words for name, words in rows.items() if not words.startswith("nan")}
 
 
-def step_row(number: int, name: str, state: State) -> dict[str, Any]:
-    """Return a row of `step_table`, which result files hold, too."""
-    contact, counts = state.contact, state.counts
-    return {
-        "number": number,
-        "name": name,
-        "iterations": counts["solver_steps"],
-        "products": counts["f_products"],
-        **{status.name.lower(): contact.count(status) for status in Status},
-        "normal_force": float(contact.normal_force.sum()),
-        "friction_force": _resultant(state),
-        "peak_pressure": float(contact.pressure.max(initial=0.0)),
-    }
-
-
 def step_table(rows: Sequence[Mapping[str, Any]], file: SceneFile) -> Table:
     """Return one row for every load step."""
     units = file.document.units
@@ -315,15 +293,6 @@ def step_table(rows: Sequence[Mapping[str, Any]], file: SceneFile) -> Table:
     for row in rows:
         table.add_row(*(f"{value:.6g}" if isinstance(value, float) else str(value) for value in row.values()))
     return table
-
-
-def _resultant(state: State) -> float:
-    """Return the magnitude of the sum of all friction forces, zero below what the solver left, [force]."""
-    contact = state.contact
-    tangential = contact.force - contact.normal_force[:, None] * contact.points.normal
-    size = float(np.linalg.norm(tangential.sum(axis=0)))
-    left = max(ROUNDING, float(np.nan_to_num(state.solution.natural_residual)))
-    return size if size > left * float(np.abs(contact.force).sum()) else 0.0
 
 
 def _largest_displacement(state: State) -> float:

@@ -21,6 +21,7 @@ from fenics_contact.output.files import only_run_in
 from fenics_contact.output.paraview import ResultSeries, file_of_each
 from fenics_contact.output.result import write_optimisation_result
 from fenics_contact.output.surfaces import write_design_table, write_stl
+from fenics_contact.output.tables import write_contact_table
 from fenics_contact.results.state import pairs_in_words
 
 _MILLIMETRES = {"µm": 1e-3, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
@@ -103,7 +104,7 @@ def _minimised(
 ) -> tuple[Result, list[Path]]:
     """Run the optimisation and write its files; return these, too. Collective."""
     checkpoint = checkpoint_of(file, resume)
-    kinds = file.document.output.files
+    kinds = file.document.output.field_files
     series = ResultSeries(file.folder, "designs", console.comm, formats=kinds) if kinds else None
     follow = None if series is None else series.follow(task.problem)
     with resumable(console, checkpoint):
@@ -112,6 +113,8 @@ def _minimised(
     write_optimisation_result(result, task.problem, file.folder, more=more)
     written = [] if series is None else [series.path]
     written += write_design_files(console, file, task.problem, result.x)
+    if "csv" in file.document.output.files and file.scene.contacts:
+        written.append(write_contact_table(task.problem.at(result.x).state, file.folder / "contact.csv"))
     # A run that stopped at a limit can continue from its checkpoint with a larger one.
     if result.reason.success:
         forget(console, checkpoint)

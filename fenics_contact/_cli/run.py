@@ -14,7 +14,6 @@ from fenics_contact._cli.console import (
     facts,
     forces_table,
     state_facts,
-    step_row,
     step_table,
 )
 from fenics_contact._cli.options import checkpoint_of, forget, resumable, scene_command
@@ -24,6 +23,7 @@ from fenics_contact.errors import LoadStepError
 from fenics_contact.output.files import only_run_in
 from fenics_contact.output.paraview import ResultSeries, write_vtu, write_xdmf
 from fenics_contact.output.result import forces_record, write_result
+from fenics_contact.output.tables import StepTable, step_row, write_contact_table
 from fenics_contact.results.deformed_state import DeformedState
 from fenics_contact.results.state import State
 
@@ -52,11 +52,15 @@ run = scene_command(_run)
 
 
 def _files(file: SceneFile) -> list[str]:
-    """Return the names of the files of fields to open."""
-    kinds = file.document.output.files
-    if file.steps:
-        return ["history.pvd"] if kinds else []
-    return ["state.vtm"] if "vtu" in kinds else []
+    """Return the names of the files to open."""
+    output, names = file.document.output, list[str]()
+    if "vtu" in output.files or (file.steps and output.field_files):
+        names.append("history.pvd" if file.steps else "state.vtm")
+    if "csv" in output.files:
+        names.append("steps.csv")
+        if file.scene.contacts:
+            names.append("contact/" if file.steps else "contact.csv")
+    return names
 
 
 def _at_once(console: Console, file: SceneFile) -> dict[str, State]:
@@ -75,6 +79,10 @@ def _write(file: SceneFile, state: State) -> None:
         write_vtu(state, file.folder)
     if "xdmf" in kinds:
         write_xdmf(state, file.folder / "state.xdmf")
+    if "csv" in kinds:
+        StepTable(file.folder / "steps.csv", file.comm).add(state, file.title)
+        if file.scene.contacts:
+            write_contact_table(state, file.folder / "contact.csv")
     write_result(state, file.folder, more=_origin(file), errors=state.known_errors is not None)
 
 
@@ -109,19 +117,16 @@ def _through_steps(console: Console, file: SceneFile, resume: bool | None) -> di
     rows, drawn = list[dict[str, Any]](), dict[str, State]()
     chosen = set(np.unique(np.linspace(0, len(file.steps) - 1, MAPS).round().astype(int)))
     with resumable(console, checkpoint):
-        sequence = file.sequence(checkpoint)
-        series = ResultSeries(file.folder, "history", console.comm, formats=file.document.output.files)
+        sequence, keep = file.sequence(checkpoint), _writer(console, file)
 
-        def keep(last: DeformedState) -> None:
-            if file.document.output.files:
-                series.add(last, last.equilibrium.time, f"{step.name}, as far as it could be followed")
+        def keep_last(last: DeformedState) -> None:
+            keep(last, len(rows), last.equilibrium.time, f"{step.name}, as far as it could be followed")
             write_result(last, file.folder, more={**_origin(file), "steps": _steps(rows, file)})
 
         for number, step in enumerate(file.steps):
-            with _keeping_last(console, file, keep):
+            with _keeping_last(console, file, keep_last):
                 state = sequence.advance(step)
-            if file.document.output.files:
-                series.add(state, number if step.time is None else step.time, step.name)
+            keep(state, number, number if step.time is None else step.time, step.name)
             rows.append(step_row(number, step.name, state))
             if number in chosen:
                 drawn[f"{number}: {step.name}"] = state
@@ -132,6 +137,23 @@ def _through_steps(console: Console, file: SceneFile, resume: bool | None) -> di
     write_result(state, file.folder, more=more, errors=state.known_errors is not None)
     forget(console, checkpoint)
     return drawn
+
+
+def _writer(console: Console, file: SceneFile) -> Callable[[State, int, float, str], None]:
+    """Return what writes the files of a load step: its state, number, time and name. Collective."""
+    output = file.document.output
+    series = ResultSeries(file.folder, "history", console.comm, formats=output.field_files)
+    table = StepTable(file.folder / "steps.csv", console.comm)
+
+    def keep(state: State, number: int, time: float, name: str) -> None:
+        if output.field_files:
+            series.add(state, time, name)
+        if "csv" in output.files:
+            table.add(state, name, time)
+            if file.scene.contacts:
+                write_contact_table(state, file.folder / "contact" / f"step_{number:04d}.csv")
+
+    return keep
 
 
 def _origin(file: SceneFile) -> dict[str, Any]:

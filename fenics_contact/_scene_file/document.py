@@ -313,7 +313,7 @@ def _require_few(steps: Sequence[StepPart]) -> None:
         )
 
 
-FileKind: TypeAlias = Literal["vtu", "xdmf"]
+FileKind: TypeAlias = Literal["vtu", "xdmf", "csv"]
 DesignFileKind: TypeAlias = Literal["csv", "stl", "step"]
 PictureKind: TypeAlias = Literal["stress", "pressure", "status", "decomposition", "error"]
 _ByRegion = Annotated[dict[str, str], Field(min_length=1)]
@@ -350,7 +350,9 @@ class OutputPart(Part):
         default=None,
         description="folder of the results, relative to where the command runs (output/NAME of the file)",
     )
-    files: list[FileKind] = Field(default=["vtu"], description="files of fields, for ParaView")
+    files: list[FileKind] = Field(
+        default=["vtu"], description="fields for ParaView; csv: tables of contact points and load steps"
+    )
     design: list[DesignFileKind] = Field(
         default=["csv"],
         description="files of an optimised surface: a table, the body as triangles, for CAD programs",
@@ -359,6 +361,11 @@ class OutputPart(Part):
     checkpoint: bool = Field(
         default=True, description="keep a file from which interrupted load steps or optimisations go on"
     )
+
+    @property
+    def field_files(self) -> list[FileKind]:
+        """Kinds of ``files`` that hold fields."""
+        return [kind for kind in self.files if kind != "csv"]
 
 
 class Document(Part):

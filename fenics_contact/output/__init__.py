@@ -8,14 +8,17 @@ from fenics_contact.output.files import OutputError, only_run_in, write_json, wr
 from fenics_contact.output.paraview import ResultSeries, write_xdmf
 from fenics_contact.output.result import read_result, versions, write_optimisation_result
 from fenics_contact.output.surfaces import write_design_table, write_stl
+from fenics_contact.output.tables import StepTable, write_contact_table
 
 __all__ = [
     "CadError",
     "OutputError",
     "ResultSeries",
+    "StepTable",
     "only_run_in",
     "read_result",
     "versions",
+    "write_contact_table",
     "write_design_table",
     "write_json",
     "write_optimisation_result",

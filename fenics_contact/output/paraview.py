@@ -371,7 +371,7 @@ class ResultSeries:
             folder: Output folder; created with the first member.
             name: Name of the series, the beginning of all file names.
             comm: Communicator of the states.
-            formats: Any of "vtu", "xdmf" and "vtx"; VTU files are always written.
+            formats: Any of "vtu" and "xdmf"; VTU files are always written.
 
         Raises:
             InvalidInputError: If the name contains a folder, a format is unknown or unavailable, or a PVD

@@ -1,17 +1,22 @@
-"""The area in which surfaces touch."""
+"""The area in which surfaces touch, and its width."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
 import numpy as np
 
-from fenics_contact._scene.pairs import Surface
+from fenics_contact._base.checks import GivenVector, unit_vector
+from fenics_contact._scene.pairs import Surface, pair_number
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._surfaces.facets import filled_at_corners
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.results.state import State
 
 
-def contact_area(state: State, pair: int = 0) -> float:
+def contact_area(state: State, pair: int | str = 0) -> float:
     """Return the area in which the surfaces of a pair touch, in the plane the length, [length²] or [length].
 
     It is measured on the slave, on the deformed one where its material is made for large deformations.
@@ -23,12 +28,112 @@ def contact_area(state: State, pair: int = 0) -> float:
 
     Args:
         state: The state.
-        pair: Number of the contact pair in the scene.
+        pair: Number of the contact pair in the scene, or its name: its slave, as in "lid bottom", or both
+            surfaces.
+
+    Raises:
+        InvalidInputError: If the scene has no such pair.
 
     References:
         Johnson, K. L.: Contact Mechanics. Cambridge University Press (1985), sections 3.2 and 5.1.
     """
+    surface, total = _slave_surface(state, pair), 0.0
+    for corners, weight in _simplices(surface.facets.shape[1]):
+        facets = surface.facets[:, corners]
+        edges = surface.places[facets[:, 1:]] - surface.places[facets[:, :1]]
+        gram = np.linalg.det(edges @ np.swapaxes(edges, 1, 2))
+        size = np.sqrt(np.maximum(gram, 0.0)) / (len(corners) - 1)
+        total += weight * float(size @ surface.closed_share(facets))
+    return total
+
+
+def contact_width(state: State, direction: GivenVector, pair: int | str = 0) -> float:
+    """Return how far the area in which the surfaces of a pair touch reaches along a direction, [length].
+
+    From its first to its last point, as `contact_area` locates its rim, with all that is open between them:
+    the width of a roller's footprint, the diameter of a ball's; in a half model, half of it. Zero where
+    nothing touches. Collective.
+
+    Args:
+        state: The state.
+        direction: The direction, of any length, shape (dim,).
+        pair: As for `contact_area`.
+
+    Raises:
+        InvalidInputError: If the scene has no such pair, or the direction does not fit the space.
+
+    Example:
+        >>> contact_width(state, (1, 0, 0), "tyre tread")  # doctest: +SKIP
+    """
+    along = np.array(unit_vector("the direction of a contact width", direction, state.scene.dim))
+    surface = _slave_surface(state, pair)
+    ends = [surface.places[surface.closed] @ along]
+    for corners, _ in _simplices(surface.facets.shape[1]):
+        for first, second in combinations(corners, 2):
+            ends.append(surface.rim(surface.facets[:, [first, second]]) @ along)
+    reached = np.concatenate(ends)
+    return float(np.ptp(reached)) if reached.size else 0.0
+
+
+@dataclass(frozen=True)
+class _SlaveSurface:
+    """A slave surface, with what locates the rim of the contact on it.
+
+    Attributes:
+        places: Its nodes, deformed if its body deforms much, shape (n, dim), [length].
+        facets: Its facets by the numbers of their corners, shape (n_facets, corners).
+        pressure: Of closed nodes, zero at open ones, shape (n,).
+        spread: E* times the gap of open nodes, shape (n,).
+    """
+
+    places: np.ndarray
+    facets: np.ndarray
+    pressure: np.ndarray
+    spread: np.ndarray
+
+    @cached_property
+    def closed(self) -> np.ndarray:
+        """Marks of the nodes that touch, shape (n,)."""
+        return self.pressure > 0.0
+
+    def reach(self, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """Return how far contact reaches from closed towards open nodes, relative to their distances."""
+        length = np.linalg.norm(self.places[one] - self.places[other], axis=1)
+        return _reach(self.pressure[one], self.spread[other], length)
+
+    def rim(self, edges: np.ndarray) -> np.ndarray:
+        """Return where the rim crosses edges, (n_edges, 2), of which one end is closed, (m, dim)."""
+        crossed = edges[self.closed[edges].sum(axis=1) == 1]
+        inner, outer = np.where(self.closed[crossed[:, :1]], crossed, crossed[:, ::-1]).T
+        share = self.reach(inner, outer)[:, None]
+        return np.asarray((1.0 - share) * self.places[inner] + share * self.places[outer])
+
+    def closed_share(self, facets: np.ndarray) -> np.ndarray:
+        """Return the share of simplices that touches, shape (n,).
+
+        The rim cuts off one corner: a triangle whose sides are the parts of the edges that meet there.
+        """
+        inside = self.closed[facets]
+        count = inside.sum(axis=1)
+        share = (count == facets.shape[1]).astype(float)
+        cut = np.flatnonzero((count > 0) & (count < facets.shape[1]))
+        single = np.where(count == 1, 1, 0)[cut, None] == inside[cut]  # the corner that differs from others
+        alone = np.argmax(single, axis=1)
+        product = np.ones(len(cut))
+        for step in range(1, facets.shape[1]):
+            corner = facets[cut, alone]
+            other = facets[cut, (alone + step) % facets.shape[1]]
+            here = self.closed[corner]
+            reach = self.reach(np.where(here, corner, other), np.where(here, other, corner))
+            product *= np.where(here, reach, 1.0 - reach)
+        share[cut] = np.where(self.closed[facets[cut, alone]], product, 1.0 - product)
+        return share
+
+
+def _slave_surface(state: State, which: int | str) -> _SlaveSurface:
+    """Return the slave surface of a pair. Collective."""
     scene, contact = state.scene, state.contact
+    pair = pair_number(scene.contacts, which)
     mine = contact.on_pair(pair)
     points, slave = contact.points, scene.contacts[pair].slave
     surface = surface_of(scene, slave, "faceted")
@@ -40,17 +145,10 @@ def contact_area(state: State, pair: int = 0) -> float:
     spread[place] = _modulus(state, pair) * np.maximum(contact.gap[mine], 0.0)
     whole = np.searchsorted(surface.nodes, scene.bodies[slave.body].mesh.surfaces[slave.name])
     pressure, spread = filled_at_corners(whole, pressure), np.maximum(filled_at_corners(whole, spread), 0.0)
-    closed = pressure > 0.0
-    total, places = 0.0, surface.points
+    places = surface.points
     if scene.bodies[slave.body].deforms_much:
         places = places + state.gather_displacement(slave.body)[surface.nodes]
-    for corners, weight in _simplices(surface.corners):
-        facets = surface.facets[:, corners]
-        edges = places[facets[:, 1:]] - places[facets[:, :1]]
-        gram = np.linalg.det(edges @ np.swapaxes(edges, 1, 2))
-        size = np.sqrt(np.maximum(gram, 0.0)) / (len(corners) - 1)
-        total += weight * float(size @ _closed_share(places, facets, closed, pressure, spread))
-    return total
+    return _SlaveSurface(places, surface.facets[:, : surface.corners], pressure, spread)
 
 
 def _modulus(state: State, pair: int) -> float:
@@ -81,32 +179,6 @@ def _simplices(corners: int) -> list[tuple[list[int], float]]:
     if corners < 4:
         return [(list(range(corners)), 1.0)]
     return [([k, (k + 1) % 4, (k + 2) % 4], 0.5) for k in range(4)]
-
-
-def _closed_share(
-    points: np.ndarray, facets: np.ndarray, closed: np.ndarray, pressure: np.ndarray, spread: np.ndarray
-) -> np.ndarray:
-    """Return the share of simplices that touches, shape (n,).
-
-    The rim cuts off one corner: a triangle whose sides are the parts of the edges that meet there.
-    """
-    inside = closed[facets]
-    count = inside.sum(axis=1)
-    share = (count == facets.shape[1]).astype(float)
-    cut = np.flatnonzero((count > 0) & (count < facets.shape[1]))
-    single = np.where(count == 1, 1, 0)[cut, None] == inside[cut]  # the corner that differs from the others
-    alone = np.argmax(single, axis=1)
-    product = np.ones(len(cut))
-    for step in range(1, facets.shape[1]):
-        corner = facets[cut, alone]
-        other = facets[cut, (alone + step) % facets.shape[1]]
-        here = closed[corner]
-        inner, outer = np.where(here, corner, other), np.where(here, other, corner)
-        length = np.linalg.norm(points[inner] - points[outer], axis=1)
-        reach = _reach(pressure[inner], spread[outer], length)
-        product *= np.where(here, reach, 1.0 - reach)
-    share[cut] = np.where(closed[facets[cut, alone]], product, 1.0 - product)
-    return share
 
 
 def _reach(

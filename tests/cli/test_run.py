@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 import sys
@@ -23,6 +24,8 @@ from tests.conftest import ROOT
 from tests.scene_file.texts import GOOD, STEPS, changed
 
 SCENES = ROOT / "demos" / "scenes"
+#: Options for files of fields and tables.
+BOTH = ("--set", "output.files=['vtu', 'csv']")
 
 
 def run(*arguments: object) -> int:
@@ -98,11 +101,29 @@ def test_load_steps_are_listed_and_make_a_film(tmp_path: Path, capsys: pytest.Ca
     assert not (tmp_path / "checkpoint.npz").exists(), "a run that is complete leaves none"
 
 
+def test_tables_are_written_where_a_file_asks_for_csv(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tables = ("--set", "output.files=['csv']", "--no-pictures")
+    assert run("run", scene(tmp_path, STEPS), "-o", tmp_path / "steps", *tables) == 0
+    assert ": result.json, steps.csv, contact/\n" in capsys.readouterr().out
+    files = {str(path.relative_to(tmp_path / "steps")) for path in (tmp_path / "steps").rglob("*.*")}
+    assert files == {"result.json", "steps.csv", *(f"contact/step_000{k}.csv" for k in range(3))}
+    head, *rows = csv.reader((tmp_path / "steps" / "steps.csv").read_text().splitlines()[2:])
+    assert [row[1:3] for row in rows] == [["pressed", "1"], ["shifted 1/2", "2"], ["shifted 2/2", "3"]]
+    steps = read_result(tmp_path / "steps")["more"]["steps"]
+    forces = [float(row[head.index("block z1 Fx")]) for row in rows]
+    assert forces[1:] == pytest.approx(steps["friction_force"][1:], rel=1e-6)
+    assert run("run", scene(tmp_path, GOOD), "-o", tmp_path / "once", *tables) == 0
+    assert ": result.json, steps.csv, contact.csv\n" in capsys.readouterr().out
+    assert (tmp_path / "once" / "contact.csv").read_text().count("upper z0 on lower z1") == 9
+
+
 def test_an_interrupted_history_goes_on_to_the_same_result(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, advance = scene(tmp_path, STEPS), LoadSequence.advance
-    assert run("run", path, "-o", tmp_path / "whole") == 0
+    assert run("run", path, "-o", tmp_path / "whole", *BOTH) == 0
 
     def stopped(sequence: LoadSequence, step: object) -> object:
         if getattr(step, "name", "") == "shifted 2/2":
@@ -110,17 +131,20 @@ def test_an_interrupted_history_goes_on_to_the_same_result(
         return advance(sequence, step)  # type: ignore[arg-type]
 
     monkeypatch.setattr(LoadSequence, "advance", stopped)
-    assert run("run", path, "-o", tmp_path / "cut") == cli.ExitCode.INTERRUPTED == 130
+    assert run("run", path, "-o", tmp_path / "cut", *BOTH) == cli.ExitCode.INTERRUPTED == 130
     monkeypatch.undo()
     assert not (tmp_path / "cut" / "result.json").exists()
     assert "interrupted" in capsys.readouterr().err
-    assert run("run", path, "-o", tmp_path / "cut", "--resume") == 0
+    assert run("run", path, "-o", tmp_path / "cut", *BOTH, "--resume") == 0
     assert "going on from" in capsys.readouterr().out
     whole, cut = (read_result(tmp_path / name) for name in ("whole", "cut"))
     np.testing.assert_allclose(
         cut["more"]["steps"]["normal_force"], whole["more"]["steps"]["normal_force"], rtol=1e-6
     )
     assert (tmp_path / "cut" / "history.pvd").read_text().count("timestep") == 3
+    tables = [(tmp_path / name / "steps.csv").read_text().splitlines() for name in ("whole", "cut")]
+    assert tables[0][:3] == tables[1][:3]
+    assert len(tables[0]) == len(tables[1]) == 6
 
 
 def test_a_checkpoint_of_another_scene_is_refused_with_the_way_out(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from fenics_contact._cli.console import forces_table, state_facts, step_row
+from fenics_contact._cli.console import forces_table, state_facts
 from fenics_contact._scene_file.document import UnitNames
 from fenics_contact.output.result import forces_record
+from fenics_contact.output.tables import step_row
 from tests.viz.plane_states import flat_pad
 from tests.viz.states import touching_blocks
 

@@ -32,6 +32,7 @@ from fenics_contact import (
     _dolfinx,
     box_partition,
     contact_area,
+    contact_width,
     solve_scene,
     solve_steps,
     write_vtu,
@@ -348,6 +349,33 @@ def test_the_area_under_a_ball_is_that_of_hertz() -> None:
     assert np.mean(found) < 0.3 * np.mean(nodal), "counting nodes is as good"
 
 
+def test_the_footprint_of_a_ball_is_round_with_the_radius_of_hertz() -> None:
+    state, exact = ball(500.0, 8), hertz_point(500.0, (0.1, 0.1), MODULUS)
+    along, diagonal = (contact_width(state, axis, "ball contact") for axis in ((1, 0, 0), (1, 1, 0)))
+    assert along == pytest.approx(exact.semi_axes[0], rel=0.02)
+    assert diagonal == pytest.approx(exact.semi_axes[0], rel=0.06)
+    assert contact_area(state, "ball contact on rigid plane") == pytest.approx(exact.area / 4, rel=0.06)
+
+
+def test_a_width_reaches_over_what_is_open_between() -> None:
+    """A bridge on its two feet, whose footprints lie apart; nothing touches once it is lifted."""
+    mesh = block((0.0, 0.0, 0.0), (6.0, 2.0, 1.0), (6, 2, 1))
+    bottom = mesh.surfaces["z0"]
+    middle = np.abs(mesh.points[bottom].mean(axis=1)[:, 0] - 3.0) < 2.0
+    mesh = replace(mesh, surfaces={**mesh.surfaces, "feet": bottom[~middle]})
+    pair = ContactPair(Surface("bridge", "feet"), RigidPlane((0, 0, 0), (0, 0, 1)))
+    widths = []
+    for push in (-0.01, 0.01):
+        supports = [Support("bridge", "z1", (0.0, 0.0, push))]
+        state = solve_scene(Scene({"bridge": Body(mesh, SOLID)}, supports, contacts=[pair]), MPI.COMM_WORLD)
+        widths.append([contact_width(state, axis) for axis in np.eye(3)])
+    np.testing.assert_allclose(widths[0], (6.0, 2.0, 0.0), atol=1e-12)
+    assert contact_area(state) == 0.0
+    np.testing.assert_array_equal(widths[1], 0.0)
+    with pytest.raises(InvalidInputError, match="the direction of a contact width must be 3 finite numbers"):
+        contact_width(state, (1, 0))
+
+
 def test_the_width_under_a_disc_is_that_of_hertz() -> None:
     force = 200.0
     scene = Scene(
@@ -357,7 +385,11 @@ def test_the_width_under_a_disc_is_that_of_hertz() -> None:
         [ContactPair(Surface("disc", "contact"), RigidPlane((0, 0), (0, 1)))],
     )
     state = solve_scene(scene, MPI.COMM_WORLD, solver=FaceNewton(tolerance=1e-8))
-    assert contact_area(state) == pytest.approx(hertz_line(force, 0.1, MODULUS).half_width, rel=0.05)
+    half_width = hertz_line(force, 0.1, MODULUS).half_width
+    assert contact_area(state, "disc contact") == pytest.approx(half_width, rel=0.05)
+    assert contact_width(state, (2.0, 0.0)) == pytest.approx(contact_area(state), rel=5e-3)
+    rise = half_width**2 / 20.0  # of the circle, as small displacements leave the surface round
+    assert contact_width(state, (0.0, 1.0)) == pytest.approx(rise, rel=0.1)
 
 
 @pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron", "quadrilateral"])

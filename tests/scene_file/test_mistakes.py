@@ -115,7 +115,7 @@ def test_several_mistakes_are_all_listed_in_the_order_of_their_lines(tmp_path: P
         (
             "[solver]",
             "[output]\nfiles = ['vtk']\n[solver]",
-            "line 43: output.files.0 must be one of 'vtu', 'xdmf', got \"vtk\"",
+            "line 43: output.files.0 must be one of 'vtu', 'xdmf', 'csv', got \"vtk\"",
         ),
         ("tolerance = 1e-8", "max_products = 2.5", "solver.max_products must be an integer, got 2.5"),
         ("tolerance = 1e-8", "max_products = 0", "max_products must be a number greater than 0, got 0"),

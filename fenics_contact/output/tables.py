@@ -1,0 +1,270 @@
+"""Results as tables (CSV) for spreadsheets and scripts: contact points, load steps."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._scene.pairs import pair_number
+from fenics_contact.errors import collectively, together
+from fenics_contact.output.files import write_text
+from fenics_contact.results.area import contact_area
+from fenics_contact.results.contact import Status
+from fenics_contact.results.state import State
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from fenics_contact._scene.pairs import ContactPair
+
+
+@collectively("write_contact_table", lambda state, *_, **__: state.torn.decomposition.comm)
+def write_contact_table(state: State, path: str | Path, *, pair: int | str | None = None) -> Path:
+    """Write what happens at every contact point as a table (CSV). Collective.
+
+    After a remark that begins with "#", a line names the columns, in the plane without those of z:
+
+    | column | |
+    |---|---|
+    | ``pair``, ``node`` | the pair in words, and the node of the slave's mesh |
+    | ``x``, ``y``, ``z`` and ``x_moved``, ... | where it is before and after deformation, [length] |
+    | ``status`` | open, stick or slip; without friction open or closed |
+    | ``gap`` | after deformation, [length] |
+    | ``pressure``, ``traction_x``, ... | on the slave, by friction, [force / length²] |
+    | ``slip_x``, ... | motion of the slave along the master in the last load step, [length] |
+    | ``total_slip_x``, ... | the same since the undeformed state, [length] |
+    | ``normal_x``, ... | unit normal from master to slave |
+    | ``area`` | that belongs to the point, [length²], in the plane [length] |
+
+    Rows are in the order of pairs and nodes, on any number of ranks.
+
+    Args:
+        state: The state.
+        path: File to write; its folder is created.
+        pair: Number of a contact pair, or its name, that of its slave or of both surfaces; all unless given.
+
+    Returns:
+        The path.
+
+    Raises:
+        InvalidInputError: If the scene has no such pair.
+
+    Example:
+        >>> write_contact_table(state, "output/contact.csv", pair="lid bottom")  # doctest: +SKIP
+    """
+    scene, comm, target = state.scene, state.torn.decomposition.comm, Path(path)
+    with together(comm):
+        chosen = None if pair is None else pair_number(scene.contacts, pair)
+    moved = {name: state.gather_displacement(name) for name in scene.bodies}
+    with together(comm):
+        if comm.rank == 0:
+            columns = _contact_columns(state, np.concatenate(list(moved.values())))
+            mine = np.lexsort((state.contact.points.slave, state.contact.points.pair))
+            rows = mine if chosen is None else mine[state.contact.points.pair[mine] == chosen]
+            remark = "one row a contact point; forces by area act on the slave; units are those of the scene"
+            table = zip(*([values[row] for row in rows] for values in columns.values()), strict=True)
+            write_text(target, csv_text([remark], list(columns), table))
+    return target
+
+
+def _contact_columns(state: State, displacement: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the columns of a contact table; `displacement`: of the nodes of all bodies, (n_nodes, dim)."""
+    scene, contact, points = state.scene, state.contact, state.contact.points
+    sizes = [body.mesh.n_nodes for body in scene.bodies.values()]
+    first = dict(zip(scene.bodies, np.cumsum([0, *sizes]), strict=False))
+    offset = np.array([first[pair.slave.body] for pair in scene.contacts], dtype=int)[points.pair]
+    places, in_space = state.contact_places, points.tangents
+    vectors = {
+        "": places,
+        "moved": places + displacement[points.slave],
+        "traction": -np.einsum("na,nad->nd", contact.traction, in_space),
+        "slip": contact.slip_in_space,
+        "total_slip": np.einsum("na,nad->nd", contact.total_slip, in_space),
+        "normal": points.normal,
+    }
+    axes = "xyz"[: scene.dim]
+    split = {
+        name: {
+            axis if not name else f"{axis}_moved" if name == "moved" else f"{name}_{axis}": part
+            for axis, part in zip(axes, values.T, strict=True)
+        }
+        for name, values in vectors.items()
+    }
+    kinds = zip(points.pair, contact.status, strict=True)
+    status = [_status(scene.contacts[pair], kind) for pair, kind in kinds]
+    return {
+        "pair": np.array([pair.place for pair in scene.contacts], dtype=object)[points.pair],
+        "node": points.slave - offset,
+        **split[""],
+        **split["moved"],
+        "status": np.array(status, dtype=object),
+        "gap": contact.gap,
+        "pressure": contact.pressure,
+        **split["traction"],
+        **split["slip"],
+        **split["total_slip"],
+        **split["normal"],
+        "area": contact.area,
+    }
+
+
+def _status(pair: ContactPair, status: int) -> str:
+    """Return the status of a point in a word: a closed one without friction is "closed"."""
+    word = Status(status).name.lower()
+    return word if pair.has_friction or word == "open" else "closed"
+
+
+def csv_text(remarks: Sequence[str], names: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
+    """Return a table as text: remarks behind "#", names of columns, rows; numbers have twelve digits."""
+    text = io.StringIO()
+    text.writelines(f"# {' '.join(remark.split())}\n" for remark in remarks)
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([_cell(value) for value in row] for row in rows)
+    return text.getvalue()
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    return f"{value + 0.0:.12g}" if isinstance(value, float | np.floating) else str(value)
+
+
+def step_row(number: int, name: str, state: State) -> dict[str, Any]:
+    """Return what a load step cost and what contact is like at its end."""
+    contact, counts = state.contact, state.counts
+    return {
+        "number": number,
+        "name": name,
+        "iterations": counts["solver_steps"],
+        "products": counts["f_products"],
+        **{status.name.lower(): contact.count(status) for status in Status},
+        "normal_force": float(contact.normal_force.sum()),
+        "friction_force": _resultant(state),
+        "peak_pressure": float(contact.pressure.max(initial=0.0)),
+    }
+
+
+def _resultant(state: State) -> float:
+    """Return the magnitude of the sum of all friction forces, zero below what the solver left, [force]."""
+    contact = state.contact
+    tangential = contact.force - contact.normal_force[:, None] * contact.points.normal
+    size = float(np.linalg.norm(tangential.sum(axis=0)))
+    left = max(ROUNDING, float(np.nan_to_num(state.solution.natural_residual)))
+    return size if size > left * float(np.abs(contact.force).sum()) else 0.0
+
+
+class StepTable:
+    """A table (CSV) of load steps: loads, reactions, forces of contacts, energies and work, a row a step.
+
+    After remarks that begin with "#", which give the points of moments, a line names the columns:
+
+    | column | |
+    |---|---|
+    | ``number``, ``name``, ``time`` | of the load step |
+    | ``iterations``, ``products`` | of the solver, and with F |
+    | ``open``, ``stick``, ``slip`` | contact points by status; closed ones without friction slip |
+    | ``normal_force``, ``friction_force`` | sums over all pairs, [force] |
+    | ``peak_pressure`` | of all pairs, [force / length²] |
+    | ``strain_energy``, ``load_energy``, ``friction_energy`` | as in `results.Energies`; empty if not known |
+    | ``loads Fx``, ... | force of all loads, and its moment ``loads Mx``, ... |
+    | ``lid top Fx``, ... | reaction of the supports of the surface "top" of the body "lid" |
+    | ``lid bottom on pot rim Fx``, ... | force on the slave of a pair or tie |
+    | ``lid bottom on pot rim pressure``, ``... area`` | the largest pressure, and the area of contact |
+
+    The file is complete after every `add`, the same on any number of ranks.
+
+    Attributes:
+        path: The file.
+
+    Example:
+        >>> table = StepTable("output/steps.csv", comm)  # doctest: +SKIP
+        >>> for number, state in enumerate(solve_steps(ContactProblem(scene, comm), steps)):  # doctest: +SKIP
+        ...     table.add(state, steps[number].name)
+    """
+
+    path: Path
+
+    def __init__(self, path: str | Path, comm: MPI.Comm) -> None:
+        """Begin a new table; nothing is written yet.
+
+        Args:
+            path: File to write; its folder is created, and a file of that name replaced, with the first row.
+            comm: Communicator of the states.
+        """
+        self.path, self._comm = Path(path), comm
+        self._rows: list[Mapping[str, Any]] = []
+        self._about: dict[str, np.ndarray] = {}
+
+    @collectively("StepTable.add", lambda self, *_, **__: self._comm)
+    def add(self, state: State, name: str = "", time: float | None = None) -> Path:
+        """Add the row of a state and write the table. Collective.
+
+        Args:
+            state: The state after the step.
+            name: Name of the step.
+            time: Time of the step; that of the state unless given.
+
+        Returns:
+            The path.
+
+        Raises:
+            OutputError: If the file cannot be written; the table before is unchanged.
+        """
+        values = self._forces(state)
+        for number, each in enumerate(_names([pair.place for pair in state.scene.contacts])):
+            pressure = state.contact.pressure[state.contact.on_pair(number)]
+            values[f"{each} pressure"] = float(pressure.max(initial=0.0))
+            values[f"{each} area"] = contact_area(state, number)
+        energies = {key: getattr(state.energies, key) for key in ("strain", "load", "friction")}
+        named = {"number": len(self._rows), "name": name, "time": state.time if time is None else float(time)}
+        known = {f"{key}_energy": value if np.isfinite(value) else None for key, value in energies.items()}
+        self._rows.append({**named, **step_row(len(self._rows), name, state), **known, **values})
+        with together(self._comm):
+            if self._comm.rank == 0:
+                write_text(self.path, self._text())
+        return self.path
+
+    def _forces(self, state: State) -> dict[str, float]:
+        """Return forces and moments by their columns, rounding as zero. Collective."""
+        balance, pairs = state.balance(self._about.get("loads")), state.resultants()
+        reactions = state.reactions()
+        found = {"loads": balance.loads, **{place: reactions[place] for place in reactions.places}}
+        for listed in (pairs.contacts, pairs.ties):
+            found |= dict(zip(_names(listed.places), listed, strict=True))
+        columns: dict[str, float] = {}
+        for name, each in found.items():
+            self._about.setdefault(name, each.about)
+            parts = (each.force, balance.force_scale), (each.moment, balance.moment_scale)
+            numbers = np.concatenate([rounded(part, scale) for part, scale in parts])
+            axes = ("Fx", "Fy", "Fz", "Mx", "My", "Mz") if state.scene.dim == 3 else ("Fx", "Fy", "M")
+            columns |= {f"{name} {axis}": float(number) for axis, number in zip(axes, numbers, strict=True)}
+        return columns
+
+    def _text(self) -> str:
+        names = list(dict.fromkeys(name for row in self._rows for name in row))
+        about = (f"{each} ({', '.join(f'{x:.6g}' for x in point)})" for each, point in self._about.items())
+        remarks = [
+            "one row a load step; forces of pairs act on the slave; units are those of the scene",
+            f"moments about: {'; '.join(about)}",
+        ]
+        return csv_text(remarks, names, ([row.get(name) for name in names] for row in self._rows))
+
+
+def rounded(values: Any, scale: float) -> np.ndarray:
+    """Return numbers, shape (n,), with what is rounding of a scale set to zero."""
+    numbers = np.atleast_1d(np.asarray(values, dtype=float))
+    return np.where(np.abs(numbers) > ROUNDING * scale, numbers, 0.0)
+
+
+def _names(places: Sequence[str]) -> list[str]:
+    """Return the names of columns: places, numbered where pairs of the scene share one."""
+    times = Counter(places)
+    return [place if times[place] == 1 else f"{place} ({k})" for k, place in enumerate(places)]
