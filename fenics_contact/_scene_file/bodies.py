@@ -29,6 +29,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import scene_file_code
 from fenics_contact.gallery import blocks, bolted, hertz
 from fenics_contact.gallery import links as links_module
+from fenics_contact.gallery import round as whole
 from fenics_contact.gallery.links import DesignSurface, Link
 from fenics_contact.gallery.ring import LinkShape
 from fenics_contact.materials import elastic, hyperelastic
@@ -439,6 +440,9 @@ MESHES = (
     table_of(
         hertz.half_disc, Placed, shape="half_disc", n=_FromTwo, grading=_Grading, symmetry=Literal["x", ""]
     ),
+    table_of(whole.disc, Placed, shape="disc", n=_FromTwo, grading=_Grading),
+    table_of(whole.ball, Placed, shape="ball", n=_FromTwo, grading=_Grading),
+    table_of(whole.cylinder, Placed, shape="cylinder", n=_FromTwo, grading=_Grading),
     table_of(_plate, Placed, shape="drilled_plate"),
     table_of(bolted.bolt, Placed, shape="bolt"),
     LinkMesh,

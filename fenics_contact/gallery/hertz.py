@@ -23,15 +23,17 @@ CORE = 0.5
 
 
 @dataclass(frozen=True)
-class _Frame:
+class RoundFrame:
     """Cube coordinates (u, v, w) of a round body.
 
     Attributes:
         flat: Directions along which the body is straight: (1,) for a cylinder along y, () for a ball.
+        dim: Dimension, 2 for a disc.
     """
 
     radius: float
     flat: tuple[int, ...]
+    dim: int = 3
 
     @property
     def shape(self) -> SurfaceShape:
@@ -40,7 +42,7 @@ class _Frame:
         return Cylinder(centre, (0.0, 1.0, 0.0), self.radius) if self.flat else Sphere(centre, self.radius)
 
     def sphere(self, cube: np.ndarray) -> np.ndarray:
-        """Map cube coordinates, (n, 3), to the round surface: angles, not lengths, follow them."""
+        """Map cube coordinates, (n, dim), to the round surface: angles, not lengths, follow them."""
         reach = self._reach(cube)
         bent = cube.copy()
         bent[:, self.flat] = 0.0
@@ -56,7 +58,7 @@ class _Frame:
         return self._straight(cube, CORE * 0.5 * (square + ball))
 
     def _reach(self, cube: np.ndarray) -> np.ndarray:
-        round_ = [d for d in range(3) if d not in self.flat]
+        round_ = [d for d in range(self.dim) if d not in self.flat]
         return np.asarray(np.abs(cube[:, round_]).max(axis=1, keepdims=True))
 
     def _straight(self, cube: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -89,7 +91,7 @@ def hemisphere(radius: float, n: int, *, symmetry: str = "xy", grading: float = 
     ticks = [_lateral(n, grading, "x" in symmetry), _lateral(n, grading, "y" in symmetry)]
     core = box_lattice([*ticks, np.linspace(-1.0, 0.0, (n + 1) // 2 + 1)])
     round_sides = {"z0", "x1", "y1"} | ({"x0", "y0"} - {f"{d}0" for d in symmetry})
-    return _wrap(core, sorted(round_sides), _Frame(radius, ()), n, grading)
+    return _wrap(core, sorted(round_sides), RoundFrame(radius, ()), n, grading)
 
 
 def half_cylinder(
@@ -122,10 +124,10 @@ def half_cylinder(
     upwards = np.linspace(-1.0, 0.0, (n + 1) // 2 + 1)
     core = box_lattice([_lateral(n, grading, "x" in symmetry), along, upwards])
     round_sides = ["x1", "z0"] if symmetry else ["x0", "x1", "z0"]
-    return _wrap(core, round_sides, _Frame(radius, (1,)), n, grading)
+    return _wrap(core, round_sides, RoundFrame(radius, (1,)), n, grading)
 
 
-def _wrap(core: BodyMesh, round_sides: list[str], frame: _Frame, layers: int, grading: float) -> BodyMesh:
+def _wrap(core: BodyMesh, round_sides: list[str], frame: RoundFrame, layers: int, grading: float) -> BodyMesh:
     """Map a box in cube coordinates to the core and add the shell on its round sides."""
     facets = np.concatenate([core.surfaces[side] for side in round_sides])
     require_room(layers, len(facets), 1)
@@ -157,8 +159,13 @@ def _flat_sides(points: np.ndarray, cells: np.ndarray, curved: np.ndarray) -> di
 
 
 def _lateral(n: int, grading: float, symmetric: bool) -> np.ndarray:
+    return graded(n, grading) if symmetric else mirrored_ticks(n, grading)
+
+
+def mirrored_ticks(n: int, grading: float) -> np.ndarray:
+    """Divide [−1, 1] into 2 n intervals that grow from the middle to both ends."""
     ticks = graded(n, grading)
-    return ticks if symmetric else np.concatenate([-ticks[:0:-1], ticks])
+    return np.concatenate([-ticks[:0:-1], ticks])
 
 
 def _check(radius: float, n: int, grading: float, symmetry: str, known: tuple[str, ...]) -> None:

@@ -14,6 +14,7 @@ import pytest
 from fenics_contact import BodyMesh
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import blocks, bolted, hertz, links, ring
+from fenics_contact.gallery import round as whole
 from fenics_contact.gallery.blocks import BYTES_A_CELL, memory, require_room
 
 #: What no size and no count can be.
@@ -37,6 +38,9 @@ BUILDERS: list[tuple[Callable[..., object], dict[str, Any], list[str]]] = [
     (hertz.hemisphere, {"radius": 1.0, "n": 2, "grading": 1.0}, ["n"]),
     (hertz.half_disc, {"radius": 1.0, "n": 3, "grading": 1.0}, ["n"]),
     (hertz.half_cylinder, {"radius": 1.0, "length": 2.0, "n": 3, "n_length": 1}, ["n", "n_length"]),
+    (whole.disc, {"radius": 1.0, "n": 3, "hole": 0.5, "grading": 1.0}, ["n"]),
+    (whole.ball, {"radius": 1.0, "n": 2, "hole": 0.5}, ["n"]),
+    (whole.cylinder, {"radius": 1.0, "length": 2.0, "n": 3, "n_length": 1}, ["n", "n_length"]),
     (
         partial(bolted.drilled_plate, ends=(-3.0, 3.0), heights=(0.0, 1.0)),
         {"hole": 1.0, "half_width": 2.0, "n": 1, "n_radial": 1},
@@ -103,6 +107,8 @@ def test_what_are_no_corners_of_a_block_is_refused(value: Any) -> None:
         (lambda: blocks.growing_ticks(1e20, 1e-3, 1.0 + 1e-15), "must fit into the memory"),
         (lambda: hertz.hemisphere(1.0, 10**5), "must fit into the memory"),
         (lambda: hertz.half_disc(1.0, 10**6), "must fit into the memory"),
+        (lambda: whole.ball(1.0, 10**5, hole=0.999), "must fit into the memory"),
+        (lambda: whole.disc(1.0, 4, layers=10**6), "must fit into the memory"),
         (
             lambda: bolted.drilled_plate(1.0, 2.0, (-1e50, 4.0), (0, 1), 2),
             "along the strip must be at most",

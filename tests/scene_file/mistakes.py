@@ -64,7 +64,8 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         'shape = "block"',
         'shape = "blok"',
         "scene.toml, line 4: meshes.lower.shape must be one of 'block', 'rectangle', 'hemisphere', "
-        "'half_cylinder', 'half_disc', 'drilled_plate', 'bolt', 'chain_link', 'two_links', 'chain', got "
+        "'half_cylinder', 'half_disc', 'disc', 'ball', 'cylinder', 'drilled_plate', 'bolt', 'chain_link', "
+        "'two_links', 'chain', got "
         "\"blok\": did you mean 'block'?",
     ),
     "a law of friction is not known": (

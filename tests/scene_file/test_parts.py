@@ -18,7 +18,17 @@ from fenics_contact._scene import supports as supports_module
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact._scene_file.source import SceneFileError
 from fenics_contact._scene_file.values import Expression, VectorExpression
-from fenics_contact.gallery import LinkShape, block, chain, half_disc, hemisphere, rectangle
+from fenics_contact.gallery import (
+    LinkShape,
+    ball,
+    block,
+    chain,
+    cylinder,
+    disc,
+    half_disc,
+    hemisphere,
+    rectangle,
+)
 from fenics_contact.materials import elastic, hyperelastic, orthotropic, plastic
 from fenics_contact.readers import gmsh_model, read_msh
 from fenics_contact.shapes import Box, Cone
@@ -42,7 +52,7 @@ def file_of(*, mesh: dict[str, Any] = BLOCK, material: dict[str, Any] = STEEL, *
 
 
 def mesh_of(**mesh: Any) -> Any:
-    plane = mesh["shape"] in ("rectangle", "half_disc")
+    plane = mesh["shape"] in ("rectangle", "half_disc", "disc")
     material = {**STEEL, "model": "plane_strain"} if plane else STEEL
     return file_of(mesh=mesh, material=material).scene.bodies["a"].mesh
 
@@ -52,6 +62,13 @@ def test_shapes_are_those_of_the_package() -> None:
     np.testing.assert_array_equal(found.points, hemisphere(2.0, 3, symmetry="x").points)
     found = mesh_of(shape="half_disc", radius=2.0, n=3)
     np.testing.assert_array_equal(found.points, half_disc(2.0, 3).points)
+    found = mesh_of(shape="disc", radius=2.0, n=3, hole=1.5, layers=1)
+    np.testing.assert_array_equal(found.points, disc(2.0, 3, hole=1.5, layers=1).points)
+    found = mesh_of(shape="ball", radius=2.0, n=2, grading=1.0)
+    np.testing.assert_array_equal(found.points, ball(2.0, 2, grading=1.0).points)
+    found = mesh_of(shape="cylinder", radius=2.0, length=3.0, n=2, n_length=2, axis=[0, 1, 0], degrees=90)
+    straight = cylinder(2.0, 3.0, 2, 2)
+    np.testing.assert_allclose(found.points, straight.points[:, [2, 1, 0]] * (1, 1, -1), atol=1e-12)
     found = mesh_of(shape="rectangle", lower=[0, 0], upper=[1, 2], counts=[2, 3], cell="triangle")
     np.testing.assert_array_equal(found.cells, rectangle((0, 0), (1, 2), (2, 3), "triangle").cells)
 
