@@ -14,10 +14,16 @@ from fenics_contact import _dolfinx
 from fenics_contact._accuracy.recovery import find_sites, recovered_gradients
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
-from fenics_contact._fem.composition import Composition
+from fenics_contact._fem.composition import Composition, on_cells
 from fenics_contact._fem.forms import FormLibrary
 from fenics_contact._fem.model_checks import stiffness_of_cell
-from fenics_contact._fem.templates import Template, Written, scalar_constants, volume_measure
+from fenics_contact._fem.templates import (
+    Template,
+    Written,
+    per_revolution,
+    scalar_constants,
+    volume_measure,
+)
 from fenics_contact._scene.body import Body
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import nodal_mean
@@ -147,13 +153,21 @@ def _write(material: Material, cell_type: str) -> Written:
     u, *rows = _dolfinx.field_symbols(cell_type, dim + 1)
     q = ufl.TestFunction(_dolfinx.cellwise_space(cell_type))
     parameters = scalar_constants(cell_type, len(material.parameters))
+    difference = ufl.as_tensor([[row[j] for j in range(dim)] for row in rows]) - ufl.grad(u)
+    measure = volume_measure(cell_type, DEGREE)
+    if _dolfinx.is_revolved(cell_type):
+        from fenics_contact._fem.revolution import strained  # plane and solid bodies go without
+
+        # The hoop strain u_r / r is as accurate as the recovered gradient.
+        trial = strained(difference, 0.0)
+        density = on_cells(material.stiffness(trial, trial, parameters), cell_type)
+        return per_revolution(density * q, cell_type) * measure, parameters, (u, *rows)
     x = ufl.SpatialCoordinate(_dolfinx.template(cell_type))
     c, d = (_dolfinx.constant_symbol(cell_type, shape) for shape in ((dim, dim), (dim,)))
     trial = ufl.dot(c, x) - d
     density = expand_derivatives(material.stiffness(trial, trial, parameters))
-    difference = ufl.as_tensor([[row[j] for j in range(dim)] for row in rows]) - ufl.grad(u)
     density = ufl.replace(density, {c: difference, d: ufl.dot(difference, x)})
-    return density * q * volume_measure(cell_type, DEGREE), parameters, (u, *rows)
+    return density * q * measure, parameters, (u, *rows)
 
 
 def energy_on_subdomain(
@@ -262,7 +276,7 @@ class _Energies:
     """Energies of differences of gradients in one body. Collective."""
 
     def __init__(self, torn: TornSystem, body: Body) -> None:
-        forms, cell_type = torn.decomposition.forms, body.mesh.cell_type
+        forms, cell_type = torn.decomposition.forms, body.cell_type
         self._body = body
         self._ways: list[np.ndarray | Template] = [
             compile_energy(forms, material, cell_type)

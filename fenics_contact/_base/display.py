@@ -149,9 +149,9 @@ def counted(number: int, one: str, many: str = "") -> str:
     return f"{number} {one if number == 1 else many or one + 's'}"
 
 
-def force_units(force: str, length: str, dim: int) -> tuple[str, str]:
+def force_units(force: str, length: str, per_thickness: bool) -> tuple[str, str]:
     """Return the units of forces, and of moments and energies; those of plane bodies are per thickness."""
-    per = f"/{length}" if dim == 2 else ""
+    per = f"/{length}" if per_thickness else ""
     return f"{force}{per}", f"{force} {length}{per}"
 
 

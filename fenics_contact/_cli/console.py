@@ -225,18 +225,25 @@ def forces_table(forces: Mapping[str, Any], units: Mapping[str, str] | None = No
     """Return forces and moments of a result file, one row each."""
     balance, names = forces["balance"], units or {}
     force, length = names.get("force", "force"), names.get("length", "length")
-    plane = np.ndim(balance["loads"]["moment"]) == 0
-    force, moment = force_units(force, length, 2 if plane else 3)
-    table = Table(title=f"forces ({force}) and moments ({moment})", title_justify="left", box=None)
+    moments = np.shape(balance["loads"]["moment"])
+    plane, turned = moments == (), moments == (0,)
+    force, moment = force_units(force, length, plane)
+    table = Table(
+        title=f"forces ({force}) per revolution" if turned else f"forces ({force}) and moments ({moment})",
+        title_justify="left",
+        box=None,
+    )
     table.pad_edge = False
     table.caption_justify = "left"
+    about = f"moments about the centroids of surfaces,\nof sums about {_place(balance['about'])}\n"
     table.caption = (
-        f"moments about the centroids of surfaces,\nof sums about {_place(balance['about'])}\n"
-        f"imbalance of all forces and moments {balance['imbalance']:.1e}"
+        f"{'' if turned else about}imbalance of all forces{'' if turned else ' and moments'} "
+        f"{balance['imbalance']:.1e}"
     )
     for column in ("", "on"):
         table.add_column(column, overflow="fold")
-    for column in ("Fx", "Fy", "M") if plane else ("Fx", "Fy", "Fz", "Mx", "My", "Mz"):
+    in_space = ("Fr", "Fz") if turned else ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+    for column in ("Fx", "Fy", "M") if plane else in_space:
         table.add_column(column, justify="right", no_wrap=True)
     scales = scales_of(forces)
     for what, entry in listed_forces(forces):
@@ -253,7 +260,7 @@ def _place(point: Any) -> str:
 
 def state_facts(state: State, units: UnitNames) -> dict[str, str]:
     """Return a summary of a state as text, without energies that are not known. Collective."""
-    counts, (force, energy) = state.counts, force_units(units.force, units.length, state.scene.dim)
+    counts, (force, energy) = state.counts, force_units(units.force, units.length, state.scene.is_plane)
     rows = {
         "unknowns": f"{counts['torn_unknowns']} in {counted(counts['subdomains'], 'subdomain')}",
         "work": f"{counted(counts['solver_steps'], 'step')}, "
@@ -279,7 +286,7 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
 def step_table(rows: Sequence[Mapping[str, Any]], file: SceneFile) -> Table:
     """Return one row for every load step."""
     units = file.document.units
-    force, _ = force_units(units.force, units.length, file.scene.dim)
+    force, _ = force_units(units.force, units.length, file.scene.is_plane)
     table = Table(
         title=f"{file.title}: load steps", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
     )

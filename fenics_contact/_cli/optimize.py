@@ -138,7 +138,7 @@ def _facts(file: SceneFile, task: ShapeTask, result: Result) -> dict[str, str]:
         rows[f"constraint {one.name}"] = f"{one.value:.6g}{', active' if one.active else ''}"
     for name, point in (("before", before), ("after", after)):
         state = point.state
-        force, _ = force_units(units.force, units.length, state.scene.dim)
+        force, _ = force_units(units.force, units.length, state.scene.is_plane)
         for number, words in enumerate(pairs_in_words(state.scene, state.contact, force, units.stress)):
             rows[f"contact {number} {name}"] = words
     volume, start = problem.volume(result.x)[0], problem.volume(task.start)[0]

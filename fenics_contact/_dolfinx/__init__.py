@@ -15,7 +15,16 @@ from fenics_contact._dolfinx.assembly import (
     assemble_vector,
     write_xdmf,
 )
-from fenics_contact._dolfinx.cells import CELL_TYPES, degree, dimension, facet_vertices, shape
+from fenics_contact._dolfinx.cells import (
+    CELL_TYPES,
+    degree,
+    dimension,
+    facet_vertices,
+    is_revolved,
+    of_mesh,
+    revolved,
+    shape,
+)
 from fenics_contact._dolfinx.forms import CompiledForm
 from fenics_contact._dolfinx.loading import fem, mesh, release, untested, version, warn_if_untested
 from fenics_contact._dolfinx.meshes import local_mesh, rank_mesh
@@ -78,6 +87,7 @@ __all__ = [
     "field_symbols",
     "global_dofs",
     "input_cells",
+    "is_revolved",
     "lagrange_degree",
     "local_mesh",
     "match_facets",
@@ -86,10 +96,12 @@ __all__ = [
     "nodal_space",
     "nodal_space_on",
     "node_dofs",
+    "of_mesh",
     "rank_mesh",
     "read_mesh",
     "read_tags",
     "release",
+    "revolved",
     "scalar_space",
     "shape",
     "tag_arrays",

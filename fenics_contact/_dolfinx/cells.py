@@ -1,4 +1,8 @@
-"""Cell types: dimension, shape, degree, order of nodes, facets."""
+"""Cell types: dimension, shape, degree, order of nodes, facets.
+
+Forms of bodies of revolution are written on cells whose type has the word axisymmetric in front: they have
+weights and strains of their own.
+"""
 
 from __future__ import annotations
 
@@ -36,14 +40,34 @@ _FACET_VERTICES = {
 }
 
 
+#: What the types of cells of bodies of revolution begin with.
+_REVOLVED = "axisymmetric "
+
+
+def revolved(cell_type: str) -> str:
+    """Return the type of plane cells as that of a body of revolution."""
+    return _REVOLVED + cell_type
+
+
+def is_revolved(cell_type: str) -> bool:
+    """Return whether cells are those of a body of revolution."""
+    return cell_type.startswith(_REVOLVED)
+
+
+def of_mesh(cell_type: str) -> str:
+    """Return the type that the cells have in a mesh, which does not know whether a body is revolved."""
+    return cell_type.removeprefix(_REVOLVED)
+
+
 def shape(cell_type: str) -> str:
     """Return dolfinx's name of the shape of such cells."""
-    return _SHAPE.get(cell_type, cell_type)
+    cell = of_mesh(cell_type)
+    return _SHAPE.get(cell, cell)
 
 
 def degree(cell_type: str) -> int:
     """Return the degree of the map from the reference cell and of displacements, 1 or 2."""
-    return 2 if cell_type in _SHAPE else 1
+    return 2 if of_mesh(cell_type) in _SHAPE else 1
 
 
 def cell_type_named(name: str, order: int) -> str:

@@ -20,7 +20,6 @@ from fenics_contact.errors.ranks import made_once
 from fenics_contact.feti.factor import fixing_nodes
 from fenics_contact.feti.subdomain import common_kernel
 from fenics_contact.feti.torn import TornSystem
-from fenics_contact.materials.kernels import rigid_body_modes
 from fenics_contact.results.rigid_motions import UnheldMotion, motion_in_words
 
 #: A load that needs all but this fraction of the friction is at the limit: how far the body slides would be
@@ -91,7 +90,7 @@ class RigidBody:
         self._nodes = slice(int(tearing.node_offset[index]), int(tearing.node_offset[index + 1]))
         body = torn.scene.bodies[self.name]
         self._points = body.mesh.points
-        self._modes = rigid_body_modes(self._points)
+        self._modes = body.rigid_modes()
         supports = resisted_motions(held_components(torn.scene, self.name, self._modes))
         #: Wrenches that supports and material can exert in both directions, shape (n_modes, n).
         self.support = _both(supports, _resisted_by_material(body, self._modes))
@@ -150,7 +149,7 @@ def _resisted_by_material(body: Body, modes: np.ndarray) -> np.ndarray:
     """Return an orthonormal basis of the rigid motions that cost energy, shape (n_modes, n)."""
     count = modes.shape[2]
     flat = modes.reshape(-1, count)
-    kernel = common_kernel(body.materials, body.mesh.points).reshape(len(flat), -1)
+    kernel = common_kernel(body.materials, body.mesh.points, body.axisymmetric).reshape(len(flat), -1)
     if kernel.shape[1] == count:
         return np.zeros((count, 0))
     free, _ = np.linalg.qr(np.linalg.lstsq(flat, kernel, rcond=None)[0])
@@ -425,13 +424,13 @@ def _of_contact(torn: TornSystem, bodies: list[RigidBody]) -> list[sp.csc_matrix
 
 def _of_any(torn: TornSystem, pair: ContactPair, names: list[str]) -> sp.csc_matrix:
     """Return the wrenches of any forces between the bodies of a pair."""
-    mesh = torn.scene.bodies[pair.slave.body].mesh
-    at = mesh.points[fixing_nodes(mesh.points)]
-    size = rigid_body_modes(at).shape[2]
+    slave = torn.scene.bodies[pair.slave.body]
+    at = slave.mesh.points[fixing_nodes(slave.mesh.points)]
+    size = slave.rigid_modes(at).shape[2]
     result = np.zeros((len(names), size, at.size))
     for side, sign in ((pair.slave, 1.0), (pair.master, -1.0)):
         if isinstance(side, Surface):
-            modes = rigid_body_modes(torn.scene.bodies[side.body].mesh.points, at)
+            modes = torn.scene.bodies[side.body].rigid_modes(at)
             result[names.index(side.body)] += sign * modes.reshape(at.size, size).T
     return sp.csc_matrix(result.reshape(-1, at.size))
 

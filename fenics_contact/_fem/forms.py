@@ -12,7 +12,7 @@ from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact._base.libraries import MPI
-from fenics_contact._fem.composition import Composition, integrate, material_sets
+from fenics_contact._fem.composition import Composition, as_in_space, integrate, material_sets
 from fenics_contact._fem.load_forms import (
     FIRST_COUNT,
     Symbol,
@@ -67,17 +67,17 @@ class FormLibrary:
     def prepare(self, scene: Scene) -> None:
         """Compile the missing forms of a scene. Collective on the library's communicator."""
         for body in scene.bodies.values():
-            cell_type = body.mesh.cell_type
+            cell_type = body.cell_type
             for materials in material_sets(body):
                 self._prepare_stiffness(materials, cell_type)
         with together(self._comm):
             for body in scene.bodies.values():
                 for material in body.materials:
-                    self._check(material, body.mesh.cell_type)
+                    self._check(material, body.cell_type)
         for load in as_tractions(scene):
             body = scene.bodies[load.body]
             for materials in material_sets(body):
-                self._prepare_load(load, materials, body.mesh.cell_type)
+                self._prepare_load(load, materials, body.cell_type)
 
     def stiffness(
         self, parts: Composition, cell_type: str, space: _dolfinx.fem.FunctionSpace
@@ -118,7 +118,7 @@ class FormLibrary:
         with together(self._comm):
             for body in scene.bodies.values():
                 for material in body.materials:
-                    cell_type = body.mesh.cell_type
+                    cell_type = body.cell_type
                     if (
                         isinstance(material, Hyperelasticity)
                         and (material, cell_type) not in self._deformable
@@ -189,7 +189,7 @@ class FormLibrary:
     def _prepare_stiffness(self, materials: tuple[Material, ...], cell_type: str) -> None:
         def write() -> Written:
             V = _dolfinx.displacement_space(cell_type)
-            u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+            u, v = as_in_space(cell_type, ufl.TrialFunction(V), ufl.TestFunction(V))
             form, constants = integrate(
                 materials, cell_type, lambda m, c: m.stiffness(u, v, c), volume_measure(cell_type)
             )
@@ -212,14 +212,16 @@ def cell_stiffness(scene: Scene, forms: FormLibrary) -> dict[str, np.ndarray]:
     """Return a typical nodal stiffness of every cell of every body, [force / length].
 
     It is a material's stiffness on a unit cell, times the mean cell size of the body: within a body of one
-    material it is the same everywhere.
+    material it is the same everywhere, of one of revolution in proportion to the radius.
     """
     stiffness = {}
     for name, body in scene.bodies.items():
         size = (body.mesh.volume / body.mesh.n_cells) ** (1.0 / scene.dim)
-        cell_type = body.mesh.cell_type
+        cell_type = body.cell_type
         moduli = np.array([forms.typical_modulus(material, cell_type) for material in body.materials])
         stiffness[name] = moduli[body.material_of_cells] * size ** (scene.dim - 2)
+        if body.axisymmetric:
+            stiffness[name] *= body.mesh.points[body.mesh.cells, 0].mean(axis=1)
     return stiffness
 
 

@@ -10,8 +10,14 @@ import ufl
 from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
-from fenics_contact._fem.composition import Composition, integrate
-from fenics_contact._fem.templates import Constants, scalar_constants, surface_measure, volume_measure
+from fenics_contact._fem.composition import Composition, as_in_space, integrate
+from fenics_contact._fem.templates import (
+    Constants,
+    per_revolution,
+    scalar_constants,
+    surface_measure,
+    volume_measure,
+)
 from fenics_contact._scene.fields import Ufl, evaluate
 from fenics_contact._scene.loads import BodyForce, Load, Pressure, ThermalStrain
 from fenics_contact.errors import InvalidInputError
@@ -109,17 +115,17 @@ def load_work(
 ) -> tuple[ufl.Form, Constants]:
     """Return the virtual work of a load along ``v``, a UFL form, and the constants of the materials in it."""
     if isinstance(load, ThermalStrain):
+        (along,) = as_in_space(cell_type, v)
 
         def thermal(material: Any, constants: Constants) -> Expr:
-            return value * ufl.inner(material.thermal_stress(constants), strain(v))
+            return value * ufl.inner(material.thermal_stress(constants), strain(along))
 
         return integrate(materials, cell_type, thermal, volume_measure(cell_type, 2))
-    if isinstance(load, BodyForce):
-        return ufl.dot(value, v) * volume_measure(cell_type, 2), ()
-    if isinstance(load, Pressure):
-        normal = ufl.FacetNormal(_dolfinx.template(cell_type))
-        return -value * ufl.dot(normal, v) * surface_measure(cell_type), ()
-    return ufl.dot(value, v) * surface_measure(cell_type), ()
+    work = ufl.dot(value, v) if not isinstance(load, Pressure) else None
+    if work is None:
+        work = -value * ufl.dot(ufl.FacetNormal(_dolfinx.template(cell_type)), v)
+    measure = volume_measure(cell_type, 2) if isinstance(load, BodyForce) else surface_measure(cell_type)
+    return per_revolution(work, cell_type) * measure, ()
 
 
 def load_parameters(load: Load, parts: Composition) -> tuple[float, ...]:

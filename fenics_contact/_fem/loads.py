@@ -142,7 +142,7 @@ def spread_traction(scene: Scene, load: TotalForce) -> Traction:
     With the area A and J b = ∫ (x − c) × (b × (x − c)): a = F / A and J b = M + (p − c) × F.
     """
     mesh = scene.bodies[load.body].mesh
-    surface = surface_moments(mesh.points, mesh.surfaces[load.surface])
+    surface = surface_moments(mesh.points, mesh.surfaces[load.surface], scene.axisymmetric)
     even = tuple(component / surface.area for component in load.value)
     if load.moment is None and load.at is None:
         return Traction(load.body, load.surface, even)

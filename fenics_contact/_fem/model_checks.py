@@ -159,7 +159,13 @@ Bind = Callable[["_dolfinx.fem.FunctionSpace"], "_dolfinx.fem.Form"]
 
 def unit_cell_stiffness(cell_type: str, bind: Bind) -> np.ndarray:
     """Return the stiffness matrix of a cell of edge length one, dense, block by block."""
-    return stiffness_of_cell(CELL_TYPES[cell_type].nodes, cell_type, bind)[0]
+    return stiffness_of_cell(_unit_cell(cell_type), cell_type, bind)[0]
+
+
+def _unit_cell(cell_type: str) -> np.ndarray:
+    """Return the nodes of a cell of edge length one, of a body of revolution with radii around one."""
+    nodes = CELL_TYPES[_dolfinx.of_mesh(cell_type)].nodes
+    return nodes + np.array([0.5, 0.0]) if _dolfinx.is_revolved(cell_type) else nodes
 
 
 def check_model(material: Material, cell_type: str, bind: Bind) -> None:
@@ -169,7 +175,7 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
     stiffness; both could be taken for a solution.
     """
     name = type(material).__name__
-    K, points = stiffness_of_cell(skewed(CELL_TYPES[cell_type].nodes), cell_type, bind)
+    K, points = stiffness_of_cell(skewed(_unit_cell(cell_type)), cell_type, bind)
     if not np.isfinite(K).all():
         raise InvalidInputError(
             f"stiffness and load must be finite, got NaN or infinity in the stiffness of {name}: check the "
@@ -192,7 +198,7 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
             f"the energy of a material must not be negative, {name} has the eigenvalue {energies[0]:.3g} "
             f"beside {energies[-1]:.3g}: check signs and parameters"
         )
-    R = _checked_kernel(material, points)
+    R = _checked_kernel(material, points, _dolfinx.is_revolved(cell_type))
     check_kernel(K, R, f"material {name}")
     claimed, counted = R.shape[1], int((energies < ROUNDING * energies[-1]).sum())
     if counted > claimed:
@@ -224,8 +230,18 @@ def check_kernel(
         )
 
 
-def kernel_of(material: Material, points: np.ndarray) -> np.ndarray:
-    """Return the modes without energy of a material at points, shape (n, dim, n_modes)."""
+def kernel_of(material: Material, points: np.ndarray, axisymmetric: bool = False) -> np.ndarray:
+    """Return the modes without energy of a material at points, shape (n, dim, n_modes).
+
+    A body of revolution has the translation along its axis, unless the material resists that.
+    """
+    if axisymmetric:
+        in_space = kernel_of(material, np.pad(points, ((0, 0), (0, 1)))).reshape(3 * len(points), -1)
+        along = np.zeros((*points.shape, 1))
+        along[:, 1] = 1.0
+        moved = np.pad(along, ((0, 0), (0, 1), (0, 0))).ravel()
+        rest = moved - in_space @ np.linalg.lstsq(in_space, moved, rcond=None)[0]
+        return along if np.abs(rest).max() <= 1e-8 else along[..., :0]
     name = type(material).__name__
     with user_code(f"the kernel of material {name}"):
         modes = np.asarray(material.kernel(points), dtype=np.float64)
@@ -238,8 +254,9 @@ def kernel_of(material: Material, points: np.ndarray) -> np.ndarray:
     return modes
 
 
-def _checked_kernel(material: Material, points: np.ndarray) -> np.ndarray:
-    name, R = type(material).__name__, kernel_of(material, points).reshape(points.size, -1)
+def _checked_kernel(material: Material, points: np.ndarray, axisymmetric: bool) -> np.ndarray:
+    name, R = type(material).__name__, kernel_of(material, points, axisymmetric)
+    R = R.reshape(points.size, R.shape[2])
     if np.linalg.matrix_rank(R, tol=1e-8 * max(np.abs(R).max(initial=0.0), 1e-300)) < R.shape[1]:
         raise InvalidInputError(
             f"the modes in the kernel of {name} must be independent, the {R.shape[1]} given are not: leave "
@@ -260,7 +277,7 @@ def stiffness_of_cell(vertices: np.ndarray, cell_type: str, bind: Bind) -> tuple
 
     `vertices`: coordinates in VTK order, shape (n, dim), [length].
     """
-    mesh = _dolfinx.local_mesh(vertices, np.arange(len(vertices))[None], cell_type)
+    mesh = _dolfinx.local_mesh(vertices, np.arange(len(vertices))[None], _dolfinx.of_mesh(cell_type))
     space = _dolfinx.coefficient(mesh, "u").function_space
     nodes, dofs = _dolfinx.node_dofs(space)
     points = np.empty_like(vertices)
@@ -304,8 +321,8 @@ def check_hyperelastic(
     cell_type = cell_type or ("hexahedron" if 3 in material.dims else "quadrilateral")
     templates = Templates(MPI.COMM_SELF) if templates is None else templates
     prepare_forms(templates, (material,), cell_type)
-    name, vertices = type(material).__name__, skewed(CELL_TYPES[cell_type].nodes)
-    mesh = _dolfinx.local_mesh(vertices, np.arange(len(vertices))[None], cell_type)
+    name, vertices = type(material).__name__, skewed(_unit_cell(cell_type))
+    mesh = _dolfinx.local_mesh(vertices, np.arange(len(vertices))[None], _dolfinx.of_mesh(cell_type))
     space = _dolfinx.coefficient(mesh, "u").function_space
     nodes, dofs = _dolfinx.node_dofs(space)
     points = np.empty_like(vertices)

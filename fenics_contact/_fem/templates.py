@@ -22,8 +22,12 @@ from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
 from fenics_contact.mesh.quality import jacobians
 
 #: Gauss rule of the volume by shape: two points per direction on tensor-product cells, one on simplices suit
-#: linear elasticity; quadratic cells get twice the degree.
-QUADRATURE_DEGREE = {"hexahedron": 2, "tetrahedron": 1, "quadrilateral": 2, "triangle": 1}
+#: linear elasticity; quadratic cells get twice the degree. The hoop strain of bodies of revolution varies
+#: also in linear triangles.
+QUADRATURE_DEGREE = {
+    "hexahedron": 2, "tetrahedron": 1, "quadrilateral": 2, "triangle": 1,
+    _dolfinx.revolved("quadrilateral"): 2, _dolfinx.revolved("triangle"): 2,
+}  # fmt: skip
 #: Tag of every loaded surface inside a load form.
 LOADED = 1
 
@@ -176,7 +180,9 @@ def volume_measure(cell_type: str, degree: int | None = None) -> ufl.Measure:
 
 def quadrature_degree(cell_type: str, degree: int | None = None) -> int:
     """Return the degree of the package's quadrature on cells, or of that given for linear ones."""
-    linear = QUADRATURE_DEGREE[_dolfinx.shape(cell_type)] if degree is None else degree
+    shape = _dolfinx.shape(cell_type)
+    shape = _dolfinx.revolved(shape) if _dolfinx.is_revolved(cell_type) else shape
+    linear = QUADRATURE_DEGREE[shape] if degree is None else degree
     return int(linear * _dolfinx.degree(cell_type))
 
 
@@ -184,6 +190,13 @@ def surface_measure(cell_type: str) -> ufl.Measure:
     """Return ds of the loaded surface on the template."""
     degree = 2 * _dolfinx.degree(cell_type)
     return ufl.ds(domain=_dolfinx.template(cell_type), metadata={"quadrature_degree": degree})(LOADED)
+
+
+def per_revolution(density: Expr, cell_type: str) -> Expr:
+    """Return a density times the circumference 2 π r on bodies of revolution, as it is on others."""
+    if not _dolfinx.is_revolved(cell_type):
+        return density
+    return 2 * np.pi * ufl.SpatialCoordinate(_dolfinx.template(cell_type))[0] * density
 
 
 #: Cells with a dilatation that is linear in each; it is constant in all others. Hexahedra and quadrilaterals

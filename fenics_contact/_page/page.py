@@ -277,7 +277,7 @@ def _tolerance(given: Any) -> Any:
 
 def _force_units(record: Record, units: Units) -> tuple[str, str]:
     """Return the units of forces, and of moments and energies."""
-    return force_units(units.force, units.length, 2 if _plane(record) else 3)
+    return force_units(units.force, units.length, _plane(record))
 
 
 def _accuracy(record: Record) -> dict[str, Any]:
@@ -339,7 +339,8 @@ def _side(side: Any) -> str:
 
 
 def _plane(record: Record) -> bool:
-    return (record.get("scene") or {}).get("dimension") == 2
+    scene = record.get("scene") or {}
+    return scene.get("dimension") == 2 and not scene.get("axisymmetric")
 
 
 def _steps(record: Record, units: Units) -> str:
@@ -381,8 +382,10 @@ def _forces(record: Record, units: Units) -> str:
         for what, entry in listed_forces(forces)
     ]
     rows = [row for name, entry in entries for row in _force_rows(name, entry, scales, names)]
-    words = f"<p>Imbalance of all forces and moments: {escape(number(imbalance))}.</p>"
-    return _table(("", "", "x", "y", "z"), rows, words=2) + words
+    turned = bool((record.get("scene") or {}).get("axisymmetric"))
+    what = "axial forces per revolution" if turned else "forces and moments"
+    words = f"<p>Imbalance of all {what}: {escape(number(imbalance))}.</p>"
+    return _table(("", "", *(("r", "z", "") if turned else "xyz")), rows, words=2) + words
 
 
 def _force_rows(
@@ -396,6 +399,8 @@ def _force_rows(
     )
     if not any([*force, *moment]):
         return []
+    if not moment:  # all around an axis
+        return [(name, f"radial and axial force ({units[0]})", *force, "")]
     # In the plane a moment is one number, about the axis across it.
     return [
         (name, f"force ({units[0]})", *force, *[""] * (3 - len(force))),

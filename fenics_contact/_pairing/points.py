@@ -51,6 +51,7 @@ class ContactPoints:
             interference, shape (n,).
         taken: Slave nodes plus one of other pairs that have a point in the same place, which is left out, on
             a surface beside: their areas are part of that of the point. Shape (n, n_pairs); None: none are.
+        length: `sizes` on bodies of revolution, shape (n,), [length]; None elsewhere, where areas give them.
     """
 
     pair: np.ndarray
@@ -67,6 +68,14 @@ class ContactPoints:
     distance: np.ndarray
     given: np.ndarray
     taken: sp.csr_matrix | None = None
+    length: np.ndarray | None = None
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """Size of the slave's facets around each node, shape (n,), [length]."""
+        if self.length is not None:
+            return self.length
+        return np.asarray(self.area ** (1.0 / (self.normal.shape[1] - 1)))
 
     @property
     def count(self) -> int:
@@ -124,6 +133,7 @@ def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> Conta
         strung("pair"), strung("slave"), sp.vstack([part.master for part in parts], format="csr"),
         strung("normal"), strung("tangents"), strung("gap"), strung("area"), strung("facet"), strung("local"),
         strung("axes"), strung("symmetric"), strung("distance"), strung("given"), taken,
+        None if parts[0].length is None else strung("length"),
     )  # fmt: skip
 
 
@@ -353,7 +363,7 @@ def _shared(points: ContactPoints, scene: Scene) -> tuple[np.ndarray, np.ndarray
     towards = sign[:, None] * points.normal[other]
     cosine = np.einsum("nd,nd->n", points.normal[one], towards)
     # Of two in one direction the one with the larger gap never closes; turned ones differ by their facets.
-    size = points.area ** (1.0 / (scene.dim - 1))
+    size = points.sizes
     equal = HELD * size.mean()
     turned = np.linalg.norm(points.normal[one] - towards, axis=1)
     as_far = np.abs(points.gap[one] - points.gap[other]) <= equal + turned * size[one]

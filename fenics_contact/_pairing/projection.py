@@ -192,7 +192,8 @@ def _areas(surface: FacetedSurface, places: np.ndarray, met: np.ndarray) -> tupl
     """
     facets = surface.facets if surface.whole is None else surface.whole
     full = met[facets].all(axis=1)
-    areas = np.bincount(facets[full].ravel(), bearing_areas(places, facets[full]).ravel(), minlength=len(met))
+    bearing = bearing_areas(places, facets[full], surface.axisymmetric)
+    areas = np.bincount(facets[full].ravel(), bearing.ravel(), minlength=len(met))
     return ~np.isin(np.arange(len(met)), facets[~full]), areas
 
 

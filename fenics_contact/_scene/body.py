@@ -7,15 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact import _dolfinx
 from fenics_contact._base.checks import brief, checked
-from fenics_contact._base.display import displayed
+from fenics_contact._base.display import counted, displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material
-from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_finite_strain
+from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_finite_strain, is_nonlinear
+from fenics_contact.materials.kernels import rigid_body_modes
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES
+from fenics_contact.mesh.faces import computed_rounding
 
 
 @displayed
@@ -27,17 +30,30 @@ class Body:
     Attributes:
         mesh: The mesh.
         material: The material, or one for each of the mesh's regions by name.
+        axisymmetric: Whether the plane mesh is half the section of a body of revolution, with the radius
+            r ≥ 0 as first coordinate and the height z along the axis as second. Its materials are those of
+            space, with the axes r, z and around the circumference as x, y and z. Loads, forces, areas and
+            energies are those of a full revolution; on the axis the radial displacement is zero.
+
+    Example:
+        >>> from fenics_contact.gallery import rectangle
+        >>> from fenics_contact.materials import IsotropicElasticity
+        >>> half_section = rectangle((20.0, 0.0), (40.0, 10.0), (8, 4))  # mm
+        >>> ring = Body(half_section, IsotropicElasticity(2.1e5, 0.3), axisymmetric=True)
     """
 
     mesh: BodyMesh
     material: Material | Mapping[str, Material]
+    axisymmetric: bool = False
 
     def __post_init__(self) -> None:
         """Refuse materials of another dimension and regions without exactly one material."""
+        if self.axisymmetric:
+            _check_half_section(self.mesh)
         if isinstance(self.material, Mapping):
             _check_regions(self.mesh, self.material)
         for material in self.materials:
-            _check_material(material, self.mesh.dim)
+            _check_material(material, self.mesh.dim, self.axisymmetric)
             _check_mean_dilatation(material, self.mesh)
 
     @property
@@ -52,6 +68,29 @@ class Body:
         return tuple(different)
 
     @property
+    def cell_type(self) -> str:
+        """The type of its cells for forms, which are others for bodies of revolution."""
+        return _dolfinx.revolved(self.mesh.cell_type) if self.axisymmetric else self.mesh.cell_type
+
+    @property
+    def on_axis(self) -> np.ndarray:
+        """Which nodes of a body of revolution lie on its axis, shape (n_nodes,); none of others."""
+        if not self.axisymmetric:
+            return np.zeros(self.mesh.n_nodes, dtype=bool)
+        return np.asarray(self.mesh.points[:, 0] <= computed_rounding(self.mesh.points))
+
+    def rigid_modes(self, at: np.ndarray | None = None) -> np.ndarray:
+        """Return its rigid motions at its nodes or elsewhere, see `rigid_body_modes`.
+
+        A body of revolution has the translation along its axis alone, shape (n, 2, 1).
+        """
+        if not self.axisymmetric:
+            return rigid_body_modes(self.mesh.points, at)
+        modes = np.zeros((*(self.mesh.points if at is None else at).shape, 1))
+        modes[:, 1] = 1.0
+        return modes
+
+    @property
     def deforms_much(self) -> bool:
         """Whether one of the materials is made for large deformations, rotations included."""
         return any(map(is_finite_strain, self.materials))
@@ -59,7 +98,9 @@ class Body:
     @property
     def in_words(self) -> str:
         """Its cells and materials in a few words."""
-        return f"{self.mesh.cells_in_words} of {', '.join(type(each).__name__ for each in self.materials)}"
+        turned = ", a body of revolution" * self.axisymmetric
+        materials = ", ".join(type(each).__name__ for each in self.materials)
+        return f"{self.mesh.cells_in_words} of {materials}{turned}"
 
     @property
     def material_of_cells(self) -> np.ndarray:
@@ -80,7 +121,22 @@ def _check_regions(mesh: BodyMesh, materials: Mapping[str, Material]) -> None:
         )
 
 
-def _check_material(material: Material, dim: int) -> None:
+def _check_half_section(mesh: BodyMesh) -> None:
+    if mesh.dim != 2:
+        raise InvalidInputError(
+            "axisymmetric=True needs a plane mesh, half the section of the body with the coordinates r and "
+            f"z, got one in {mesh.dim} dimensions: give the section, or leave axisymmetric out"
+        )
+    left = mesh.points[:, 0] < -computed_rounding(mesh.points)
+    if left.any():
+        raise InvalidInputError(
+            "the first coordinate of a body of revolution is the radius, which must not be negative, "
+            f"{counted(int(left.sum()), 'node lies', 'nodes lie')} left of the axis, down to "
+            f"{mesh.points[:, 0].min():.3g}: give the half of the section right of the axis r = 0"
+        )
+
+
+def _check_material(material: Material, dim: int, axisymmetric: bool) -> None:
     name = type(material).__name__
     needed = ("dims", "parameters", "stress", "stiffness", "kernel")
     with user_code(f"reading {', '.join(needed)} of material {name}"):
@@ -95,7 +151,19 @@ def _check_material(material: Material, dim: int) -> None:
             f"parameters of {name} must be a sequence of numbers, got {brief(material.parameters)}: "
             "return a tuple, with a comma behind a single one"
         )
-    if dim not in material.dims:
+    if axisymmetric and 3 not in material.dims:
+        raise InvalidInputError(
+            f"the material of a body of revolution must be one of space, {name} is for {material.dims}: use "
+            "IsotropicElasticity, OrthotropicElasticity or others that plane bodies cannot have"
+        )
+    if axisymmetric and is_nonlinear(material):
+        raise InvalidInputError(
+            f"bodies of revolution need linear materials, {name} is nonlinear: model a sector of the body in "
+            "space between two planes of symmetry"
+        )
+    if axisymmetric:
+        _check_symmetric_axes(material)
+    elif dim not in material.dims:
         raise InvalidInputError(
             f"the material must be made for the dimension of the mesh, {name} is for {material.dims} and the "
             f"mesh has {dim}: use PlaneStrain or PlaneStress in the plane, IsotropicElasticity or "
@@ -108,6 +176,18 @@ def _check_material(material: Material, dim: int) -> None:
             f"a material must be hashable, {name} is not ({error}): write it as a frozen dataclass of "
             "numbers and tuples"
         ) from error
+
+
+def _check_symmetric_axes(material: Material, rounding: float = 1e-9) -> None:
+    """Refuse stiffness that would twist a body: shear around the circumference under other strains."""
+    stiffness = getattr(material, "stiffness_matrix", None)
+    if stiffness is not None and np.shape(stiffness) == (6, 6):
+        coupling = np.abs(stiffness[np.ix_([0, 1, 2, 5], [3, 4])]).max()
+        if coupling > rounding * np.abs(stiffness).max():
+            raise InvalidInputError(
+                f"a body of revolution cannot twist, but the axes of {type(material).__name__} are inclined "
+                "to the circumference, its third axis: let one of them point along it"
+            )
 
 
 def _check_mean_dilatation(material: Material, mesh: BodyMesh) -> None:

@@ -51,6 +51,8 @@ class SceneParts:
         for part in (*self.supports, *self.loads):
             if not isinstance(part, RigidSurface):
                 self._require_components(part)
+            if self.axisymmetric:
+                self._require_off_axis(part)
             if isinstance(part, TotalForce):
                 self._require_lever(part)
             if isinstance(part, ThermalStrain):
@@ -84,7 +86,14 @@ class SceneParts:
         )
 
     def _require_one_dimension(self) -> None:
-        """Raise if some bodies are plane and others solid."""
+        """Raise if some bodies are plane and others solid, or only some are bodies of revolution."""
+        turned = [name for name, body in self.bodies.items() if body.axisymmetric]
+        if turned and len(turned) < len(self.bodies):
+            others = [name for name in self.bodies if name not in turned]
+            raise InvalidInputError(
+                f"the bodies of a scene must all be bodies of revolution or none, got axisymmetric {turned} "
+                f"and others {others}: give all of them axisymmetric=True"
+            )
         plane = [name for name, body in self.bodies.items() if body.mesh.dim == 2]
         solid = [name for name in self.bodies if name not in plane]
         if plane and solid:
@@ -113,6 +122,8 @@ class SceneParts:
         dim = self.bodies[support.body].mesh.dim
         if isinstance(support, Support):
             return support.held_in(dim)
+        if self.axisymmetric:
+            support = support.along_axis()
         if support.dim != dim:
             raise InvalidInputError(
                 f"RigidSurface.at on surface {support.surface!r} of body {support.body!r} must have {dim} "
@@ -128,6 +139,22 @@ class SceneParts:
             raise InvalidInputError(
                 f"{type(part).__name__}.value of body {part.body!r} must hold {needed}, got {part.value!r}: "
                 f"give {dim} of them"
+            )
+
+    def _require_off_axis(self, part: Load | AnySupport) -> None:
+        """Reject a surface load on the axis, and a resultant with a moment."""
+        if not isinstance(part, SurfaceLoad):
+            return
+        where, body = f"surface {part.surface!r} of body {part.body!r}", self.bodies[part.body]
+        if body.on_axis[body.mesh.surfaces[part.surface]].all():
+            raise InvalidInputError(
+                f"a load on a surface needs an area, {where} is a line, the axis of revolution: choose "
+                "another surface"
+            )
+        if isinstance(part, TotalForce) and (part.moment is not None or part.at is not None):
+            raise InvalidInputError(
+                f"TotalForce on {where} of a body of revolution acts along its axis, and outwards all "
+                f"around, got moment {part.moment!r} and at {part.at!r}: leave both out"
             )
 
     def _require_lever(self, load: TotalForce) -> None:
@@ -192,6 +219,16 @@ class SceneParts:
         """Dimension of space, 2 or 3."""
         return int(next(iter(self.bodies.values())).mesh.points.shape[1])
 
+    @property
+    def axisymmetric(self) -> bool:
+        """Whether its bodies are bodies of revolution."""
+        return next(iter(self.bodies.values())).axisymmetric
+
+    @property
+    def is_plane(self) -> bool:
+        """Whether its bodies are plane, with forces a unit of thickness; bodies of revolution are not."""
+        return self.dim == 2 and not self.axisymmetric
+
     def fixed(self, body: str, supports: Sequence[AnySupport] | None = None) -> np.ndarray:
         """Return which components of a body's nodes supports prescribe, shape (n_nodes, dim).
 
@@ -211,6 +248,9 @@ class SceneParts:
             if support.body == body:
                 nodes, given = self.given(support)
                 values[nodes] = np.where(np.isnan(given), values[nodes], given)
+        axis = self.bodies[body].on_axis
+        check_axis(body, values[axis, 0])
+        values[axis, 0] = 0.0
         return values
 
     def given(self, support: AnySupport) -> tuple[np.ndarray, np.ndarray]:
@@ -284,6 +324,16 @@ class SceneParts:
     def _with_meshes(self, meshes: Mapping[str, BodyMesh]) -> Self:
         changed = {name: replace(self.bodies[name], mesh=mesh) for name, mesh in meshes.items()}
         return replace(self, bodies={**self.bodies, **changed})
+
+
+def check_axis(body: str, prescribed: np.ndarray) -> None:
+    """Reject radial displacements prescribed on the axis of a body of revolution other than zero."""
+    moved = np.abs(np.nan_to_num(prescribed)).max(initial=0.0)
+    if moved > 0.0:
+        raise InvalidInputError(
+            f"the radial displacement is zero on the axis of revolution, supports of body {body!r} prescribe "
+            f"up to {moved:.3g} there: leave it free or zero"
+        )
 
 
 def _require_different(pairs: Sequence[ContactPair | Tie]) -> None:
@@ -375,7 +425,8 @@ TILT = 1e-9
 def mirrored(scene: SceneParts, body: str) -> np.ndarray:
     """Return which nodes of a body lie on a plane of symmetry normal to each axis, shape (n_nodes, dim).
 
-    A plane of symmetry is a flat side normal to an axis on which a support prescribes only that component.
+    A plane of symmetry is a flat side normal to an axis on which a support prescribes only that component. On
+    the axis of revolution surfaces have none that is normal to it.
     """
     mesh = scene.bodies[body].mesh
     marks = np.zeros(mesh.points.shape, dtype=bool)
@@ -389,6 +440,7 @@ def mirrored(scene: SceneParts, body: str) -> np.ndarray:
         areas = vector_areas(mesh.points, facets)
         across = np.abs(areas[:, given[0]]) >= (1.0 - TILT) * np.linalg.norm(areas, axis=1)
         marks[facets[across].ravel(), given[0]] = True
+    marks[scene.bodies[body].on_axis, 0] = True
     return marks
 
 
@@ -396,5 +448,7 @@ def surface_of(
     scene: SceneParts, surface: Surface, geometry: Geometry, *, finer: bool = False
 ) -> FacetedSurface:
     """Return a named surface; its normals lie in the planes of symmetry that cut it."""
-    mesh = scene.bodies[surface.body].mesh
-    return true_surface(mesh, surface.name, geometry, mirrored=mirrored(scene, surface.body), finer=finer)
+    body, marks = scene.bodies[surface.body], mirrored(scene, surface.body)
+    return true_surface(
+        body.mesh, surface.name, geometry, mirrored=marks, finer=finer, axisymmetric=body.axisymmetric
+    )

@@ -17,7 +17,6 @@ from fenics_contact._scene.parts import in_words
 from fenics_contact._scene.supports import RigidSurface
 from fenics_contact._surfaces.facets import has_midside_pressure
 from fenics_contact.materials.hyperelastic import is_nonlinear
-from fenics_contact.materials.kernels import rigid_body_modes
 from fenics_contact.mesh.body_mesh import BodyMesh
 
 if TYPE_CHECKING:
@@ -29,6 +28,7 @@ class EffectName(StrEnum):
     """The effects that a scene can contain."""
 
     ELASTICITY = "elasticity"
+    AXISYMMETRY = "axisymmetry"
     NONLINEAR_MATERIAL = "nonlinear material"
     PRESCRIBED_DISPLACEMENT = "prescribed displacement"
     RIGID_SURFACE = "rigid surface"
@@ -54,6 +54,7 @@ class Effect:
 def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
     """List the effects in a scene, in the order of `EffectName`."""
     names, loads = EffectName, scene.loads
+    turned = sum(body.axisymmetric for body in scene.bodies.values())
     nonlinear = sum(any(map(is_nonlinear, body.materials)) for body in scene.bodies.values())
     rigid = sum(isinstance(support, RigidSurface) for support in scene.supports)
     volume = sum(isinstance(load, BodyForce) for load in loads)
@@ -64,6 +65,8 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
     fixed, rough = "has a fixed slip bound", "has a friction coefficient above zero"
     found = (
         (names.ELASTICITY, len(scene.bodies), "elastic body", "elastic bodies"),
+        (names.AXISYMMETRY, turned, "body of revolution, all per revolution",
+         "bodies of revolution, all per revolution"),
         (names.NONLINEAR_MATERIAL, nonlinear, "body deforms much or yields", "bodies do"),
         (names.PRESCRIBED_DISPLACEMENT, len(scene.supports) - rigid, "support", "supports"),
         (names.RIGID_SURFACE, rigid, "surface stays rigid", "surfaces stay rigid"),
@@ -135,7 +138,7 @@ def resisted_motions(held: np.ndarray) -> np.ndarray:
 
 def held_by_supports(scene: SceneParts, body: str) -> bool:
     """Return whether the supports of a body resist all its rigid motions."""
-    modes = rigid_body_modes(scene.bodies[body].mesh.points)
+    modes = scene.bodies[body].rigid_modes()
     return resisted_motions(held_components(scene, body, modes)).shape[1] == modes.shape[2]
 
 
@@ -233,7 +236,8 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
     solver = choose_solver(scene, subdomains, sensitivity=sensitivity)
     direct = solver is SolverKind.DIRECT
     loose = sum(int(s.free.sum()) for s in scene.supports if isinstance(s, RigidSurface))
-    motions = 0 if direct else subdomains * scene.dim * (scene.dim + 1) // 2 + loose
+    each = 1 if scene.axisymmetric else scene.dim * (scene.dim + 1) // 2
+    motions = 0 if direct else subdomains * each + loose
     sizes = zip(scene.dim * nodes, scene.dim * shared, strict=True)
     factors = sum(expected_bytes(int(size), int(interface)) for size, interface in sizes)
     return Plan(

@@ -150,6 +150,18 @@ class RigidSurface:
                 f"and rotation {self.rotation!r}: leave the component free (None), or the load away"
             )
 
+    def along_axis(self) -> RigidSurface:
+        """Return the rigid surface of a body of revolution, which moves along the axis alone."""
+        radial, turned = (self.displacement or (None,))[0], self.rotation
+        if self.dim != 2 or radial or turned or self.load[0] or self.load[2]:
+            raise InvalidInputError(
+                f"RigidSurface {self.surface!r} of body {self.body!r}, a body of revolution, can move along "
+                f"the axis alone, got displacement {self.displacement!r}, rotation {self.rotation!r}, force "
+                f"{self.force!r} and moment {self.moment!r}: give displacement=(0.0, w) or force=(0.0, F)"
+            )
+        along = self.displacement[1] if self.displacement is not None else None
+        return replace(self, displacement=(0.0, along), rotation=0.0)
+
     def _checked(self, name: str, count: int) -> Motion | float | None:
         """Return an attribute as plain numbers; reject other than one finite number for each component."""
         given = getattr(self, name)

@@ -341,6 +341,9 @@ class BodyPart(Part):
     material: Materials = Field(
         description="name of a material of [materials], or one for each region of the mesh"
     )
+    axisymmetric: bool = Field(
+        False, description="whether a plane mesh is half the section (r, z) of a body of revolution"
+    )
 
 
 class OutputPart(Part):

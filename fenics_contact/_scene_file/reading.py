@@ -95,11 +95,10 @@ class Builder:
             with self._at("bodies", name):
                 chosen[name] = self._part_of(name, body, shapes[body.mesh])
                 made_of: Any = body.material
-                if isinstance(made_of, str):
-                    made[name] = Body(chosen[name].mesh, materials[made_of])
-                else:
-                    by_region = {region: materials[part] for region, part in made_of.items()}
-                    made[name] = Body(chosen[name].mesh, by_region)
+                given: Any = materials[made_of] if isinstance(made_of, str) else None
+                if given is None:
+                    given = {region: materials[part] for region, part in made_of.items()}
+                made[name] = Body(chosen[name].mesh, given, body.axisymmetric)
         self._check()
         return made, chosen
 

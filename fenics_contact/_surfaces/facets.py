@@ -17,20 +17,22 @@ import numpy as np
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import FACET_TYPES, CellType, quadrature, shape_gradients, shape_values
+from fenics_contact.mesh.faces import computed_rounding
 
 
-def quadrature_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
+def quadrature_areas(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> np.ndarray:
     """Return the areas of facets, in the plane the lengths of edges.
 
     `points`: coordinates, shape (n_nodes, 3 or 2), [length]; `facets`: node numbers as in
-    `BodyMesh.surfaces`, shape (n_facets, nodes of a facet).
+    `BodyMesh.surfaces`, shape (n_facets, nodes of a facet); `axisymmetric`: whether edges turn around the
+    axis where the first coordinate is zero; their areas are those of whole revolutions.
 
     The result has shape (n_facets,), [length²] or [length].
     """
-    return np.asarray(nodal_areas(points, facets).sum(axis=1), dtype=np.float64)
+    return np.asarray(nodal_areas(points, facets, axisymmetric).sum(axis=1), dtype=np.float64)
 
 
-def nodal_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
+def nodal_areas(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> np.ndarray:
     """Integrate the shape functions over every facet: nodal forces of a unit pressure.
 
     Two Gauss points per direction on linear facets, three on quadratic ones.
@@ -38,7 +40,7 @@ def nodal_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
     The result has shape (n_facets, nodes of a facet), [length²] or [length].
     """
     total = np.zeros(facets.shape)
-    for at in gauss_points(points, facets):
+    for at in gauss_points(points, facets, axisymmetric):
         total += at.areas[:, None] * at.values
     return total
 
@@ -58,11 +60,12 @@ class SurfaceMoments:
     second_moment: np.ndarray
 
 
-def surface_moments(points: np.ndarray, facets: np.ndarray) -> SurfaceMoments:
+def surface_moments(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> SurfaceMoments:
     """Return area, centroid and second moments of a surface; arguments as of `quadrature_areas`."""
     origin = points[facets[0, 0]]  # moments are as exact far from the origin of coordinates as near it
     corners = points[facets] - origin
-    rule = [(at.areas, np.einsum("k,nkd->nd", at.values, corners)) for at in gauss_points(points, facets)]
+    every = gauss_points(points, facets, axisymmetric)
+    rule = [(at.areas, np.einsum("k,nkd->nd", at.values, corners)) for at in every]
     areas, places = np.concatenate([area for area, _ in rule]), np.concatenate([place for _, place in rule])
     area = float(areas.sum())
     centre = areas @ places / area
@@ -75,12 +78,13 @@ class GaussPoint:
     """One point of a quadrature rule in every facet.
 
     Attributes:
+        weight: Of the rule; on bodies of revolution times the circumference in every facet, (n_facets, 1).
         values: Shape functions, shape (nodes of a facet,).
         gradients: Their derivatives by the reference coordinates, shape (nodes of a facet, dim − 1).
         tangents: Derivatives of the place by these, shape (n_facets, dim − 1, dim), [length].
     """
 
-    weight: float
+    weight: float | np.ndarray
     values: np.ndarray
     gradients: np.ndarray
     tangents: np.ndarray
@@ -103,14 +107,15 @@ class GaussPoint:
         return np.asarray(np.linalg.norm(self.normals, axis=1))
 
 
-def gauss_points(points: np.ndarray, facets: np.ndarray) -> Iterator[GaussPoint]:
+def gauss_points(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> Iterator[GaussPoint]:
     """Return the points of a quadrature rule on facets; arguments as of `quadrature_areas`."""
     kind = FACET_TYPES[facets.shape[1], points.shape[1]]
     positions, weights = quadrature(kind, 2 * kind.order)  # as in load forms: resultants are exact
     values, gradients = shape_values(kind, positions), shape_gradients(kind, positions)
     corners = points[facets]
     for weight, value, gradient in zip(weights, values, gradients, strict=True):
-        yield GaussPoint(float(weight), value, gradient, np.einsum("ka,nkd->nad", gradient, corners))
+        around = 2 * np.pi * (corners[..., 0] @ value)[:, None] if axisymmetric else 1.0
+        yield GaussPoint(float(weight) * around, value, gradient, np.einsum("ka,nkd->nad", gradient, corners))
 
 
 #: The nodes of a quadratic triangle.
@@ -122,15 +127,20 @@ def has_midside_pressure(facets: np.ndarray) -> bool:
     return facets.shape[1] == _MIDPOINTS.stop
 
 
-def bearing_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
+def bearing_areas(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> np.ndarray:
     """Return the area of each facet that bears on each of its nodes.
 
     It is the nodal force of a unit pressure, but that of the corners of quadratic triangles, which vanishes
-    on flat ones, is shared by their midpoints.
+    on flat ones, is shared by their midpoints. On an axis of revolution the same holds of the ends of
+    quadratic edges.
 
     The result has shape (n_facets, nodes of a facet), [length²] or [length].
     """
-    areas = nodal_areas(points, facets)
+    areas = nodal_areas(points, facets, axisymmetric)
+    if axisymmetric and facets.shape[1] == 3:
+        ends = np.where(points[facets[:, :2], 0] <= computed_rounding(points), areas[:, :2], 0.0)
+        areas[:, :2] -= ends
+        areas[:, 2] += ends.sum(axis=1)
     if has_midside_pressure(facets):
         areas[:, _MIDPOINTS] += areas[:, _CORNERS].mean(axis=1, keepdims=True)
         areas[:, _CORNERS] = 0.0
@@ -155,6 +165,20 @@ def share_areas(mesh: BodyMesh, name: str) -> np.ndarray:
     if has_midside_pressure(facets):
         facets = mesh.linear.surfaces[name]
     return np.bincount(facets.ravel(), nodal_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
+
+
+def filled_on_axis(facets: np.ndarray, values: np.ndarray, on_axis: np.ndarray) -> np.ndarray:
+    """Fill in values at ends of quadratic edges on an axis of revolution: those of an even parabola.
+
+    `facets`: node numbers, (n, nodes of a facet); values stay as they are unless there are three; `values`:
+    values at nodes, (n_nodes,) or (n_nodes, k); `on_axis`: marks of nodes, (n_nodes,).
+    """
+    result = values.copy()
+    if facets.shape[1] == 3:
+        for here, there in ((0, 1), (1, 0)):
+            edges = facets[on_axis[facets[:, here]]]
+            result[edges[:, here]] = (4 * values[edges[:, 2]] - values[edges[:, there]]) / 3
+    return result
 
 
 def filled_at_corners(facets: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -298,11 +322,13 @@ class FacetedSurface:
         points: Coordinates of the nodes, shape (n, dim), [length].
         averaged: Outward unit normals at the nodes, averaged over the facets around each, shape (n, dim).
         areas: Area, in the plane length, that belongs to each node, shape (n,), [length²] or [length]; zero
-            at the corners of quadratic triangles, on which a pressure does not bear.
+            at the corners of quadratic triangles, on which a pressure does not bear. On bodies of revolution
+            that of the whole circumference.
         mirrored: Components that the normals lack on planes of symmetry, shape (n, dim).
         relief: The true surface relative to the facets; None if it is unknown or coincides with them.
         whole: The quadratic facets that were cut into these, as rows of positions in ``nodes``; None if they
             are whole.
+        axisymmetric: Whether it is that of a body of revolution, half of its section.
     """
 
     nodes: np.ndarray
@@ -313,6 +339,7 @@ class FacetedSurface:
     mirrored: np.ndarray
     relief: Relief | None = None
     whole: np.ndarray | None = None
+    axisymmetric: bool = False
 
     @cached_property
     def normals(self) -> np.ndarray:
@@ -337,10 +364,21 @@ class FacetedSurface:
 
         `points`: coordinates of the nodes, shape (n, dim), [length].
         """
-        if self.whole is None:
-            return _linear_areas(points, self.facets)
-        bearing = bearing_areas(points, self.whole)
-        return np.bincount(self.whole.ravel(), bearing.ravel(), minlength=len(points))
+        if self.whole is None and not self.axisymmetric:
+            return self.widths_at(points)
+        facets = self.facets if self.whole is None else self.whole
+        bearing = bearing_areas(points, facets, self.axisymmetric)
+        return np.bincount(facets.ravel(), bearing.ravel(), minlength=len(points))
+
+    def widths_at(self, points: np.ndarray) -> np.ndarray:
+        """Return the area of linear facets around each node, on bodies of revolution the length of edges."""
+        return _linear_areas(points, self.facets)
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """Size of the facets around each node, shape (n,), [length]."""
+        areas = self.widths_at(self.points) if self.axisymmetric else self.areas
+        return np.asarray(areas ** (1.0 / (self.dim - 1)))
 
 
 def faceted_surface(

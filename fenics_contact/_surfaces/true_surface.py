@@ -332,6 +332,7 @@ def true_surface(
     *,
     mirrored: np.ndarray | None = None,
     finer: bool = False,
+    axisymmetric: bool = False,
 ) -> FacetedSurface:
     """Return a surface of a mesh with its normals and its relief: linear facets through its nodes.
 
@@ -340,7 +341,7 @@ def true_surface(
     """
     marks = np.zeros(mesh.points.shape, dtype=bool) if mirrored is None else mirrored
     surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks)
-    surface = _with_areas(surface, mesh, name)
+    surface = _with_areas(surface, mesh, name, axisymmetric)
     order = 2
     if finer:
         order, geometry = (2 if geometry == "faceted" else 3), "best"
@@ -354,12 +355,13 @@ def true_surface(
     return replace(surface, relief=known[key])
 
 
-def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str) -> FacetedSurface:
-    """Distribute the area of quadratic facets over the nodes on which a uniform pressure bears."""
-    if mesh.order == 1:
+def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str, axisymmetric: bool) -> FacetedSurface:
+    """Distribute the area of quadratic or turned facets over the nodes on which a uniform pressure bears."""
+    if mesh.order == 1 and not axisymmetric:
         return surface
-    facets = mesh.surfaces[name]
-    surface = replace(surface, whole=np.searchsorted(surface.nodes, facets))
+    if mesh.order > 1:
+        surface = replace(surface, whole=np.searchsorted(surface.nodes, mesh.surfaces[name]))
+    surface = replace(surface, axisymmetric=axisymmetric)
     return replace(surface, areas=surface.areas_at(surface.points))
 
 

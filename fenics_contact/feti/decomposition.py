@@ -15,6 +15,7 @@ from fenics_contact._base.libraries import MPI, PETSc, free_communicators, start
 from fenics_contact._base.sparse import LAST_PLACES, dispose_with, expected_seconds, sent
 from fenics_contact._fem.forms import FormLibrary, cell_stiffness
 from fenics_contact._pairing.points import NodeNumbers
+from fenics_contact._scene.parts import check_axis
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.inverse import Condensations
@@ -207,6 +208,11 @@ def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
                 "component free (None) in one of them"
             )
         prescribed[nodes] = np.where(np.isnan(given), known, given)
+    if scene.axisymmetric:
+        for name in tearing.body_names:
+            axis = tearing.global_nodes(name, np.flatnonzero(scene.bodies[name].on_axis))
+            check_axis(name, prescribed[axis, 0])
+            prescribed[axis, 0] = 0.0
     return prescribed
 
 

@@ -201,7 +201,7 @@ def assemble(
         if isinstance(load, SurfaceLoad):
             facets = mesh.facets_of(body, load.surface)
             acted = np.isin(mesh.nodes[order], body.mesh.surfaces[load.surface])
-        form = forms.load(load, parts, body.mesh.cell_type, mesh.space, points[order], facets, acted)
+        form = forms.load(load, parts, body.cell_type, mesh.space, points[order], facets, acted)
         absolute = isinstance(load.value, Ufl) or _varies(parts, body, forms)
         coordinates = points[order] if absolute else _from_own_origin(points[order])
         _dolfinx.update_coordinates(mesh.space.mesh, coordinates)
@@ -224,7 +224,7 @@ def _with_stiffness(
     mesh: SubdomainMesh, body: Body, parts: Composition, forms: FormLibrary, points: np.ndarray
 ) -> Subdomain:
     """Return the subdomain without loads."""
-    space, cell_type = mesh.space, body.mesh.cell_type
+    space, cell_type = mesh.space, body.cell_type
     by_input_node = points[np.argsort(mesh.nodes)]
     if not _varies(parts, body, forms):
         by_input_node = _from_own_origin(by_input_node)
@@ -237,7 +237,7 @@ def _with_stiffness(
     matrix = CachedMatrix(stiffness)
     K = matrix.get()
     _check_finite(K.data, mesh)
-    kernel = common_kernel(parts.materials, points).reshape(mesh.size, -1)
+    kernel = common_kernel(parts.materials, points, body.axisymmetric).reshape(mesh.size, -1)
     check_kernel(K, kernel, f"subdomain {mesh.number} of body {mesh.body!r}")
     typical = float(K.diagonal().mean())
     return Subdomain(mesh, parts, (), points, np.zeros(mesh.size), kernel, typical, matrix)
@@ -245,7 +245,7 @@ def _with_stiffness(
 
 def _varies(parts: Composition, body: Body, forms: FormLibrary) -> bool:
     """Return whether the materials of a mesh depend on position."""
-    return any(forms.varies(material, body.mesh.cell_type) for material in parts.materials)
+    return any(forms.varies(material, body.cell_type) for material in parts.materials)
 
 
 def _from_own_origin(points: np.ndarray) -> np.ndarray:
@@ -253,10 +253,13 @@ def _from_own_origin(points: np.ndarray) -> np.ndarray:
     return np.asarray(points - points[0])
 
 
-def common_kernel(materials: Sequence[Material], points: np.ndarray) -> np.ndarray:
+def common_kernel(
+    materials: Sequence[Material], points: np.ndarray, axisymmetric: bool = False
+) -> np.ndarray:
     """Return the modes without energy of a body of several materials at points, (n, dim, n_modes)."""
     # A motion without energy has none in any of the materials.
-    return min((kernel_of(material, points) for material in materials), key=lambda modes: modes.shape[-1])
+    every = (kernel_of(material, points, axisymmetric) for material in materials)
+    return min(every, key=lambda modes: modes.shape[-1])
 
 
 def _check_finite(values: np.ndarray, mesh: SubdomainMesh) -> None:

@@ -120,8 +120,7 @@ def gap_with_room(
 
 def _explained(points: ContactPoints) -> np.ndarray:
     """Return the penetration that faceting explains at each point, [length]."""
-    dim = points.normal.shape[1]
-    return np.asarray(FACETING * points.area ** (1.0 / (dim - 1)))
+    return FACETING * points.sizes
 
 
 _LOG = logging.getLogger(__name__)

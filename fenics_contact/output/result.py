@@ -59,6 +59,7 @@ def described_scene(scene: Scene, subdomains: Mapping[str, int], time: float = 0
     """
     return {
         "dimension": scene.dim,
+        **({"axisymmetric": True} if scene.axisymmetric else {}),
         "bodies": {name: _body(body, subdomains[name]) for name, body in scene.bodies.items()},
         "supports": readable(scene.supports),
         "loads": readable(scene.loads),
@@ -145,7 +146,7 @@ def scales_of(forces: Mapping[str, Any]) -> dict[str, float]:
     entries: Sequence[Mapping[str, Any]] = [entry for _, entry in listed_forces(forces)]
     return {
         kind: forces["balance"].get(
-            f"{kind}_scale", max(float(np.max(np.abs(each[kind]))) for each in entries)
+            f"{kind}_scale", max(float(np.max(np.abs(each[kind]), initial=0.0)) for each in entries)
         )
         for kind in ("force", "moment")
     }
@@ -206,7 +207,8 @@ FORMAT_VERSION = 1
 UNITS = (
     "those of the input: a scene in N and mm has forces in N, stresses, moduli and pressures in N/mm², "
     "energies and moments in N mm; seconds are wall time of rank 0; residuals and errors are relative; "
-    "plane bodies have forces, moments and energies a unit of thickness"
+    "plane bodies have forces, moments and energies a unit of thickness, bodies of revolution those of a "
+    "full revolution"
 )
 
 

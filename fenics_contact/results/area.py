@@ -9,15 +9,18 @@ from itertools import combinations
 import numpy as np
 
 from fenics_contact._base.checks import GivenVector, unit_vector
+from fenics_contact._scene.pair_geometry import modulus_of
 from fenics_contact._scene.pairs import Surface, pair_number
 from fenics_contact._scene.parts import surface_of
-from fenics_contact._surfaces.facets import filled_at_corners
+from fenics_contact._surfaces.facets import filled_at_corners, filled_on_axis
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.results.state import State
 
 
 def contact_area(state: State, pair: int | str = 0) -> float:
     """Return the area in which the surfaces of a pair touch, in the plane the length, [length²] or [length].
+
+    On bodies of revolution it is that all around the axis.
 
     It is measured on the slave, on the deformed one where its material is made for large deformations.
     Its rim runs between closed and open nodes and is located by pressure and gap: at a distance d inside the
@@ -43,7 +46,10 @@ def contact_area(state: State, pair: int | str = 0) -> float:
         edges = surface.places[facets[:, 1:]] - surface.places[facets[:, :1]]
         gram = np.linalg.det(edges @ np.swapaxes(edges, 1, 2))
         size = np.sqrt(np.maximum(gram, 0.0)) / (len(corners) - 1)
-        total += weight * float(size @ surface.closed_share(facets))
+        share = surface.closed_share(facets)
+        if state.scene.axisymmetric:
+            size = size * _circumference(surface.places[facets, 0], surface.closed[facets], share)
+        total += weight * float(size @ share)
     return total
 
 
@@ -145,10 +151,19 @@ def _slave_surface(state: State, which: int | str) -> _SlaveSurface:
     spread[place] = _modulus(state, pair) * np.maximum(contact.gap[mine], 0.0)
     whole = np.searchsorted(surface.nodes, scene.bodies[slave.body].mesh.surfaces[slave.name])
     pressure, spread = filled_at_corners(whole, pressure), np.maximum(filled_at_corners(whole, spread), 0.0)
+    if scene.axisymmetric:
+        on_axis = scene.bodies[slave.body].on_axis[surface.nodes]
+        pressure = np.maximum(filled_on_axis(whole, pressure, on_axis), 0.0)
     places = surface.points
     if scene.bodies[slave.body].deforms_much:
         places = places + state.gather_displacement(slave.body)[surface.nodes]
     return _SlaveSurface(places, surface.facets[:, : surface.corners], pressure, spread)
+
+
+def _circumference(radii: np.ndarray, closed: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Return that of the middle of the closed share of edges, by radii and marks of their ends, (n, 2)."""
+    near, far = np.where(closed[:, :1], radii, radii[:, ::-1]).T
+    return np.asarray(2 * np.pi * (near + share / 2 * (far - near)))
 
 
 def _modulus(state: State, pair: int) -> float:
@@ -159,6 +174,8 @@ def _modulus(state: State, pair: int) -> float:
     from fenics_contact._accuracy.discretisation import moduli  # not before an area is asked for
 
     scene, forms = state.scene, state.torn.decomposition.forms
+    if scene.axisymmetric:
+        return modulus_of(scene, scene.contacts[pair]) or float("nan")
     compliance = 0.0
     for surface in (scene.contacts[pair].slave, scene.contacts[pair].master):
         if isinstance(surface, Surface):

@@ -15,12 +15,13 @@ from ufl.core.expr import Expr
 from fenics_contact import _dolfinx
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
-from fenics_contact._fem.composition import Composition, integrate
+from fenics_contact._fem.composition import Composition, as_in_space, integrate
 from fenics_contact._fem.forms import Temperature, stress_in_space, temperature_of
 from fenics_contact._fem.templates import (
     Constants,
     Template,
     Written,
+    per_revolution,
     quadrature_degree,
     scalar_constants,
     volume_measure,
@@ -28,14 +29,13 @@ from fenics_contact._fem.templates import (
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.scene import Scene
-from fenics_contact._surfaces.facets import filled_at_corners
+from fenics_contact._surfaces.facets import filled_at_corners, filled_on_axis
 from fenics_contact.errors import together
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.elastic import Material
 from fenics_contact.materials.hyperelastic import is_nonlinear
-from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature
+from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
 from fenics_contact.mesh.quality import jacobians
 from fenics_contact.results.contact import ContactResult
 
@@ -129,7 +129,7 @@ class CellMeans:
         quantity: tuple[OfStress, int],
     ) -> None:
         """Compile the forms. Collective on ``comm``."""
-        cell_type = body.mesh.cell_type
+        cell_type = body.cell_type
         self._parts = _composition(mesh, body)
         q = ufl.TestFunction(_dolfinx.cellwise_space(cell_type))
         with together(comm):
@@ -140,7 +140,7 @@ class CellMeans:
         self._form = Template(mesh.comm, form, constants, coefficients)
         self._numbers = temperature.numbers
         self._space = _dolfinx.scalar_space(mesh, 0)
-        volume = Template(mesh.comm, q * volume_measure(cell_type, 2), ())
+        volume = Template(mesh.comm, per_revolution(q, cell_type) * volume_measure(cell_type, 2), ())
         self._volume = _dolfinx.assemble_vector(volume.bind([self._space], ()))
 
     def of(self, displacement: _dolfinx.fem.Function, values: tuple[float, ...] = ()) -> np.ndarray:
@@ -241,12 +241,13 @@ def _weighted(
 ) -> Written:
     """Return ∫ of a quantity times q dx (a form), its constants and its coefficients."""
     (u,) = _dolfinx.field_symbols(cell_type, 1)
+    (displacement,) = as_in_space(cell_type, u)
     change, numbers, fields = temperature.write(cell_type)
     of_stress, count = quantity
     weights = scalar_constants(cell_type, count)
 
     def density(material: Material, constants: tuple[ufl.Constant, ...]) -> Expr:
-        return of_stress(stress_in_space(material, u, constants, change), weights) * q
+        return of_stress(stress_in_space(material, displacement, constants, change), weights) * q
 
     form, constants = integrate(materials, cell_type, density, volume_measure(cell_type, 2))
     return form, (*weights, *numbers, *constants), [u, *fields]
@@ -289,8 +290,8 @@ def contact_fields(
     points; and, zero on those, ``contact_pressure``, (n_nodes,), [force / length²], ``contact_force`` on the
     slave and ``contact_slip``, (n_nodes, 3), [force] and [length]; where a body of the scene deforms much
     ``contact_nominal_pressure``, too. At the corners of quadratic triangles pressures and slip are
-    interpolated, see `filled_at_corners`. A node that belongs to several pairs has their sum, and the status
-    of the last.
+    interpolated, see `filled_at_corners`, and pressures at the ends of quadratic edges on an axis of
+    revolution. A node that belongs to several pairs has their sum, and the status of the last.
     """
     start, end = numbers.node_offset[numbers.body_names.index(body) :][:2]
     count = int(end - start)
@@ -303,7 +304,10 @@ def contact_fields(
             field, own = np.zeros_like(total), mine[contact.points.pair[mine] == pair]
             field[nodes[own]] = values[own]
             facets = scene.bodies[body].mesh.surfaces[scene.contacts[pair].slave.name]
-            total += filled_at_corners(facets, field) if filled else field
+            field = filled_at_corners(facets, field) if filled else field
+            if filled and scene.axisymmetric and field.ndim == 1:  # slip is zero there
+                field = filled_on_axis(facets, field, scene.bodies[body].on_axis)
+            total += field
         return total
 
     status = np.full(count, -1, dtype=np.int32)
@@ -363,7 +367,7 @@ def put_history_stress(
     known = np.full((body.mesh.n_cells, *shape), np.nan)
     for mesh, response in zip(torn.decomposition.meshes, responses, strict=True):
         if mesh.body == name and response.stress is not None:
-            known[mesh.cells] = _means(body.mesh, mesh.cells, quantity(response.stress))
+            known[mesh.cells] = _means(body, mesh.cells, quantity(response.stress))
     number = cells_of_body(field.function_space.mesh, body.mesh.cells)
     mine = known[number].reshape(len(number), math.prod(shape))  # a rank may have no cells
     here = ~np.isnan(mine[:, 0])
@@ -372,12 +376,20 @@ def put_history_stress(
     field.x.scatter_forward()
 
 
-def _means(mesh: BodyMesh, cells: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _means(body: Body, cells: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return means over cells of values at Gauss points, (n_cells, n_gauss, ...) to (n_cells, ...)."""
-    positions, weights = quadrature(CELL_TYPES[mesh.cell_type], quadrature_degree(mesh.cell_type))
-    weights = weights * jacobians(mesh.points, mesh.cells[cells], positions)
+    weights, radii = _gauss_weights(body, cells)
+    weights = weights * radii if body.axisymmetric else weights
     weights = weights / weights.sum(axis=1, keepdims=True)
     return np.einsum("cq,cq...->c...", weights, values)
+
+
+def _gauss_weights(body: Body, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return weights of the Gauss points in the plane or in space, and their first coordinates."""
+    mesh, cell = body.mesh, CELL_TYPES[body.mesh.cell_type]
+    positions, weights = quadrature(cell, quadrature_degree(body.cell_type))
+    first = mesh.points[mesh.cells[cells], 0] @ shape_values(cell, positions).T
+    return weights * jacobians(mesh.points, mesh.cells[cells], positions), first
 
 
 def nodal_stress(
@@ -406,7 +418,7 @@ def nodal_stress(
                 if any(map(is_nonlinear, body.materials)):
                     own = _from_cells(torn, name, sites, stresses[name])
                 else:
-                    own = _at_sites(torn, name, sites, gradients, meshes[name])
+                    own = _at_sites(torn, name, sites, (displacement, gradients), meshes[name])
                 found[name] = _gathered(torn, name, sites, own)
     return found
 
@@ -420,30 +432,53 @@ def _from_cells(torn: TornSystem, name: str, sites: Sites, stress: _dolfinx.fem.
 
 
 def _at_sites(
-    torn: TornSystem, name: str, sites: Sites, gradients: np.ndarray, mesh: _dolfinx.mesh.Mesh
+    torn: TornSystem,
+    name: str,
+    sites: Sites,
+    moved: tuple[np.ndarray, np.ndarray],
+    mesh: _dolfinx.mesh.Mesh,
 ) -> np.ndarray:
     """Return the components of the stress at the sites of a body, shape (n_sites, 6). Collective.
 
     It is affine in the gradient. Its coefficients are the stresses of unit gradients, averaged over the cells
     around a site; they are the same in all of them unless the material or the temperature varies.
+
+    `moved`: displacements of all nodes and gradients at the sites.
     """
     body, dim = torn.scene.bodies[name], torn.dim
+    displacement, gradients = moved
     temperature = temperature_of(torn.scene.loads, name)
     means = CellStress(mesh, body, torn.decomposition.comm, temperature)
     number = cells_of_body(mesh, body.mesh.cells)
-    places = body.mesh.points - body.mesh.points.mean(axis=0)
+    places = body.mesh.points - (0.0 if body.axisymmetric else body.mesh.points.mean(axis=0))
     # A rotation has no stress: the gradients (i, j) and (j, i) have the same.
     pairs = [(i, j) for i in range(dim) for j in range(i, dim)]
     units = np.zeros((1 + len(pairs), dim, dim))
     units[np.arange(1, len(units)), [i for i, _ in pairs], [j for _, j in pairs]] = 1.0
-    on_cells = [means.components(displacement_function(mesh, places @ unit.T)) for unit in units]
+    fields = [places @ unit.T for unit in units]
+    sizes = [gradients[:, i, j] + (gradients[:, j, i] if i != j else 0.0) for i, j in pairs]
+    if body.axisymmetric:
+        # u = (r, 0) has the hoop strain of its radial one; (1, 0) has 1 / r, and no other.
+        fields.append(np.broadcast_to([1.0, 0.0], places.shape))
+        sizes.append(_hoop_strains(torn, sites, displacement, sizes[0]) - sizes[0])
+    on_cells = [means.components(displacement_function(mesh, field)) for field in fields]
+    if body.axisymmetric:
+        weights, radii = _gauss_weights(body, number)
+        mean = (weights * radii).sum(axis=1) / weights.sum(axis=1)
+        on_cells[-1] = on_cells[0] + mean[:, None] * (on_cells[-1] - on_cells[0])
     around = _around_sites(torn, name, sites, np.hstack(on_cells), number)
-    at_rest, *strained = np.split(around, len(units), axis=1)
+    at_rest, *strained = np.split(around, len(fields), axis=1)
     total = at_rest.copy()
-    for (i, j), stress in zip(pairs, strained, strict=True):
-        size = gradients[:, i, j] if i == j else gradients[:, i, j] + gradients[:, j, i]
+    for size, stress in zip(sizes, strained, strict=True):
         total += size[:, None] * (stress - at_rest)
     return total
+
+
+def _hoop_strains(torn: TornSystem, sites: Sites, displacement: np.ndarray, radial: np.ndarray) -> np.ndarray:
+    """Return u_r / r at sites; on the axis it is the radial strain there."""
+    on_axis = np.concatenate([body.on_axis for body in torn.scene.bodies.values()])[sites.node]
+    radii = np.where(on_axis, 1.0, sites.points[:, 0])
+    return np.where(on_axis, radial, displacement[sites.node, 0] / radii)
 
 
 def _around_sites(

@@ -102,7 +102,7 @@ def by_node(points: ContactPoints, force: np.ndarray, chosen: np.ndarray) -> np.
 
 def _resisted(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:
     """Return K u of the subdomains whose material resists a rigid motion, zero on others, (torn_size,)."""
-    motions = 3 * (torn.dim - 1)
+    motions = 1 if torn.scene.axisymmetric else 3 * (torn.dim - 1)
     parts = np.split(displacement, np.cumsum([part.mesh.size for part in torn.subdomains])[:-1])
     return np.concatenate(
         [
@@ -120,7 +120,9 @@ class Resultant:
     Attributes:
         force: Sum of the forces, shape (dim,), [force].
         moment: Sum of their moments about ``about``, shape (3,) in space; one number in the plane, positive
-            from x to y; [force·length]. Plane bodies have forces and moments a unit of thickness.
+            from x to y; [force·length]. Plane bodies have forces and moments a unit of thickness. Bodies of
+            revolution have those of a full revolution: the sum of the radial forces, the axial force, and no
+            moment, shape (0,).
         about: The point, shape (dim,), [length].
         surface: The surface on which they act; None for a sum over surfaces.
     """
@@ -139,7 +141,14 @@ class Resultant:
         Raises:
             InvalidInputError: If it is no point of the bodies' space.
         """
+        if self.axisymmetric:
+            return self.moment
         return self.moment + moment_of(self.force, self.about - point_of(point, len(self.force)))
+
+    @property
+    def axisymmetric(self) -> bool:
+        """Whether it is that of forces all around bodies of revolution."""
+        return np.size(self.moment) == 0
 
     def __add__(self, other: Resultant) -> Resultant:
         """Return the sum with another one about the same point."""
@@ -169,6 +178,8 @@ class Resultant:
 
     def __str__(self) -> str:
         """Return it in words."""
+        if self.axisymmetric:
+            return f"radial and axial force {_in_brackets(self.force)} [force] per revolution"
         moment = _in_brackets(_row(self.moment))
         return (
             f"force {_in_brackets(self.force)} [force], moment {moment} [force·length] about "
@@ -245,17 +256,18 @@ def table(
         np.stack([each.force for each in resultants]),
         np.stack([_row(each.moment) for each in resultants]),
     ]
-    sizes = scales or tuple(float(np.abs(part).max()) for part in columns)
+    sizes = scales or tuple(float(np.abs(part).max(initial=0.0)) for part in columns)
     shown = [
         np.where(np.abs(part) > ROUNDING * size, part, 0.0) for part, size in zip(columns, sizes, strict=True)
     ]
     cells = [
         (*name, *(f"{value:.5g}" for value in row)) for name, row in zip(names, np.hstack(shown), strict=True)
     ]
-    dim = len(resultants[0].force)
-    moments = ("Mx", "My", "Mz") if dim == 3 else ("M",)
-    head = (*[""] * len(names[0]), *("Fx", "Fy", "Fz")[:dim], *moments)
-    return "\n".join([*_aligned([head, *cells], len(names[0])), "F in [force], M in [force·length]"])
+    dim, units = len(resultants[0].force), "F in [force], M in [force·length]"
+    heads = [*("Fx", "Fy", "Fz")[:dim], *(("Mx", "My", "Mz") if dim == 3 else ("M",))]
+    if resultants[0].axisymmetric:
+        heads, units = ["Fr", "Fz"], "F in [force] per revolution"
+    return "\n".join([*_aligned([(*[""] * len(names[0]), *heads), *cells], len(names[0])), units])
 
 
 def _aligned(rows: list[tuple[str, ...]], names: int) -> list[str]:
@@ -271,9 +283,18 @@ def _aligned(rows: list[tuple[str, ...]], names: int) -> list[str]:
 
 
 def resultant(
-    forces: np.ndarray, places: np.ndarray, about: np.ndarray, surface: Surface | None = None
+    forces: np.ndarray,
+    places: np.ndarray,
+    about: np.ndarray,
+    surface: Surface | None = None,
+    axisymmetric: bool = False,
 ) -> Resultant:
-    """Return force and moment of forces that act at places, both of shape (n, dim), about a point, (dim,)."""
+    """Return force and moment of forces that act at places, both of shape (n, dim), about a point, (dim,).
+
+    Forces all around an axis have no moment.
+    """
+    if axisymmetric:
+        return Resultant(forces.sum(axis=0), np.zeros(0), about, surface)
     moment = moment_of(forces, places - about)
     total = float(moment.sum()) if forces.shape[1] == 2 else moment.sum(axis=0)
     return Resultant(forces.sum(axis=0), total, about, surface)
@@ -318,15 +339,19 @@ def support_reactions(
         surface = Surface(support.body, support.surface)
         own = np.array(support.at) if isinstance(support, RigidSurface) else centroid(scene, surface)
         point = own if about is None else point_of(about, scene.dim)
-        total = resultant(share * forces.reaction, forces.places, point, surface)
-        entries.append(total - point_load(support, point) if isinstance(support, RigidSurface) else total)
+        total = resultant(share * forces.reaction, forces.places, point, surface, scene.axisymmetric)
+        if isinstance(support, RigidSurface):
+            total = total - point_load(support, point, scene.axisymmetric)
+        entries.append(total)
     places = tuple(Surface(each.body, each.surface).in_words for each in scene.supports)
     return Resultants("reaction", tuple(entries), places)
 
 
-def point_load(support: RigidSurface, about: np.ndarray) -> Resultant:
+def point_load(support: RigidSurface, about: np.ndarray, axisymmetric: bool = False) -> Resultant:
     """Return the load at the point of a rigid surface, about a point."""
     force, moment = np.split(support.load, [support.dim])
+    if axisymmetric:
+        return Resultant(force, np.zeros(0), about)
     load = Resultant(force, float(moment[0]) if support.dim == 2 else moment, np.array(support.at))
     return Resultant(force, load.moment_about(about), about)
 
@@ -355,7 +380,7 @@ def support_shares(scene: Scene, numbers: NodeNumbers) -> list[np.ndarray]:
 def centroid(scene: Scene, surface: Surface) -> np.ndarray:
     """Return the centroid of a surface, shape (dim,)."""
     mesh = scene.bodies[surface.body].mesh
-    return surface_moments(mesh.points, mesh.surfaces[surface.name]).centroid
+    return surface_moments(mesh.points, mesh.surfaces[surface.name], scene.axisymmetric).centroid
 
 
 @displayed
@@ -439,15 +464,20 @@ def force_balance(
 ) -> Balance:
     """Return the balance of all forces, about a point or the middle of the box around all bodies.
 
+    Radial forces all around an axis balance each other.
+
     `least`: A force below which bodies count as free of forces, [force].
     """
     point = _middle(forces.places) if about is None else point_of(about, torn.dim)
-    parts = _parts(torn, forces)
-    resultants = {name: resultant(force, forces.places, point) for name, force in parts.items()}
+    parts, turned = _parts(torn, forces), torn.scene.axisymmetric
+    acting = {name: force * [0.0, 1.0] for name, force in parts.items()} if turned else parts
+    resultants = {
+        name: resultant(force, forces.places, point, axisymmetric=turned) for name, force in acting.items()
+    }
     for support in torn.scene.supports:
         if isinstance(support, RigidSurface):  # the load at its point comes in through its nodes
-            resultants["loads"] += point_load(support, point)
-            resultants["reactions"] -= point_load(support, point)
+            resultants["loads"] += point_load(support, point, turned)
+            resultants["reactions"] -= point_load(support, point, turned)
     arms = forces.places - point
     sizes = [np.linalg.norm(force, axis=1) for force in parts.values()]
     reach = np.linalg.norm(arms, axis=1)
@@ -511,7 +541,8 @@ def pair_resultants(
         for number, pair in enumerate(pairs):
             mine = np.flatnonzero(points.pair == number)
             point = centroid(scene, pair.slave) if about is None else point_of(about, scene.dim)
-            found.append(resultant(force[mine], forces.places[points.slave[mine]], point, pair.slave))
+            places = forces.places[points.slave[mine]]
+            found.append(resultant(force[mine], places, point, pair.slave, scene.axisymmetric))
         return Resultants(kind, tuple(found), tuple(pair.place for pair in pairs))
 
     normal = torn.points.normal

@@ -15,7 +15,6 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import RigidSurface
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.torn import TornSystem
-from fenics_contact.materials.kernels import rigid_body_modes
 
 
 @displayed
@@ -24,8 +23,9 @@ class UnheldMotion:
     """A rigid motion, such as one that no support, tie or contact resists and no load drives.
 
     Attributes:
-        bodies: Body name -> coefficients of its `rigid_body_modes`, translations first, shape (3,) in the
-            plane, (6,) in space; the largest of all is one. Bodies that stay are left out.
+        bodies: Body name -> coefficients of its `Body.rigid_modes`, translations first, shape (3,) in the
+            plane, (6,) in space, (1,) for bodies of revolution; the largest of all is one. Bodies that stay
+            are left out.
     """
 
     bodies: Mapping[str, np.ndarray]
@@ -51,7 +51,7 @@ def rigid_motions(torn: TornSystem, fields: sp.spmatrix) -> tuple[UnheldMotion, 
     count, coefficients, fields = fields.shape[1], [], sp.csr_matrix(fields)
     starts = np.cumsum([0] + [part.mesh.size for part in torn.subdomains])
     for name, body in torn.scene.bodies.items():
-        modes = rigid_body_modes(body.mesh.points)
+        modes = body.rigid_modes()
         size = modes.shape[2]
         sums = np.zeros((size, size + count))
         for part, start in zip(torn.subdomains, starts, strict=False):
@@ -71,7 +71,9 @@ def rigid_motions(torn: TornSystem, fields: sp.spmatrix) -> tuple[UnheldMotion, 
 
 
 def motion_in_words(motion: np.ndarray) -> str:
-    """Return coefficients of rigid modes, shape (3,) or (6,), as translation and rotation."""
+    """Return coefficients of rigid modes, shape (3,), (6,) or (1,), as translation and rotation."""
+    if len(motion) == 1:
+        return f"translation {motion[0]:.2g} along the axis"
     dim = 2 if len(motion) == 3 else 3
     return " with ".join(
         f"{kind} ({', '.join(f'{component:.2g}' for component in part)})"

@@ -22,7 +22,7 @@ References:
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 
 import numpy as np
@@ -241,7 +241,7 @@ class MortarCoupling:
     Attributes:
         node: Positions in ``slave.nodes``, ascending, shape (n,).
         area: D_i = ∫ ψ_i = ∫ N_i over the part of the slave that faces the master, shape (n,), [length²] or
-            in plane problems [length].
+            in plane problems [length]; of bodies of revolution all integrals go around the axis.
         weight: M_ij / D_i with M_ij = ∫ ψ_i N_j, N_j of the master, shape (n, len(master.nodes)); rows add up
             to one.
         normal: Unit normal from master to slave, the averaged slave normal reversed, shape (n, dim).
@@ -342,6 +342,8 @@ def _integrals(
     for pair_slave, pair_master in chunks(*pairs):
         overlaps = overlaps_of(planes, pair_slave, pair_master, master)
         cells, at_slave, at_master = cells_of(overlaps), overlaps.slave, overlaps.master
+        if slave.axisymmetric:
+            cells = revolved(cells, slave, chosen[at_slave])
         closer = relief_of_cells(cells, slave, master, (chosen[at_slave], at_master), planes.normal[at_slave])
         coverage, integrals, of_relief = dual_integrals(cells, closer)
         np.add.at(area, slave.facets[chosen[overlaps.facets]], coverage)
@@ -355,6 +357,12 @@ def _integrals(
         entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
         total = sparse.csr_matrix(entries, shape=shape)
     return area, total, relief
+
+
+def revolved(cells: Cells, slave: FacetedSurface, facet: np.ndarray) -> Cells:
+    """Return cells whose weights have the circumference 2 π r in them; `facet`: slave facet of each pair."""
+    radii = slave.points[slave.facets[facet[cells.pair]], 0]
+    return replace(cells, weight=2 * np.pi * cells.weight * np.einsum("nqk,nk->nq", cells.slave, radii))
 
 
 def chunks(pair_slave: np.ndarray, pair_master: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:

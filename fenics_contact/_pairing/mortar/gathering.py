@@ -128,5 +128,5 @@ def _bears_tipping(slave: FacetedSurface, nodes: np.ndarray) -> bool:
         return False
     places = slave.points[nodes]
     extents = np.linalg.svd(places - places.mean(axis=0), compute_uv=False) / np.sqrt(len(nodes))
-    width = np.median(slave.areas[nodes]) ** (1.0 / (slave.dim - 1))
+    width = np.median(slave.sizes[nodes])
     return bool(extents[slave.dim - 2] > 0.25 * width)
