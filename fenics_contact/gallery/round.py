@@ -13,16 +13,10 @@ import numpy as np
 
 from fenics_contact._base.checks import check_count, check_grading, check_numbers
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery.blocks import (
-    SIDES,
-    box_lattice,
-    extrude,
-    graded,
-    rectangle_lattice,
-    require_room,
-)
+from fenics_contact.gallery.blocks import SIDES, extrude, graded, require_room, structured_cells
 from fenics_contact.gallery.hertz import RoundFrame, mirrored_ticks
 from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.shapes.parametric import tensor_grid
 from fenics_contact.shapes.simple import Circle, Cylinder, Sphere
 
 
@@ -138,33 +132,49 @@ def _round(
 ) -> BodyMesh:
     """Return a round body; `shape`: its true surface from a radius, and whether that is a hole's."""
     dim = shape(1.0, False).dim
-    box, frame = _checked_box(dim, radius, hole, n, grading), RoundFrame(radius, (), dim)
-    sides = np.concatenate([np.full(len(box.surfaces[side]), k) for k, side in enumerate(SIDES[: 2 * dim])])
-    facets = np.concatenate([box.surfaces[side] for side in SIDES[: 2 * dim]])
+    ticks = _checked_ticks(radius, hole, n, grading)
     layers = _layers(radius, hole, n) if layers is None else layers
     check_count(layers, "layers")
-    require_room(layers, len(facets), *(1,) * (dim - 2))
+    require_room(layers if hole else layers + n, 4 * dim * n, *(2 * n,) * (dim - 2))
+    facets, sides = _box_skin(2 * n, dim)
     skin, local = np.unique(facets, return_inverse=True)
     local = local.reshape(facets.shape)
-    outer = frame.sphere(box.points[skin])
-    core = frame.core(box.points)
-    inner = outer * (hole / radius) if hole else core[skin]
+    places, frame = tensor_grid([ticks] * dim), RoundFrame(radius, (), dim)
+    outer = frame.sphere(places[skin])
+    inner = outer * (hole / radius) if hole else frame.core(places[skin])
     share = 1.0 - graded(layers, grading)[::-1, None, None]  # thinnest layers outside; 1 on the surface
     shell = (1.0 - share) * inner + share * outer
-    kept = 0 if hole else box.n_nodes
-    rows = kept + np.arange((layers + bool(hole)) * len(skin)).reshape(-1, len(skin))
-    rows = rows if hole else np.vstack([skin, rows])
-    points = shell.reshape(-1, dim) if hole else np.concatenate([core, shell[1:].reshape(-1, dim)])
+    if hole:
+        points, core = shell.reshape(-1, dim), np.zeros((0, 2**dim), dtype=np.int64)
+        rows = np.arange(len(points)).reshape(-1, len(skin))
+    else:
+        points = np.concatenate([frame.core(places), shell[1:].reshape(-1, dim)])
+        core = structured_cells((2 * n,) * dim)[0]
+        rows = np.vstack([skin, np.arange(len(places), len(points)).reshape(-1, len(skin))])
     # An edge has the body on its left, so the shell on its right.
     low, high = rows[:-1, local], rows[1:, local]
-    ring = np.concatenate([low[..., ::-1], high] if dim == 2 else [low, high], axis=-1)
-    cells = ring.reshape(-1, 2**dim)
-    rim = rows[-1][local]
+    around = np.concatenate([low[..., ::-1], high] if dim == 2 else [low, high], axis=-1)
+    cells, rim = np.concatenate([core, around.reshape(-1, 2**dim)]), rows[-1][local]
     surfaces = {"outer": rim, **{side: rim[sides == k] for k, side in enumerate(SIDES[: 2 * dim])}}
     if hole:
         surfaces["inner"] = rows[0][local][:, ::-1]
     shapes = {name: shape(radius, False) if name != "inner" else shape(hole, True) for name in surfaces}
-    return BodyMesh(points, cells if hole else np.concatenate([box.cells, cells]), surfaces, shapes=shapes)
+    return BodyMesh(points, cells, surfaces, shapes=shapes)
+
+
+def _box_skin(n: int, dim: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the outer facets of a lattice of n cells along each axis, by its nodes, and their sides."""
+    nodes, facets = np.arange((n + 1) ** dim).reshape((n + 1,) * dim), []
+    for axis in range(dim):
+        for end in (0, -1):
+            face = nodes.take(end, axis)
+            quads = [face[:-1], face[1:]] if dim == 2 else [
+                face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]
+            ]  # fmt: skip
+            found = np.stack(quads, axis=-1).reshape(-1, 2 ** (dim - 1))
+            outward = (axis % 2 == 0) == (end == -1)  # of the cross product of the other axes
+            facets.append(found if outward else found[:, ::-1])
+    return np.concatenate(facets), np.repeat(np.arange(2 * dim), n ** (dim - 1))
 
 
 def _layers(radius: float, hole: float, n: int) -> int:
@@ -175,8 +185,8 @@ def _layers(radius: float, hole: float, n: int) -> int:
     return max(1, round(min((radius - hole) / long, 1e6)))
 
 
-def _checked_box(dim: int, radius: float, hole: float, n: int, grading: float) -> BodyMesh:
-    """Return the box of cells from −1 to 1, if the arguments can be used."""
+def _checked_ticks(radius: float, hole: float, n: int, grading: float) -> np.ndarray:
+    """Return the ends of cells from −1 to 1, if the arguments can be used."""
     check_count(n, "n", 2)
     check_numbers(radius=radius, hole=hole)
     check_grading(grading)
@@ -185,5 +195,4 @@ def _checked_box(dim: int, radius: float, hole: float, n: int, grading: float) -
             f"a round body needs a positive radius and a hole that is smaller, got radius {radius} and hole "
             f"{hole}: give hole=0 for a solid one"
         )
-    ticks = [mirrored_ticks(n, grading)] * dim
-    return rectangle_lattice(ticks) if dim == 2 else box_lattice(ticks)
+    return mirrored_ticks(n, grading)

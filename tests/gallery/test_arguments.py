@@ -108,7 +108,7 @@ def test_what_are_no_corners_of_a_block_is_refused(value: Any) -> None:
         (lambda: hertz.hemisphere(1.0, 10**5), "must fit into the memory"),
         (lambda: hertz.half_disc(1.0, 10**6), "must fit into the memory"),
         (lambda: whole.ball(1.0, 10**5, hole=0.999), "must fit into the memory"),
-        (lambda: whole.disc(1.0, 4, layers=10**6), "must fit into the memory"),
+        (lambda: whole.disc(1.0, 10**5, hole=0.5, layers=10**6), "must fit into the memory"),
         (
             lambda: bolted.drilled_plate(1.0, 2.0, (-1e50, 4.0), (0, 1), 2),
             "along the strip must be at most",
