@@ -291,6 +291,9 @@ class MeshFile(Placed):
     size: PositiveFloat | None = Field(
         None, description="largest edge of a cell, for CAD files, which gmsh meshes, [length]"
     )
+    sizes: dict[str, PositiveFloat] | None = Field(
+        None, description="body or surface of a CAD file -> size of the cells there, [length]"
+    )
     order: Literal[1, 2] = Field(1, description="order of the cells that CAD files are meshed with")
     labels: str | None = Field(
         None,
@@ -313,16 +316,16 @@ class MeshFile(Placed):
                 "choose groups with bodies and surfaces"
             )
         if kind in CAD:
-            return cad.read_cad(path, self.size, *groups, order=self.order, comm=comm)
+            return cad.read_cad(path, self.size, *groups, sizes=self.sizes, order=self.order, comm=comm)
         if by_place(self.surfaces):
             raise InvalidInputError(
                 f"faces are chosen by where they lie in CAD files ({', '.join(CAD)}), got {self.file!r}: "
                 "choose groups by their names or numbers"
             )
-        if self.size is not None or self.order > 1:
+        if self.size is not None or self.sizes is not None or self.order > 1:
             raise InvalidInputError(
-                f"size and order are for CAD files ({', '.join(CAD)}), got {self.file!r}: leave it away, or "
-                "mesh the body anew"
+                f"size, sizes and order are for CAD files ({', '.join(CAD)}), got {self.file!r}: leave it "
+                "away, or mesh the body anew"
             )
         if kind == ".msh":
             return gmsh_module.read_msh(path, *groups, comm=comm)

@@ -272,6 +272,7 @@ def read_cad(
     bodies: Bodies | None = None,
     surfaces: FaceChoice | None = None,
     *,
+    sizes: Mapping[str, float] | None = None,
     order: int = 1,
     comm: MPI.Comm | None = None,
 ) -> dict[str, BodyMesh]:
@@ -283,11 +284,14 @@ def read_cad(
 
     Args:
         path: A file .step, .stp, .iges, .igs, .brep, .geo or .geo_unrolled; .geo is a script: gmsh runs it.
-        size: Largest edge of a cell, [length]; that of the file unless given.
+        size: Largest edge of a cell wherever ``sizes`` says nothing else, [length]; that of the file unless
+            given.
         bodies: As in `read_msh`.
         surfaces: The wanted surfaces: names or numbers of faces, or name of the surface to what chooses its
             faces: a name, a number, `InBox`, `OnPlane`, `OnCylinder`, a function that says of a `CadFace`
             whether it is one, or several of these. Every face unless given.
+        sizes: Name of a body or a surface to the size of the cells in it, [length]; of several names that
+            share an edge the smallest counts there. Cells grow from the edges of what is finer into the rest.
         order: 1 for linear cells, 2 for quadratic ones, curved like the surfaces.
         comm: If given, rank 0 reads the file and all ranks receive the bodies.
 
@@ -296,8 +300,9 @@ def read_cad(
         millimetres; `BodyMesh.placed` scales them to another unit. Other files name no unit.
 
     Raises:
-        InvalidInputError: As `read_msh`, or if gmsh cannot read or mesh the file, nothing is chosen for a
-            surface, or a face for two; these messages list all faces.
+        InvalidInputError: As `read_msh`, or if gmsh cannot read or mesh the file, a size is not positive or
+            of something that does not exist, nothing is chosen for a surface, or a face for two; the latter
+            list all faces.
         MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
 
     Note:
@@ -306,14 +311,16 @@ def read_cad(
     Example:
         ``read_cad("bracket.step", 2.0, surfaces={"foot": [4, 7], "hole": OnCylinder(5.0)})`` makes bodies of
         tetrahedra of at most 2 mm. Faces 4 and 7 are the surface "foot"; all on cylinders of radius 5 mm the
-        surface "hole", whose shape is a `Cylinder`.
+        surface "hole", whose shape is a `Cylinder`. With ``sizes={"hole": 0.5}`` cells along the hole have
+        0.5 mm.
     """
-    return made_once(comm, lambda: _read(Path(path), size, order, bodies, surfaces))
+    return made_once(comm, lambda: _read(Path(path), size, sizes or {}, order, bodies, surfaces))
 
 
 def _read(
     path: Path,
     size: float | None,
+    sizes: Mapping[str, float],
     order: int,
     bodies: Bodies | None,
     surfaces: FaceChoice | None,
@@ -324,10 +331,13 @@ def _read(
             f"file '{path}' must be a CAD file, {', '.join(SUFFIXES)}: read a mesh with `read_msh` or "
             "`read_mesh`"
         )
-    if size is not None:
-        check_numbers(size=size)
-        if size <= 0:
-            raise InvalidInputError(f"size must be above zero, got {size}: give the largest edge of a cell")
+    for name, given in {"": size, **sizes}.items():
+        of = f" of {name!r}" if name else ""
+        check_numbers(**{f"size{of}": 1.0 if given is None and not name else given})
+        if given is not None and given <= 0:
+            raise InvalidInputError(
+                f"size{of} must be above zero, got {given}: give the largest edge of a cell"
+            )
     if order not in (1, 2):
         raise InvalidInputError(f"order must be 1 or 2, got {order}: linear or quadratic cells")
     options: dict[str, float] = {
@@ -337,7 +347,7 @@ def _read(
     }
     options["Mesh.HighOrderOptimize"] = 1  # only where curved cells would be inverted
     if size is not None:
-        options["Mesh.MeshSizeMax"] = size
+        options["Mesh.MeshSizeMax"] = max([size, *sizes.values()])
     with gmsh_model("fenics_contact CAD", **options) as gmsh:
         with _reasons(path):
             gmsh.merge(str(path))
@@ -346,9 +356,39 @@ def _read(
             _name(gmsh, each, unique=each == dim)
         if surfaces is not None and dim > 1:
             _choose(gmsh, dim - 1, surfaces, f"file '{path}'")
+        if sizes:
+            _set_sizes(gmsh, dim, size, sizes, bodies, f"file '{path}'")
         with _reasons(path):
             gmsh.model.mesh.generate(dim)
         return from_gmsh_model(bodies)
+
+
+def _set_sizes(
+    gmsh: ModuleType,
+    dim: int,
+    size: float | None,
+    sizes: Mapping[str, float],
+    bodies: Bodies | None,
+    source: str,
+) -> None:
+    """Give the points of bodies and surfaces their sizes, from the largest to the smallest."""
+    known: dict[str, list[tuple[int, int]]] = {}
+    for of in (dim, dim - 1):
+        for label, tags in physical_groups(gmsh, of).items() if of else ():
+            known.setdefault(str(label), []).extend((of, tag) for tag in tags)
+    for body, parts in (bodies if isinstance(bodies, Mapping) else {}).items():
+        labels = [parts] if isinstance(parts, str | int) else getattr(parts, "values", lambda: parts)()
+        known[body] = [entity for label in labels for entity in known.get(str(label), [])]
+    if missing := [name for name in sizes if not known.get(name)]:
+        raise InvalidInputError(
+            f"a size must be of a body or a surface of {source}, which has {', '.join(map(repr, known))}; "
+            f"got {missing[0]!r}: correct the name"
+        )
+    if size is not None and max(sizes.values()) > size:  # it is no limit for all any more
+        gmsh.model.mesh.setSize(gmsh.model.getEntities(0), size)
+    for name, own in sorted(sizes.items(), key=lambda entry: -entry[1]):
+        points = gmsh.model.getBoundary(known[name], combined=False, oriented=False, recursive=True)
+        gmsh.model.mesh.setSize(points, own)
 
 
 @contextmanager

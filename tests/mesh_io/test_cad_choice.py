@@ -159,3 +159,44 @@ def test_step_files_come_in_millimetres(plate: Path, tmp_path: Path, unit: str, 
     path.write_text(text.replace("SI_UNIT(.MILLI.,.METRE.)", f"SI_UNIT{unit}"))
     (mesh,) = read_cad(path, 0.6 * factor, surfaces={"x": OnCylinder(0.2 * factor)}).values()
     assert mesh.points.max() == pytest.approx(factor * WIDE)
+
+
+def edges(mesh: BodyMesh, name: str) -> np.ndarray:
+    places = mesh.points[mesh.surfaces[name]]
+    return np.asarray(np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2))
+
+
+def test_surfaces_and_bodies_have_their_own_sizes(plate: Path, tmp_path: Path) -> None:
+    holes = {"fine": (1.0, 1.0, 0.0), "plain": (3.0, 1.0, 0.0)}
+    chosen = {name: OnCylinder(RADIUS, point=point) for name, point in holes.items()}
+    (mesh,) = read_cad(plate, 0.6, surfaces=chosen, sizes={"fine": 0.1}).values()
+    (even,) = read_cad(plate, 0.6, surfaces=chosen).values()
+    assert edges(mesh, "fine").mean() == pytest.approx(0.1, rel=0.1)
+    np.testing.assert_allclose(edges(mesh, "plain").mean(), edges(even, "plain").mean(), rtol=0.05)
+    assert edges(even, "fine").mean() > 0.3
+    # A body is coarser than the rest, a curve on its rim finer: the smallest size counts.
+    squares = tmp_path / "squares.geo"
+    squares.write_text("""
+        SetFactory("OpenCASCADE"); Rectangle(1) = {0, 0, 0, 4, 4}; Rectangle(2) = {5, 0, 0, 4, 4};
+        Physical Surface("left") = {1}; Physical Surface("right") = {2};
+        Physical Curve("rim") = {5}; Physical Curve("side") = {1};
+    """)
+    bodies = {"coarse": "right", "other": ["left"]}
+    both = read_cad(squares, 0.5, bodies, sizes={"coarse": 2.0, "rim": 0.25})
+    assert edges(both["coarse"], "rim").max() == pytest.approx(0.25, rel=0.05)
+    assert edges(both["other"], "side").max() == pytest.approx(0.5, rel=0.05)
+    far = both["coarse"].points[:, 1] > 3.9
+    assert np.diff(np.sort(both["coarse"].points[far, 0])).max() > 1.0
+
+
+@pytest.mark.parametrize(
+    ("sizes", "words"),
+    [
+        ({"holes": 0.1}, r"a size must be of a body or a surface of .*'hole'; got 'holes': correct the name"),
+        ({"hole": 0.0}, "size of 'hole' must be above zero, got 0.0"),
+        ({"hole": "fine"}, "size of 'hole' must be a finite number"),
+    ],
+)
+def test_sizes_are_positive_and_of_what_exists(plate: Path, sizes: Any, words: str) -> None:
+    with pytest.raises(InvalidInputError, match=words):
+        read_cad(plate, 0.6, surfaces={"hole": OnCylinder(RADIUS)}, sizes=sizes)

@@ -577,7 +577,7 @@ def test_bodies_come_from_mesh_files() -> None:
     with pytest.raises(SceneFileError, match="labels and corners_only are for other formats than"):
         mesh_from_file({"file": str(data), "labels": "sets"})
     with pytest.raises(
-        SceneFileError, match=r"size and order are for CAD files \(.step, .*: leave it away, or mesh"
+        SceneFileError, match=r"size, sizes and order are for CAD files \(.step, .*: leave it away, or mesh"
     ):
         mesh_from_file({"file": str(data), "size": 1.0})
 
@@ -614,6 +614,8 @@ def test_bodies_come_from_cad_files_with_their_shapes(tmp_path: Path) -> None:
     curved = mesh_from_file({**mesh, "order": 2})
     assert (curved.cell_type, found.cell_type) == ("tetrahedron10", "tetrahedron")
     coarse = mesh_from_file({**mesh, "size": 0.7})
+    fine = mesh_from_file({**mesh, "size": 0.7, "sizes": {"mantle": 0.2}})
+    assert len(fine.surfaces["mantle"]) > 2 * len(coarse.surfaces["mantle"])
     assert coarse.n_cells < found.n_cells
     with pytest.raises(SceneFileError, match=r"labels and corners_only are for other formats than CAD"):
         mesh_from_file({**mesh, "labels": "sets"})
