@@ -3,7 +3,7 @@
 What a script needs is here; nothing is loaded before it is used:
 
 Scenes: Scene, Body, BodyMesh, Surface, Support, RigidSurface, ContactPair, Tie, AutomaticContact, LoadStep,
-    box_partition
+    Preload, Section, box_partition
 
 Friction laws: Coulomb, Tresca, FrictionTable, FrictionCurve
 
@@ -85,6 +85,8 @@ if TYPE_CHECKING:
     from fenics_contact._scene.pairs import Surface as Surface
     from fenics_contact._scene.pairs import Tie as Tie
     from fenics_contact._scene.pairs import Tresca as Tresca
+    from fenics_contact._scene.preloads import Preload as Preload
+    from fenics_contact._scene.preloads import Section as Section
     from fenics_contact._scene.scene import LoadStep as LoadStep
     from fenics_contact._scene.scene import Scene as Scene
     from fenics_contact._scene.supports import RigidSurface as RigidSurface

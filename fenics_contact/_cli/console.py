@@ -34,6 +34,7 @@ from fenics_contact.errors import (
 from fenics_contact.output.files import OutputError
 from fenics_contact.output.result import listed_forces, scales_of
 from fenics_contact.output.tables import rounded
+from fenics_contact.results.preloads import names_of
 from fenics_contact.results.state import State, pairs_in_words
 
 if TYPE_CHECKING:
@@ -275,6 +276,8 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
         rows[f"contact {number}"] = words
     for number, motion in enumerate(state.rigid_motions()):
         rows[f"rigid surface {number}"] = str(motion).replace("[length]", units.length)
+    for name, each in state.preloads().items() if state.scene.preloads else ():
+        rows[f"preload {name}"] = f"{each.force:.6g} {force}, shorter by {each.shortening:.6g} {units.length}"
     if state.unheld:
         rows["held by nothing"] = " and ".join(map(str, state.unheld)) + ": stays where it is"
     if state.known_errors is not None:
@@ -295,6 +298,7 @@ def step_table(rows: Sequence[Mapping[str, Any]], file: SceneFile) -> Table:
     for name in (
         "iterations", "products", "open", "stick", "slip", f"normal force\n({force})",
         f"friction\n({force})", f"largest pressure\n({units.stress})",
+        *(f"{name}\n({force})" for name in names_of(file.scene.preloads)),
     ):  # fmt: skip
         table.add_column(name, justify="right")
     for row in rows:

@@ -140,7 +140,14 @@ class DeformedEquilibria:
 
 
 def _require_prescribed(scene: Scene) -> None:
-    """Reject rigid surfaces that forces move."""
+    """Reject rigid surfaces that forces move, and preloads by a force."""
+    for preload in scene.preloads:
+        if preload.is_free:
+            raise InvalidInputError(
+                "preloads must have a shortening where materials are nonlinear, got a force of "
+                f"{preload.force:g} for body {preload.body!r}: give the shortening and read the force from "
+                "the state's preloads()"
+            )
     for support in scene.supports:
         if isinstance(support, RigidSurface) and support.free.any():
             kinds = {type(each).__name__ for body in scene.bodies.values() for each in body.materials}

@@ -79,7 +79,7 @@ class FollowedLoads:
         change = system.torn.load - self.before.torn.load
         sizes = (np.sum(law.growth(start) * pressed), np.abs(change).sum())
         rubs, changes = system.torn.numbering.comm.allreduce(np.array(sizes))
-        moved = np.abs(system.torn.free.load - self.before.torn.free.load).sum()
+        moved = np.abs(system.torn.free.load - self._free_load(system.torn)).sum()
         if rubs == 0.0 or changes + moved == 0.0:
             return False
         problem = system.problem
@@ -105,5 +105,10 @@ class FollowedLoads:
 
         pairs = zip(self.before.torn.subdomains, torn.subdomains, strict=True)
         subdomains = tuple(replace(new, load=mixed(old.load, new.load)) for old, new in pairs)
-        free = replace(torn.free, load=mixed(self.before.torn.free.load, torn.free.load))
+        free = replace(torn.free, load=mixed(self._free_load(torn), torn.free.load))
         return replace(torn, subdomains=subdomains, free=free)
+
+    def _free_load(self, torn: TornSystem) -> np.ndarray:
+        """Return the loads of free motions before, those of now where other sections are free."""
+        free = [[each.is_free for each in at.scene.preloads] for at in (self.before.torn, torn)]
+        return self.before.torn.free.load if free[0] == free[1] else torn.free.load

@@ -18,10 +18,10 @@ from fenics_contact._equilibrium.static_admissibility import check_held
 from fenics_contact._equilibrium.stored import Stored, restored_solution, with_stored_slip
 from fenics_contact._equilibrium.warnings import ContactWarnings
 from fenics_contact._pairing.points import ContactPoints
-from fenics_contact._scene.loads import Load
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.plan import SolverKind, choose_solver
 from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact._scene.sections import held_at
 from fenics_contact._scene.supports import RigidSurface
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti.decomposition import Decomposition, decompose
@@ -35,6 +35,7 @@ from fenics_contact.qp.solve import DualSolver
 from fenics_contact.results.contact import no_contact
 from fenics_contact.results.dual_solve import contact_result, row_values, solve_dual
 from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.preloads import shortenings
 from fenics_contact.results.state import State, Tolerance, checked_tolerance, compute_energies
 
 if TYPE_CHECKING:
@@ -233,9 +234,17 @@ def default_solver(kind: SolverKind) -> DualSolver:
     return ProjectedCG(tolerance=LINEAR_TOLERANCE)
 
 
-def _loads_of(scene: Scene) -> tuple[list[Load], list[RigidSurface]]:
-    """Return the loads of a scene, and the rigid surfaces, at whose points loads act."""
-    return list(scene.loads), [each for each in scene.supports if isinstance(each, RigidSurface)]
+def _loads_of(scene: Scene) -> tuple[list[Any], ...]:
+    """Return the loads of a scene, the rigid surfaces, at whose points loads act, and the preloads."""
+    rigid = [each for each in scene.supports if isinstance(each, RigidSurface)]
+    return list(scene.loads), rigid, list(scene.preloads)
+
+
+def _lengths_after(before: State | None, scene: Scene) -> np.ndarray:
+    """Return the shortenings of preloads at the end of the load step before. Collective."""
+    if before is None or not before.scene.preloads:
+        return np.zeros(len(scene.preloads))
+    return shortenings(before.torn, before.torn_displacement)
 
 
 @displayed
@@ -414,6 +423,8 @@ class ContactProblem:
         with together(self.comm):
             _require_obstacles_at(scene, time)
             wanted = checked_tolerance(self.tolerance if tolerance is None else tolerance)
+        if scene.preloads:
+            scene = replace(scene, preloads=held_at(scene, _lengths_after(before, scene)))
         kind = self._kind(scene, sensitivity=design)
         _dolfinx.warn_if_untested(self.comm.rank)  # once PETSc has started on the ranks that solve
         with one_thread(self.comm):
@@ -480,6 +491,8 @@ class ContactProblem:
             InvalidInputError: If the arrays are those of another system.
         """
         scene = self.scene if scene is None else scene
+        if "lengths" in stored:
+            scene = replace(scene, preloads=held_at(scene, stored["lengths"]))
         if self._kind(scene, sensitivity=False) is SolverKind.TANGENT_NEWTON:
             return self._deformed(scene).restored(stored, scene)
         return self._linear(scene).restored(stored, scene, self.state)

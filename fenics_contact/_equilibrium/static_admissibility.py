@@ -10,7 +10,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from fenics_contact._base.sparse import ROUNDING
-from fenics_contact._pairing.points import ContactPoints
+from fenics_contact._pairing.points import ContactPoints, are_sliding
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.pairs import ContactPair, Surface
@@ -20,6 +20,7 @@ from fenics_contact.errors.ranks import made_once
 from fenics_contact.feti.factor import fixing_nodes
 from fenics_contact.feti.subdomain import common_kernel
 from fenics_contact.feti.torn import TornSystem
+from fenics_contact.mesh.cuts import parts_of
 from fenics_contact.results.rigid_motions import UnheldMotion, motion_in_words
 
 #: A load that needs all but this fraction of the friction is at the limit: how far the body slides would be
@@ -40,7 +41,7 @@ def check_held(torn: TornSystem) -> None:
     """
     comm = torn.numbering.comm
     with together(comm):
-        bodies = [RigidBody(torn, index) for index in range(len(torn.scene.bodies))]
+        bodies = rigid_bodies(torn)
     loads = comm.allreduce(np.array([body.load_wrench(torn) for body in bodies]))
     loads[np.abs(loads) <= ROUNDING * comm.allreduce(np.abs(torn.load).sum())] = 0.0
     with together(comm):
@@ -55,6 +56,10 @@ def _check_balance(torn: TornSystem, bodies: list[RigidBody], loads: np.ndarray)
         return
     support = sp.block_diag([body.support for body in bodies])
     tied = sp.vstack([body.tie_wrenches(torn) for body in bodies])
+    drawn = any(preload.is_free for preload in torn.scene.preloads)
+    along = _along_sections(torn)[0] if drawn else None
+    if along is not None:  # sections that forces draw together transmit nothing else along their normals
+        tied = tied - (tied @ along) @ along.T
     reactions, right = sp.hstack([support, tied]), -loads.ravel() / scale
     contact = sp.vstack([body.contact_wrenches(torn) for body in bodies])
     bound = torn.tresca_bound / scale
@@ -68,6 +73,8 @@ def _check_balance(torn: TornSystem, bodies: list[RigidBody], loads: np.ndarray)
     # The certificate points against the right side, which is minus the load. The pushed body may take others
     # along: it is the one on which the load does most work.
     pushed = int(np.argmax(np.einsum("bm,bm->b", found.bodies, loads)))
+    if along is not None:
+        _require_closed(torn, bodies, found, along)
     if without_margin is None:
         raise InfeasibleError(
             f"every body must be held by supports, contact or friction, but body {bodies[pushed].name!r} is "
@@ -81,16 +88,71 @@ def _check_balance(torn: TornSystem, bodies: list[RigidBody], loads: np.ndarray)
     )
 
 
-class RigidBody:
-    """A body regarded as rigid: its modes, and the wrenches of supports, ties, contacts and loads on it."""
+def _require_closed(torn: TornSystem, bodies: list[RigidBody], found: _Motion, along: sp.csr_matrix) -> None:
+    """Reject preloads that draw parts together between which nothing resists."""
+    wrenches = [body.tie_wrenches(torn) @ along for body in bodies]
+    moved = sum(wrench.T @ own for wrench, own in zip(wrenches, found.bodies, strict=True))
+    free = [preload for preload in torn.scene.preloads if preload.is_free]
+    for preload, way in zip(free, np.abs(np.atleast_1d(moved)), strict=True):
+        if preload.force and way > MARGIN * np.abs(found.bodies).max():
+            raise InfeasibleError(
+                f"a preload must draw parts against each other, but that of body {preload.body!r} acts "
+                f"against an open joint: nothing resists its force of {preload.force:g} between the parts on "
+                "both sides of its section. Let head and nut, and what they clamp, have contacts or ties, or "
+                "give a shortening in place of the force"
+            )
 
-    def __init__(self, torn: TornSystem, index: int) -> None:
+
+def rigid_bodies(torn: TornSystem) -> list[RigidBody]:
+    """Return the bodies regarded as rigid; sections of preloads separate some into parts."""
+    found = []
+    for index, body in enumerate(torn.scene.bodies.values()):
+        if not body.mesh.cuts:
+            found.append(RigidBody(torn, index))
+            continue
+        part = parts_of(body.mesh)
+        found += [RigidBody(torn, index, part == number) for number in range(part.max() + 1)]
+    return found
+
+
+def _along_sections(torn: TornSystem) -> tuple[sp.csr_matrix, np.ndarray]:
+    """Return directions in which forces draw sections together, among forces at tied points, and the forces.
+
+    Returns shape (n_tie_forces, n_free), orthonormal, and coefficients of these, (n_free,).
+    """
+    scene, ties = torn.scene, torn.ties
+    bonded = ~are_sliding(scene.ties, ties.pair)
+    place = np.cumsum(bonded) - 1
+    columns, forces = [], []
+    for number, preload in enumerate(scene.preloads):
+        if not preload.is_free:
+            continue
+        mine = np.flatnonzero(ties.pair == len(scene.ties) + number)
+        row = place[mine][:, None] * torn.dim + np.arange(torn.dim)
+        size = np.sqrt(len(mine))
+        entries = (ties.normal[mine].ravel() / size, (row.ravel(), np.zeros(row.size, dtype=np.int64)))
+        count = torn.dim * int(bonded.sum()) + int((~bonded).sum())
+        columns.append(sp.csr_matrix(entries, shape=(count, 1)))
+        forces.append(-(preload.force or 0.0) / size)
+    return sp.hstack(columns, format="csr"), np.array(forces)
+
+
+class RigidBody:
+    """A body regarded as rigid: its modes, and the wrenches of supports, ties, contacts and loads on it.
+
+    `part`: marks of the nodes of a part of it, shape (n_nodes,); all by default.
+    """
+
+    def __init__(self, torn: TornSystem, index: int, part: np.ndarray | None = None) -> None:
         tearing = torn.decomposition.tearing
         self.name = tearing.body_names[index]
         self._nodes = slice(int(tearing.node_offset[index]), int(tearing.node_offset[index + 1]))
         body = torn.scene.bodies[self.name]
         self._points = body.mesh.points
         self._modes = body.rigid_modes()
+        if part is not None:
+            self._modes = np.where(part[:, None, None], self._modes, 0.0)
+            self._points = self._points[part]
         supports = resisted_motions(held_components(torn.scene, self.name, self._modes))
         #: Wrenches that supports and material can exert in both directions, shape (n_modes, n).
         self.support = _both(supports, _resisted_by_material(body, self._modes))
@@ -111,7 +173,7 @@ class RigidBody:
     def tie_wrenches(self, torn: TornSystem) -> sp.csr_matrix:
         """Wrenches of unit forces at tied points, shape (n_modes, n)."""
         arms = self.arms(torn.ties)
-        sliding = np.array([tie.sliding for tie in torn.scene.ties], dtype=bool)[torn.ties.pair]
+        sliding = are_sliding(torn.scene.ties, torn.ties.pair)
         bonded = arms[~sliding].reshape(-1, arms.shape[2]).T
         gliding = np.einsum("nd,ndm->mn", torn.ties.normal[sliding], arms[sliding])
         return sp.csr_matrix(np.hstack([bonded, gliding]))
@@ -125,6 +187,9 @@ class RigidBody:
                 wrench += subdomain.load @ self._modes[subdomain.mesh.nodes].reshape(-1, count)
         if torn.decomposition.comm.rank == 0:
             wrench += point_loads(torn.scene, self.name, self._modes)
+            if any(preload.is_free for preload in torn.scene.preloads):
+                along, forces = _along_sections(torn)
+                wrench += self.tie_wrenches(torn) @ (along @ forces)
         return wrench
 
     def arms(self, points: ContactPoints) -> np.ndarray:
@@ -394,7 +459,7 @@ def unresisted_in_words(motions: list[UnheldMotion] | tuple[UnheldMotion, ...]) 
 
 
 def _unresisted(torn: TornSystem) -> tuple[UnheldMotion, ...]:
-    bodies = [RigidBody(torn, index) for index in range(len(torn.scene.bodies))]
+    bodies = rigid_bodies(torn)
     if all(body.held for body in bodies):
         return ()
     supports = sp.block_diag([body.support for body in bodies])

@@ -25,6 +25,7 @@ from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti.direct import DirectSolution
+from fenics_contact.feti.preloads import given_shortenings
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State
 
@@ -47,7 +48,7 @@ def stored_state(state: State) -> dict[str, np.ndarray]:
     if not isinstance(state, LinearState):
         from fenics_contact._equilibrium.deformed import stored_deformed
 
-        return stored_deformed(cast("DeformedState", state))
+        return stored_deformed(cast("DeformedState", state)) | held_lengths(state.scene)
     torn, solution = state.torn, state.dual_solution
     rows = np.arange(torn.numbering.total)
     return {
@@ -55,7 +56,13 @@ def stored_state(state: State) -> dict[str, np.ndarray]:
         "origin": torn.numbering.gather(torn.right + torn.supported, rows),
         "slid": torn.slid,
         "motion": np.asarray(solution.alpha),
+        **held_lengths(state.scene),
     }
+
+
+def held_lengths(scene: Scene) -> dict[str, np.ndarray]:
+    """Return the prescribed shortenings of the preloads of a state, at which it holds bolts, if any."""
+    return {"lengths": given_shortenings(scene)} if scene.preloads else {}
 
 
 class StepCheckpoint:

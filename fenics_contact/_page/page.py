@@ -353,6 +353,8 @@ def _steps(record: Record, units: Units) -> str:
         "stick": "stick", "slip": "slip", "normal_force": f"normal force ({force})",
         "friction_force": f"friction ({force})", "peak_pressure": f"largest pressure ({units.stress})",
     }  # fmt: skip
+    drawn = [name for name in steps if name.startswith("preload ")]
+    named |= {name: f"{name.removeprefix('preload ')} ({force})" for name in drawn}
     columns = [name for name in named if name in steps]
     rows = list(zip(*(steps[name] for name in columns), strict=True))
     return _table([named[name] for name in columns], rows, words=2)

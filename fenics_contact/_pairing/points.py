@@ -263,6 +263,12 @@ class NodeNumbers:
         return nodes + self.first_of(body)
 
 
+def are_sliding(ties: Sequence[Tie], pair: np.ndarray) -> np.ndarray:
+    """Return whether tied points may slide, by the numbers of their pairs; those after the ties do not."""
+    sliding = np.array([*(tie.sliding for tie in ties), False], dtype=bool)
+    return np.asarray(sliding[np.minimum(pair, len(ties))])
+
+
 #: Cosine between normals above which two points act in the same direction: corners stay what they are.
 PARALLEL = 0.9
 
@@ -300,7 +306,7 @@ def tied_once(ties: ContactPoints, scene: Scene, fixed: np.ndarray) -> ContactPo
     Where an edge belongs to two ties, their forces would be split at will.
     """
     one, other, _ = _same_places(ties, ties)
-    sliding = np.array([tie.sliding for tie in scene.ties], dtype=bool)[ties.pair]
+    sliding = are_sliding(scene.ties, ties.pair)
     held = _held(ties.normal[one], ties, other, scene, fixed)
     first = np.where(sliding[one] == sliding[other], ties.pair[other] < ties.pair[one], sliding[one])
     lost = one[held & first & (sliding[one] | ~sliding[other])]
@@ -394,7 +400,7 @@ def _held(
     normal: np.ndarray, ties: ContactPoints, tied: np.ndarray, scene: Scene, fixed: np.ndarray
 ) -> np.ndarray:
     """Return whether tied points hold displacements along normals, shape (n, dim)."""
-    sliding = np.array([tie.sliding for tie in scene.ties], dtype=bool)[ties.pair[tied]]
+    sliding = are_sliding(scene.ties, ties.pair[tied])
     along = np.abs(np.einsum("nd,nd->n", normal, ties.normal[tied]))
     # A fixed tie holds all components but those that a support has on its slave.
     bonded = np.linalg.norm(np.where(fixed[ties.slave[tied]], 0.0, normal), axis=1)

@@ -15,6 +15,7 @@ from fenics_contact._scene.body import Body
 from fenics_contact._scene.loads import Load, Pressure, SurfaceLoad, ThermalStrain, TotalForce
 from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface, Tie
+from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.supports import AnySupport, RigidSurface, Support
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
 from fenics_contact._surfaces.projection import surfaces_match
@@ -36,6 +37,7 @@ class SceneParts:
     loads: Sequence[Load] = field(default=())
     contacts: Sequence[ContactPair] = field(default=())
     ties: Sequence[Tie] = field(default=())
+    preloads: Sequence[Preload] = field(default=())
 
     def __post_init__(self) -> None:
         """Reject names that do not exist, and loads and supports that do not suit their bodies."""
@@ -47,6 +49,8 @@ class SceneParts:
         for part in (*self.supports, *self.loads):
             surface = part.surface if isinstance(part, SurfaceLoad | AnySupport) else None
             self._require(part.body, surface, type(part).__name__)
+        for preload in self.preloads:
+            self._require(preload.body, None, "Preload")
         object.__setattr__(self, "supports", tuple(map(self._in_space, self.supports)))
         for part in (*self.supports, *self.loads):
             if not isinstance(part, RigidSurface):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,10 +19,12 @@ from fenics_contact._scene.supports import RigidSurface
 from fenics_contact._surfaces.facets import has_midside_pressure
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.cuts import pieces
 
 if TYPE_CHECKING:
     from fenics_contact._scene.pair_geometry import PairGeometry
     from fenics_contact._scene.parts import SceneParts
+    from fenics_contact._scene.preloads import Preload
 
 
 class EffectName(StrEnum):
@@ -37,6 +40,7 @@ class EffectName(StrEnum):
     FOLLOWING_PRESSURE = "following pressure"
     THERMAL_STRAIN = "thermal strain"
     TIE = "tied surfaces"
+    PRELOAD = "bolt preload"
     CONTACT = "contact"
     TRESCA = "Tresca friction"
     COULOMB = "Coulomb friction"
@@ -76,6 +80,7 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
          "pressures follow their surfaces"),
         (names.THERMAL_STRAIN, thermal, "change of temperature", "temperatures"),
         (names.TIE, len(scene.ties), "pair stays together", "pairs stay together"),
+        (names.PRELOAD, len(scene.preloads), "section is drawn together", "sections are drawn together"),
         (names.CONTACT, len(scene.contacts), "pair may touch", "pairs may touch"),
         (names.TRESCA, tresca, f"pair {fixed}", f"pairs {fixed.replace('has', 'have')}"),
         (names.COULOMB, coulomb, f"pair {rough}", f"pairs {rough.replace('has', 'have')}"),
@@ -181,6 +186,7 @@ class Plan:
         ties: Where each tie is enforced, and why.
         unpaired: Which bodies touch or overlap without a pair or tie, or will where supports move them as if
             they were rigid, and what to do.
+        preloads: What each preload does, and along which faces of cells its body is cut.
     """
 
     effects: tuple[Effect, ...]
@@ -196,6 +202,7 @@ class Plan:
     contacts: tuple[PairGeometry, ...]
     ties: tuple[str, ...]
     unpaired: tuple[str, ...]
+    preloads: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         """Return one line for each decision."""
@@ -217,6 +224,7 @@ class Plan:
             "memory": f"{self.memory / 1e6:.0f} MB",
             **{f"pair {number}": str(pair) for number, pair in enumerate(self.contacts)},
             **{f"tie {number}": tie for number, tie in enumerate(self.ties)},
+            **{f"preload {number}": preload for number, preload in enumerate(self.preloads)},
             **({"no pair": "; ".join(self.unpaired)} if self.unpaired else {}),
         }
 
@@ -229,6 +237,7 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
     from fenics_contact._scene.pair_geometry import pair_geometry, unpaired_bodies
 
     effects = effects_of(scene)
+    partitions = {name: pieces(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
     names = {effect.name for effect in effects}
     counts = [_node_counts(body.mesh, partitions[name]) for name, body in scene.bodies.items()]
     nodes, shared = (np.concatenate(column) for column in zip(*counts, strict=True))
@@ -236,6 +245,7 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
     solver = choose_solver(scene, subdomains, sensitivity=sensitivity)
     direct = solver is SolverKind.DIRECT
     loose = sum(int(s.free.sum()) for s in scene.supports if isinstance(s, RigidSurface))
+    loose += sum(preload.is_free for preload in scene.preloads)
     each = 1 if scene.axisymmetric else scene.dim * (scene.dim + 1) // 2
     motions = 0 if direct else subdomains * each + loose
     sizes = zip(scene.dim * nodes, scene.dim * shared, strict=True)
@@ -254,7 +264,21 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
         contacts=tuple(pair_geometry(scene, pair) for pair in scene.contacts),
         ties=tuple(f"{tie.place}; {in_words(tie)}" for tie in scene.ties),
         unpaired=unpaired_bodies(scene),
+        preloads=tuple(map(partial(_section_in_words, scene), scene.preloads)),
     )
+
+
+def _section_in_words(scene: SceneParts, preload: Preload) -> str:
+    """Return what a preload does, and how closely faces of cells follow its section."""
+    mesh = scene.bodies[preload.body].mesh
+    facets, normal = preload.cut(mesh).facets, preload.normal(mesh)
+    along = mesh.points[np.unique(facets)] @ normal
+    area = preload.area(mesh, scene.axisymmetric)
+    cut = f"cut along {counted(len(facets), 'face')} of cells, area {area:.6g}"
+    words = f"{preload.place}; {cut}"
+    away = float(np.ptp(along))
+    size = float(np.ptp(mesh.points[np.unique(facets)], axis=0).max())
+    return words if away <= MOTION_ROUNDING * size else f"{words}, within a layer of {away:.3g} [length]"
 
 
 def choose_solver(scene: SceneParts, subdomains: int, *, sensitivity: bool = False) -> SolverKind:
@@ -266,6 +290,7 @@ def choose_solver(scene: SceneParts, subdomains: int, *, sensitivity: bool = Fal
         return SolverKind.FACE_NEWTON
     # A body that its supports alone do not hold has a singular stiffness.
     loose = any(isinstance(support, RigidSurface) and support.free.any() for support in scene.supports)
+    loose = loose or bool(scene.preloads)
     if subdomains == 1 and not (sensitivity or loose) and held_by_supports(scene, scene.body_names[0]):
         return SolverKind.DIRECT
     return SolverKind.PROJECTED_CG
@@ -289,6 +314,7 @@ def _multipliers(scene: SceneParts, unknowns: int) -> dict[str, int]:
         "gluing": unknowns - scene.dim * nodes,
         "prescribed": fixed,
         "tied": sum(tied),
+        "drawn": sum(scene.dim * each.count(scene.bodies[each.body].mesh) for each in scene.preloads),
         "normal": sum(slaves),
         "tangential": (scene.dim - 1) * sum(rubbing),
     }

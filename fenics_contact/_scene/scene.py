@@ -13,6 +13,8 @@ from fenics_contact._base.display import displayed
 from fenics_contact._scene.automatic import AutomaticContact
 from fenics_contact._scene.loads import Load
 from fenics_contact._scene.parts import SceneParts, with_discretisation
+from fenics_contact._scene.preloads import Preload
+from fenics_contact._scene.sections import changed_by, require_preloads, with_cuts
 from fenics_contact._scene.supports import AnySupport
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
@@ -35,6 +37,8 @@ class Scene(SceneParts):
         contacts: Pairs of surfaces that may touch; `AutomaticContact` finds them, and names the surfaces.
             Each has the discretisation that it was given or that the scene chose for it, see `plan`.
         ties: Pairs of surfaces that stay together, likewise.
+        preloads: Sections through bodies that are drawn together. The scene cuts the meshes of these bodies,
+            whose nodes are there twice; cells and surfaces keep numbers and names.
 
     Raises:
         InvalidInputError: If a part names a body or a surface that is not there, does not suit the body's
@@ -64,6 +68,9 @@ class Scene(SceneParts):
             object.__setattr__(self, "bodies", bodies)
             object.__setattr__(self, "contacts", pairs)
             super().__post_init__()
+        if self.preloads:
+            object.__setattr__(self, "bodies", with_cuts(self))
+        require_preloads(self)
         object.__setattr__(self, "contacts", with_discretisation(self, self.contacts))
         object.__setattr__(self, "ties", with_discretisation(self, self.ties))
 
@@ -98,6 +105,7 @@ class Scene(SceneParts):
                 for pair in self.contacts
             ],
             "ties": [tie.place for tie in self.ties],
+            **({"preloads": [preload.place for preload in self.preloads]} if self.preloads else {}),
         }
 
     def effects(self) -> tuple[Effect, ...]:
@@ -158,6 +166,8 @@ class LoadStep:
             time, or None; they must hold the same components in every step.
         time: Time at the end of the step in any unit, for records, functions of time, obstacles that move
             and materials that creep; None: the number of the step, from 1.
+        preloads: The bolts that are drawn together in the step, by a force or a length; all others of the
+            scene are held at the length that they have at its start. An empty list holds all.
 
     Raises:
         InvalidInputError: If there are functions of time, and no time, or it is not finite.
@@ -172,6 +182,7 @@ class LoadStep:
     loads: Sequence[Load] | LoadsInTime | None = None
     supports: Sequence[AnySupport] | SupportsInTime | None = None
     time: float | None = None
+    preloads: Sequence[Preload] | None = None
 
     def __post_init__(self) -> None:
         """Raise if loads are functions of time and no finite time is given."""
@@ -196,6 +207,8 @@ class LoadStep:
         loads = scene.loads if self.loads is None else self.loads
         supports = scene.supports if self.supports is None else self.supports
         end = 0.0 if self.time is None else self.time
+        if self.preloads is not None:
+            scene = replace(scene, preloads=changed_by(scene, self.preloads))
         return self._with(scene, loads, supports, end)
 
     def at(self, scene: Scene, time: float) -> Scene:

@@ -13,10 +13,19 @@ from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt
 from fenics_contact._equilibrium.problem import default_solver
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.plan import choose_solver
+from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene_file.bodies import AnyMaterial, Mesh
 from fenics_contact._scene_file.design import DesignPart, check_formulas
-from fenics_contact._scene_file.model import AnyLoad, AnySupportPart, AutomaticPart, ContactPart, TiePart
+from fenics_contact._scene_file.model import (
+    AnyLoad,
+    AnySupportPart,
+    AutomaticPart,
+    ContactPart,
+    PreloadAim,
+    PreloadPart,
+    TiePart,
+)
 from fenics_contact._scene_file.part import Part
 from fenics_contact._scene_file.source import Mistake, Source, as_toml, branches, written
 from fenics_contact._scene_file.source import Path as Keys
@@ -200,12 +209,28 @@ class StepPart(Part):
     )
     supports: dict[str, StepComponents] = Field({}, description="name of a support -> its value at the end")
     loads: dict[str, LoadValue] = Field({}, description="name of a load -> its value at the end")
+    preloads: dict[str, PreloadAim] | None = Field(
+        None,
+        description="name of a preload -> its force or shortening, all others are held at their lengths; {} "
+        "holds all; not given, all stay as they were",
+    )
+
+    def drawn(self, preloads: Sequence[PreloadPart]) -> tuple[Preload, ...] | None:
+        """Return the preloads that the step draws together, None where all stay as they were."""
+        if self.preloads is None:
+            return None
+        known = {part.name: part.made() for part in preloads}
+        return tuple(
+            replace(known[name], force=aim.force, shortening=aim.shortening)
+            for name, aim in self.preloads.items()
+        )
 
 
 def load_steps(
     steps: Sequence[StepPart],
     supports: Sequence[AnySupportPart],
     loads: Sequence[AnyLoad],
+    preloads: Sequence[PreloadPart],
     bodies: Mapping[str, Body],
     at: Callable[..., AbstractContextManager[None]],
 ) -> tuple[LoadStep, ...]:
@@ -213,7 +238,8 @@ def load_steps(
 
     A support or load that a step does not name keeps its value; a named one changes linearly from the value
     before, initially its own, to the one given. A formula that depends on t is evaluated at the end of each
-    load step instead, also in later steps and where it is the initial value; t starts at zero.
+    load step instead, also in later steps and where it is the initial value; t starts at zero. Preloads have
+    their aims in all of the step's parts.
     """
     with at("steps"):
         _require_few(steps)
@@ -234,7 +260,7 @@ def load_steps(
                 acts, holds = (
                     each if in_parts and each.varies else each.at(time, share) for each in (acted, held_up)
                 )
-                built.append(LoadStep(name, acts, holds, time))
+                built.append(LoadStep(name, acts, holds, time, step.drawn(preloads)))
             for part in (*acted.at(time, 1.0), *held_up.at(time, 1.0)):
                 check_formulas(part, bodies)
         held.reach(step.supports)
@@ -386,6 +412,7 @@ class Document(Part):
         None, description="pairs that are found where boundaries face each other, in place of [[contacts]]"
     )
     ties: list[TiePart] = Field([], description="pairs that stay together")
+    preloads: list[PreloadPart] = Field([], description="bolts drawn together at a section")
     steps: list[StepPart] = Field([], description="load steps; without them all acts at once")
     solver: SolverPart = Field(SolverPart(), description="how it is solved")
     output: OutputPart = Field(OutputPart(), description="what is written, and where")

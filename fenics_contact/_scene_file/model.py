@@ -10,11 +10,13 @@ import numpy as np
 from pydantic import AfterValidator, Field, PositiveFloat
 from scipy.spatial.transform import Rotation
 
+from fenics_contact._base.checks import meaning
 from fenics_contact._scene import automatic, loads, pairs, surface_laws
 from fenics_contact._scene import obstacles as obstacles_module
 from fenics_contact._scene.loads import Load
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
+from fenics_contact._scene.preloads import Preload, Section
 from fenics_contact._scene.supports import RigidSurface, Support
 from fenics_contact._scene_file.part import Part, keys_of, table_of
 from fenics_contact._scene_file.values import (
@@ -23,6 +25,7 @@ from fenics_contact._scene_file.values import (
     Expression,
     FieldOrMeasured,
     Motion,
+    Names,
     NotNegativeField,
     PlaceOfFile,
     Scalar,
@@ -326,6 +329,40 @@ class RigidPart(_Named):
         if not isinstance(component, Expression):
             return component
         return float(component(np.array([self.at]))[0])  # type: ignore[attr-defined]
+
+
+@keys_of(Preload, without=("section", "name"))
+class PreloadPart(Part):
+    """A bolt drawn together at a section of its body; without force and shortening held at its length."""
+
+    name: str | None = Field(None, description="how load steps and results call it, the body by default")
+    point: Vector | None = Field(None, description="a point of the plane of the section, [length]")
+    normal: Vector | None = Field(None, description="normal of the plane, the axis of the bolt")
+    regions: Annotated[Names | None, Field(min_length=2, max_length=2)] = Field(
+        None, description="two regions of the mesh whose common face is the section, in place of a plane"
+    )
+    region: str | None = Field(None, description=meaning(Section, "region"))
+    radius: float | None = Field(None, gt=0, description=meaning(Section, "radius"))
+
+    def made(self, **other: Any) -> Preload:
+        """Build the preload, with the section that its keys give."""
+        plane = self.point is not None and self.normal is not None
+        if plane == (self.regions is not None):
+            raise InvalidInputError(
+                "a preload needs the point and normal of a plane, or two regions, got "
+                f"point={self.point!r}, normal={self.normal!r} and regions={self.regions!r}: give one of them"
+            )
+        section: Any = self.regions
+        if plane:
+            section = Section(self.point or (), self.normal or (), self.region, self.radius)
+        return super().made(section=section, name=self.name or "")
+
+
+class PreloadAim(Part):
+    """What a load step does with a preload: a force or a shortening."""
+
+    force: float | None = Field(None, description="force of the section, [force]")
+    shortening: float | None = Field(None, description="how much shorter the bolt gets, [length]")
 
 
 AnySupportPart: TypeAlias = Annotated[

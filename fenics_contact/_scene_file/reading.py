@@ -123,7 +123,7 @@ class Builder:
         document, dim = self._document, next(iter(bodies.values())).mesh.dim
         empty = Scene(bodies)
         built: dict[str, list[Any]] = {}
-        for key in ("supports", "loads", "contacts", "ties"):
+        for key in ("supports", "loads", "contacts", "ties", "preloads"):
             built[key] = []
             for number, part in enumerate(getattr(document, key)):
                 with self._at(key, number):
@@ -422,7 +422,8 @@ class SceneFile:
     def steps(self) -> tuple[LoadStep, ...]:
         """All load steps; empty where everything acts at once. Collective on first use."""
         document, bodies = self._complete, self.scene.bodies
-        return load_steps(document.steps, document.supports, document.loads, bodies, self._at)
+        parts = document.supports, document.loads, document.preloads
+        return load_steps(document.steps, *parts, bodies, self._at)
 
     @cached_property
     def partitions(self) -> dict[str, np.ndarray]:

@@ -42,6 +42,7 @@ def wrong_names(source: Source, document: Document) -> list[Mistake]:
         "a body": document.bodies,
         "the name of a support": _names(document.supports),
         "the name of a load": _names(document.loads),
+        "the name of a preload": _names(document.preloads),
     }
     used = _references(document)
     wrong = [
@@ -70,7 +71,8 @@ def _references(document: Document) -> Iterator[tuple[Path, str, str]]:
     for name in cuts if isinstance(cuts, Mapping) else ():
         yield ("solver", "subdomains", name), name, "a body"
     for number, step in enumerate(document.steps):
-        for key, named in (("supports", step.supports), ("loads", step.loads)):
+        changed = {"supports": step.supports, "loads": step.loads, "preloads": step.preloads or ()}
+        for key, named in changed.items():
             for name in named:
                 yield ("steps", number, key, name), name, f"the name of a {key[:-1]}"
 
@@ -98,7 +100,7 @@ def _wrong_pairs(source: Source, document: Document) -> Iterator[Mistake]:
 
 
 def _twice(source: Source, document: Document) -> Iterator[Mistake]:
-    for key in ("supports", "loads"):
+    for key in ("supports", "loads", "preloads"):
         seen: set[str] = set()
         for number, part in enumerate(getattr(document, key)):
             if part.name in seen:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact._pairing.points import HELD, ContactPoints, movable
+from fenics_contact._pairing.points import HELD, ContactPoints, are_sliding, movable
 from fenics_contact._scene.pairs import Tie
 from fenics_contact.feti.decomposition import Rows, Tearing
 
@@ -137,7 +137,7 @@ def tied_relations(points: ContactPoints, ties: Sequence[Tie], fixed: np.ndarray
     `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
     """
     dim = points.normal.shape[1]
-    sliding = np.array([tie.sliding for tie in ties], dtype=bool)[points.pair]
+    sliding = are_sliding(ties, points.pair)
     bonded, component = np.nonzero(~sliding[:, None] & ~fixed[points.slave])
     gliding = np.flatnonzero(sliding)
     which = np.concatenate([bonded, gliding])

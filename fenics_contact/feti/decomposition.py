@@ -21,6 +21,7 @@ from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.inverse import Condensations
 from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.subdomain import SubdomainMesh, cut_out
+from fenics_contact.mesh.cuts import pieces
 from fenics_contact.mesh.partition import check_face_connected
 
 
@@ -389,6 +390,7 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
     check_same_input(comm, scene, partitions=partitions)
     with together(comm):
         _check_partitions(scene, partitions)
+        partitions = {name: pieces(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
     forms = FormLibrary(comm)
     forms.prepare(scene)
     # Ranks agree on errors after each local stage, before the next collective one.
@@ -430,7 +432,7 @@ def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> Non
                 f"subdomain per cell, got {given}: bisection_partition or box_partition of "
                 "fenics_contact.mesh cuts a mesh into a number of subdomains"
             )
-        check_face_connected(body.mesh, partition)
+        check_face_connected(body.mesh, pieces(body.mesh, partition))
 
 
 def _check_communicators(subdomains: int, each: int) -> None:

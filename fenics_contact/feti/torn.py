@@ -35,6 +35,13 @@ from fenics_contact.feti.decomposition import (
     stack,
 )
 from fenics_contact.feti.free_motions import NO_MOTIONS, FreeMotions, free_motions
+from fenics_contact.feti.preloads import (
+    given_shortenings,
+    once_at_sections,
+    section_points,
+    shortening_columns,
+    with_shortenings,
+)
 from fenics_contact.feti.subdomain import Subdomain, assemble
 from fenics_contact.qp.cones import CoulombLaw, SlipLaw, Strengths, TrescaLaw
 from fenics_contact.qp.layout import ContactLayout
@@ -85,6 +92,11 @@ def meeting_points(
             points = without_tied(points, ties, scene, fixed, told=told or comm.rank > 0)
     if len(scene.contacts) > 1:
         points = shared_once(points, scene, told=told or comm.rank > 0)
+    if scene.preloads:
+        with together(comm):
+            points = once_at_sections(points, scene, tearing)
+            sections = section_points(scene, ties, tearing, fixed)
+        ties = join_points([ties, sections], scene.dim, tearing.n_nodes)
     return points, ties
 
 
@@ -155,7 +167,7 @@ class TornSystem:
         right: c of the owned rows less the contribution of supports, shape (n_owned,), [length].
         slid: Tangential displacement of the points without friction, which have no such rows, at the origin
             of slip, replicated, shape (n_contact − n_friction, dim − 1), [length].
-        free: The free motions of rigid surfaces, which add Q q to c.
+        free: The free motions of rigid surfaces and unknown shortenings of preloads, which add Q q to c.
     """
 
     scene: Scene
@@ -190,17 +202,19 @@ class TornSystem:
         return jump + self.supported - self.free.columns @ self.free_motion(self.right - jump)
 
     def free_motion(self, residual: np.ndarray) -> np.ndarray:
-        """Return q of rigid surfaces, the motion that fits the residual of rows best, replicated. Collective.
+        """Return q of rigid surfaces and preloads, which fits the residual of rows best. Collective.
+
+        Replicated.
 
         Args:
             residual: c − B u, owned, shape (n_owned,), [length].
         """
         if self.free.count == 0:
             return np.zeros(0)
-        columns = self.free.columns[self.numbering.owned < self.n_gluing]
-        sums = np.column_stack(
-            [(columns.T @ columns).toarray(), -columns.T @ residual[self.numbering.owned < self.n_gluing]]
-        )
+        # Sections lie in the last rows of ties.
+        rows = self.numbering.owned < (self.n_equality if self.scene.preloads else self.n_gluing)
+        columns = self.free.columns[rows]
+        sums = np.column_stack([(columns.T @ columns).toarray(), -columns.T @ residual[rows]])
         sums = self.decomposition.comm.allreduce(sums)
         return np.asarray(np.linalg.solve(sums[:, :-1], sums[:, -1]))
 
@@ -221,6 +235,15 @@ class TornSystem:
         tangential = self.numbering.owned >= self.n_equality + self.points.count
         right = np.where(tangential, relative - self.supported, self.right)
         return replace(self, right=right, slid=slid)
+
+    def of_ties(self, columns: sp.csr_matrix) -> sp.csr_matrix:
+        """Return the owned rows of a matrix with a row for each row of ties, zero on other rows."""
+        rows = self.numbering.owned - self.n_gluing
+        here = (rows >= 0) & (rows < columns.shape[0])
+        chosen = sp.csr_matrix(
+            (np.ones(here.sum()), (np.flatnonzero(here), rows[here])), shape=(len(rows), columns.shape[0])
+        )
+        return (chosen @ columns).tocsr()
 
     @property
     def frictionless(self) -> np.ndarray:
@@ -371,6 +394,9 @@ def build_torn_system(
     tied, slip = np.zeros(system.n_equality - len(right)), np.zeros(system.tangential_rows.size)
     supported = np.concatenate([np.zeros(len(right)), supported])
     owned = system.numbering.owned
+    if scene.preloads:
+        drawn = shortening_columns(scene, system.relations[0])
+        tied = drawn @ given_shortenings(scene)
     right = np.concatenate([right, tied, gap, slip]) - supported
     slid = np.zeros((len(system.frictionless), system.dim - 1))
     if free.count:
@@ -379,12 +405,14 @@ def build_torn_system(
         free = replace(free, columns=free.of_rows(decomposition.gluing.dof, system.relations)[owned])
     else:
         free = replace(free, columns=sp.csr_matrix((len(owned), 0)))
+    if scene.preloads:
+        free = with_shortenings(free, scene, system.of_ties(drawn))
     return replace(system, supported=supported[owned], right=right[owned], slid=slid, free=free)
 
 
 def _meets_alike(scene: Scene, other: Scene) -> bool:
     """Return whether two scenes have the same meshes and the same pairs of surfaces."""
-    pairs = [[*each.contacts, *each.ties] for each in (scene, other)]
+    pairs = [[*each.contacts, *each.ties, *(p.key for p in each.preloads)] for each in (scene, other)]
     return scene.has_meshes_of(other) and pairs[0] == pairs[1]
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from fenics_contact._base.checks import check_count
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.cuts import closed, pieces
 from fenics_contact.mesh.faces import coordinate_rounding
 from fenics_contact.mesh.partition import cell_weights, check_one_piece, check_parts, face_areas, merge_pieces
 
@@ -49,6 +50,8 @@ def bisection_partition(mesh: BodyMesh, parts: int) -> np.ndarray:
         InvalidInputError: If there are fewer cells than parts, or the mesh consists of separate parts.
     """
     check_parts(mesh, parts)
+    if mesh.cuts:
+        return pieces(mesh, bisection_partition(closed(mesh), parts))
     partition = np.zeros(mesh.n_cells, dtype=np.int64)
     if parts > 1:
         pending = [_whole(mesh, parts)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -235,6 +235,19 @@ def checked_regions(regions: Mapping[str, ArrayLike], n_cells: int) -> dict[str,
     return checked
 
 
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Faces of cells along which a mesh is cut.
+
+    Attributes:
+        pairs: Node behind the cut and node before it, at the same place, shape (n, 2).
+        facets: The faces, outward of the cells before the cut, shape (n_facets, nodes of a face).
+    """
+
+    pairs: np.ndarray
+    facets: np.ndarray
+
+
 @displayed
 @dataclass(frozen=True, eq=False)
 class BodyMesh:
@@ -285,6 +298,7 @@ class BodyMesh:
     shapes: Mapping[str, SurfaceShape] = field(default_factory=dict)
     _origin: BodyMesh | None = field(default=None, init=False, repr=False)
     _off_shapes: Mapping[str, np.ndarray] = field(default_factory=dict, init=False, repr=False)
+    _cuts: Mapping[Hashable, Cut] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check everything, in order of cost."""
@@ -377,6 +391,14 @@ class BodyMesh:
         """
         return self._off_shapes
 
+    @property
+    def cuts(self) -> Mapping[Hashable, Cut]:
+        """The sections along which a scene has cut the body, see `fenics_contact.Preload`; by default none.
+
+        Nodes on the far sides are numbered after all others.
+        """
+        return self._cuts
+
     def with_shapes(self, shapes: Mapping[str, SurfaceShape]) -> BodyMesh:
         """Return the mesh with exactly these shapes of its surfaces.
 
@@ -414,7 +436,7 @@ class BodyMesh:
         none.
 
         Args:
-            points: New coordinates, (n_nodes, 3 | 2).
+            points: New coordinates, (n_nodes, 3 | 2); of a mesh with `cuts` those before it was cut will do.
 
         Returns:
             The moved mesh.
@@ -459,7 +481,7 @@ class BodyMesh:
         return result
 
     def _at(self, points: np.ndarray) -> BodyMesh:
-        new_points = checked_points(points, self.points.shape)
+        new_points = checked_points(self._on_both_sides(points), self.points.shape)
         check_jacobians(
             new_points,
             self.cells,
@@ -469,6 +491,13 @@ class BodyMesh:
         result.__dict__.pop("linear", None)
         result._set(points=new_points)
         return result
+
+    def _on_both_sides(self, points: np.ndarray) -> np.ndarray:
+        """Return coordinates of all nodes if those before the mesh was cut are given."""
+        for cut in self.cuts.values():
+            if len(points) == cut.pairs[0, 0]:
+                points = np.concatenate([points, np.asarray(points)[cut.pairs[:, 1]]])
+        return points
 
     @cached_property
     def linear(self) -> BodyMesh:

@@ -19,6 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from fenics_contact._base.checks import check_count
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.cuts import closed
 from fenics_contact.mesh.faces import neighbours, shared_faces, vector_areas
 from fenics_contact.mesh.quality import cell_volumes
 
@@ -124,7 +125,8 @@ def _named(body: str) -> str:
 
 
 def check_one_piece(mesh: BodyMesh, body: str = "") -> None:
-    """Reject a mesh that is not connected through faces."""
+    """Reject a mesh that is not connected through faces, other than where a section cuts it."""
+    mesh = closed(mesh) if mesh.cuts else mesh
     piece, owner = _face_pieces(
         mesh, np.zeros(mesh.n_cells, dtype=np.int64), neighbours(mesh.cells, mesh.dim)
     )

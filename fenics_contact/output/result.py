@@ -65,6 +65,7 @@ def described_scene(scene: Scene, subdomains: Mapping[str, int], time: float = 0
         "loads": readable(scene.loads),
         "contacts": [_described_pair(pair, time) for pair in scene.contacts],
         "ties": [_described_pair(tie, time) for tie in scene.ties],
+        **({"preloads": readable(scene.preloads)} if scene.preloads else {}),
     }
 
 
@@ -108,10 +109,12 @@ def _described_pair(pair: ContactPair | Tie, time: float) -> dict[str, Any]:
 def forces_record(state: State) -> dict[str, Any]:
     """Return reactions, forces of ties and contacts, and their balance by name. Collective."""
     pairs, balance = state.resultants(), state.balance()
+    drawn = {"preloads": preloads_record(state)} if state.scene.preloads else {}
     return {
         "reactions": [_on_surface(each) for each in state.reactions()],
         "contacts": [_on_surface(each) for each in pairs.contacts],
         "ties": [_on_surface(each) for each in pairs.ties],
+        **drawn,
         "balance": {
             "about": balance.total.about,
             **{name: {"force": part.force, "moment": part.moment} for name, part in balance.parts.items()},
@@ -122,6 +125,23 @@ def forces_record(state: State) -> dict[str, Any]:
     }
 
 
+def preloads_record(state: State) -> list[dict[str, Any]]:
+    """Return force, moments and shortening of the sections of preloads. Collective."""
+    return [
+        {
+            "name": name,
+            "axial_force": each.force,
+            "shortening": each.shortening,
+            "shear": each.shear,
+            "bending": each.bending,
+            "torsion": each.torsion,
+            "normal": each.normal,
+            **_on_surface(each.resultant),
+        }
+        for name, each in state.preloads().items()
+    ]
+
+
 def listed_forces(forces: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
     """Return the entries of a record of forces by what they are: "reaction 0", ..., "sum of loads", ...
 
@@ -129,6 +149,7 @@ def listed_forces(forces: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any
     """
     words = {"reactions": "reaction", "contacts": "contact", "ties": "tie"}
     single = [(f"{words[kind]} {k}", entry) for kind in words for k, entry in enumerate(forces[kind])]
+    single += [(f"section of {each['name']}", each) for each in forces.get("preloads", ())]
     balance = forces["balance"]
     sums = {name: entry for name, entry in balance.items() if isinstance(entry, Mapping)}
     whole = [
@@ -247,8 +268,9 @@ None where materials dissipate or are nonlinear |
 ``smallest_gap``, ``largest_slip`` in the last load step; without friction closed points count as ``slip`` |
     | ``unheld`` | rigid motions that nothing resists and nothing loads, in words; `State.unheld` |
     | ``forces`` | ``reactions`` of the supports, ``contacts`` and ``ties`` (on the slave): each with body, \
-surface, ``force``, ``moment`` and the point ``about`` which it is; ``balance`` of all with the loads, its \
-``imbalance`` and the scales to which that is relative |
+surface, ``force``, ``moment`` and the point ``about`` which it is; of ``preloads``, where there are any, \
+``name``, ``axial_force``, ``shortening``, ``shear``, ``bending`` and ``torsion``; ``balance`` of all with \
+the loads, its ``imbalance`` and the scales to which that is relative |
     | ``rigid_motions`` | of each rigid surface body, surface, ``displacement`` and ``rotation`` of the \
 point ``about`` |
     | ``more`` | further results of the caller |

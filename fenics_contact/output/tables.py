@@ -140,6 +140,7 @@ def _cell(value: Any) -> str:
 def step_row(number: int, name: str, state: State) -> dict[str, Any]:
     """Return what a load step cost and what contact is like at its end."""
     contact, counts = state.contact, state.counts
+    drawn = state.preloads() if state.scene.preloads else {}
     return {
         "number": number,
         "name": name,
@@ -149,6 +150,7 @@ def step_row(number: int, name: str, state: State) -> dict[str, Any]:
         "normal_force": float(contact.normal_force.sum()),
         "friction_force": _resultant(state),
         "peak_pressure": float(contact.pressure.max(initial=0.0)),
+        **{f"preload {name}": each.force for name, each in drawn.items()},
     }
 
 

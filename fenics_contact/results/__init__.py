@@ -7,6 +7,7 @@ from fenics_contact.qp.fixed_point import Damping
 from fenics_contact.results.contact import ContactResult
 from fenics_contact.results.fields import GatheredFields
 from fenics_contact.results.forces import Balance, PairResultants, Resultant, Resultants
+from fenics_contact.results.preloads import Preloads, SectionForces
 from fenics_contact.results.rigid_motions import RigidMotion, UnheldMotion
 from fenics_contact.results.state import Energies
 
@@ -23,9 +24,11 @@ __all__ = [
     "Energies",
     "GatheredFields",
     "PairResultants",
+    "Preloads",
     "Resultant",
     "Resultants",
     "RigidMotion",
+    "SectionForces",
     "SolverErrors",
     "StateErrors",
     "UnheldMotion",

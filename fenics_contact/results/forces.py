@@ -267,10 +267,10 @@ def table(
     heads = [*("Fx", "Fy", "Fz")[:dim], *(("Mx", "My", "Mz") if dim == 3 else ("M",))]
     if resultants[0].axisymmetric:
         heads, units = ["Fr", "Fz"], "F in [force] per revolution"
-    return "\n".join([*_aligned([(*[""] * len(names[0]), *heads), *cells], len(names[0])), units])
+    return "\n".join([*aligned([(*[""] * len(names[0]), *heads), *cells], len(names[0])), units])
 
 
-def _aligned(rows: list[tuple[str, ...]], names: int) -> list[str]:
+def aligned(rows: list[tuple[str, ...]], names: int) -> list[str]:
     """Return rows of cells as lines, the first ``names`` columns to the left and the others to the right."""
     width = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [

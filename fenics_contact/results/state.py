@@ -46,6 +46,7 @@ from fenics_contact.results.forces import (
     pair_resultants,
     support_reactions,
 )
+from fenics_contact.results.preloads import Preloads, section_forces
 from fenics_contact.results.rigid_motions import RigidMotion, UnheldMotion, rigid_motion
 
 if TYPE_CHECKING:
@@ -428,6 +429,16 @@ class State(ABC):
         """
         rigid = [support for support in self.scene.supports if isinstance(support, RigidSurface)]
         return tuple(rigid_motion(self.scene, each, self.gather_displacement(each.body)) for each in rigid)
+
+    @collectively("State.preloads", comm_of)
+    def preloads(self) -> Preloads:
+        """Return force, moment and shortening of the sections of all preloads, by name. Collective.
+
+        Example:
+            >>> print(state.preloads())  # doctest: +SKIP
+            >>> state.preloads()["bolt"].force  # doctest: +SKIP
+        """
+        return section_forces(self.torn, self._nodal_forces, self.torn_displacement)
 
     @collectively("State.resultants", comm_of)
     def resultants(self, about: GivenVector | np.ndarray | None = None) -> PairResultants:

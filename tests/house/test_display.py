@@ -31,6 +31,7 @@ from fenics_contact import (
     LoadStep,
     MovingObstacle,
     NewtonSteps,
+    Preload,
     Pressure,
     RigidCylinder,
     RigidPlane,
@@ -38,6 +39,7 @@ from fenics_contact import (
     RigidSurface,
     SampledField,
     SceneResponse,
+    Section,
     ShapeProblem,
     Status,
     Support,
@@ -97,7 +99,7 @@ from fenics_contact.materials import (
 )
 from fenics_contact.mesh.cell_types import CELL_TYPES
 from fenics_contact.qp import FaceNewton
-from fenics_contact.results import BalancedTolerance, RigidMotion, UnheldMotion
+from fenics_contact.results import BalancedTolerance, Preloads, RigidMotion, SectionForces, UnheldMotion
 from fenics_contact.results.deformed_state import AnyState
 from tests.contact.gallery import partitions
 from tests.nonlinear.scenes import pressed, rounded
@@ -131,6 +133,7 @@ def objects() -> dict[str, Any]:
     search = ForScipy(bowl, np.zeros(60), constraints=limits)
     search.arguments("SLSQP")["fun"](np.zeros(60))
     weights = [BodyForce("block", (0, 0, float(k))) for k in range(50)]
+    drawn = SectionForces(0.1, np.eye(3)[2], state.balance().loads)
     roots = [
         shape.function(TotalPotential()),
         shape, point, state, scene, scene.plan(), state.estimate_errors(), partials,
@@ -143,6 +146,7 @@ def objects() -> dict[str, Any]:
         UnheldMotion({"block": np.eye(6)[0]}), RigidSurface("block", "z1", (0.5, 0.5, 1.0)),
         *shape.geometry.motions, LoadCases({"one": shape}), path, followed,
         Remeshed(shape), Remeshing(np.zeros(60), 1.0, 1.1),
+        Preload("block", Section((0, 0, 0.5), (0, 0, 1))), Preloads({"block": drawn}), drawn,
         RigidMotion(Surface("block", "z1"), np.zeros(3), np.ones(3), np.arange(3.0)),
         limits, BundleTrust(),
         minimize(bowl, np.ones(60), constraints=NonlinearConstraint(bowl, 90.0, name="size")),

@@ -1,0 +1,196 @@
+"""Bolt preload: sections through bodies that are drawn together by a force, or by a length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+
+from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.body_mesh import BodyMesh, Cut
+from fenics_contact.mesh.faces import vector_areas
+
+
+@dataclass(frozen=True)
+@checked()
+class Section:
+    """The section of a body by a plane.
+
+    The body is cut along the faces of cells nearest to the plane: between cells whose centres lie on
+    different sides of it. Cells stay as they are.
+
+    Attributes:
+        point: A point of the plane, three coordinates (two for a plane body), [length].
+        normal: Its normal, of any length: the axis of the bolt.
+        region: Region of the body's mesh to which the section is limited; by default none.
+        radius: Distance from the point to which the section is limited, [length]: one of several bolts that
+            are meshed as one body. By default the whole plane cuts.
+
+    Raises:
+        InvalidInputError: If there are not as many finite numbers, the normal is zero or the radius is not
+            positive.
+
+    Example:
+        >>> across_the_shank = Section((0, 0, 5), (0, 0, 1))  # mm
+        >>> one_of_four = Section((40, 0, 5), (0, 0, 1), radius=8.0)
+    """
+
+    point: GivenVector
+    normal: GivenVector
+    region: str | None = None
+    radius: float | None = None
+
+    def __post_init__(self) -> None:
+        """Reject a plane that is not determined, and keep its unit normal."""
+        if len(self.point) not in (2, 3) or not np.isfinite(self.point).all():
+            raise InvalidInputError(
+                f"Section.point must be three finite coordinates (two for a plane body), got {self.point!r}: "
+                "give a point inside the bolt's shank"
+            )
+        normal = unit_vector("Section.normal", self.normal, len(self.point))
+        object.__setattr__(self, "point", floats(np.asarray(self.point, dtype=np.float64)))
+        object.__setattr__(self, "normal", normal)
+        if self.radius is not None and not (np.isfinite(self.radius) and self.radius > 0):
+            raise InvalidInputError(
+                f"Section.radius must be positive, got {self.radius!r}: give the distance from the point to "
+                "which the section reaches, a little more than the radius of the bolt"
+            )
+
+    def sides(self, mesh: BodyMesh, body: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return the cells before and behind the plane that the section may separate."""
+        if len(self.point) != mesh.dim:
+            raise InvalidInputError(
+                f"the section of body {body!r} must have {mesh.dim} coordinates as the body has, got "
+                f"{self.point!r}: give {mesh.dim} of them"
+            )
+        cells = np.arange(mesh.n_cells)
+        if self.region is not None:
+            cells = cells_of_region(mesh, body, self.region)
+        arms = mesh.points[mesh.cells[cells]].mean(axis=1) - np.array(self.point)
+        if self.radius is not None:
+            near = np.linalg.norm(arms, axis=1) <= self.radius
+            cells, arms = cells[near], arms[near]
+        behind = arms @ np.array(self.normal) > 0.0
+        return cells[~behind], cells[behind]
+
+    def reach(self, mesh: BodyMesh) -> str:
+        """Return in words where the body lies along the normal."""
+        along = (mesh.points - np.array(self.point)) @ np.array(self.normal)
+        return f"the body reaches from {along.min():.4g} to {along.max():.4g} along the normal from the point"
+
+
+#: A plane, or the names of two regions of a mesh, as gmsh and CAD make them by partition: the section is
+#: their common face, its normal points from the first to the second.
+AnySection: TypeAlias = Section | tuple[str, str]
+
+
+@dataclass(frozen=True)
+@checked()
+class Preload:
+    """A bolt drawn together at a section through its body, by a force or a length, or held at its length.
+
+    The sides of the section move alike, but that one approaches the other along the normal n by the
+    shortening q, u₊ − u₋ = −q n: both parts overlap by q, and together are that much longer. With a force F,
+    q is unknown and the section transmits F; with a shortening it is given, and the force follows. Without
+    either, the bolt is held at the length that it had at the end of the load step before, in the first step
+    as it was made. n stays as it is, also where bodies deform much. F and q are read from `State.preloads`.
+
+    Attributes:
+        body: Name of the body.
+        section: Where it is cut: a plane, or two regions of its mesh by name, at their common face.
+        force: Force F that the section transmits, positive in tension, [force] (in the plane: per unit of
+            thickness).
+        shortening: q, positive where the bolt gets shorter, [length]. Not together with a force.
+        name: Name in results; by default that of the body.
+
+    Raises:
+        InvalidInputError: If both are given, or numbers are not finite.
+
+    Example:
+        >>> tightened = Preload("bolt", Section((0, 0, 5), (0, 0, 1)), force=40e3)  # N
+        >>> held = Preload("bolt", Section((0, 0, 5), (0, 0, 1)))
+        >>> at_a_partition_face = Preload("bolt", ("shank", "head"), shortening=0.05)  # mm
+    """
+
+    body: str
+    section: AnySection
+    force: float | None = None
+    shortening: float | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        """Reject two aims at once, numbers that are not finite and regions that do not form a pair."""
+        given = [value for value in (self.force, self.shortening) if value is not None]
+        if len(given) > 1 or not np.isfinite(given).all():
+            raise InvalidInputError(
+                f"a Preload must have a finite force or a finite shortening, got force={self.force!r} and "
+                f"shortening={self.shortening!r}: give one of them, or none to hold the bolt at its length"
+            )
+        if isinstance(self.section, tuple) and (len(self.section) != 2 or len(set(self.section)) < 2):
+            raise InvalidInputError(
+                f"Preload.section must be a Section or the names of two regions, got {self.section!r}: give "
+                "the regions on both sides of the face"
+            )
+
+    @property
+    def place(self) -> str:
+        """The body and what it does, in words."""
+        if self.force is not None:
+            return f"{self.label} drawn by {self.force:g} [force]"
+        if self.shortening is None:
+            return f"{self.label} held at its length"
+        return f"{self.label} shortened by {self.shortening:g} [length]"
+
+    @property
+    def label(self) -> str:
+        """Its name, by default that of the body."""
+        return self.name or self.body
+
+    @property
+    def key(self) -> tuple[str, AnySection]:
+        """Body and section, by which load steps find it."""
+        return self.body, self.section
+
+    @property
+    def is_free(self) -> bool:
+        """Whether the shortening is unknown."""
+        return self.force is not None
+
+    def with_aim_of(self, other: Preload | None) -> Preload:
+        """Return it with force or shortening of another one, held if there is none."""
+        if other is None:
+            return replace(self, force=None, shortening=None)
+        return replace(self, force=other.force, shortening=other.shortening)
+
+    def cut(self, mesh: BodyMesh) -> Cut:
+        """Return the cut that the scene has made into the mesh of its body."""
+        return mesh.cuts[self.section]
+
+    def normal(self, mesh: BodyMesh) -> np.ndarray:
+        """Return the unit normal n, shape (dim,): that of the plane, or the mean one of the common face."""
+        if isinstance(self.section, Section):
+            return np.array(self.section.normal)
+        areas = vector_areas(mesh.points, self.cut(mesh).facets).sum(axis=0)
+        return np.asarray(areas / np.linalg.norm(areas))
+
+    def count(self, mesh: BodyMesh) -> int:
+        """Return the number of nodes on either side of the section."""
+        return len(self.cut(mesh).pairs)
+
+    def area(self, mesh: BodyMesh, axisymmetric: bool = False) -> float:
+        """Return the area of the section across its normal, [length^(dim - 1)], of a full revolution."""
+        facets = self.cut(mesh).facets
+        areas = vector_areas(mesh.points, facets) @ self.normal(mesh)
+        radius = mesh.points[facets[:, :2], 0].mean(axis=1)
+        return float((2.0 * np.pi * radius * areas if axisymmetric else areas).sum())
+
+
+def cells_of_region(mesh: BodyMesh, body: str, name: str) -> np.ndarray:
+    if name not in mesh.regions:
+        raise InvalidInputError(
+            f"the section of body {body!r} names region {name!r}, its mesh has {sorted(mesh.regions)}: use "
+            "one of them, or a plane"
+        )
+    return mesh.regions[name]

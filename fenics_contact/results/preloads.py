@@ -1,0 +1,129 @@
+"""What the sections of preloads transmit, and how far they are drawn together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact._base.display import displayed
+from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._scene.preloads import Preload
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.preloads import shortening_columns
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.results.forces import NodalForces, Resultant, aligned, resultant
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class SectionForces:
+    """What a section transmits, and its shortening.
+
+    Attributes:
+        shortening: q, positive where the bolt has got shorter, [length].
+        normal: Unit normal n of the section, shape (dim,).
+        resultant: Force and moment on the part behind the section, where n points to, about the centroid of
+            the section's nodes.
+    """
+
+    shortening: float
+    normal: np.ndarray
+    resultant: Resultant
+
+    @property
+    def force(self) -> float:
+        """Force along the normal, positive in tension, [force] (in the plane: per unit of thickness)."""
+        return -float(self.resultant.force @ self.normal)
+
+    @property
+    def shear(self) -> float:
+        """Size of the force across the normal, [force]."""
+        return float(np.linalg.norm(self.resultant.force + self.force * self.normal))
+
+    @property
+    def bending(self) -> float:
+        """Size of the moment but for that about the normal, in the plane all of it, [force·length]."""
+        moment = np.atleast_1d(self.resultant.moment)
+        if len(moment) == 3:
+            moment = moment - (moment @ self.normal) * self.normal
+        return float(np.linalg.norm(moment))
+
+    @property
+    def torsion(self) -> float:
+        """Moment about the normal on the part behind, in the plane zero, [force·length]."""
+        moment = np.atleast_1d(self.resultant.moment)
+        return float(moment @ self.normal) if len(moment) == 3 else 0.0
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Preloads(Mapping[str, SectionForces]):
+    """What the sections of all preloads transmit, by the names of these, in the scene's order.
+
+    Preloads of the same name, as several through one body, are numbered: "plate 1", "plate 2".
+    """
+
+    entries: Mapping[str, SectionForces]
+
+    def __len__(self) -> int:
+        """Return the number of preloads."""
+        return len(self.entries)
+
+    def __getitem__(self, name: str) -> SectionForces:
+        """Return that of a name."""
+        if name not in self.entries:
+            raise InvalidInputError(
+                f"preloads of the scene are {', '.join(map(repr, self.entries)) or 'none'}, got {name!r}: "
+                "use one of these names"
+            )
+        return self.entries[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Return the names."""
+        return iter(self.entries)
+
+    def __str__(self) -> str:
+        """Return a table with one line for each preload."""
+        if not self.entries:
+            return "none"
+        head = ("", "force", "shortening", "shear", "bending", "torsion")
+        size = max(abs(each.force) for each in self.values())
+        rows: list[tuple[str, ...]] = [head]
+        for name, each in self.items():
+            numbers = each.force, each.shortening, each.shear, each.bending, each.torsion
+            shown = [0.0 if k != 1 and abs(x) <= ROUNDING * size else x for k, x in enumerate(numbers)]
+            rows.append((name, *(f"{x:.5g}" for x in shown)))
+        return "\n".join([*aligned(rows, 1), "in [force], [length], [force·length]"])
+
+
+def names_of(preloads: Sequence[Preload]) -> list[str]:
+    """Return the names of preloads, those of the same name numbered."""
+    labels = [preload.label for preload in preloads]
+    return [
+        label if labels.count(label) == 1 else f"{label} {labels[: k + 1].count(label)}"
+        for k, label in enumerate(labels)
+    ]
+
+
+def shortenings(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:
+    """Return the shortening of each preload of a torn displacement, (n_preloads,), replicated. Collective."""
+    columns = shortening_columns(torn.scene, torn.relations[0])
+    rows = np.arange(torn.n_gluing, torn.n_gluing + columns.shape[0])
+    jump = torn.numbering.gather(torn.jump(displacement), rows)
+    return np.asarray((columns.T @ jump) / np.asarray(columns.power(2).sum(axis=0)).ravel())
+
+
+def section_forces(torn: TornSystem, forces: NodalForces, displacement: np.ndarray) -> Preloads:
+    """Return what the sections transmit. Collective."""
+    scene, lengths = torn.scene, shortenings(torn, displacement)
+    found = {}
+    for number, (name, preload) in enumerate(zip(names_of(scene.preloads), scene.preloads, strict=True)):
+        mine = torn.ties.pair == len(scene.ties) + number
+        nodes = torn.ties.slave[mine]
+        places = forces.places[nodes]
+        total = resultant(forces.tie[mine], places, places.mean(axis=0), axisymmetric=scene.axisymmetric)
+        normal = preload.normal(scene.bodies[preload.body].mesh)
+        found[name] = SectionForces(float(lengths[number]), normal, total)
+    return Preloads(found)
