@@ -145,7 +145,7 @@ def _show_plan(console: Console, file: SceneFile, *, sensitivity: bool) -> None:
 def _show_outputs(console: Console, file: SceneFile, *, draws: bool) -> None:
     """Report what a run would write."""
     output = file.document.output
-    pictures = f", pictures of {', '.join(output.pictures)}" if draws and output.pictures else ""
+    pictures = f", pictures of {', '.join(output.drawn)}" if draws and output.drawn else ""
     kinds = f", {', '.join(output.files)} files" if output.files else ""
     shapes = (
         f", {', '.join(output.design)} files of the design" if file.document.design and output.design else ""

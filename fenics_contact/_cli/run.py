@@ -41,7 +41,7 @@ def _run(console: Console, file: SceneFile, resume: bool | None, pictures: bool)
     with only_run_in(file.folder, console.comm):
         states = _through_steps(console, file, resume) if file.steps else _at_once(console, file)
         gallery = Gallery()
-        if pictures and file.document.output.pictures and can_draw(console, file, gallery):
+        if pictures and file.document.output.drawn and can_draw(console, file, gallery):
             draw_state(console, file, states, gallery)
     names = ", ".join(["result.json", *_files(file), *(path.name for path in gallery.drawn)])
     console.write(f"results in {file.folder}/: {names}")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -51,8 +53,9 @@ def can_draw(console: Console, file: SceneFile, gallery: Gallery) -> bool:
         agree(console.comm, error)
     except MissingRequirementError as missing:
         console.write(f"no pictures: {missing}")
-        if "pictures" in file.document.output.model_fields_set:
-            gallery.missing += [f"{kind}.png" for kind in file.document.output.pictures]
+        output = file.document.output
+        asked = output.drawn if "pictures" in output.model_fields_set else output.fields
+        gallery.missing += [f"{name}.png" for name in asked]
         return False
     return True
 
@@ -66,25 +69,33 @@ def draw_state(
     state, names = list(states.values())[-1], file.document.units
     units = viz.Units(length=names.length, force=names.force, stress=names.stress)
     words: dict[str, Any] = {"title": file.title, "units": units}
-    for kind in file.document.output.pictures:
-        path = file.folder / f"{kind}{suffix}.png"
+    output = file.document.output
+    drawings: dict[str, Callable[[Path], Any]] = {
+        "stress": lambda path: viz.plot_stress(state, path, **words),
+        "pressure": lambda path: viz.plot_contact_pressure(state, path, **words),
+        "status": lambda path: viz.plot_contact_status(states, path, **words),
+        "decomposition": lambda path: viz.plot_decomposition(
+            file.scene, file.partitions, path, comm=file.comm, **words
+        ),
+        "error": lambda path: viz.plot_error(state, path, **words),
+    }
+    by_field = {name: partial(_draw_field, state, name, words) for name in output.fields}
+    for name in output.drawn:
+        draw = by_field[name] if name in by_field else drawings[name]
+        path = file.folder / f"{name}{suffix}.png"
         try:
-            match kind:
-                case "stress":
-                    viz.plot_stress(state, path, **words)
-                case "pressure":
-                    viz.plot_contact_pressure(state, path, **words)
-                case "status":
-                    viz.plot_contact_status(states, path, **words)
-                case "decomposition":
-                    viz.plot_decomposition(file.scene, file.partitions, path, comm=file.comm, **words)
-                case "error":
-                    viz.plot_error(state, path, **words)
+            draw(path)
         except InvalidInputError as error:
             console.write(f"no picture {path.name}: {error}")
             gallery.missing.append(path.name)
         else:
             gallery.drawn.append(path)
+
+
+def _draw_field(state: State, name: str, words: dict[str, Any], path: Path) -> None:
+    from fenics_contact.pictures.states import plot_field
+
+    plot_field(state, name, path, **words)
 
 
 #: Entries of a result that are shown, in this order; the others are long.
@@ -124,13 +135,27 @@ def view(
         str, typer.Option("--field", help="Field shown by the colours, as in the list.")
     ] = "von_mises",
     scale: Annotated[float, typer.Option("--scale", help="Factor of the displacement.")] = 1.0,
+    body: Annotated[
+        list[str] | None,
+        typer.Option("--body", help="Body to draw, all unless given; repeatable.", show_default=False),
+    ] = None,
+    clip: Annotated[
+        str | None,
+        typer.Option(
+            "--clip",
+            metavar="[-]AXIS=VALUE",
+            help="Cut away what lies beyond a plane: y=0 all with y > 0, -y=0 all with y < 0.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Show a result: its numbers and its fields, a picture or a web page of them."""
     console = console_of(context)
     with together(console.comm):
         if console.comm.rank == 0:
             html = save is not None and save.suffix == ".html"
-            _view(console, result, None if html else save, field, scale)
+            options = {"scale": scale, "bodies": body or None, "clip": None if clip is None else _plane(clip)}
+            _view(console, result, None if html else save, field, options)
             if page:
                 _write_page(console, result, (result if result.is_dir() else result.parent) / "page.html")
             if html and save is not None:
@@ -144,7 +169,24 @@ def _write_page(console: Console, result: Path, target: Path) -> None:
     console.write(f"page in {target}, {target.stat().st_size / 1e6:.1f} MB: open it in a browser")
 
 
-def _view(console: Console, result: Path, save: Path | None, field: str, scale: float) -> None:
+def _plane(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return point and normal of a plane like "y=0" or "-y=2.5"."""
+    match = re.fullmatch(r"([+-]?)([xyz])=(.+)", text.strip())
+    try:
+        if match is None:
+            raise ValueError
+        value = float(match[3])
+    except ValueError:
+        raise InvalidInputError(
+            f"--clip must be an axis and a place on it, such as y=0 or -y=2.5, got {text!r}"
+        ) from None
+    axis = "xyz".index(match[2])
+    sign = -1.0 if match[1] == "-" else 1.0
+    point, normal = ([0.0] * axis + [end] + [0.0] * (2 - axis) for end in (value, sign))
+    return tuple(point), tuple(normal)
+
+
+def _view(console: Console, result: Path, save: Path | None, field: str, options: Mapping[str, Any]) -> None:
     """Print a result, and draw it to a file if one is given."""
     try:
         there, reason = result.exists(), "nothing is there"
@@ -181,7 +223,7 @@ def _view(console: Console, result: Path, save: Path | None, field: str, scale: 
         )
     from fenics_contact.pictures.states import plot_field
 
-    plot_field(bodies, field, save, scale=scale)
+    plot_field(bodies, field, save, **options)
     console.write(f"picture in {save}")
 
 

@@ -387,9 +387,17 @@ class OutputPart(Part):
         description="files of an optimised surface: a table, the body as triangles, for CAD programs",
     )
     pictures: list[PictureKind] = Field(default=["stress"], description="pictures as PNG files")
+    fields: list[Line] = Field(
+        default=[], description="names of fields that are drawn as well, such as displacement_z"
+    )
     checkpoint: bool = Field(
         default=True, description="keep a file from which interrupted load steps or optimisations go on"
     )
+
+    @property
+    def drawn(self) -> list[str]:
+        """Names of all pictures, those of fields last."""
+        return [*self.pictures, *self.fields]
 
     @property
     def field_files(self) -> list[FileKind]:

@@ -545,5 +545,6 @@ def change(first: float, last: float) -> str:
 
 
 def headline(title: str, facts: str) -> str:
-    """Return "title: facts", or the capitalised facts without a title."""
-    return f"{title}: {facts}" if title else facts[:1].upper() + facts[1:]
+    """Return "title: facts", or without a title the facts, a word at their start capitalised."""
+    first = facts[:1].upper() if facts[:2].isascii() else facts[:1]  # a symbol is another one in capitals
+    return f"{title}: {facts}" if title else first + facts[1:]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
 
 import numpy as np
 import pyvista as pv
@@ -15,8 +15,10 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
 from matplotlib.figure import Figure
 
+from fenics_contact._base.checks import GivenVector, unit_vector
 from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle
 from fenics_contact._scene.pairs import Surface
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.pictures.canvas import (
     AXES,
     GREY,
@@ -59,6 +61,8 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
 
+#: A point and a normal: what lies on the side to which it points is cut away.
+Clip: TypeAlias = tuple[GivenVector, GivenVector]
 #: Samples along each side of a plane picture.
 SAMPLES = 400
 #: Pieces of a circle.
@@ -232,6 +236,7 @@ def draw_field_on_bodies(
     *,
     obstacles: list[SurfaceShape],
     spot: Spot | None = None,
+    clip: Clip | None = None,
     comm: MPI.Comm | None = None,
 ) -> Picture:
     """Draw a field on all bodies, with details of a contact in true deformation. Collective on ``comm``.
@@ -241,10 +246,30 @@ def draw_field_on_bodies(
     """
     coloured = field.on(bodies)
     plane = all(map(is_plane, bodies.values()))
+    if clip is not None:
+        coloured = _clipped(coloured, clip, plane=plane)
     parts_of = _in_plane if plane else _in_space
     return draw_picture(
         comm, path, lambda paper: _draw(parts_of(coloured, obstacles, spot, field), paper, field)
     )
+
+
+def _clipped(bodies: Bodies, clip: Clip, *, plane: bool) -> dict[str, pv.UnstructuredGrid]:
+    """Return what a plane leaves of bodies, its normal pointing to what is cut away."""
+    if plane:
+        raise InvalidInputError("clip is for bodies in space, these are plane: leave it out")
+    point, towards = clip
+    normal = unit_vector("the normal of clip", towards, 3)
+    if len(point) != 3 or not np.isfinite(point).all():
+        raise InvalidInputError(f"the point of clip must be three finite numbers, got {point!r}")
+    parts = {name: body.clip(normal=normal, origin=point) for name, body in bodies.items()}
+    kept = {name: part for name, part in parts.items() if part.n_cells}
+    if not kept:
+        raise InvalidInputError(
+            f"clip must leave something of the bodies, got the point {point!r} and the normal {towards!r}, "
+            "which points to all of them: turn the normal around, or move the point"
+        )
+    return kept
 
 
 def _draw(parts: Sequence[_Part], paper: BinaryIO, field: ColouredField) -> None:

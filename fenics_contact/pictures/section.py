@@ -172,16 +172,24 @@ def _components(name: str, columns: int, units: Units) -> list[dict[str, Any]]:
     ]
 
 
-def _range(steps: Sequence[Bodies], entry: Mapping[str, Any], quantile: float = 0.995) -> dict[str, Any]:
-    """Return kind and range of the colours over all steps, and the extremes of each step.
-
-    The colours end at a quantile of the sizes of all values, as peaks would leave the rest in one shade.
-    """
+def _range(steps: Sequence[Bodies], entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Return kind and range of the colours over all steps, and the extremes of each step."""
     if entry["source"] == "contact_status":
         return {"colours": "status", "range": [0.0, 1.0], "extremes": [None] * len(steps)}
     values = [_values(grids, entry) for grids in steps]
-    extremes = [[float(part.min()), float(part.max())] if part.size else None for part in values]
+    return range_of(values, values)
+
+
+def range_of(
+    values: Sequence[np.ndarray], ends: Sequence[Sequence[float] | np.ndarray], quantile: float = 0.995
+) -> dict[str, Any]:
+    """Return kind and range of the colours of values of all steps, and the extremes of others.
+
+    The colours end at a quantile of the sizes of all values, as peaks would leave the rest in one shade.
+    """
+    extremes = [[float(np.min(part)), float(np.max(part))] if len(part) else None for part in ends]
     together = np.concatenate(values)
+    together = together[np.isfinite(together)]
     signed = bool(together.min(initial=0.0) < 0)
     top = rounded_up(float(np.quantile(np.abs(together), quantile)) if together.size else 0.0)
     if top < 1e-3 * np.abs(together).max(initial=0.0):  # few nodes carry something, as in contact

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 import pyvista as pv
@@ -37,7 +37,7 @@ from fenics_contact.pictures.canvas import (
     written,
 )
 from fenics_contact.pictures.curves import contact_trace
-from fenics_contact.pictures.drawing import ColouredField, draw_field_on_bodies, obstacles_of
+from fenics_contact.pictures.drawing import Clip, ColouredField, draw_field_on_bodies, obstacles_of
 from fenics_contact.pictures.section import (
     Bodies,
     Spot,
@@ -51,6 +51,7 @@ from fenics_contact.pictures.section import (
     moved,
     nodal,
     points_of,
+    range_of,
     rounded_up,
     strongest_contact,
 )  # fmt: skip
@@ -65,7 +66,7 @@ from fenics_contact.pictures.unrolled import (
 from fenics_contact.results.fields import in_space
 from fenics_contact.results.linear_state import as_linear
 from fenics_contact.results.multi_block import body_grid
-from fenics_contact.results.state import State
+from fenics_contact.results.state import State, comm_of
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -197,54 +198,116 @@ def plot_stress(
 
 
 def plot_field(
-    bodies: Mapping[str, pv.UnstructuredGrid],
-    field: str = "von_mises",
+    result: State | Bodies,
+    field: str | Mapping[str, np.ndarray] = "von_mises",
     path: str | Path | None = None,
     *,
+    bodies: Sequence[str] | None = None,
     scale: float = 1.0,
+    clim: tuple[float, float] | None = None,
+    clip: Clip | None = None,
+    label: str = "",
     title: str = "",
     units: Units | None = None,
     width: int = 1600,
 ) -> Picture:
-    """Draw any field of bodies, such as those of `State.to_pyvista` or of a file of results.
+    """Draw any field of bodies: one of a state or of a file of results, or values of your own.
+
+    Of a state it is collective, and its rigid obstacles are drawn, too.
 
     Args:
-        bodies: Name -> body with its fields.
-        field: Name of the field: that in the file, with the name of a component for stresses, as in
-            "stress_xx" and "principal_stress_1", and for vectors, as in "displacement_x".
-        scale: Factor of the displacement.
+        result: A state; or name -> body with its fields, as from `State.to_pyvista` or a file.
+        field: Name of a field as in the file, with the name of a component for stresses, as in "stress_xx"
+            and "principal_stress_1", and for vectors, as in "displacement_x". Or values of your own, name of
+            a body -> one for each node, (n_nodes,), or cell, (n_cells,), or for the Gauss points of each
+            cell, (n_cells, n_gauss), which are drawn as their means; other bodies are left out.
+        bodies: Names of the bodies to draw; all that have the field unless given.
+        scale: Factor of the displacement; 0 for the undeformed bodies.
+        clim: Range of the colours; chosen unless given.
+        clip: A point and a normal, of bodies in space: what lies on the side to which the normal points,
+            before deformation, is cut away.
+        label: Words for a field of your own, with its unit.
 
     Raises:
-        InvalidInputError: If there is no such field, or an option or the name of the file cannot be used.
+        InvalidInputError: If there is no such field or body, values do not fit, the cut leaves nothing, or an
+            option or the name of the file cannot be used.
+
+    Example:
+        >>> plot_field(state, "displacement_z", "lift.png", bodies=["lid"])  # doctest: +SKIP
+        >>> strain = {"pin": state.history.values["pin"][..., 6]}  # at Gauss points  # doctest: +SKIP
+        >>> plot_field(state, strain, clip=((0, 0, 0), (0, 1, 0)), label="plastic strain")  # doctest: +SKIP
     """
     target, named = png_path(path), units or Units()
     checked_scale(scale)
-    bodies = {name: linear(name, body) for name, body in bodies.items()}
-    entries = {entry["name"]: entry for entry in field_entries([bodies], named)}
+    given = None if clim is None else checked_range(clim)
+    state = result if isinstance(result, State) else None
+    every: Bodies = drawn_bodies(result) if isinstance(result, State) else result
+    known = [name for name in every if isinstance(field, str) or name in field]
+    chosen = _chosen_bodies(every, known if bodies is None else bodies)
+    drawn = {name: linear(name, body) for name, body in chosen.items()}
+    if isinstance(field, str):
+        values, entry = _named_field(drawn, field, named)
+    else:
+        meshes = state.scene.bodies if state else {}
+        cells = {k: meshes[k].mesh.n_cells if state else body.n_cells for k, body in chosen.items()}
+        values, entry = _own_field(drawn, cells, field, label)
+    is_status = entry["colours"] == "status"
+    ends = (-1.0, 2.0) if is_status else entry["extremes"][0] or (0.0, 0.0)
+    words = f"{entry['label']} ({entry['unit']})" if entry["unit"] else entry["label"]
+    facts = f"{entry['label']}, {written(ends[0])} to {written(ends[1])} {entry['unit']}".rstrip()
+    colours = SIGNED_MAP if entry["colours"] == "signed" else STRESS_MAP
+    norm = Normalize(*(given or (ends if is_status else entry["range"])))
+    head = headline(title, f"{facts}; displacement × {scale:g}")
+    coloured = ColouredField(values, colours, norm, words, head, float(scale), None, named, width)
+    return draw_field_on_bodies(
+        drawn,
+        coloured,
+        target,
+        obstacles=obstacles_of(state) if state else [],
+        clip=clip,
+        comm=comm_of(state) if state else None,
+    )
+
+
+def _chosen_bodies(bodies: Bodies, names: Sequence[str]) -> dict[str, pv.UnstructuredGrid]:
+    """Return the bodies of these names."""
+    unknown = [name for name in names if name not in bodies]
+    if unknown or not names or isinstance(names, str):
+        raise InvalidInputError(
+            f"bodies must be some of {list(bodies)}, got {names!r}: give a list of their names"
+        )
+    return {name: bodies[name] for name in names}
+
+
+def _named_field(bodies: Bodies, field: str, units: Units) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Return the values of a field by body, and what is known of it."""
+    entries = {entry["name"]: entry for entry in field_entries([bodies], units)}
     if field not in entries:
         raise InvalidInputError(
             f"field must be one of {', '.join(entries)}, got {field!r}: choose one of them"
         )
-    entry = entries[field]
-    values = {name: component(body, entry) for name, body in bodies.items()}
-    is_status = entry["colours"] == "status"
-    ends = (-1.0, 2.0) if is_status else entry["extremes"][0] or (0.0, 0.0)
-    label = f"{entry['label']} ({entry['unit']})" if entry["unit"] else entry["label"]
-    facts = f"{entry['label']}, {written(ends[0])} to {written(ends[1])} {entry['unit']}".rstrip()
-    colours = SIGNED_MAP if entry["colours"] == "signed" else STRESS_MAP
-    words = headline(title, f"{facts}; displacement × {scale:g}")
-    coloured = ColouredField(
-        values,
-        colours,
-        Normalize(*(ends if is_status else entry["range"])),
-        label,
-        words,
-        float(scale),
-        None,
-        named,
-        width,
-    )
-    return draw_field_on_bodies(bodies, coloured, target, obstacles=[])
+    return {name: component(body, entries[field]) for name, body in bodies.items()}, entries[field]
+
+
+def _own_field(
+    bodies: Bodies, cells: Mapping[str, int], field: Mapping[str, np.ndarray], label: str
+) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Return given values by body, for each node or drawn cell, and their range; `cells`: of the meshes."""
+    values, extremes = {}, list[float]()
+    for name, body in bodies.items():
+        own = np.asarray(field[name], dtype=float) if name in field else np.zeros(0)
+        nodal = own.shape == (body.n_points,)
+        if not nodal and (own.ndim not in (1, 2) or len(own) != cells[name]):
+            raise InvalidInputError(
+                f"values of your own on {name!r} must be one for each of its {body.n_points} nodes or "
+                f"{cells[name]} cells, or a row of Gauss points for each cell, got shape {own.shape}: "
+                "compute them on the mesh of the body"
+            )
+        extremes += [float(np.nanmin(own)), float(np.nanmax(own))]
+        means = own.mean(axis=1) if own.ndim == 2 else own
+        values[name] = means if nodal else np.repeat(means, body.n_cells // cells[name])
+    drawn = np.concatenate(list(values.values()))
+    return values, {"label": label or "given values", "unit": "", **range_of([drawn], [extremes])}
 
 
 def checked_scale(scale: float) -> None:

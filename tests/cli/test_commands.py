@@ -202,6 +202,16 @@ def test_view_draws_to_a_file(
     assert picture.stat().st_size > 5000
 
 
+def test_view_draws_some_bodies_and_cuts_them(result: Path, tmp_path: Path) -> None:
+    options: list[tuple[str, ...]] = [(), ("--body", "upper"), ("--clip", "y=1"), ("--clip=-y=1",)]
+    pictures = []
+    for number, more in enumerate(options):
+        picture = tmp_path / f"{number}.png"
+        assert run("view", result / "state.vtm", "--save", picture, *more) == 0
+        pictures.append(picture.read_bytes())
+    assert len(set(pictures)) == len(options)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -209,6 +219,8 @@ def test_view_draws_to_a_file(
         (("{result}/scene.toml",), "a result must be a whole JSON file"),
         (("{result}", "--save", "a.jpg"), "pictures are PNG files, got the name 'a.jpg'"),
         (("{result}", "--save", "a.png", "--field", "strain"), "--field must be one of ['nodal_von_mises'"),
+        (("{result}", "--save", "a.png", "--body", "lid"), "bodies must be some of ['lower', 'upper']"),
+        (("{result}", "--save", "a.png", "--clip", "1=y"), "--clip must be an axis and a place on it"),
     ],
 )
 def test_view_refuses_what_is_no_result(

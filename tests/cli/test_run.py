@@ -119,6 +119,18 @@ def test_tables_are_written_where_a_file_asks_for_csv(
     assert (tmp_path / "once" / "contact.csv").read_text().count("upper z0 on lower z1") == 9
 
 
+def test_fields_are_drawn_by_their_names(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = scene(tmp_path, GOOD)
+    fields = ("--set", "output.pictures=[]", "--set", "output.fields=['displacement_z', 'heat']")
+    assert run("run", path, "-o", tmp_path / "out", *fields, "--dry-run") == 0
+    assert "pictures of displacement_z, heat\n" in capsys.readouterr().out
+    assert run("run", path, "-o", tmp_path / "out", *fields) == 2
+    printed = capsys.readouterr().out
+    assert "no picture heat.png: field must be one of nodal_von_mises, " in printed
+    assert ", displacement_z.png\n" in printed
+    assert [path.name for path in (tmp_path / "out").glob("*.png")] == ["displacement_z.png"]
+
+
 def test_an_interrupted_history_goes_on_to_the_same_result(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

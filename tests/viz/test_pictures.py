@@ -294,6 +294,7 @@ def test_nice_number_is_one_two_or_five_times_a_power_of_ten(value: float, nice:
 
 def test_headline_starts_with_a_capital() -> None:
     assert headline("", "largest 3") == "Largest 3"
+    assert headline("", "σ² / 2E") == "σ² / 2E"
     assert headline("Before", "largest 3") == "Before: largest 3"
 
 

@@ -124,6 +124,49 @@ def test_a_field_of_one_body_or_of_statuses_is_drawn(name: str) -> None:
     assert painted(pixels(plot_field(bodies, name, width=SMALL))) > 0.2
 
 
+@pytest.mark.parametrize("cell", ["hexahedron27", "triangle6"])
+def test_values_of_nodes_cells_and_gauss_points_are_drawn(cell: str) -> None:
+    state = pulled(cell)
+    mesh = state.scene.bodies["bar"].mesh
+    x = mesh.points[mesh.cells].mean(axis=1)[:, 0]
+    words = {"width": SMALL, "clim": (0.0, float(mesh.points[:, 0].max())), "label": "place (mm)"}
+    nodal, cells, gauss = (
+        pixels(plot_field(state, {"bar": values}, **words))
+        for values in (mesh.points[:, 0], x, x[:, None] + [-0.1, 0.0, 0.1])
+    )
+    assert np.abs(cells - gauss).mean() < 2e-3, "only the title differs, by the extremes"
+    assert 0.0 < np.abs(nodal - cells).mean() < 0.1, "the same field, smooth and by cells"
+    assert len(np.unique(cells.reshape(-1, cells.shape[2]), axis=0)) > 20
+    with pytest.raises(InvalidInputError, match=r"'bar' must be one for each of its .* got shape \(3,\)"):
+        plot_field(state, {"bar": np.zeros(3)})
+
+
+def test_bodies_are_chosen_undeformed_and_cut() -> None:
+    state, draw = touching_blocks(), {"width": SMALL, "clim": (0.0, 1.0)}
+    both, upper = (plot_field(state, "displacement_z", bodies=names, **draw) for names in (None, ["upper"]))
+    own = plot_field(state, {"upper": state.gather_displacement("upper")[:, 2]}, **draw)
+    assert pixels(both).shape != pixels(upper).shape
+    assert np.abs(pixels(own) - pixels(upper)).mean() < 5e-3, "without values the other one is left out"
+    middle = tuple(state.scene.bodies["upper"].mesh.points.mean(axis=0))
+    whole, cut, rest = (
+        pixels(plot_field(state, "von_mises", clip=clip, scale=0.0, **draw))
+        for clip in (None, (middle, (0, -1, 0)), (middle, (0, 1, 0)))
+    )
+    assert np.abs(whole - cut).max() > 0.1 if whole.shape == cut.shape else True
+    assert cut.shape != rest.shape or np.abs(cut - rest).max() > 0.1
+    for wrong, words in (
+        ({"bodies": ["lid"]}, r"bodies must be some of \['lower', 'upper'\], got \['lid'\]"),
+        ({"clip": (middle, (0, 0, 0))}, "the normal of clip must be 3 finite numbers, not all zero"),
+        ({"clip": ((0, 0), (0, 0, 1))}, "the point of clip must be three finite numbers"),
+        ({"clip": ((0, 0, 99), (0, 0, -1))}, "clip must leave something of the bodies"),
+        ({"clim": (1.0, 0.0)}, "clim must be a finite range"),
+    ):
+        with pytest.raises(InvalidInputError, match=words):
+            plot_field(state, **wrong)
+    with pytest.raises(InvalidInputError, match="clip is for bodies in space, these are plane"):
+        plot_field(pulled("triangle6"), clip=((0, 0, 0), (1, 0, 0)))
+
+
 def test_pressure_and_status_are_drawn(tmp_path: Path) -> None:
     units = Units("m", "kN", "kPa")
     path = plot_contact_pressure(touching_blocks(), tmp_path / "pressure.png", width=800, units=units)
