@@ -234,8 +234,8 @@ def plot_field(
 
     Example:
         >>> plot_field(state, "displacement_z", "lift.png", bodies=["lid"])  # doctest: +SKIP
-        >>> strain = {"pin": state.history.values["pin"][..., 6]}  # at Gauss points  # doctest: +SKIP
-        >>> plot_field(state, strain, clip=((0, 0, 0), (0, 1, 0)), label="plastic strain")  # doctest: +SKIP
+        >>> used = {"pin": state.gather_von_mises("pin") / 235.0}  # doctest: +SKIP
+        >>> plot_field(state, used, clip=((0, 0, 0), (0, 1, 0)), label="share of yield")  # doctest: +SKIP
     """
     target, named = png_path(path), units or Units()
     checked_scale(scale)
