@@ -5,7 +5,8 @@ What a script needs is here; nothing is loaded before it is used:
 Scenes: Scene, Body, BodyMesh, Surface, Support, RigidSurface, ContactPair, Tie, AutomaticContact, LoadStep,
     Preload, Section, box_partition
 
-Friction laws: Coulomb, Tresca, FrictionTable, FrictionCurve
+Laws of surfaces: Coulomb, Tresca, FrictionTable, FrictionCurve, LinearClosure, ExponentialClosure,
+    ClosureTable, ClosureLaw
 
 Rigid obstacles: RigidPlane, RigidSphere, RigidCylinder, DistanceObstacle, MovingObstacle
 
@@ -91,8 +92,12 @@ if TYPE_CHECKING:
     from fenics_contact._scene.scene import Scene as Scene
     from fenics_contact._scene.supports import RigidSurface as RigidSurface
     from fenics_contact._scene.supports import Support as Support
+    from fenics_contact._scene.surface_laws import ClosureLaw as ClosureLaw
+    from fenics_contact._scene.surface_laws import ClosureTable as ClosureTable
+    from fenics_contact._scene.surface_laws import ExponentialClosure as ExponentialClosure
     from fenics_contact._scene.surface_laws import FrictionCurve as FrictionCurve
     from fenics_contact._scene.surface_laws import FrictionTable as FrictionTable
+    from fenics_contact._scene.surface_laws import LinearClosure as LinearClosure
     from fenics_contact._scene_file.reading import read_scene_file as read_scene_file
     from fenics_contact.design.design import SurfaceDesign as SurfaceDesign
     from fenics_contact.design.problem import ShapeProblem as ShapeProblem

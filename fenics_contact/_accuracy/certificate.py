@@ -208,11 +208,14 @@ def admissible(
     shape (n_friction,), owned. That of the others is given and not raised; `residual`: r = F λ − d − Gᵀα,
     owned.
     """
-    layout = problem.layout
-    trial = multiplier - contact_step(layout, problem.diagonal) * residual
+    layout, step = problem.layout, contact_step(problem.layout, problem.diagonal)
+    trial = multiplier - step * residual
     wanted = trial[layout.tangential]
     length = np.linalg.norm(wanted, axis=1)
-    slip = (slip_bound > 0.0) & (length >= slip_bound)
+    softened = np.ones_like(length)
+    if problem.compliance is not None:
+        softened = problem.compliance.rows_at(trial, step).slip_stiffening
+    slip = (slip_bound > 0.0) & (length >= softened * slip_bound)
     start = np.array(multiplier)
     start[layout.normal[trial[layout.normal] <= 0.0]] = 0.0
     start[layout.tangential[slip]] = (slip_bound[slip] / length[slip])[:, None] * wanted[slip]
@@ -450,6 +453,10 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
     The correction w is that of the preconditioner, whose quality determines the sharpness: mostly a factor of
     two, for nearly incompressible bodies, thin plates and stiff bodies on soft ones ten to thirty.
 
+    Surfaces that give way by C(λ) count as touching where the gap is −C(λ): the terms of the second sum are
+    then φ(δ) + Φ(λ_N) − λ_N δ with Φ' = C, its conjugate φ and the closure δ of v, at most λ_N (c − B v +
+    C(λ))_N.
+
     The bound is for Tresca's problem with the slip bounds of the solution. Where these are given, that is the
     actual problem; and it is infinite where no multiplier within them balances the load. Where they follow
     the normal forces it does not bound the distance to the solution of Coulomb's law, see `friction_error`
@@ -468,10 +475,14 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
     follows = system.torn.law.growth(solution.multiplier) > 0.0
     known = admissible(problem, solution.slip_bound, follows, solution.multiplier, residual)
     change = known.multiplier - solution.multiplier
-    if problem.norm(change) > LAST_PLACES * problem.norm(solution.multiplier):
+    moves = problem.norm(change) > LAST_PLACES * problem.norm(solution.multiplier)
+    if moves:
         product = system.apply(change)
         moved = float(np.sqrt(max(problem.dot(change, product), 0.0)))
-        residual = known.statuses.settled(residual + product)
+        residual = residual + product
+    residual = residual + problem.given_way(known.multiplier)
+    if moves:
+        residual = known.statuses.settled(residual)
     lifted = lift(system, known, residual, _cancelled(problem, solution))
     rest = _pressed(problem, known, lifted.residual) + _rubbed(problem, known, lifted.residual)
     gap = 0.5 * lifted.energy + rest

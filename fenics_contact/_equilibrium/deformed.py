@@ -33,7 +33,7 @@ from fenics_contact.results.contact import ContactResult
 from fenics_contact.results.deformed_state import DeformedState, row_values_at
 from fenics_contact.results.dual_solve import contact_result
 from fenics_contact.results.rigid_motions import UnheldMotion
-from fenics_contact.results.state import Energies, State, Tolerance
+from fenics_contact.results.state import Energies, State, Tolerance, softened
 
 if TYPE_CHECKING:
     from fenics_contact._pairing.sliding.slip import MaterialPoints
@@ -222,7 +222,11 @@ def _energies(evaluation: ResidualState, rubbed: float) -> Energies:
     strain = float(evaluation.torn.numbering.comm.allreduce(float(np.sum(stored))))
     dead = evaluation.softening is None
     work = evaluation.torn.load_work(evaluation.at.displacement) if dead else np.nan
-    return Energies(strain, work, rubbed + evaluation.rubbing)
+    surface = 0.0
+    if evaluation.torn.compliance is not None:
+        given_way, kept = softened(evaluation.torn, evaluation.at.multiplier)
+        surface = float(evaluation.torn.numbering.comm.allreduce(given_way - kept))
+    return Energies(strain, work, rubbed + evaluation.rubbing, surface=surface)
 
 
 def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:

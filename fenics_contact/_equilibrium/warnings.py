@@ -367,6 +367,8 @@ def _passing_nodes(state: State, number: int, moved: float) -> list[tuple[int, s
     if pair.by_mortar or not isinstance(pair.master, Surface) or pair.within_body:
         return []
     deep = _depth(state, number, pair, pair.master)
+    if pair.closure is not None:
+        deep += float(state.contact.gap[state.contact.on_pair(number)].min(initial=0.0))
     if deep <= SHARE * moved:
         return []
     words = (

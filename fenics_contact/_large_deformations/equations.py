@@ -374,7 +374,8 @@ class Equations:
         least = global_min(comm, min((r.least_jacobian for r in responses), default=1.0))
         open_ = contact.constraint_residual(at.displacement)
         step, feasible = at.natural_step(caution), torn.law.feasible(at.multiplier)
-        mapped = feasible.project(at.multiplier - step * open_)
+        trial, compliance = at.multiplier - step * open_, torn.compliance
+        mapped = feasible.project(trial) if compliance is None else compliance.resolve(feasible, trial, step)
         natural = beyond(at.multiplier - mapped, ROUNDED * self._reach * step)
         forces = unbalanced, internal, bound, external
         residuals = relative_residuals(

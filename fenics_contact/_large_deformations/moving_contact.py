@@ -303,7 +303,8 @@ class ContactConfiguration:
         residual = self.torn.right - self.torn.jump(displacement)
         if self.points is None or self.start is None:
             return residual
-        return self._with_contact_rows(residual, self.points.points.gap, -self.slip(self.start))
+        gap = self.points.points.gap - self.torn.reach
+        return self._with_contact_rows(residual, gap, -self.slip(self.start))
 
     def slip(self, start: MaterialPoints) -> np.ndarray:
         """Return the slip since other material points, none across planes of symmetry, shape (n, dim − 1)."""
@@ -329,7 +330,8 @@ class ContactConfiguration:
             return TurningForces.of(None, further) if further else None
         normal, friction = self.at_points(multiplier)
         points, slave, normal = self.points, self.points.points.slave, np.maximum(normal, 0.0)
-        stiffness, means = points.stiffness(normal), points.mean_tangents(normal, friction, self.start)
+        stiffness, apart = points.stiffness(normal), self.torn.closures is not None
+        means = points.mean_tangents(normal, friction, self.start, apart=apart)
         further += [
             UnevenStiffness(each.left, each.right, slave[each.point])
             for each in (points.friction_stiffness(friction), means.stiffness)

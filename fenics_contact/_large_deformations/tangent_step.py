@@ -114,7 +114,7 @@ def tangent_step(
     problem = at.problem
     bound = (1.0 - margin) * problem.law.bound(at.multiplier)
     ratio = step if factor is None else np.asarray(step / factor**2, dtype=np.float64)
-    face = classify(problem.layout, bound, at.multiplier, at.residual, ratio)
+    face = classify(problem.layout, bound, at.multiplier, at.residual, ratio, problem.compliance)
     operator = CountedOperator(problem.operator)
     moving, fixed = growing_basis(problem.comm, face, problem.law.growth(at.multiplier), at.multiplier)
     solved = _StiffFace.build(at, face, face.restriction if moving is None else moving, operator)
@@ -139,7 +139,7 @@ def whole_step(system: TangentSystem, multiplier: Vector, step: Vector, solver: 
     problem = replace(problem.with_load(problem.rhs + flexed, load), reach=None)
     solution = solve(problem, None, solver, multiplier, law=torn.law)
     bound = torn.law.bound(solution.multiplier)
-    face = classify(problem.layout, bound, solution.multiplier, solution.residual, step)
+    face = classify(problem.layout, bound, solution.multiplier, solution.residual, step, problem.compliance)
     products = system.products - before
     return TangentStep(solution.multiplier, solution.alpha, face, products, Stop.CONVERGED)
 
@@ -165,10 +165,9 @@ def tangent_adjoint(
     problem = problem.with_load(right, load)
     nothing = np.zeros_like(tangent.multiplier)
     at = replace(tangent, problem=problem, multiplier=nothing, residual=nothing).scaled()
-    flexibility = face.flexibility * (factor * np.ones_like(nothing))[problem.layout.tangential[:, 0]] ** 2
     operator = CountedOperator(at.problem.operator)
-    face, moving = replace(face, flexibility=flexibility), (face.restriction + coupling).tocsr()
-    solved = _StiffFace.build(at, face, moving, operator)
+    face, moving = face.scaled(factor * np.ones_like(nothing)), (face.restriction + coupling).tocsr()
+    solved = _StiffFace.build(at, face.homogeneous, moving, operator)
     if solved is None:
         return None
     transposed = solved.coupled.transposed(at.problem.coarse)
@@ -241,6 +240,8 @@ class _StiffFace:
         y = coupled.balanced(self._filled(on_face), load)
         change = fixed + moving @ y - self.at.multiplier
         gradient = coupled.operate(y, apply_unless_zero(problem, operator, change) - problem.rhs)
+        if coupled.system.face.soft is not None:
+            gradient += self._filled(coupled.system.face.offset[self.shared])
 
         def expand(vector: Vector) -> tuple[Vector, Kept]:
             step, motions = self._direction(vector)

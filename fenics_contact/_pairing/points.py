@@ -17,6 +17,7 @@ from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tie, Tres
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import together
 from fenics_contact.errors.kinds import safe_log
+from fenics_contact.qp.compliance import Closures
 from fenics_contact.qp.cones import Strengths
 
 #: Weights of nodes below this fraction of all are rounding, which must not keep a supported point free.
@@ -228,6 +229,23 @@ def _strengths(
     number_of = np.cumsum([curve is not None for curve in curves]) - 1
     curve = np.where([each is not None for each in curves], number_of, -1)[points.pair]
     return Strengths(coefficient, limit, points.area, curve, known)
+
+
+def closures_of(scene: Scene, points: ContactPoints) -> Closures | None:
+    """Return the closures of all contact points under force; None where all contact is exact."""
+    laws = [pair.closure for pair in scene.contacts]
+    known = tuple(law for law in laws if law is not None)
+    if not known:
+        return None
+    number_of = np.cumsum([law is not None for law in laws]) - 1
+    curve = np.where([law is not None for law in laws], number_of, -1)[points.pair]
+    return Closures(points.area, curve, np.ones(points.count), known)
+
+
+def reach_of(scene: Scene, points: ContactPoints) -> np.ndarray:
+    """Return the distances at which pressure begins, zero in exact contact, shape (n,), [length]."""
+    reach = np.array([0.0 if pair.closure is None else pair.closure.reach for pair in scene.contacts])
+    return reach[points.pair] if len(reach) else np.zeros(0)
 
 
 @displayed

@@ -12,7 +12,7 @@ from fenics_contact._base.checks import checked
 from fenics_contact._base.display import name_in_words
 from fenics_contact._scene.fields import OfPosition, evaluate
 from fenics_contact._scene.obstacles import RigidObstacle
-from fenics_contact._scene.surface_laws import FrictionCurve, check_rising
+from fenics_contact._scene.surface_laws import ClosureLaw, FrictionCurve, check_closing, check_rising
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 
@@ -132,6 +132,9 @@ class ContactPair:
             nodes, shape (n, dim), that returns one for each, shape (n,). None: as measured.
         interference: Overlap in place of the measured gap, ≥ 0, [length], given like ``gap``;
             ``"measured"`` takes the one that the geometry has, which counts as a mistake otherwise.
+        closure: How far the surfaces approach under pressure: `LinearClosure`, `ExponentialClosure`,
+            `ClosureTable` or a `ClosureLaw` of your own, for rough surfaces, coats and gaskets. None: contact
+            is exact. With one, the gap of a closed point is minus its closure.
         adjust: Slave points whose measured clearance or overlap is at most this, [length], are put in touch
             without strain, or get ``gap`` or ``interference`` if these are given; all others keep the
             measured gap. None: no point is put in touch, and ``gap`` and ``interference`` hold at all points.
@@ -155,6 +158,7 @@ class ContactPair:
     gap: float | OfPosition | None = None
     interference: float | OfPosition | Literal["measured"] | None = None
     adjust: float | None = None
+    closure: ClosureLaw | None = None
     reason: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
@@ -167,6 +171,8 @@ class ContactPair:
             )
         for name in ("gap", "interference", "adjust"):
             _check_length(f"ContactPair.{name}", getattr(self, name))
+        if self.closure is not None:
+            check_closing(self.closure)
         _forget_other_reason(self)
 
     @property

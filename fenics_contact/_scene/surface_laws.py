@@ -1,4 +1,4 @@
-"""Laws of surfaces: how large friction may become under pressure."""
+"""Laws of surfaces: how far they give way under pressure, and how large friction may become."""
 
 from __future__ import annotations
 
@@ -149,4 +149,252 @@ def check_rising(curve: FrictionCurve, decades: int = 12) -> None:
         raise InvalidInputError(
             f"largest_coefficient of {name} must be at least strength / pressure everywhere, got {largest:g} "
             f"but {np.max(strength[1:] / p[1:]):g}: give the larger one"
+        )
+
+
+class ClosureLaw(ABC):
+    """How far two surfaces approach under pressure, for a law of your own: a rough surface, a coat, a gasket.
+
+    Give `closure` and its derivative `growth`; use it as `ContactPair.closure`. It enters as a compliance of
+    the contact points and not as a penalty: the stiffer, the closer to exact contact, at no loss of accuracy.
+    Pressures are by undeformed area. The closure is zero without pressure and must not fall.
+
+    Attributes:
+        reach: Distance of the surfaces at which pressure begins and from which closures count, [length].
+
+    Example:
+        >>> class Asperities(ClosureLaw):
+        ...     '''Spheres on a plane: p = (closure / 0.01)^1.5, in N/mm² and mm.'''
+        ...
+        ...     def closure(self, pressure):
+        ...         return 0.01 * pressure ** (2 / 3)
+        ...
+        ...     def growth(self, pressure):
+        ...         return 0.01 * 2 / 3 * pressure ** (-1 / 3)
+        >>> Asperities().closure(np.array([8.0]))
+        array([0.04])
+    """
+
+    reach: float = 0.0
+
+    @abstractmethod
+    def closure(self, pressure: np.ndarray) -> np.ndarray:
+        """Return how far the surfaces have approached, from the distance `reach` on, [length].
+
+        Args:
+            pressure: Pressures p > 0, shape (n,), [force / length²].
+
+        Returns:
+            Shape (n,).
+        """
+
+    @abstractmethod
+    def growth(self, pressure: np.ndarray) -> np.ndarray:
+        """Return the derivative of `closure` by the pressure, [length³ / force].
+
+        Args:
+            pressure: Pressures p > 0, shape (n,), [force / length²].
+
+        Returns:
+            Shape (n,), not negative.
+        """
+
+    def work(self, pressure: np.ndarray) -> np.ndarray:
+        """Return the integral of `closure` over the pressure from zero to p, [force / length].
+
+        By Gauss's quadrature unless a law knows better; only energies and searches for the next step use it.
+
+        Args:
+            pressure: Pressures p > 0, shape (n,), [force / length²].
+
+        Returns:
+            Shape (n,).
+        """
+        places, weights = np.polynomial.legendre.leggauss(40)
+        part = 0.5 * (places + 1.0)  # squared: curves are steep near zero
+        at = [self.closure(np.asarray(pressure * s * s)) for s in part]
+        return np.asarray(sum(w * s * c for w, s, c in zip(weights, part, at, strict=True)) * pressure)
+
+
+@dataclass(frozen=True)
+@checked()
+class LinearClosure(ClosureLaw):
+    """Pressure proportional to the closure: p = stiffness · closure.
+
+    Attributes:
+        stiffness: Pressure per closure, > 0, [force / length³].
+
+    Example:
+        >>> LinearClosure(2000.0).closure(np.array([10.0]))
+        array([0.005])
+    """
+
+    stiffness: float
+
+    def __post_init__(self) -> None:
+        """Reject a stiffness that is not positive."""
+        if not (np.isfinite(self.stiffness) and self.stiffness > 0):
+            raise InvalidInputError(
+                f"LinearClosure.stiffness must be positive and finite, got {self.stiffness!r}: give the "
+                "pressure per closure, or omit the closure for exact contact"
+            )
+
+    def closure(self, pressure: np.ndarray) -> np.ndarray:
+        """Return p / stiffness, see `ClosureLaw.closure`."""
+        return np.asarray(pressure / self.stiffness)
+
+    def growth(self, pressure: np.ndarray) -> np.ndarray:
+        """Return 1 / stiffness, see `ClosureLaw.growth`."""
+        return np.full(len(pressure), 1.0 / self.stiffness)
+
+    def work(self, pressure: np.ndarray) -> np.ndarray:
+        """Return p² / (2 stiffness), see `ClosureLaw.work`."""
+        return np.asarray(0.5 * pressure**2 / self.stiffness)
+
+
+@dataclass(frozen=True)
+@checked()
+class ExponentialClosure(ClosureLaw):
+    """Pressure that grows exponentially as surfaces approach: p = pressure · 100^(−distance / clearance).
+
+    It is a hundredth of ``pressure`` at the clearance, from which on there is none.
+
+    Attributes:
+        pressure: Pressure where the distance is zero, > 0, [force / length²].
+        clearance: Distance at which pressure begins, > 0, [length].
+
+    Example:
+        >>> rough = ExponentialClosure(pressure=50.0, clearance=0.004)
+        >>> rough.reach - rough.closure(np.array([50.0]))  # the distance under that pressure
+        array([0.])
+    """
+
+    pressure: float
+    clearance: float
+
+    def __post_init__(self) -> None:
+        """Reject numbers that are not positive."""
+        if not all(np.isfinite(each) and each > 0 for each in (self.pressure, self.clearance)):
+            raise InvalidInputError(
+                "ExponentialClosure needs a positive pressure at distance zero and a positive clearance, got "
+                f"{self.pressure!r} and {self.clearance!r}"
+            )
+
+    @property
+    def reach(self) -> float:  # type: ignore[override]
+        """The clearance."""
+        return self.clearance
+
+    @property
+    def _rate(self) -> float:
+        """The distance in which pressure changes by a factor of e."""
+        return float(self.clearance / np.log(100.0))
+
+    def closure(self, pressure: np.ndarray) -> np.ndarray:
+        """Return the clearance less the distance, see `ClosureLaw.closure`."""
+        return self._rate * np.log(np.maximum(100.0 * pressure / self.pressure, 1.0))
+
+    def growth(self, pressure: np.ndarray) -> np.ndarray:
+        """Return the derivative of `closure`, see `ClosureLaw.growth`."""
+        return np.where(100.0 * pressure > self.pressure, self._rate / np.asarray(pressure), 0.0)
+
+    def work(self, pressure: np.ndarray) -> np.ndarray:
+        """Return the integral of `closure`, see `ClosureLaw.work`."""
+        begun = np.maximum(pressure, 0.01 * self.pressure)
+        return np.asarray(begun * self.closure(begun) - self._rate * (begun - 0.01 * self.pressure))
+
+
+@dataclass(frozen=True)
+@checked()
+class ClosureTable(ClosureLaw):
+    """A pressure over closure that is measured: linear between values, with the last slope beyond them.
+
+    Attributes:
+        closures: Closures, ascending, [length]; a negative one is a distance, at which pressure begins.
+        pressures: The pressure at each of them, ascending from zero, [force / length²].
+
+    Raises:
+        InvalidInputError: If the numbers do not fit each other, or pressures or closures fall.
+
+    Example:
+        >>> gasket = ClosureTable(closures=(0.0, 0.1, 0.15), pressures=(0.0, 5.0, 40.0))
+        >>> gasket.closure(np.array([5.0, 40.0]))
+        array([0.1 , 0.15])
+    """
+
+    closures: Sequence[float]
+    pressures: Sequence[float]
+
+    def __post_init__(self) -> None:
+        """Reject incomplete tables, and those that fall."""
+        c, p = self._values
+        if not (c.ndim == 1 and c.shape == p.shape and len(c) > 1 and np.isfinite(c).all() and p[0] == 0.0):
+            raise InvalidInputError(
+                "ClosureTable needs two or more closures and a pressure for each, the first of them zero, "
+                f"got {self.closures!r} and {self.pressures!r}"
+            )
+        wrong = np.flatnonzero(~((np.diff(p) > 0) & (np.diff(c) >= 0)))
+        if len(wrong) or c[-1] == c[-2]:
+            at = int(wrong[0]) if len(wrong) else len(c) - 2
+            raise InvalidInputError(
+                "pressures of a ClosureTable must rise with the closures, got "
+                f"{p[at]:g} at {c[at]:g} and {p[at + 1]:g} at {c[at + 1]:g}: surfaces whose pressure falls "
+                "as they approach have no unique answer; leave out the falling part, or give it a small slope"
+            )
+
+    @property
+    def _values(self) -> tuple[np.ndarray, np.ndarray]:
+        """Closures and pressures."""
+        values = self.closures, self.pressures
+        closure, pressure = (np.array(each, dtype=np.float64) for each in values)
+        return closure, pressure
+
+    @property
+    def reach(self) -> float:  # type: ignore[override]
+        """The distance at which pressure begins, negative where surfaces overlap before."""
+        return -float(self.closures[0])
+
+    def _at(self, pressure: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the segment of each pressure, the slopes, and how far pressures are beyond its start."""
+        c, p = self._values
+        slope = np.diff(c) / np.diff(p)
+        segment = np.clip(np.searchsorted(p, pressure, side="right") - 1, 0, len(slope) - 1)
+        return segment, slope, pressure - p[segment]
+
+    def closure(self, pressure: np.ndarray) -> np.ndarray:
+        """Return the closure from the first value on, see `ClosureLaw.closure`."""
+        c, _ = self._values
+        segment, slope, beyond = self._at(pressure)
+        return np.asarray(c[segment] - c[0] + slope[segment] * beyond)
+
+    def growth(self, pressure: np.ndarray) -> np.ndarray:
+        """Return the slope of the segment, see `ClosureLaw.growth`."""
+        segment, slope, _ = self._at(pressure)
+        return np.asarray(slope[segment])
+
+    def work(self, pressure: np.ndarray) -> np.ndarray:
+        """Return the integral of `closure`, see `ClosureLaw.work`."""
+        c, p = self._values
+        whole = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(p) * (c[1:] + c[:-1] - 2.0 * c[0]))])
+        segment, slope, beyond = self._at(pressure)
+        return np.asarray(whole[segment] + beyond * (c[segment] - c[0] + 0.5 * slope[segment] * beyond))
+
+
+def check_closing(law: ClosureLaw, decades: int = 12) -> None:
+    """Reject a law that falls; pressures of ``decades`` above and below one."""
+    p, name = np.logspace(-decades, decades, 40 * decades + 1), type(law).__name__
+    with user_code(f"{name} as a law of closure"):
+        closure, growth = (np.asarray(each(p), dtype=np.float64) for each in (law.closure, law.growth))
+    if any(each.shape != p.shape or not np.isfinite(each).all() for each in (closure, growth)):
+        raise InvalidInputError(
+            f"closure and growth of {name} must return a finite number for each pressure, shape {p.shape}, "
+            f"got shapes {closure.shape} and {growth.shape}: check them at low and high pressures"
+        )
+    wrong = np.flatnonzero((np.diff(closure) < -1e-12 * np.abs(closure[1:])) | (growth[1:] < 0))
+    if closure[0] < 0.0 or len(wrong) or not np.isfinite(law.reach):
+        at = int(wrong[0]) + 1 if len(wrong) else 0
+        raise InvalidInputError(
+            f"the closure of {name} must be zero without pressure and must not fall, got {closure[at]:g} at "
+            f"the pressure {p[at]:g}: surfaces that open under pressure have no unique answer; count "
+            "closures from `reach`, and give a falling part a small slope"
         )

@@ -185,6 +185,12 @@ FRICTION_LAWS = (
 )
 
 
+CLOSURE_LAWS = (
+    table_of(surface_laws.LinearClosure, law="linear"),
+    table_of(surface_laws.ExponentialClosure, law="exponential"),
+    table_of(surface_laws.ClosureTable, law="table"),
+)
+
 Master: TypeAlias = Annotated[
     Any,
     one_of(
@@ -196,6 +202,8 @@ Master: TypeAlias = Annotated[
 ]
 AnyFriction: TypeAlias = Annotated[Any, one_of("law", *FRICTION_LAWS)]
 
+AnyClosure: TypeAlias = Annotated[Any, one_of("law", *CLOSURE_LAWS)]
+
 
 @keys_of(ContactPair, without={"reason"})
 class ContactPart(Part):
@@ -204,6 +212,7 @@ class ContactPart(Part):
     slave: SurfaceOfBody
     master: Master
     friction: AnyFriction | None
+    closure: AnyClosure | None
     gap: NotNegativeField | None = Field(
         description="clearance in place of the measured one, [length]: a number, a formula in x, y, z in "
         "quotes, or a field from a file"

@@ -116,7 +116,7 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
     counted = _on_switch(layout, trial, bound, coefficient, uncertainty)
     weak = _on_switch(layout, trial, bound, coefficient, closest)
 
-    known = classify(layout, bound, rows.multiplier, rows.residual, step)
+    known = classify(layout, bound, rows.multiplier, rows.residual, step, torn.compliance)
     direction = _directions(known.direction, trial[layout.tangential], length, weak.disc | weak.vanishing)
     held, at_rest = choice is WeakChoice.HELD, length <= closest[layout.tangential[:, 0]]
     face = replace(
@@ -377,8 +377,7 @@ def _scaled(problem: DualProblem, face: Face) -> tuple[DualProblem, Face, np.nda
     if problem.scaling is None:
         return problem, face, 1.0
     factor = problem.scaling.factor
-    flexibility = face.flexibility * factor[problem.layout.tangential[:, 0]] ** 2
-    return problem.scaled_problem, replace(face, flexibility=flexibility), factor
+    return problem.scaled_problem, face.scaled(factor), factor
 
 
 def require_from_rest(state: State) -> None:
@@ -464,7 +463,11 @@ def state_error(
     """
     torn, rows, layout = state.torn, state.rows, state.torn.layout
     trial = rows.multiplier - rows.step * rows.residual
-    miss = rows.multiplier - FeasibleSet(layout, rows.slip_bound).project(trial)
+    feasible, compliance = FeasibleSet(layout, rows.slip_bound), torn.compliance
+    if compliance is None:
+        miss = rows.multiplier - feasible.project(trial)
+    else:
+        miss = rows.multiplier - compliance.resolve(feasible, trial, rows.step)
     slope = partials.by_multiplier - torn.jump(adjoint.displacement)
     tested = rows.residual + _bent(linearised, rows.multiplier)
     shares = adjoint.multiplier * tested - slope * _off_face(miss, linearised, layout)
@@ -475,8 +478,9 @@ def state_error(
 
 
 def _bent(linearised: LinearisedFace, multiplier: np.ndarray) -> np.ndarray:
-    """Return κ s across the slip of slipping discs, zero in all other rows, owned."""
-    across = linearised.face.curvature * linearised.face.restrict(multiplier)
+    """Return κ s across the slip of slipping discs and what rows give way, zero in all others, owned."""
+    face = linearised.face
+    across = face.curvature * face.restrict(multiplier) + face.offset
     return np.asarray(linearised.face.prolong(across))
 
 

@@ -67,6 +67,17 @@ def bounds_by_area(torn: TornSystem, normal_force: np.ndarray, by_bound: np.ndar
     return by_area
 
 
+def closures_by_area(torn: TornSystem, multiplier: np.ndarray, adjoint: np.ndarray) -> np.ndarray | float:
+    """Return dJ by the areas of points through their closures, ζ ∂C/∂A, replicated, (n_points,). Collective.
+
+    `multiplier`: λ, owned; `adjoint`: its ζ, owned. Zero where contact is exact.
+    """
+    if torn.closures is None:
+        return 0.0
+    force, weight = (torn.numbering.gather(x, torn.normal_rows) for x in (multiplier, adjoint))
+    return np.asarray(weight * torn.closures.by_area(force))
+
+
 def bounds_by_place(torn: TornSystem, normal_force: np.ndarray, by_bound: np.ndarray) -> np.ndarray:
     """Vector-Jacobian product of the slip bounds with respect to the slave nodes, (n_points, dim).
 

@@ -24,6 +24,7 @@ from fenics_contact.design.contact_derivatives import (
     bound_sensitivity,
     bounds_by_area,
     bounds_by_place,
+    closures_by_area,
     contact_by_shape,
     ties_by_shape,
 )
@@ -199,9 +200,10 @@ def by_nodes(
     work = work_by_shape(forms, torn, u, w)
     fields = PairedFields((state.solution.multiplier, adjoint.multiplier - partials.by_jump), (w, u))
     by_bound = bound_sensitivity(state.torn, partials.by_multiplier, w, linearised)
+    by_area = partials.by_area + closures_by_area(torn, state.solution.multiplier, adjoint.multiplier)
     if isinstance(state, DeformedState):
-        rows = deformed_contact_by_shape(state, fields, by_bound, partials.by_area)
+        rows = deformed_contact_by_shape(state, fields, by_bound, by_area)
     else:
-        rows = contact_by_shape(torn, fields, by_bound, partials.by_area)
+        rows = contact_by_shape(torn, fields, by_bound, by_area)
     rows = rows + ties_by_shape(torn, fields)
     return np.asarray(torn.decomposition.comm.allreduce(partials.by_shape - work)) + rows

@@ -329,7 +329,8 @@ class DualSystem:
             self._set_up(timer)
         bent = self.inverse(torn.load)
         self._bent = bent[self.inverse.interface]
-        self.problem = replace(self.problem, rhs=self.jump(bent) - torn.right)
+        rhs = self.jump(bent) - torn.right
+        self.problem = replace(self.problem, rhs=rhs, compliance=torn.compliance)
 
     def _inverse(
         self, torn: TornSystem, condensations: Condensations, kind: LocalKind, known: TornInverse | None

@@ -15,8 +15,10 @@ from fenics_contact._fem.loads import as_tractions
 from fenics_contact._pairing.points import (
     HELD,
     ContactPoints,
+    closures_of,
     friction_data,
     join_points,
+    reach_of,
     shared_once,
     tied_once,
     without_tied,
@@ -43,6 +45,7 @@ from fenics_contact.feti.preloads import (
     with_shortenings,
 )
 from fenics_contact.feti.subdomain import Subdomain, assemble
+from fenics_contact.qp.compliance import Closures, Compliance
 from fenics_contact.qp.cones import CoulombLaw, SlipLaw, Strengths, TrescaLaw
 from fenics_contact.qp.layout import ContactLayout
 
@@ -108,17 +111,24 @@ def check_apart(scene: Scene, decomposition: Decomposition) -> None:
 
 
 def gap_with_room(
-    normal: Relations, fixed: np.ndarray, prescribed: np.ndarray, slight: float = 0.02
+    normal: Relations,
+    fixed: np.ndarray,
+    prescribed: np.ndarray,
+    soft: np.ndarray | None = None,
+    slight: float = 0.02,
 ) -> np.ndarray:
     """Return the gaps; between surfaces held by supports, penetration due to faceting is removed.
 
     `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `prescribed`: prescribed
-    components of all nodes, NaN where free, shape (n_nodes, dim); `slight`: supports hold a point along its
+    components of all nodes, NaN where free, shape (n_nodes, dim); `soft`: marks of points that give way,
+    which may be pressed, shape (n_points,); `slight`: supports hold a point along its
     normal if the free fraction is no larger than this: normals of facets are slightly tilted, and sliding
     along that tilt does not open a gap.
     """
     points = normal.points
     missing = np.where(normal.freedom(fixed) <= slight, normal.of_supports(prescribed) - points.gap, 0.0)
+    if soft is not None:
+        missing[soft] = 0.0
     # A given interference is meant: it must not vanish where nothing can yield.
     pressed = missing > np.where(points.given, HELD, 1.0) * _explained(points)
     if pressed.any():
@@ -158,6 +168,7 @@ class TornSystem:
         tresca_bound: Fixed slip bound of each frictional point, replicated, shape (n_friction,), [force].
         strengths: Slip bounds with limits or on curves in place of μ λ_N, whose μ is then the largest ratio,
             replicated; None where there are none.
+        closures: Closures of the contact points under their forces, replicated; None where contact is exact.
         numbering: Owners and exchange of multipliers.
         relations: The relative displacements in the rows of ties and contacts, in their order, replicated.
         B: This rank's part of B, shape (n_local_rows, torn_size); rows of ties and contacts act on free
@@ -180,6 +191,7 @@ class TornSystem:
     friction_coefficient: np.ndarray
     tresca_bound: np.ndarray
     strengths: Strengths | None
+    closures: Closures | None
     numbering: DualNumbering
     relations: tuple[Relations, ...]
     B: sp.csr_matrix
@@ -339,6 +351,19 @@ class TornSystem:
         strengths = None if self.strengths is None else self.strengths.part(discs)
         return CoulombLaw(layout, coefficient[discs], self.tresca_bound[discs], strengths)
 
+    @property
+    def compliance(self) -> Compliance | None:
+        """By how much this rank's contact rows give way; None where none does."""
+        if self.closures is None:
+            return None
+        owned = self.numbering.owned_index(self.normal_rows) >= 0
+        return Compliance(self.layout, self.closures.part(owned), np.zeros(len(self.owned_discs)))
+
+    @property
+    def reach(self) -> np.ndarray | float:
+        """Distances of the contact points at which pressure begins, shape (n_contact,); zero by default."""
+        return 0.0 if self.closures is None else reach_of(self.scene, self.points)
+
     def slip_bound(self, normal_force: np.ndarray) -> np.ndarray:
         """Return Ψ at normal forces of the frictional points, shape (n_friction,), [force]."""
         if self.strengths is not None:
@@ -389,7 +414,8 @@ def build_torn_system(
     else:
         system = _joined(scene, decomposition, subdomains, overlap, previous, prescribed)
     with together(comm):
-        gap = gap_with_room(system.relations[1], decomposition.fixed, prescribed)
+        soft = None if system.closures is None else system.closures.curve >= 0
+        gap = gap_with_room(system.relations[1], decomposition.fixed, prescribed, soft) - system.reach
     supported = np.concatenate([relation.of_supports(prescribed) for relation in system.relations])
     tied, slip = np.zeros(system.n_equality - len(right)), np.zeros(system.tangential_rows.size)
     supported = np.concatenate([np.zeros(len(right)), supported])
@@ -478,8 +504,8 @@ def _with_rows(
     return TornSystem(
         scene, decomposition, subdomains, points, ties, gluing.count + tied.count, frictional,
         coefficient[frictional], tresca[frictional],
-        None if strengths is None else strengths.part(frictional), numbering, relations, B,
-        np.zeros(0), np.zeros(0), np.zeros((0, scene.dim - 1)), NO_MOTIONS,
+        None if strengths is None else strengths.part(frictional), closures_of(scene, points),
+        numbering, relations, B, np.zeros(0), np.zeros(0), np.zeros((0, scene.dim - 1)), NO_MOTIONS,
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from fenics_contact._base.libraries import MPI
+from fenics_contact.qp.compliance import Compliance, SoftRows
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector, global_sum
 
@@ -39,6 +40,7 @@ class Face:
         direction: ŵ, direction of the friction force of a slipping disc, shape (n_friction, t), owned.
         overshoot: ‖w_T‖/Ψ ≥ 1 of a slipping disc and 1 elsewhere, shape (n_friction,), owned.
         flexibility: 1/ρ_T of the discs, shape (n_friction,), owned.
+        soft: Compliances of contacts and discs; None where there are none.
     """
 
     layout: ContactLayout
@@ -49,6 +51,7 @@ class Face:
     direction: Vector
     overshoot: Vector
     flexibility: Vector
+    soft: SoftRows | None = None
 
     @cached_property
     def restriction(self) -> sp.csr_matrix:
@@ -75,8 +78,10 @@ class Face:
 
     @cached_property
     def curvature(self) -> Vector:
-        """κ = (‖w_T‖ − Ψ)/(ρ_T Ψ) on the offsets of slipping discs, 0 elsewhere, shape (n_face,)."""
+        """κ = (‖w_T‖ − Ψ)/(ρ_T Ψ) on the offsets of slipping discs, compliances, else 0, shape (n_face,)."""
         kappa = np.zeros(self.n_face)
+        if self.soft is not None:
+            self._spread(self.soft.slope, self.soft.slip, kappa)
         sliding = self._sliding
         kappa[self.n_face - len(sliding) :] = (self.overshoot[sliding] - 1.0) * self.flexibility[sliding]
         return kappa
@@ -85,9 +90,49 @@ class Face:
     def damping(self) -> Vector:
         """(1 + ρ_T κ)^-½, by which a preconditioner for F becomes one for F + κ, shape (n_face,)."""
         factor = np.ones(self.n_face)
+        if self.soft is not None:
+            self._spread(self.soft.stiffening**-0.5, self.soft.slip_stiffening**-0.5, factor)
         sliding = self._sliding
         factor[self.n_face - len(sliding) :] = 1.0 / np.sqrt(self.overshoot[sliding])
         return factor
+
+    @cached_property
+    def offset(self) -> Vector:
+        """The constant part of linearised closures, shape (n_face,)."""
+        result = np.zeros(self.n_face)
+        if self.soft is not None:
+            self._spread(self.soft.offset, np.zeros(len(self.slip)), result)
+        return result
+
+    @property
+    def homogeneous(self) -> Face:
+        """The face without the constant parts of closures, for what is linear in them."""
+        if self.soft is None:
+            return self
+        return replace(self, soft=replace(self.soft, offset=np.zeros_like(self.soft.offset)))
+
+    @cached_property
+    def softness(self) -> Vector | float:
+        """What a preconditioner adds where a compliance exceeds F, shape (n_face,); zero without any."""
+        if self.soft is None:
+            return 0.0
+        result = np.zeros(self.n_face)
+        self._spread(*self.soft.inverses, result)
+        return result
+
+    def _spread(self, contacts: Vector, discs: Vector, result: Vector) -> None:
+        """Put values of closed contacts and of sticking discs in their columns."""
+        width = self.layout.tangential.shape[1]
+        values = np.concatenate([contacts[self.closed], np.repeat(discs[self.stick], width)])
+        first = len(self.layout.equality)
+        result[first : first + len(values)] = values
+
+    def scaled(self, factor: Vector) -> Face:
+        """Return the face of multipliers λ / s, with the factors s of all rows, owned."""
+        layout = self.layout
+        discs = factor[layout.tangential[:, 0]]
+        soft = None if self.soft is None else self.soft.scaled(factor[layout.normal], discs)
+        return replace(self, flexibility=self.flexibility * discs**2, soft=soft)
 
     def restrict(self, x: Vector) -> Vector:
         """Return Zᵀ x for an owned vector x."""
@@ -165,12 +210,17 @@ def face_basis(
 
 
 def classify(
-    layout: ContactLayout, slip_bound: Vector, multiplier: Vector, residual: Vector, step: Vector
+    layout: ContactLayout,
+    slip_bound: Vector,
+    multiplier: Vector,
+    residual: Vector,
+    step: Vector,
+    compliance: Compliance | None = None,
 ) -> Face:
     """Return the face on which the semismooth Newton method linearises w = λ − ρ r.
 
-    Contacts with w_N > 0 are closed. Discs with ‖w_T‖ < Ψ stick, the others slip along ŵ = w_T/‖w_T‖, and
-    those with Ψ = 0 are pinned.
+    Contacts with w_N > 0 are closed. Discs with ‖w_T‖ < Ψ, or (1 + ρ_T D) Ψ with a compliance D, stick, the
+    others slip along ŵ = w_T/‖w_T‖, and those with Ψ = 0 are pinned.
 
     `slip_bound`: Ψ, shape (n_friction,), owned; `residual`: r = F λ − d − Gᵀα, owned; `step`: ρ, positive,
     the same for the components of one disc, shape (size,), owned.
@@ -178,8 +228,9 @@ def classify(
     trial = multiplier - step * residual
     tangential = trial[layout.tangential]
     length = np.linalg.norm(tangential, axis=1)
+    soft = None if compliance is None else compliance.rows_at(trial, step)
     free = slip_bound > 0.0
-    slip = free & (length >= slip_bound)
+    slip = free & (length >= slip_bound * (1.0 if soft is None else soft.slip_stiffening))
     divisor = np.where(slip, length, 1.0)
     return Face(
         layout=layout,
@@ -190,4 +241,5 @@ def classify(
         direction=np.where(slip[:, None], tangential / divisor[:, None], 0.0),
         overshoot=np.divide(length, slip_bound, out=np.ones_like(length), where=slip),
         flexibility=np.asarray(1.0 / step[layout.tangential[:, 0]], dtype=np.float64),
+        soft=soft,
     )

@@ -38,15 +38,22 @@ class FaceSystem:
         return self.face.restrict(full) + self.face.curvature * y
 
     def precondition(self, residual: Vector) -> Vector:
-        """Apply D Zᵀ M Z D, where D = (1 + ρκ)^-½ accounts for the curvature of the discs. Collective."""
-        damping = self.face.damping
+        """Apply D Zᵀ M Z D, where D = (1 + ρκ)^-½ accounts for the curvature of the discs. Collective.
+
+        Compliances κ far beyond F, and those of rows that supports alone determine, add their own inverses.
+        """
+        damping, soft = self.face.damping, self.face.softness * residual
         if self.preconditioner is None:
-            return damping**2 * residual
-        return damping * self.face.restrict(self.preconditioner(self.face.prolong(damping * residual)))
+            return damping**2 * residual + soft
+        solved = self.face.restrict(self.preconditioner(self.face.prolong(damping * residual)))
+        return damping * solved + soft
 
     def gradient(self, multiplier: Vector, flexed: Vector) -> Vector:
         """Return Zᵀ(F λ − d) + κ y, shape (n_face,), for λ on the face and flexed = F λ − d."""
-        return self.face.restrict(flexed) + self.face.curvature * self.face.restrict(multiplier)
+        bent = self.face.curvature * self.face.restrict(multiplier)
+        if self.face.soft is not None:
+            bent += self.face.offset
+        return self.face.restrict(flexed) + bent
 
     def enter(self, multiplier: Vector) -> Vector:
         """Return the owned vector on the face and in equilibrium that is closest to λ. Collective."""

@@ -386,13 +386,14 @@ class FaceSteps:
         """Classify, with a smaller ρ for discs whose force would otherwise reverse."""
         layout, iterate = self.problem.layout, state.iterate
         bound = self.problem.law.bound(iterate.multiplier)
-        face = classify(layout, bound, iterate.multiplier, iterate.residual, state.step)
+        soft = self.problem.compliance
+        face = classify(layout, bound, iterate.multiplier, iterate.residual, state.step, soft)
         if not state.faces or not self.safeguards.adapts_step:
             return state.step, face
         turned = np.einsum("ia,ia->i", face.direction, state.faces[0].direction) < 0.0
         step = state.step.copy()
         step[layout.tangential[turned]] *= self.safeguards.reduction
-        return step, classify(layout, bound, iterate.multiplier, iterate.residual, step)
+        return step, classify(layout, bound, iterate.multiplier, iterate.residual, step, soft)
 
     def _solve(self, face: Face, before: Iterate, tolerance: float) -> _SolvedFace:
         """Solve the linear system of a face, in which slipping forces grow with normal forces. Collective."""
@@ -419,8 +420,8 @@ class FaceSteps:
         return _SolvedFace(system, linear, multiplier, product, inner, contrary)
 
     def _contradiction(self, system: FaceSystem, gradient: Vector) -> Contradiction | None:
-        """Return what rows demand of each other; springs let all of them have their way. Collective."""
-        if isinstance(self.operator, ShiftedOperator):
+        """Return what rows demand of each other; none does that gives way. Collective."""
+        if isinstance(self.operator, ShiftedOperator) or self.problem.compliance is not None:
             return None
         return contradiction(self.problem, system, gradient)
 

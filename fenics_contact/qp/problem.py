@@ -14,7 +14,8 @@ import scipy.sparse as sp
 from fenics_contact._base.libraries import MPI
 from fenics_contact.errors import InfeasibleError, InvalidInputError, together
 from fenics_contact.qp.coarse import CoarseSpace
-from fenics_contact.qp.cones import SlipLaw, TrescaLaw
+from fenics_contact.qp.compliance import Compliance
+from fenics_contact.qp.cones import FeasibleSet, SlipLaw, TrescaLaw
 from fenics_contact.qp.face import Marks
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector, global_sum
@@ -91,6 +92,7 @@ class DualProblem:
         supported: Marks of contact rows that supports alone determine, owned, shape (size,): no multiplier
             moves them, and their diagonal is not a flexibility. None where there are no such rows.
         friction: The law of the slip bounds; None where no disc carries a force.
+        compliance: By how much contact rows give way to their forces; None where none does.
         least: Sizes below which those of forces and jumps do not fall in residuals; None: no such sizes.
     """
 
@@ -105,6 +107,7 @@ class DualProblem:
     reach: Callable[[Vector, Vector], Vector] | None = None
     supported: Marks | None = None
     friction: SlipLaw | None = None
+    compliance: Compliance | None = None
     least: LeastSizes | None = None
 
     @cached_property
@@ -116,6 +119,19 @@ class DualProblem:
     def law(self) -> SlipLaw:
         """The law of `friction`; without one all slip bounds are zero."""
         return self.friction or TrescaLaw(self.layout, np.zeros(self.layout.n_friction))
+
+    def natural_force(self, feasible: FeasibleSet, trial: Vector, step: Vector) -> Vector:
+        """Return the force that the law of contact gives to w = λ − ρ r, owned: P_Λ(w) without compliance.
+
+        `trial`: w, owned; `step`: ρ, owned.
+        """
+        if self.compliance is None:
+            return feasible.project(trial)
+        return self.compliance.resolve(feasible, trial, step)
+
+    def given_way(self, multiplier: Vector) -> Vector | float:
+        """Return C(λ) of the compliance, owned; zero without one."""
+        return 0.0 if self.compliance is None else self.compliance.given_way(multiplier)
 
     @cached_property
     def is_loaded(self) -> bool:
@@ -218,6 +234,7 @@ class Scaling:
             scaling=None,
             reach=None if reach is None else lambda x, alpha: s * reach(s * x, alpha),
             friction=None if friction is None else friction.scaled(discs),
+            compliance=None if problem.compliance is None else problem.compliance.scaled(s),
         )
 
 

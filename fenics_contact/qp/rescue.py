@@ -84,7 +84,10 @@ class ProximalPoint:
     def force(self, iterate: Iterate) -> Vector:
         """Return the force of the springs at an iterate, P_Λ(λ̄ − D⁻¹ r), owned."""
         step = contact_step(self.original.layout, self.problem.diagonal)
-        return self.problem.law.admit(iterate.multiplier - step * iterate.residual)
+        trial = iterate.multiplier - step * iterate.residual
+        if self.problem.compliance is not None:
+            return self.problem.natural_force(self.problem.law.feasible(trial), trial, step)
+        return self.problem.law.admit(trial)
 
 
 def descend(
@@ -134,7 +137,7 @@ def _slope(problem: DualProblem, before: Iterate, after: Iterate) -> Callable[[f
     def slope(part: float) -> float:
         multiplier = before.multiplier + part * moved
         trial = multiplier - step * (before.residual + part * turned)
-        missing = multiplier - problem.law.feasible(multiplier).project(trial)
+        missing = multiplier - problem.natural_force(problem.law.feasible(multiplier), trial, step)
         missing[layout.equality] = (part - 1.0) * moved[layout.equality]
         return float(global_sum(problem.comm, opened @ missing)[0])
 
@@ -201,7 +204,7 @@ class Rescue:
     def __call__(self, start: Start, budget: int, *, further: bool = False) -> Rescued:
         """Improve an iterate. Collective."""
         limit, memory = start.operator.products + budget, start.memory
-        if self.problem.preconditioner is None:
+        if self.problem.preconditioner is None and self.problem.compliance is None:
             iterate, line, memory = self._by_smalse(start, limit)
         else:
             iterate, line = self._by_proximal_points(start, limit, further)

@@ -301,6 +301,11 @@ class Smalse:
             InvalidInputError: The slip bound follows the multiplier.
             ConvergenceError: The product budget was used up; carries the history.
         """
+        if problem.compliance is not None:
+            raise InvalidInputError(
+                "SMALSE needs surfaces that do not give way, got closure laws or a stick stiffness: "
+                "use FaceNewton"
+            )
         if not isinstance(problem.law, TrescaLaw):
             raise InvalidInputError(
                 f"SMALSE needs a given slip bound, got {type(problem.law).__name__}: iterate on the "

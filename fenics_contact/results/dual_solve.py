@@ -64,6 +64,7 @@ def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray
         full[frictional], full[torn.frictionless] = values, others
         return full
 
+    gap = gap + torn.reach
     origin = torn.numbering.gather(torn.right + torn.supported, torn.tangential_rows.ravel())
     return ContactResult(
         torn.points,

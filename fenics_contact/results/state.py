@@ -66,13 +66,16 @@ class Energies:
         friction: Σ Ψ ‖slip‖, the dissipation by friction if the whole load step acts at once: what slips to
             and fro within it counts by where it ends, take more load steps and add up. Where parts of a step
             have histories of their own (`AutomaticSteps.finer_history`), the sum over these.
-        dual: Value of the dual functional, −½ (f − Bᵀλ)ᵀK⁺(f − Bᵀλ) − λᵀc; None for nonlinear materials.
+        dual: Value of the dual functional, −½ (f − Bᵀλ)ᵀK⁺(f − Bᵀλ) − λᵀc − Φ(λ); None for nonlinear
+            materials.
+        surface: Stored by surfaces that give way, λᵀC(λ) − Φ(λ) with the closures C = Φ'; zero without any.
     """
 
     strain: float
     load: float
     friction: float
     dual: float | None = None
+    surface: float = 0.0
 
     @property
     def norm(self) -> float:
@@ -81,17 +84,19 @@ class Energies:
 
     @property
     def total_potential(self) -> float:
-        """The stored energy less the work of the loads."""
+        """The energy stored in the bodies less the work of the loads."""
         return self.strain - self.load
 
     @property
     def primal(self) -> float:
-        """Functional that the displacement minimises for given slip bounds, total potential plus friction."""
-        return self.total_potential + self.friction
+        """Functional that the displacement minimises for given slip bounds: all but `dual` together."""
+        return self.total_potential + self.friction + self.surface
 
     def __str__(self) -> str:
         """List the energies, one per line."""
-        names = ("strain", "load", "friction", "total_potential", "primal", "dual")
+        names = ["strain", "load", "friction", "total_potential", "primal", "dual"]
+        if self.surface:
+            names.insert(3, "surface")
         known = [(name, getattr(self, name)) for name in names if getattr(self, name) is not None]
         return "\n".join(f"{name.replace('_', ' '):16s}{value:14.6e}" for name, value in known)
 
@@ -109,9 +114,19 @@ def compute_energies(
     """
     internal = torn.load - torn.force(multiplier)  # = K u
     strained = 0.5 * internal @ (displacement - rigid)
-    mine = np.array([strained, multiplier @ torn.right])
-    strain, prescribed = (float(total) for total in torn.numbering.comm.allreduce(mine))
-    return Energies(strain, torn.load_work(displacement), friction, -strain - prescribed)
+    mine = np.array([strained, multiplier @ torn.right, *softened(torn, multiplier)])
+    strain, prescribed, given_way, work = (float(total) for total in torn.numbering.comm.allreduce(mine))
+    load = torn.load_work(displacement)
+    return Energies(strain, load, friction, -strain - prescribed - work, given_way - work)
+
+
+def softened(torn: TornSystem, multiplier: np.ndarray) -> tuple[float, float]:
+    """Return λᵀC(λ) and Φ(λ) of this rank's rows, [force · length]; zero where contact is exact."""
+    compliance = torn.compliance
+    if compliance is None:
+        return 0.0, 0.0
+    pressing = compliance.given_way(multiplier)
+    return float(multiplier @ pressing), compliance.work(multiplier)
 
 
 def pairs_in_words(scene: Scene, contact: ContactResult, force: str = "", stress: str = "") -> list[str]:

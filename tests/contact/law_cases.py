@@ -9,15 +9,20 @@ from mpi4py import MPI
 
 from fenics_contact import (
     Body,
+    ClosureLaw,
+    ClosureTable,
     ContactPair,
     Coulomb,
+    ExponentialClosure,
     FrictionCurve,
     FrictionTable,
+    LinearClosure,
     RigidPlane,
     Scene,
     State,
     Support,
     Surface,
+    Traction,
     box_partition,
     solve_scene,
 )
@@ -62,6 +67,45 @@ def dragged_block(friction: Coulomb, pressure: float, shift: float = 1.0) -> Sce
     )
 
 
-def solved(scene: Scene, **more: object) -> State:
-    cut = {"block": box_partition(scene.bodies["block"].mesh, (2, 1, 1))}
-    return solve_scene(scene, MPI.COMM_SELF, partitions=cut, tolerance=1e-9, **more)
+class Asperities(ClosureLaw):
+    """Spheres on a plane: p = (closure / 0.003)^1.5."""
+
+    def closure(self, pressure: np.ndarray) -> np.ndarray:
+        return 0.003 * pressure ** (2.0 / 3.0)
+
+    def growth(self, pressure: np.ndarray) -> np.ndarray:
+        return 0.002 * pressure ** (-1.0 / 3.0)
+
+
+CLOSURES: dict[str, ClosureLaw] = {
+    "linear": LinearClosure(700.0),
+    "exponential": ExponentialClosure(5.0, 0.01),
+    "table": ClosureTable((-0.002, 0.001, 0.002, 0.02), (0.0, 2.0, 9.0, 30.0)),
+    "own": Asperities(),
+}
+
+
+def pressed_block(closure: ClosureLaw | None, down: float) -> Scene:
+    """A block without lateral contraction on a floor, pressed uniformly."""
+    mesh = block((0.0, 0.0, 0.0), (2.0, 1.0, HEIGHT), (4, 2, 2))
+    pair = ContactPair(Surface("block", "z0"), FLOOR, closure=closure)
+    body = Body(mesh, IsotropicElasticity(MODULUS, 0.0))
+    return Scene({"block": body}, [Support("block", "z1", (0.0, 0.0, -down))], contacts=[pair])
+
+
+def tilted_block(closure: ClosureLaw | None, friction: Coulomb | None) -> Scene:
+    """A block on a floor that nothing else holds, pressed obliquely and off its centre."""
+    mesh = block((0.0, 0.0, 0.0), (2.0, 1.0, HEIGHT), (4, 2, 2))
+    pair = ContactPair(Surface("block", "z0"), FLOOR, friction, closure=closure)
+
+    def load(x: np.ndarray) -> np.ndarray:
+        return np.column_stack([0.3 + 0 * x[:, 0], 0.1 + 0 * x[:, 0], -6.0 * x[:, 0] ** 2])
+
+    return Scene(
+        {"block": Body(mesh, IsotropicElasticity(MODULUS, 0.3))}, [], [Traction("block", "z1", load)], [pair]
+    )
+
+
+def solved(scene: Scene, tolerance: float = 1e-9, **more: object) -> State:
+    cut = {name: box_partition(body.mesh, (2, 1, 1)) for name, body in scene.bodies.items()}
+    return solve_scene(scene, MPI.COMM_SELF, partitions=cut, tolerance=tolerance, **more)

@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from fenics_contact import BodyMesh, Coulomb, read_scene_file
 from fenics_contact._scene import loads as loads_module
-from fenics_contact._scene import obstacles, pairs
+from fenics_contact._scene import obstacles, pairs, surface_laws
 from fenics_contact._scene import supports as supports_module
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact._scene_file.source import SceneFileError
@@ -260,6 +260,29 @@ def test_ties_have_no_gaps() -> None:
     tie = {"slave": {"body": "a", "surface": "z0"}, "master": {"body": "a", "surface": "z1"}, "gap": 0.1}
     with pytest.raises(SceneFileError, match=r"ties\.0\.gap"):
         file_of(ties=[tie])
+
+
+def test_laws_of_surfaces_are_those_of_the_package() -> None:
+    laws: dict[Any, dict[str, Any]] = {
+        surface_laws.LinearClosure(5.0): {"law": "linear", "stiffness": 5},
+        surface_laws.ExponentialClosure(5.0, 0.1): {
+            "law": "exponential", "pressure": 5.0, "clearance": 0.1
+        },
+        surface_laws.ClosureTable((0.0, 0.1), (0.0, 3.0)): {
+            "law": "table", "closures": [0, 0.1], "pressures": [0, 3]
+        },
+    }  # fmt: skip
+    table = {"pressure": [1, 5], "coefficient": [0.3, 0.2]}
+    friction = {"law": "coulomb", "coefficient": table, "shear_limit": 2}
+    slave = {"body": "a", "surface": "z0"}
+    for law, given in laws.items():
+        pair = {"slave": slave, "master": FLOOR, "friction": friction, "closure": given}
+        (found,) = file_of(contacts=[pair]).scene.contacts
+        assert found.closure == law
+        assert found.friction == pairs.Coulomb(surface_laws.FrictionTable((1.0, 5.0), (0.3, 0.2)), 2.0)
+    falling = {"law": "table", "closures": [0, 0.1, 0.2], "pressures": [0, 3, 2]}
+    with pytest.raises(SceneFileError, match=r"contacts\.0: .* must rise with the closures"):
+        _ = file_of(contacts=[{"slave": slave, "master": FLOOR, "closure": falling}]).scene
 
 
 def test_obstacles_and_laws_of_friction_are_those_of_the_package() -> None:

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 
-from fenics_contact import Coulomb, FrictionTable, Scene, Tresca
+from fenics_contact import ClosureLaw, ClosureTable, Coulomb, ExponentialClosure, FrictionTable, Scene, Tresca
 from tests.shape.blocks import block_on_block, block_on_floor, problem
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Line
 
 PUSH, DRAG = (0.35, 0.1, -2.0), (0.6, 0.12, -2.0)
+
+
+def closing(scene: Scene, law: ClosureLaw) -> Scene:
+    """Return the scene with surfaces that give way."""
+    return replace(scene, contacts=[replace(pair, closure=law) for pair in scene.contacts])
+
 
 SCENES: dict[str, Callable[[], Scene]] = {
     "floor": lambda: block_on_floor(Coulomb(0.3), load=PUSH),
@@ -22,6 +29,13 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "blocks, tetrahedra": lambda: block_on_block(Coulomb(0.38), "tetrahedron", load=DRAG),
     "floor, shear limit": lambda: block_on_floor(
         Coulomb(0.3, shear_limit=lambda x: 0.5 + 0.05 * x[:, 0]), load=PUSH
+    ),
+    "floor, closure": lambda: closing(
+        block_on_floor(Coulomb(0.3), load=PUSH), ExponentialClosure(1.0, 0.002)
+    ),
+    "blocks, closure": lambda: closing(
+        block_on_block(Coulomb(0.38), "tetrahedron", load=DRAG),
+        ClosureTable((0.0, 0.002, 0.003), (0.0, 1.0, 3.0)),
     ),
     "floor, table": lambda: block_on_floor(
         Coulomb(FrictionTable((0.5, 2.5, 4.0), (0.35, 0.25, 0.22))), load=PUSH

@@ -12,7 +12,11 @@ import scipy.sparse as sp
 
 from fenics_contact import (
     AutomaticSteps,
+    ClosureLaw,
+    ClosureTable,
+    Coulomb,
     DeformedState,
+    LinearClosure,
     LoadStep,
     MovingObstacle,
     Scene,
@@ -279,3 +283,22 @@ def test_what_has_no_derivative_is_named() -> None:
     path = LoadPath(problem, [LoadStep("press"), LoadStep("again")])
     with pytest.raises(InvalidInputError, match="have one load step"):
         path(np.zeros(path.size))
+
+
+@pytest.mark.parametrize(
+    ("master", "law", "friction"),
+    [
+        ("disc", ClosureTable((-0.02, 0.03, 0.06), (0.0, 0.1, 0.4)), Coulomb(0.2)),
+        ("block", LinearClosure(3.0), Coulomb(0.3, shear_limit=0.04)),
+    ],
+)
+def test_blocks_whose_surfaces_give_way(master: str, law: ClosureLaw, friction: Coulomb) -> None:
+    scene = pressed(master, 0.2, 0.1)
+    pair = replace(scene.contacts[0], closure=law, friction=friction)
+    problem, exact = (
+        design_problem(replace(scene, contacts=[pair]), PRESSURES, tolerance=tolerance)
+        for tolerance in (None, 1e-12)
+    )
+    assert miss(problem, exact) < 1e-5
+    contact = problem.last.state.contact  # type: ignore[union-attr]
+    assert contact.gap.min() < -0.01

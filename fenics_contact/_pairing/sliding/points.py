@@ -226,11 +226,13 @@ class SlidingPoints:
         found = {f"found.{name}": getattr(self.points, name) for name in LAST}
         return found | start.stored()
 
-    def mean_tangents(self, normal: np.ndarray, friction: np.ndarray, start: MaterialPoints) -> MeanTangents:
+    def mean_tangents(
+        self, normal: np.ndarray, friction: np.ndarray, start: MaterialPoints, *, apart: bool = False
+    ) -> MeanTangents:
         """Return what derivatives of mortar contact have beside the rows of its forces. Collective.
 
         `normal`: λ_N, shape (n,), [force]; `friction`: τ in the points' tangents, shape (n, dim − 1),
-        [force].
+        [force]; `apart`: whether points that carry forces may keep a distance, at which the slip has a lever.
         """
         (way, weights), count = self._way(start), self.points.count
         total = MeanTangents.none(count, friction.shape[1], self.coordinates.size)
@@ -241,7 +243,7 @@ class SlidingPoints:
             )
             total = found if len(mine) == count else total.with_points(mine, found)
         # In the plane a slipping force does not turn with the slip, of which nothing is needed then.
-        if friction.shape[1] == 2 and friction.any():
+        if (apart or friction.shape[1] == 2) and friction.any():
             total = replace(total, slip=total.slip + self._slip_beyond_rows(start, np.any(friction, axis=1)))
         return total
 

@@ -1,0 +1,223 @@
+"""Compliances of contact rows: surfaces that give way under the forces on them, by a closure and by slip.
+
+With a monotone C(λ) the law of a contact is gap + C(λ_N) ≥ 0, λ_N ≥ 0, and their product vanishes: λ
+minimises ½ λᵀF λ − dᵀλ + Φ(λ) over its cone, where Φ' = C. The natural map of exact contact, P_Λ(w) with
+w = λ − ρ r, becomes the resolvent (1 + ρ (C + ∂I_Λ))⁻¹ w; C = 0 is exact contact. Residuals and operators do
+not change otherwise: r and F are those of exact contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from fenics_contact.qp.cones import FeasibleSet
+from fenics_contact.qp.layout import ContactLayout
+from fenics_contact.qp.reductions import Vector
+
+
+class ClosureCurve(Protocol):
+    """How far two surfaces approach under a pressure; it never falls, and is zero without pressure."""
+
+    def closure(self, pressure: Vector) -> Vector:
+        """Return the closure, shape (n,), [length]."""
+
+    def growth(self, pressure: Vector) -> Vector:
+        """Return its derivative by the pressure, shape (n,)."""
+
+    def work(self, pressure: Vector) -> Vector:
+        """Return its integral over the pressure from zero, shape (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Closures:
+    """C(λ) = s c(λ / A) of normal forces, with a scale s that is one but for scaled multipliers.
+
+    Attributes:
+        area: A, shape (n,).
+        curve: Number of the curve c, −1 for exact contact, shape (n,).
+        scale: s, shape (n,).
+        curves: The curves.
+    """
+
+    area: Vector
+    curve: npt.NDArray[np.int64]
+    scale: Vector
+    curves: Sequence[ClosureCurve]
+
+    def part(self, chosen: npt.NDArray[np.int64] | npt.NDArray[np.bool_]) -> Closures:
+        """Return those of some contacts."""
+        return replace(self, area=self.area[chosen], curve=self.curve[chosen], scale=self.scale[chosen])
+
+    def scaled(self, factor: Vector) -> Closures:
+        """Return s C(s μ) of multipliers μ = λ / s."""
+        return replace(self, area=self.area / factor, scale=self.scale * factor)
+
+    def closure(self, force: Vector) -> Vector:
+        """Return C(λ), zero where λ ≤ 0, shape (n,)."""
+        return self.scale * self._of("closure", force)
+
+    def growth(self, force: Vector) -> Vector:
+        """Return C'(λ), shape (n,)."""
+        return self.scale / self.area * self._of("growth", force)
+
+    def work(self, force: Vector) -> Vector:
+        """Return Φ(λ), the integral of C from zero to λ, shape (n,)."""
+        return self.scale * self.area * self._of("work", force)
+
+    def by_area(self, force: Vector) -> Vector:
+        """Return dC/dA at given forces, shape (n,)."""
+        return -self.growth(force) * np.maximum(force, 0.0) / self.area
+
+    def _of(self, member: str, force: Vector) -> Vector:
+        pressure, values = np.maximum(force, 0.0) / self.area, np.zeros(len(force))
+        for number, curve in enumerate(self.curves):
+            mine = (self.curve == number) & (force > 0.0)
+            values[mine] = getattr(curve, member)(pressure[mine])
+        return values
+
+    def resolve(self, trial: Vector, step: Vector, most: int = 200) -> Vector:
+        """Return λ ≥ 0 with λ + ρ C(λ) = w, zero where w ≤ 0, shape (n,).
+
+        By Newton's method between bounds: the left side grows at least as λ does.
+
+        `trial`: w, shape (n,); `step`: ρ, shape (n,); `most`: more steps than bisection needs.
+        """
+        upper = np.maximum(trial, 0.0)
+        left, right = np.flatnonzero((self.curve >= 0) & (upper > 0.0)), None
+        force = upper.copy()
+        low, high = np.zeros(len(left)), upper[left]
+        for _ in range(most):
+            if len(left) == 0:
+                break
+            mine, x = self.part(left), force[left]
+            excess = x + step[left] * mine.closure(x) - upper[left]
+            low, high = np.where(excess <= 0.0, x, low), np.where(excess >= 0.0, x, high)
+            right = x - excess / (1.0 + step[left] * mine.growth(x))
+            inside = (right > low) & (right < high)
+            following = np.where(inside, right, 0.5 * (low + high))
+            force[left] = np.where(excess == 0.0, x, following)
+            small = 4.0 * np.finfo(float).eps * np.maximum(high, np.finfo(float).tiny)
+            open_ = (np.abs(force[left] - x) > small) & (high - low > small)
+            left, low, high = left[open_], low[open_], high[open_]
+        return force
+
+
+@dataclass(frozen=True, eq=False)
+class SoftRows:
+    """The linearised compliances of contacts, C ≈ offset + slope λ, and those of friction discs.
+
+    Attributes:
+        slope: Of contacts, shape (n_contact,).
+        offset: Of contacts, shape (n_contact,).
+        stiffening: 1 + ρ · slope of contacts, shape (n_contact,).
+        step: ρ of contacts, shape (n_contact,).
+        slip: Slip per friction force of discs, shape (n_friction,).
+        slip_step: ρ of discs, shape (n_friction,).
+    """
+
+    slope: Vector
+    offset: Vector
+    step: Vector
+    slip: Vector
+    slip_step: Vector
+
+    @property
+    def stiffening(self) -> Vector:
+        """1 + ρ · slope of contacts, shape (n_contact,)."""
+        return 1.0 + self.step * self.slope
+
+    @property
+    def slip_stiffening(self) -> Vector:
+        """1 + ρ · slip of discs, shape (n_friction,)."""
+        return 1.0 + self.slip_step * self.slip
+
+    @property
+    def inverses(self) -> tuple[Vector, Vector]:
+        """The inverses of large compliances κ of contacts and of discs, ρ (1 − 1/(1 + ρκ)) / (1 + ρκ)."""
+        pairs = ((self.step, self.stiffening), (self.slip_step, self.slip_stiffening))
+        contacts, discs = (step * (soft - 1.0) / soft**2 for step, soft in pairs)
+        return contacts, discs
+
+    def scaled(self, factor: Vector, discs: Vector) -> SoftRows:
+        """Return those of multipliers λ / s, with the factors of contacts and of discs."""
+        return SoftRows(
+            self.slope * factor**2,
+            self.offset * factor,
+            self.step / factor**2,
+            self.slip * discs**2,
+            self.slip_step / discs**2,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Compliance:
+    """What this rank's contact rows give way: C(λ_N) along the normal, D τ along the tangents.
+
+    Attributes:
+        closures: C of the contacts, shape (n_contact,), owned.
+        slip: D of the friction discs, the elastic slip per friction force, shape (n_friction,), owned.
+    """
+
+    layout: ContactLayout
+    closures: Closures
+    slip: Vector
+
+    def scaled(self, factor: Vector) -> Compliance:
+        """Return the compliance of multipliers λ / s, with the factors s of all rows, owned."""
+        layout = self.layout
+        discs = factor[layout.tangential[:, 0]]
+        return replace(self, closures=self.closures.scaled(factor[layout.normal]), slip=self.slip * discs**2)
+
+    def given_way(self, multiplier: Vector) -> Vector:
+        """Return C(λ), owned: closures and elastic slips, zero in rows of equality."""
+        layout, result = self.layout, np.zeros(self.layout.size)
+        result[layout.normal] = self.closures.closure(multiplier[layout.normal])
+        result[layout.tangential] = self.slip[:, None] * multiplier[layout.tangential]
+        return result
+
+    def work(self, multiplier: Vector) -> float:
+        """Return Φ(λ) of this rank's rows, [force · length]."""
+        layout, tau = self.layout, multiplier[self.layout.tangential]
+        normal = self.closures.work(multiplier[layout.normal]).sum()
+        return float(normal + 0.5 * self.slip @ np.einsum("ia,ia->i", tau, tau))
+
+    def resolve(self, feasible: FeasibleSet, trial: Vector, step: Vector) -> Vector:
+        """Return the force that the law gives to w = λ − ρ r, the resolvent of C + ∂I_Λ, owned.
+
+        `trial`: w, owned; `step`: ρ, owned.
+        """
+        layout, softened = self.layout, np.array(trial)
+        softened[layout.tangential] = trial[layout.tangential] / self._slip_stiffening(step)[:, None]
+        force = feasible.project(softened)
+        force[layout.normal] = self.closures.resolve(trial[layout.normal], step[layout.normal])
+        return force
+
+    def rows_at(self, trial: Vector, step: Vector) -> SoftRows:
+        """Return the compliances linearised where the law answers to w = λ − ρ r.
+
+        Between the force and the closure of the last iterate: a force alone may lie on the flat part of a
+        curve, a closure alone on its steep one, where Newton's steps would overshoot.
+        """
+        step_n = step[self.layout.normal]
+        force = self.closures.resolve(trial[self.layout.normal], step_n)
+        # A contact that only just touches may count as closed.
+        slope = self.closures.growth(np.maximum(force, np.sqrt(np.finfo(float).tiny)))
+        offset = self.closures.closure(force) - slope * force
+        return SoftRows(slope, offset, step_n, self.slip, step[self.layout.tangential[:, 0]])
+
+    def _slip_stiffening(self, step: Vector) -> Vector:
+        return np.asarray(1.0 + step[self.layout.tangential[:, 0]] * self.slip)
+
+    @cached_property
+    def soft(self) -> npt.NDArray[np.bool_]:
+        """Marks of the rows with a compliance, shape (size,), owned."""
+        marks = np.zeros(self.layout.size, dtype=bool)
+        marks[self.layout.normal] = self.closures.curve >= 0
+        marks[self.layout.tangential] = (self.slip > 0.0)[:, None]
+        return marks
