@@ -176,7 +176,9 @@ class StepTable:
     | ``normal_force``, ``friction_force`` | sums over all pairs, [force] |
     | ``peak_pressure`` | of all pairs, [force / length²] |
     | ``strain_energy``, ``load_energy``, ``friction_energy`` | as in `results.Energies`; empty if not known |
-    | ``loads Fx``, ... | force of all loads, and its moment ``loads Mx``, ... |
+    | ``preload NAME`` | force of each preload |
+    | ``loads Fx``, ... | force of all loads, and its moment ``loads Mx``, ...; of bodies of revolution ``Fr`` \
+and ``Fz`` of a revolution |
     | ``lid top Fx``, ... | reaction of the supports of the surface "top" of the body "lid" |
     | ``lid bottom on pot rim Fx``, ... | force on the slave of a pair or tie |
     | ``lid bottom on pot rim pressure``, ``... area`` | the largest pressure, and the area of contact |
@@ -246,8 +248,7 @@ class StepTable:
             self._about.setdefault(name, each.about)
             parts = (each.force, balance.force_scale), (each.moment, balance.moment_scale)
             numbers = np.concatenate([rounded(part, scale) for part, scale in parts])
-            axes = ("Fx", "Fy", "Fz", "Mx", "My", "Mz") if state.scene.dim == 3 else ("Fx", "Fy", "M")
-            columns |= {f"{name} {axis}": float(number) for axis, number in zip(axes, numbers, strict=True)}
+            columns |= {f"{name} {head}": float(v) for head, v in zip(each.heads, numbers, strict=True)}
         return columns
 
     def _text(self) -> str:

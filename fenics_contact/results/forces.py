@@ -150,6 +150,13 @@ class Resultant:
         """Whether it is that of forces all around bodies of revolution."""
         return np.size(self.moment) == 0
 
+    @property
+    def heads(self) -> tuple[str, ...]:
+        """Names of the components of force and moment in tables."""
+        if self.axisymmetric:
+            return "Fr", "Fz"
+        return ("Fx", "Fy", "Fz", "Mx", "My", "Mz") if len(self.force) == 3 else ("Fx", "Fy", "M")
+
     def __add__(self, other: Resultant) -> Resultant:
         """Return the sum with another one about the same point."""
         return Resultant(self.force + other.force, self.moment + other.moment, self.about, self.surface)
@@ -263,11 +270,9 @@ def table(
     cells = [
         (*name, *(f"{value:.5g}" for value in row)) for name, row in zip(names, np.hstack(shown), strict=True)
     ]
-    dim, units = len(resultants[0].force), "F in [force], M in [force·length]"
-    heads = [*("Fx", "Fy", "Fz")[:dim], *(("Mx", "My", "Mz") if dim == 3 else ("M",))]
-    if resultants[0].axisymmetric:
-        heads, units = ["Fr", "Fz"], "F in [force] per revolution"
-    return "\n".join([*aligned([(*[""] * len(names[0]), *heads), *cells], len(names[0])), units])
+    revolved, head = resultants[0].axisymmetric, (*[""] * len(names[0]), *resultants[0].heads)
+    units = "F in [force] per revolution" if revolved else "F in [force], M in [force·length]"
+    return "\n".join([*aligned([head, *cells], len(names[0])), units])
 
 
 def aligned(rows: list[tuple[str, ...]], names: int) -> list[str]:

@@ -30,7 +30,7 @@ from fenics_contact import (
 )
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.materials import J2Plasticity, NeoHooke, PlaneStrain
+from fenics_contact.materials import IsotropicElasticity, J2Plasticity, NeoHooke, PlaneStrain
 from fenics_contact.output import StepTable, write_contact_table
 from tests.io.states import touching_blocks
 
@@ -171,6 +171,25 @@ def test_what_materials_do_not_define_is_empty(tmp_path: Path) -> None:
     _, (row,) = read(table.add(solve_scene(scene, COMM)))
     assert row["strain_energy"] == ""
     assert row["bar x1 Fx"] > 100.0
+
+
+def test_tables_of_bodies_of_revolution_have_radial_and_axial_forces(tmp_path: Path) -> None:
+    material = IsotropicElasticity(1000.0, 0.3)
+    meshes = {"lid": rectangle((0, 1), (3, 2), (7, 2)), "pipe": rectangle((1, 0), (2, 1), (3, 3))}
+    scene = Scene(
+        {name: Body(mesh, material, axisymmetric=True) for name, mesh in meshes.items()},
+        [Support("pipe", "y0", (None, 0.0))],
+        [TotalForce("lid", "y1", (0.0, -20.0))],
+        [ContactPair(Surface("lid", "y0"), Surface("pipe", "y1"))],
+    )
+    state = solve_scene(scene, COMM, tolerance=1e-9)
+    _, (row,) = read(StepTable(tmp_path / "steps.csv", COMM).add(state))
+    assert [name for name in row if name.startswith("loads")] == ["loads Fr", "loads Fz"]
+    assert row["loads Fz"] == pytest.approx(-20.0)
+    assert row["pipe y0 Fz"] == pytest.approx(row["lid y0 on pipe y1 Fz"]) == pytest.approx(20.0)
+    _, rows = read(write_contact_table(state, tmp_path / "contact.csv"))
+    force = sum(row["area"] * row["pressure"] for row in rows)
+    assert force == pytest.approx(20.0, rel=1e-6), "areas are those of the full revolution"
 
 
 RANKS = """
