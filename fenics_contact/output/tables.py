@@ -177,8 +177,8 @@ class StepTable:
     | ``peak_pressure`` | of all pairs, [force / length²] |
     | ``strain_energy``, ``load_energy``, ``friction_energy`` | as in `results.Energies`; empty if not known |
     | ``preload NAME`` | force of each preload |
-    | ``loads Fx``, ... | force of all loads, and its moment ``loads Mx``, ...; of bodies of revolution ``Fr`` \
-and ``Fz`` of a revolution |
+    | ``loads Fx``, ... | force of all loads, and its moment ``loads Mx``, ... |
+    | ``loads Fr``, ``loads Fz`` | the same of bodies of revolution, a revolution |
     | ``lid top Fx``, ... | reaction of the supports of the surface "top" of the body "lid" |
     | ``lid bottom on pot rim Fx``, ... | force on the slave of a pair or tie |
     | ``lid bottom on pot rim pressure``, ``... area`` | the largest pressure, and the area of contact |
