@@ -10,7 +10,7 @@ Laws of surfaces: Coulomb, Tresca, FrictionTable, FrictionCurve, LinearClosure, 
 
 Rigid obstacles: RigidPlane, RigidSphere, RigidCylinder, DistanceObstacle, MovingObstacle
 
-Loads: Traction, Pressure, TotalForce, BodyForce, gravity, ThermalStrain
+Loads: Traction, Pressure, TotalForce, BodyForce, gravity, centrifugal, point_mass, ThermalStrain
 
 Values of loads: SampledField, read_field, Ufl
 
@@ -75,7 +75,9 @@ if TYPE_CHECKING:
     from fenics_contact._scene.loads import ThermalStrain as ThermalStrain
     from fenics_contact._scene.loads import TotalForce as TotalForce
     from fenics_contact._scene.loads import Traction as Traction
+    from fenics_contact._scene.loads import centrifugal as centrifugal
     from fenics_contact._scene.loads import gravity as gravity
+    from fenics_contact._scene.loads import point_mass as point_mass
     from fenics_contact._scene.obstacles import DistanceObstacle as DistanceObstacle
     from fenics_contact._scene.obstacles import MovingObstacle as MovingObstacle
     from fenics_contact._scene.obstacles import RigidCylinder as RigidCylinder

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact._base.checks import GivenVector, checked, floats
+from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
 from fenics_contact._scene.fields import ScalarValue, VectorValue, checked_scalar, checked_vector
 from fenics_contact.errors import InvalidInputError
 
@@ -195,3 +195,98 @@ def gravity(body: str, density: float, acceleration: Sequence[float]) -> BodyFor
             "varies with position"
         )
     return BodyForce(body, tuple(mass * component for component in direction))
+
+
+@dataclass(frozen=True)
+class Spinning:
+    """Force per volume ρ ω² r on what turns about an axis, r being the way from the axis to the point.
+
+    Attributes:
+        point: A point of the axis, [length].
+        axis: Unit vector along it; None in the plane, where it is normal to the plane.
+    """
+
+    density: float
+    speed: float
+    point: GivenVector
+    axis: GivenVector | None
+
+    def require_axis(self, dim: int, axisymmetric: bool) -> None:
+        """Reject an axis in another space than the body, and one that a body of revolution does not have."""
+        own = self.axis in ((0.0, 1.0), (0.0, -1.0)) and self.point[0] == 0.0
+        if len(self.point) != dim or (axisymmetric and not own):
+            needed = f"{dim} coordinates" if not axisymmetric else "point (0, 0) and axis (0, 1)"
+            raise InvalidInputError(
+                f"the axis of a centrifugal force must be that of the body, with {needed}, got point "
+                f"{self.point!r} and axis {self.axis!r}: give these"
+            )
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Return the force per volume at points, both of shape (n, dim)."""
+        arms = points - np.array(self.point)
+        if self.axis is not None:
+            along = np.array(self.axis)
+            arms = arms - (arms @ along)[:, None] * along
+        return np.asarray(self.density * self.speed**2 * arms)
+
+
+def centrifugal(
+    body: str,
+    density: float,
+    speed: float,
+    point: GivenVector = (0.0, 0.0, 0.0),
+    axis: GivenVector | None = None,
+) -> BodyForce:
+    """Return the centrifugal force ρ ω² r on a body that turns about an axis; its supports turn with it.
+
+    It acts as on the undeformed body, and is exact for its cells, as it is linear in the coordinates.
+
+    Args:
+        body: Name of the body.
+        density: Mass per volume, in the scene's units, for steel in N, mm, s: 7.85e-9.
+        speed: Angular velocity ω, in radians per time; 2π n for n turns per unit of time.
+        point: A point of the axis, three coordinates, two in the plane, [length].
+        axis: Direction of the axis, of any length, by default that of z. A body of revolution turns about its
+            own axis, (0, 1); another plane body about an axis normal to the plane, which has none here.
+
+    Raises:
+        InvalidInputError: If numbers are not finite, or point and axis are not in one space.
+
+    Example:
+        >>> disc = centrifugal("disc", 7.85e-9, 2 * np.pi * 50.0)  # 3000 turns per minute
+        >>> rotor = centrifugal("rotor", 7.85e-9, 314.0, (0.0, 0.0), (0.0, 1.0))  # of revolution
+    """
+    numbers = np.asarray([density, speed], dtype=np.float64)
+    if not np.isfinite(numbers).all() or len(point) not in (2, 3) or not np.isfinite(point).all():
+        raise InvalidInputError(
+            "a centrifugal force needs finite numbers and the coordinates of a point, got density "
+            f"{density!r}, speed {speed!r} and point {point!r}: give them"
+        )
+    if axis is None and len(point) == 3:
+        axis = (0.0, 0.0, 1.0)
+    along = None if axis is None else unit_vector("the axis of a centrifugal force", axis, len(point))
+    return BodyForce(body, Spinning(float(density), float(speed), floats(np.asarray(point)), along))
+
+
+def point_mass(
+    body: str, surface: str, mass: float, acceleration: Sequence[float], at: GivenVector | None = None
+) -> TotalForce:
+    """Return the weight of a mass that is fastened to a surface, which stays as flexible as the body.
+
+    Args:
+        body: Name of the body.
+        surface: Name of the surface that carries it.
+        mass: The mass, in the scene's units, for steel in N, mm, s: in tonnes.
+        acceleration: Acceleration of gravity, or minus that of the body, [length / time²].
+        at: Centre of the mass, which need not lie in the body, [length]; by default the surface's centroid.
+
+    Example:
+        >>> motor = point_mass("frame", "seat", 0.025, (0, 0, -9810), at=(0, 0, 180))  # 25 kg, N and mm
+    """
+    pulled = checked_vector("acceleration", acceleration)
+    if not np.isfinite(mass) or not isinstance(pulled, tuple):
+        raise InvalidInputError(
+            f"a point mass needs a finite mass and a vector of numbers, got {mass!r} and {acceleration!r}: "
+            "give both, in the scene's units"
+        )
+    return TotalForce(body, surface, tuple(float(mass) * component for component in pulled), at=at)

@@ -12,7 +12,15 @@ import numpy as np
 
 from fenics_contact._base.checks import checked
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.loads import Load, Pressure, SurfaceLoad, ThermalStrain, TotalForce
+from fenics_contact._scene.loads import (
+    BodyForce,
+    Load,
+    Pressure,
+    Spinning,
+    SurfaceLoad,
+    ThermalStrain,
+    TotalForce,
+)
 from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface, Tie
 from fenics_contact._scene.preloads import Preload
@@ -59,6 +67,8 @@ class SceneParts:
                 self._require_off_axis(part)
             if isinstance(part, TotalForce):
                 self._require_lever(part)
+            if isinstance(part, BodyForce) and isinstance(part.value, Spinning):
+                part.value.require_axis(self.dim, self.axisymmetric)
             if isinstance(part, ThermalStrain):
                 self._require_expansion(part)
         pairs: list[ContactPair | Tie] = [*self.contacts, *self.ties]

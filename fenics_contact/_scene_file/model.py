@@ -283,6 +283,28 @@ class GravityLoad(_Load):
     kind: Literal["gravity"]
 
 
+@keys_of(loads.centrifugal)
+class CentrifugalLoad(_Load):
+    """Centrifugal force on a body that turns about an axis."""
+
+    changed: ClassVar[str] = "speed"
+    kind: Literal["centrifugal"]
+    speed: Scalar
+
+    def build(self, dim: int, value: Any = None) -> Load:
+        """Return the load, at the speed of a load step if given."""
+        speed = self.speed if value is None else value
+        return self.made(speed=float(speed(np.zeros((1, dim)))[0]) if callable(speed) else speed)
+
+
+@keys_of(loads.point_mass)
+class PointMassLoad(_Load):
+    """Weight of a mass that is fastened to a surface."""
+
+    changed: ClassVar[str] = "acceleration"
+    kind: Literal["point_mass"]
+
+
 @keys_of(loads.ThermalStrain)
 class ThermalLoad(_Load):
     """A change of temperature."""
@@ -384,6 +406,8 @@ LOADS = (
     table_of(loads.Pressure, _Load, kind="pressure"),
     table_of(loads.BodyForce, _Load, kind="body_force"),
     GravityLoad,
+    CentrifugalLoad,
+    PointMassLoad,
     ThermalLoad,
 )
 AnyLoad: TypeAlias = Annotated[Any, one_of("kind", *LOADS)]
