@@ -328,6 +328,6 @@ def _alike(scene: Scene, other: Scene) -> bool:
         return False
     return all(
         np.array_equal(scene.bodies[name].mesh.cells, other.bodies[name].mesh.cells)
-        and np.array_equal(scene.fixed(name), other.fixed(name))
+        and scene.holds_as(other, name)
         for name in scene.body_names
     )

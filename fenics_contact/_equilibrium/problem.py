@@ -72,6 +72,8 @@ def carried_over(old: DualSystem, solution: DualSolution, new: DualSystem) -> np
         friction[before.frictional] = np.einsum("na,nad->nd", tau, before.points.tangents[before.frictional])
         in_space = np.where(matched[:, None], friction[match], 0.0)[after.frictional]
         turned = np.einsum("nad,nd->na", after.points.tangents[after.frictional], in_space)
+        if after.decomposition.axes is not None:  # tangents that supports hold are known up to rounding
+            turned[after.relations[2].held(after.decomposition.fixed).reshape(turned.shape)] = 0.0
         _put(new, start, after.tangential_rows.ravel(), turned.ravel())
     return start
 

@@ -280,7 +280,7 @@ def _moved_further(torn: TornSystem, change: np.ndarray) -> TornSystem:
     supported = np.concatenate([relation.of_supports(change) for relation in torn.relations])
     supported = np.concatenate([np.zeros(torn.n_gluing), supported])
     right = -supported
-    right[: torn.n_gluing] = change.ravel()[gluing.dof]
+    right[: torn.n_gluing] = change.ravel()[gluing.dof]  # turned surfaces hold whole nodes
     owned = torn.numbering.owned
     return replace(torn, right=torn.right + right[owned], supported=torn.supported + supported[owned])
 

@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import ROUNDING, scaled_columns, scaled_rows
 from fenics_contact._large_deformations.loading import Loading
+from fenics_contact._scene.local_axes import free_matrix
 from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidPlane
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.scene import Scene
@@ -163,11 +164,16 @@ def unsymmetric_at(
     skew = sp.coo_matrix((stiffness - stiffness.T) / 2)
     row, column = dof[skew.row], dof[skew.col]
     free = (~decomposition.fixed).ravel()
+    if decomposition.axes is not None:  # there components of the coordinates are neither free nor held
+        free.reshape(-1, dim)[decomposition.axes.nodes] = True
     kept = nodes[row // dim] & free[row] & free[column]
     mine = (row[kept], column[kept], skew.data[kept], float(np.abs(stiffness.data).max(initial=0.0)))
     parts = decomposition.comm.allgather(mine)
     rows, columns, values = (np.concatenate([part[place] for part in parts]) for place in range(3))
     matrix = sp.csr_matrix((values, (rows, columns)), shape=(len(free),) * 2)
+    if decomposition.axes is not None:
+        onto = free_matrix(decomposition.fixed, decomposition.axes)
+        matrix = (onto @ matrix @ onto).tocsr()
     # Between neighbours it cancels but for rounding.
     matrix.data[np.abs(matrix.data) <= ROUNDING * max(part[3] for part in parts)] = 0.0
     matrix.eliminate_zeros()
@@ -319,6 +325,9 @@ class ContactConfiguration:
         """
         torn, points = self.torn, self.torn.points
         across = np.einsum("nad,nd->na", points.tangents**2, points.symmetric) > 0.5
+        if points.tilted is not None:
+            along = np.einsum("nad,npd->nap", points.tangents, points.tilted)
+            across |= np.max(along**2, axis=2) > 0.5
         held = np.zeros_like(across)
         held[torn.frictional] = torn.relations[2].held(torn.decomposition.fixed).reshape(-1, torn.dim - 1)
         return np.asarray(across & held)
@@ -398,10 +407,11 @@ class ContactConfiguration:
         decomposition = self.torn.decomposition
         points = self.torn.points if self.points is None else self.points.points
         further = []
+        fixed, axes = decomposition.fixed, decomposition.axes
         for columns, owner in turning.columns:
-            entries = columns.T.tocoo()
+            entries = (columns if axes is None else free_matrix(fixed, axes) @ columns).T.tocoo()
             node, component = np.divmod(entries.col, self.torn.dim)
-            free = ~decomposition.fixed[node, component]
+            free = ~fixed[node, component] if axes is None else np.full(len(node), True)
             further.append(
                 on_copies(
                     decomposition.tearing, entries.row[free], node[free], component[free],
@@ -435,7 +445,9 @@ class MovingContact(Contact):
         """Prepare the surfaces of all pairs. Collective."""
         from fenics_contact._pairing.sliding.contact import SlidingContact  # only for bodies that move far
 
-        self._sliding = SlidingContact.of(scene, decomposition.fixed, decomposition.comm)
+        self._sliding = SlidingContact.of(
+            scene, decomposition.fixed, decomposition.comm, axes=decomposition.axes
+        )
         self._places = scene.points
         surfaces = [
             side for pair in scene.contacts for side in (pair.slave, pair.master) if isinstance(side, Surface)
@@ -488,7 +500,11 @@ class MovingContact(Contact):
         coordinates = self._places.copy()
         coordinates[self._nodes] += nodal_mean_at(load.torn.decomposition, displacement, self._nodes)
         # Prescribed components reach their values within the step: gaps are those after it.
-        return np.where(np.isnan(load.prescribed), coordinates, self._places + load.prescribed)
+        moved, axes = coordinates - self._places, load.torn.decomposition.axes
+        if axes is None:
+            return np.where(np.isnan(load.prescribed), coordinates, self._places + load.prescribed)
+        local = np.where(np.isnan(load.prescribed), axes.to_local(moved), load.prescribed)
+        return np.asarray(self._places + axes.to_global(local))
 
 
 def _shape(master: Surface | RigidObstacle) -> Surface | RigidObstacle:

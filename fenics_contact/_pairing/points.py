@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
+from fenics_contact._scene.local_axes import LocalAxes, free_part
 from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tie, Tresca
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import together
@@ -45,7 +46,7 @@ class ContactPoints:
         axes: Coordinate axis nearest to the first tangent, as a unit vector, shape (n, dim).
         symmetric: Components normal to a plane of symmetry that cuts both surfaces there, or the one on an
             obstacle: the mirror images move opposite, so that there is no slip across the plane, shape (n,
-            dim).
+            dim). Other planes are `tilted`.
         distance: Measured distance of the surfaces along the normal, positive when apart, shape (n,),
             [length].
         given: Whether the pair says what the gap is, by a value or by declaring the measured overlap an
@@ -53,6 +54,8 @@ class ContactPoints:
         taken: Slave nodes plus one of other pairs that have a point in the same place, which is left out, on
             a surface beside: their areas are part of that of the point. Shape (n, n_pairs); None: none are.
         length: `sizes` on bodies of revolution, shape (n,), [length]; None elsewhere, where areas give them.
+        tilted: Unit normals of planes of symmetry that are not normal to an axis, as `symmetric`, zero where
+            a plane does not cut a point, shape (n, n_planes, dim); None: the scene has none.
     """
 
     pair: np.ndarray
@@ -70,6 +73,7 @@ class ContactPoints:
     given: np.ndarray
     taken: sp.csr_matrix | None = None
     length: np.ndarray | None = None
+    tilted: np.ndarray | None = None
 
     @property
     def sizes(self) -> np.ndarray:
@@ -135,13 +139,35 @@ def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> Conta
         strung("normal"), strung("tangents"), strung("gap"), strung("area"), strung("facet"), strung("local"),
         strung("axes"), strung("symmetric"), strung("distance"), strung("given"), taken,
         None if parts[0].length is None else strung("length"),
+        _strung_planes(parts, dim),
     )  # fmt: skip
+
+
+def _strung_planes(parts: Sequence[ContactPoints], dim: int) -> np.ndarray | None:
+    """Return the oblique planes of symmetry at all points, none where parts have none."""
+    most = max((part.tilted.shape[1] for part in parts if part.tilted is not None), default=0)
+    if not most:
+        return None
+    none = [np.zeros((part.count, most, dim)) for part in parts]
+    each = [zero if part.tilted is None else part.tilted for part, zero in zip(parts, none, strict=True)]
+    return np.concatenate(each)
 
 
 def reference_axes(normals: np.ndarray) -> np.ndarray:
     """Return for each normal the coordinate axis that is least aligned with it, shape (n, dim)."""
     # Rounding first: symmetric geometries have ties, which must not be decided by the last bit.
     return np.eye(normals.shape[1])[np.argmin(np.round(np.abs(normals), 6), axis=1)]
+
+
+def with_symmetry(points: ContactPoints, marks: np.ndarray, planes: np.ndarray | None) -> ContactPoints:
+    """Return points with the planes of symmetry that cut them.
+
+    `marks`: which planes do, shape (n, n_planes); `planes`: their normals, the axes first, or the axes alone.
+    """
+    dim = points.normal.shape[1]
+    if planes is None:
+        return replace(points, symmetric=marks)
+    return replace(points, symmetric=marks[:, :dim], tilted=marks[:, dim:, None] * planes[dim:])
 
 
 def movable(points: ContactPoints, fixed: np.ndarray) -> np.ndarray:
@@ -155,19 +181,84 @@ def movable(points: ContactPoints, fixed: np.ndarray) -> np.ndarray:
     return np.asarray((free > HELD**2 * every) & ~points.symmetric)
 
 
-def in_free_frames(points: ContactPoints, fixed: np.ndarray) -> ContactPoints:
+@dataclass(frozen=True, eq=False)
+class FreeSpaces:
+    """In which directions supports leave points free to move.
+
+    Attributes:
+        components: Those along the axes of the coordinates, shape (n_points, dim).
+        tilted: Points whose free directions are others, ascending, shape (k,).
+        projectors: The projections onto these, shape (k, dim, dim).
+    """
+
+    components: np.ndarray
+    tilted: np.ndarray
+    projectors: np.ndarray
+
+    @classmethod
+    def of(cls, points: ContactPoints, fixed: np.ndarray, axes: LocalAxes | None) -> FreeSpaces:
+        """Return those of points; `fixed`: whether components are prescribed, along the axes of nodes."""
+        dim, components = points.normal.shape[1], movable(points, fixed)
+        if axes is None and points.tilted is None:
+            return cls(components, np.zeros(0, dtype=np.int64), np.zeros((0, dim, dim)))
+        turned, jump = np.zeros(fixed.shape[0], dtype=bool), points.jump
+        if axes is not None:
+            turned[axes.nodes] = True
+        touched = np.asarray(abs(jump) @ turned.astype(float)) > 0.0
+        if points.tilted is not None:
+            touched |= points.tilted.any(axis=(1, 2))
+        at = np.flatnonzero(touched)
+        chosen = jump[at]
+        row, node = np.repeat(np.arange(len(at)), np.diff(chosen.indptr)), chosen.indices
+        square = np.zeros((len(at), dim, dim))
+        for axis in range(dim):
+            part = free_part(np.tile(np.eye(dim)[axis], (len(node), 1)), node, fixed, axes)
+            np.add.at(square[:, axis], row, chosen.data[:, None] ** 2 * part)
+        every = np.bincount(row, chosen.data**2, len(at))
+        value, vector = np.linalg.eigh(square / every[:, None, None])
+        held = np.einsum("nda,na,nea->nde", vector, value <= HELD**2, vector)
+        across = np.eye(dim) * points.symmetric[at][:, :, None]
+        if points.tilted is not None:
+            across = across + np.einsum("npd,npe->nde", points.tilted[at], points.tilted[at])
+        value, vector = np.linalg.eigh(held + across)
+        return cls(components, at, np.einsum("nda,na,nea->nde", vector, value <= HELD, vector))
+
+    def part(self, vectors: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
+        """Return the free parts of vectors at points, by default one at each, shape (n, dim)."""
+        which = np.arange(len(self.components)) if which is None else which
+        result = np.where(self.components[which], vectors, 0.0)
+        if len(self.tilted):
+            place = np.minimum(np.searchsorted(self.tilted, which), len(self.tilted) - 1)
+            mine = np.flatnonzero(self.tilted[place] == which)
+            result[mine] = np.einsum("nde,ne->nd", self.projectors[place[mine]], vectors[mine])
+        return result
+
+    def held_axes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return which points are held along one direction alone, (n,), and that direction, (n, dim)."""
+        held = (~self.components).astype(float)
+        single = held.sum(axis=1) == 1
+        if len(self.tilted):
+            value, vector = np.linalg.eigh(self.projectors)
+            single[self.tilted] = np.round(value).sum(axis=1) == self.components.shape[1] - 1
+            along = vector[:, :, 0]
+            largest = np.argmax(np.round(np.abs(along), 6), axis=1)[:, None]
+            held[self.tilted] = along * np.sign(np.take_along_axis(along, largest, axis=1))
+        return single, held
+
+
+def in_free_frames(points: ContactPoints, fixed: np.ndarray, axes: LocalAxes | None = None) -> ContactPoints:
     """Return points whose second tangent is the only direction of slip where supports leave one.
 
     Where one component is held, closed points can slip only normal to that axis and the normal.
 
-    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim), along its `axes`.
     """
     if points.normal.shape[1] == 2:
         return points
-    held = ~movable(points, fixed)
-    single = (held.sum(axis=1) == 1) & (np.einsum("nd,nd->n", held, points.normal**2) < 0.5)
-    axes = np.where(single[:, None], held.astype(float), points.axes)
-    return replace(points, axes=axes, tangents=tangent_frames(points.normal, axes))
+    single, held = FreeSpaces.of(points, fixed, axes).held_axes()
+    single &= np.einsum("nd,nd->n", held, points.normal) ** 2 < 0.5
+    first = np.where(single[:, None], held, points.axes)
+    return replace(points, axes=first, tangents=tangent_frames(points.normal, first))
 
 
 def tangent_frames(normals: np.ndarray, axes: np.ndarray | None = None) -> np.ndarray:
@@ -294,16 +385,22 @@ _LOG = logging.getLogger(__name__)
 
 
 def without_tied(
-    points: ContactPoints, ties: ContactPoints, scene: Scene, fixed: np.ndarray, *, told: bool
+    points: ContactPoints,
+    ties: ContactPoints,
+    scene: Scene,
+    fixed: np.ndarray,
+    axes: LocalAxes | None = None,
+    *,
+    told: bool,
 ) -> ContactPoints:
     """Return the contact points that no tie has as well.
 
     Where an edge belongs to a tie and to a contact, both hold the same relative displacement. Their normal
     forces would be split at will, and friction would follow. The tie alone has them: it keeps closed.
 
-    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim), along its `axes`.
     """
-    point, tied = _tied(points, ties, scene, fixed)
+    point, tied = _tied(points, ties, scene, fixed, axes)
     if not told:
         words = "the contact of %s leaves out %s, where the force is that of %s, which ties the same places"
         _tell(words, (scene.contacts, points, point), (scene.ties, ties, tied))
@@ -311,21 +408,27 @@ def without_tied(
 
 
 def tied_keys(
-    points: ContactPoints, ties: ContactPoints, scene: Scene, fixed: np.ndarray
+    points: ContactPoints,
+    ties: ContactPoints,
+    scene: Scene,
+    fixed: np.ndarray,
+    axes: LocalAxes | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return pair and slave node of the points that `without_tied` leaves out."""
-    point = np.unique(_tied(points, ties, scene, fixed)[0])
+    point = np.unique(_tied(points, ties, scene, fixed, axes)[0])
     return points.pair[point], points.slave[point]
 
 
-def tied_once(ties: ContactPoints, scene: Scene, fixed: np.ndarray) -> ContactPoints:
+def tied_once(
+    ties: ContactPoints, scene: Scene, fixed: np.ndarray, axes: LocalAxes | None = None
+) -> ContactPoints:
     """Return the points of ties without those of which another tie holds all, the first one of equals.
 
     Where an edge belongs to two ties, their forces would be split at will.
     """
     one, other, _ = _same_places(ties, ties)
     sliding = are_sliding(scene.ties, ties.pair)
-    held = _held(ties.normal[one], ties, other, scene, fixed)
+    held = _held(ties.normal[one], ties, other, scene, (fixed, axes))
     first = np.where(sliding[one] == sliding[other], ties.pair[other] < ties.pair[one], sliding[one])
     lost = one[held & first & (sliding[one] | ~sliding[other])]
     return ties.part(np.setdiff1d(np.arange(ties.count), lost))
@@ -406,22 +509,30 @@ def _shared(points: ContactPoints, scene: Scene) -> tuple[np.ndarray, np.ndarray
 
 
 def _tied(
-    points: ContactPoints, ties: ContactPoints, scene: Scene, fixed: np.ndarray
+    points: ContactPoints,
+    ties: ContactPoints,
+    scene: Scene,
+    fixed: np.ndarray,
+    axes: LocalAxes | None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the numbers of contact points and tied ones that hold the same displacement."""
     point, tied, _ = _same_places(points, ties)
-    held = _held(points.normal[point], ties, tied, scene, fixed)
+    held = _held(points.normal[point], ties, tied, scene, (fixed, axes))
     return point[held], tied[held]
 
 
 def _held(
-    normal: np.ndarray, ties: ContactPoints, tied: np.ndarray, scene: Scene, fixed: np.ndarray
+    normal: np.ndarray,
+    ties: ContactPoints,
+    tied: np.ndarray,
+    scene: Scene,
+    supported: tuple[np.ndarray, LocalAxes | None],
 ) -> np.ndarray:
     """Return whether tied points hold displacements along normals, shape (n, dim)."""
     sliding = are_sliding(scene.ties, ties.pair[tied])
     along = np.abs(np.einsum("nd,nd->n", normal, ties.normal[tied]))
     # A fixed tie holds all components but those that a support has on its slave.
-    bonded = np.linalg.norm(np.where(fixed[ties.slave[tied]], 0.0, normal), axis=1)
+    bonded = np.linalg.norm(free_part(normal, ties.slave[tied], *supported), axis=1)
     return np.asarray(np.where(sliding, along, bonded) > PARALLEL)
 
 

@@ -27,6 +27,7 @@ from fenics_contact._pairing.points import (
     join_points,
     reference_axes,
     tangent_frames,
+    with_symmetry,
 )
 from fenics_contact._pairing.projection import (
     shared_projection,
@@ -34,6 +35,7 @@ from fenics_contact._pairing.projection import (
     warn_of_surface,
     warn_of_uneven_pressure,
 )
+from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
@@ -260,6 +262,7 @@ def find_contact_points(
     fixed: np.ndarray,
     comm: MPI.Comm | None = None,
     *,
+    axes: LocalAxes | None = None,
     finer: bool = False,
     told: bool = False,
 ) -> ContactPoints:
@@ -268,17 +271,22 @@ def find_contact_points(
     Each rank searches a share of the nodes, and all receive all points. Nodes whose displacement is
     prescribed in all components cannot move and are omitted.
 
-    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `comm`: communicator of the
-    ranks that share the work; this rank alone by default.
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim), along its `axes`; `comm`:
+    communicator of the ranks that share the work; this rank alone by default.
     """
-    return _points_of_pairs(scene, scene.contacts, fixed, comm or MPI.COMM_SELF, finer, told)
+    return _points_of_pairs(scene, scene.contacts, (fixed, axes), comm or MPI.COMM_SELF, finer, told)
 
 
 def find_tied_points(
-    scene: Scene, fixed: np.ndarray, comm: MPI.Comm | None = None, *, told: bool = False
+    scene: Scene,
+    fixed: np.ndarray,
+    comm: MPI.Comm | None = None,
+    *,
+    axes: LocalAxes | None = None,
+    told: bool = False,
 ) -> ContactPoints:
     """Find the points of tied surfaces, as `find_contact_points`; ``pair`` numbers the ties. Collective."""
-    return _points_of_pairs(scene, scene.ties, fixed, comm or MPI.COMM_SELF, told=told)
+    return _points_of_pairs(scene, scene.ties, (fixed, axes), comm or MPI.COMM_SELF, told=told)
 
 
 def without_rounding(gap: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -320,11 +328,12 @@ class _Side:
 def _points_of_pairs(
     scene: Scene,
     pairs: Sequence[ContactPair | Tie],
-    fixed: np.ndarray,
+    supported: tuple[np.ndarray, LocalAxes | None],
     comm: MPI.Comm,
     finer: bool = False,
     told: bool = False,
 ) -> ContactPoints:
+    fixed, axes = supported
     parts, told = [], told or finer
     for index, pair in enumerate(pairs):
         if isinstance(pair, ContactPair) and pair.within_body:
@@ -337,7 +346,7 @@ def _points_of_pairs(
                 first = _measured(origin, pair, index, fixed, comm, finer, told=True)
             slave = first.slave - NodeNumbers.of(scene).first_of(pair.slave.body)
             points = with_given_gaps(points, first, pair, mesh.points[slave], comm)
-        parts.append(in_free_frames(points, fixed))
+        parts.append(in_free_frames(points, fixed, axes))
     return join_points(parts, scene.dim, len(fixed))
 
 
@@ -375,7 +384,7 @@ def _measured(
             if isinstance(pair, Tie):
                 held = ~movable | np.isin(slave.nodes, points.slave)
                 warn_of_edge(pair, slave.surface, held, master.surface, comm)
-        points = replace(points, symmetric=_symmetric(points, slave, master))
+        points = with_symmetry(points, _symmetric(points, slave, master), slave.surface.planes)
     if comm.rank == 0 and not movable.all():
         safe_log(
             _LOG.info,
@@ -393,15 +402,15 @@ def _measured(
 
 
 def _symmetric(points: ContactPoints, slave: _Side, master: _Side) -> np.ndarray:
-    """Return the components normal to symmetry planes that cut both surfaces at a point, (n_points, dim)."""
+    """Return the symmetry planes that cut both surfaces at a point, (n_points, n_planes)."""
     place = np.zeros((slave.n_nodes, points.normal.shape[1]))
-    cut = np.zeros((2, *place.shape), dtype=bool)
+    cut = np.zeros((2, slave.n_nodes, slave.surface.mirrored.shape[1]), dtype=bool)
     for here, side in zip(cut, (slave, master), strict=True):
         place[side.nodes], here[side.nodes] = side.surface.points, side.surface.mirrored
     met = points.master.tocoo()
     node, other = points.slave[met.row], met.col
-    same = np.abs(place[node] - place[other]) <= coordinate_rounding(place)
-    symmetric = np.zeros(points.normal.shape, dtype=bool)
+    same = np.abs(slave.surface.across(place[node] - place[other])) <= coordinate_rounding(place)
+    symmetric = np.zeros((points.count, cut.shape[2]), dtype=bool)
     np.logical_or.at(symmetric, met.row, cut[0][node] & cut[1][other] & same)
     return symmetric
 
@@ -449,7 +458,7 @@ def _on_obstacle(slave: _Side, movable: np.ndarray, obstacle: RigidObstacle) -> 
     chosen = candidates[facing]
     gap = evaluate_shape(obstacle, "distance", slave.surface.points[chosen])
     points = _points(slave, chosen, normals[facing], gap, sp.csr_matrix((len(chosen), slave.n_nodes)))
-    return replace(points, symmetric=slave.surface.mirrored[chosen])
+    return with_symmetry(points, slave.surface.mirrored[chosen], slave.surface.planes)
 
 
 def _points(

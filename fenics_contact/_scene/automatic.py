@@ -14,6 +14,7 @@ from fenics_contact._base.checks import checked
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.pairs import AnyDiscretisation, ContactPair, Friction, Surface
+from fenics_contact._scene.supports import Roller
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import safe_log
@@ -165,7 +166,11 @@ def _largest_motion(scene: SceneParts) -> float:
     """Return the largest displacement that supports prescribe, [length]."""
     sizes = [0.0]
     for support in scene.supports:
-        values = np.nan_to_num(scene.given(support)[1])
+        if isinstance(support, Roller):
+            mesh = scene.bodies[support.body].mesh
+            values = support.amounts(mesh.points[np.unique(mesh.surfaces[support.surface])])[:, None]
+        else:
+            values = np.nan_to_num(scene.given(support)[1])
         sizes.append(float(np.linalg.norm(values, axis=1).max(initial=0.0)))
     return max(sizes)
 

@@ -14,7 +14,8 @@ from fenics_contact._base.display import counted, displayed
 from fenics_contact._scene.loads import BodyForce, Load, Pressure, ThermalStrain, TotalForce
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
 from fenics_contact._scene.parts import in_words, surface_of
-from fenics_contact._scene.supports import RigidSurface
+from fenics_contact._scene.rollers import direction_of
+from fenics_contact._scene.supports import RigidSurface, Roller
 from fenics_contact._surfaces.facets import FacetedSurface, heights, quadrature_areas
 from fenics_contact._surfaces.projection import project
 from fenics_contact.materials.elastic import PlaneStress
@@ -39,6 +40,11 @@ def displacement_along(scene: SceneParts, normal: np.ndarray) -> float:
     """Return the largest displacement along a direction that a support prescribes as a number, [length]."""
     sizes = [0.0]
     for support in scene.supports:
+        if isinstance(support, Roller):
+            along = direction_of(scene.bodies[support.body].mesh, support)
+            if along is not None and not callable(support.displacement):
+                sizes.append(abs(support.displacement * float(along @ normal)))
+            continue
         given = support.motion[: scene.dim] if isinstance(support, RigidSurface) else support.value
         value = [0.0 if number is None or callable(number) else number for number in given]
         sizes.append(abs(float(np.array(value) @ normal)))
@@ -429,9 +435,10 @@ def _moved_by_supports(scene: SceneParts, name: str) -> np.ndarray:
     """Return the rigid motion of a body's nodes nearest to what its supports prescribe, (n_nodes, dim)."""
     points = scene.bodies[name].mesh.points
     modes = rigid_body_modes(points)
-    prescribed = scene.prescribed(name)
+    prescribed, axes = scene.prescribed_along(name)
     given = ~np.isnan(prescribed)
-    motion = np.linalg.lstsq(modes[given], prescribed[given], rcond=None)[0]
+    along = modes if axes is None else axes.to_local(modes)
+    motion = np.linalg.lstsq(along[given], prescribed[given], rcond=None)[0]
     return np.asarray(modes @ motion)
 
 

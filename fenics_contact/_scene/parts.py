@@ -21,10 +21,12 @@ from fenics_contact._scene.loads import (
     ThermalStrain,
     TotalForce,
 )
+from fenics_contact._scene.local_axes import HeldDirections, LocalAxes, held_along, same_axes
 from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface, Tie
 from fenics_contact._scene.preloads import Preload
-from fenics_contact._scene.supports import AnySupport, RigidSurface, Support
+from fenics_contact._scene.rollers import direction_of, flat_normal, held_directions, widest_angle
+from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
 from fenics_contact._surfaces.projection import surfaces_match
 from fenics_contact._surfaces.true_surface import Geometry, true_surface
@@ -61,7 +63,7 @@ class SceneParts:
             self._require(preload.body, None, "Preload")
         object.__setattr__(self, "supports", tuple(map(self._in_space, self.supports)))
         for part in (*self.supports, *self.loads):
-            if not isinstance(part, RigidSurface):
+            if not isinstance(part, RigidSurface | Roller):
                 self._require_components(part)
             if self.axisymmetric:
                 self._require_off_axis(part)
@@ -136,6 +138,9 @@ class SceneParts:
         dim = self.bodies[support.body].mesh.dim
         if isinstance(support, Support):
             return support.held_in(dim)
+        if isinstance(support, Roller):
+            self._require_direction(support)
+            return support
         if self.axisymmetric:
             support = support.along_axis()
         if support.dim != dim:
@@ -144,6 +149,22 @@ class SceneParts:
                 f"coordinates, got {support.at!r}: give {dim} of them, and as many displacements"
             )
         return support
+
+    def _require_direction(self, roller: Roller) -> None:
+        """Reject a direction in another space, and normals that change where bodies deform much."""
+        mesh, given = self.bodies[roller.body].mesh, roller.direction
+        where = f"surface {roller.surface!r} of body {roller.body!r}"
+        if given is not None and len(given) != mesh.dim:
+            raise InvalidInputError(
+                f"Roller.direction of {where} must have {mesh.dim} components, got {given!r}: give "
+                f"{mesh.dim} of them, or none for the normal"
+            )
+        if self.bodies[roller.body].deforms_much and direction_of(mesh, roller) is None:
+            raise InvalidInputError(
+                f"a roller on a body that deforms much needs one direction, but {where} is curved, its "
+                f"normals turn by up to {widest_angle(mesh, roller.surface):.3g} degrees: give the roller a "
+                "direction, or hold the surface by a RigidObstacle and contact"
+            )
 
     def _require_components(self, part: Load | Support) -> None:
         """Reject a vector whose dimension is not that of its body."""
@@ -244,10 +265,13 @@ class SceneParts:
         return self.dim == 2 and not self.axisymmetric
 
     def fixed(self, body: str, supports: Sequence[AnySupport] | None = None) -> np.ndarray:
-        """Return which components of a body's nodes supports prescribe, shape (n_nodes, dim).
+        """Return which components of a body's nodes supports prescribe, along the axes of `prescribed_along`.
 
         Args:
             supports: Those that count, all by default.
+
+        Returns:
+            Shape (n_nodes, dim).
         """
         return ~np.isnan(self.prescribed(body, supports))
 
@@ -257,17 +281,53 @@ class SceneParts:
         Args:
             supports: Those that count, all by default; where they disagree the last one.
         """
+        return self.prescribed_along(body, supports)[0]
+
+    def prescribed_along(
+        self, body: str, supports: Sequence[AnySupport] | None = None
+    ) -> tuple[np.ndarray, LocalAxes | None]:
+        """Return what `prescribed` returns, and along which axes; None: all along the coordinates'."""
+        chosen = self.supports if supports is None else supports
         values = np.full(self.bodies[body].mesh.points.shape, np.nan)
-        for support in self.supports if supports is None else supports:
-            if support.body == body:
+        for support in chosen:
+            if support.body == body and not isinstance(support, Roller):
                 nodes, given = self.given(support)
                 values[nodes] = np.where(np.isnan(given), values[nodes], given)
         axis = self.bodies[body].on_axis
         check_axis(body, values[axis, 0])
         values[axis, 0] = 0.0
-        return values
+        return self.held_by_rollers(body, values, chosen)
 
-    def given(self, support: AnySupport) -> tuple[np.ndarray, np.ndarray]:
+    def holds_as(self, other: SceneParts, body: str) -> bool:
+        """Return whether its supports hold the same components of a body's nodes, along the same axes."""
+        (mine, axes), (theirs, others) = (each.prescribed_along(body) for each in (self, other))
+        return np.array_equal(np.isnan(mine), np.isnan(theirs)) and same_axes(axes, others)
+
+    @property
+    def rolling_bodies(self) -> tuple[str, ...]:
+        """Names of the bodies with rollers."""
+        rolling = {support.body for support in self.supports if isinstance(support, Roller)}
+        return tuple(name for name in self.bodies if name in rolling)
+
+    def held_by_rollers(
+        self, body: str, prescribed: np.ndarray, supports: Sequence[AnySupport] | None = None
+    ) -> tuple[np.ndarray, LocalAxes | None]:
+        """Return prescribed components of a body with those of its rollers, and along which axes.
+
+        `prescribed`: those of other supports, NaN where free, shape (n_nodes, dim), [length].
+        """
+        chosen = self.supports if supports is None else supports
+        rollers = [each for each in chosen if isinstance(each, Roller) and each.body == body]
+        if not rollers:
+            return prescribed, None
+        return held_along(prescribed, [self.directions_of(roller) for roller in rollers], body)
+
+    def directions_of(self, roller: Roller) -> HeldDirections:
+        """Return along what a roller holds which nodes of its body, and by how much they move."""
+        mesh = self.bodies[roller.body].mesh
+        return held_directions(mesh, roller, mirrored(self, roller.body), planes_of(self))
+
+    def given(self, support: Support | RigidSurface) -> tuple[np.ndarray, np.ndarray]:
         """Return the nodes of a support, ascending, and what it prescribes, NaN where free, (n, dim)."""
         body = self.bodies[support.body]
         nodes = np.unique(body.mesh.surfaces[support.surface])
@@ -436,19 +496,49 @@ def _faceted(mesh: BodyMesh, surface: str) -> FacetedSurface:
 TILT = 1e-9
 
 
-def mirrored(scene: SceneParts, body: str) -> np.ndarray:
-    """Return which nodes of a body lie on a plane of symmetry normal to each axis, shape (n_nodes, dim).
-
-    A plane of symmetry is a flat side normal to an axis on which a support prescribes only that component. On
-    the axis of revolution surfaces have none that is normal to it.
-    """
-    mesh = scene.bodies[body].mesh
-    marks = np.zeros(mesh.points.shape, dtype=bool)
+def planes_of(scene: SceneParts) -> np.ndarray | None:
+    """Return the normals of planes of symmetry, the axes first, (n_planes, dim); None: the axes alone."""
+    planes = [*np.eye(scene.dim)]
     for support in scene.supports:
-        if isinstance(support, RigidSurface):
+        normal = _plane(scene, support)
+        if normal is not None and np.max(np.abs(planes @ normal)) < 1.0 - TILT:
+            planes.append(normal)
+    return np.array(planes) if len(planes) > scene.dim else None
+
+
+def _plane(scene: SceneParts, support: AnySupport) -> np.ndarray | None:
+    """Return the normal of the flat side that a roller holds across, if it is one of symmetry."""
+    if not isinstance(support, Roller) or callable(support.displacement):
+        return None
+    mesh = scene.bodies[support.body].mesh
+    normal = flat_normal(mesh, support.surface)
+    if normal is None or abs(direction_of(mesh, support) @ normal) < 1.0 - TILT:
+        return None
+    if scene.axisymmetric and abs(normal[1]) < 1.0 - TILT:  # a cone
+        return None
+    return normal
+
+
+def mirrored(scene: SceneParts, body: str) -> np.ndarray:
+    """Return which nodes of a body lie on which plane of symmetry, shape (n_nodes, n_planes).
+
+    A plane of symmetry is a flat side on which a support prescribes only the component normal to it. The
+    columns are those of `planes_of`, by default of planes normal to the axes. On the axis of revolution
+    surfaces have none that is normal to it.
+    """
+    mesh, planes = scene.bodies[body].mesh, planes_of(scene)
+    planes = np.eye(scene.dim) if planes is None else planes
+    marks = np.zeros((mesh.n_nodes, len(planes)), dtype=bool)
+    for support in scene.supports:
+        if support.body != body or isinstance(support, RigidSurface):
+            continue
+        if isinstance(support, Roller):
+            normal = _plane(scene, support)
+            if normal is not None:
+                marks[mesh.surfaces[support.surface].ravel(), np.argmax(np.abs(planes @ normal))] = True
             continue
         given = [axis for axis, value in enumerate(support.value) if value is not None]
-        if support.body != body or len(given) != 1 or callable(support.value[given[0]]):
+        if len(given) != 1 or callable(support.value[given[0]]):
             continue
         facets = mesh.surfaces[support.surface]
         areas = vector_areas(mesh.points, facets)
@@ -464,5 +554,6 @@ def surface_of(
     """Return a named surface; its normals lie in the planes of symmetry that cut it."""
     body, marks = scene.bodies[surface.body], mirrored(scene, surface.body)
     return true_surface(
-        body.mesh, surface.name, geometry, mirrored=marks, finer=finer, axisymmetric=body.axisymmetric
-    )
+        body.mesh, surface.name, geometry, mirrored=marks, planes=planes_of(scene), finer=finer,
+        axisymmetric=body.axisymmetric,
+    )  # fmt: skip

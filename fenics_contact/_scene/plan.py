@@ -15,7 +15,7 @@ from fenics_contact._base.sparse import expected_bytes
 from fenics_contact._scene.loads import BodyForce, ThermalStrain
 from fenics_contact._scene.pairs import Coulomb, Surface, Tresca
 from fenics_contact._scene.parts import in_words
-from fenics_contact._scene.supports import RigidSurface
+from fenics_contact._scene.supports import RigidSurface, Roller
 from fenics_contact._surfaces.facets import has_midside_pressure
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -34,6 +34,7 @@ class EffectName(StrEnum):
     AXISYMMETRY = "axisymmetry"
     NONLINEAR_MATERIAL = "nonlinear material"
     PRESCRIBED_DISPLACEMENT = "prescribed displacement"
+    ROLLER = "roller"
     RIGID_SURFACE = "rigid surface"
     BODY_FORCE = "body force"
     SURFACE_LOAD = "surface load"
@@ -61,7 +62,7 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
     names, loads = EffectName, scene.loads
     turned = sum(body.axisymmetric for body in scene.bodies.values())
     nonlinear = sum(any(map(is_nonlinear, body.materials)) for body in scene.bodies.values())
-    rigid = sum(isinstance(support, RigidSurface) for support in scene.supports)
+    rigid, rolling = (sum(isinstance(s, kind) for s in scene.supports) for kind in (RigidSurface, Roller))
     volume = sum(isinstance(load, BodyForce) for load in loads)
     thermal = sum(isinstance(load, ThermalStrain) for load in loads)
     rubbing = [pair.friction for pair in scene.contacts if pair.has_friction]
@@ -74,7 +75,8 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
         (names.AXISYMMETRY, turned, "body of revolution, all per revolution",
          "bodies of revolution, all per revolution"),
         (names.NONLINEAR_MATERIAL, nonlinear, "body deforms much or yields", "bodies do"),
-        (names.PRESCRIBED_DISPLACEMENT, len(scene.supports) - rigid, "support", "supports"),
+        (names.PRESCRIBED_DISPLACEMENT, len(scene.supports) - rigid - rolling, "support", "supports"),
+        (names.ROLLER, rolling, "surface slides", "surfaces slide"),
         (names.RIGID_SURFACE, rigid, "surface stays rigid", "surfaces stay rigid"),
         (names.BODY_FORCE, volume, "load on a volume", "loads on volumes"),
         (names.SURFACE_LOAD, len(loads) - volume - thermal, "load on a surface", "loads on surfaces"),
@@ -106,7 +108,8 @@ def held_components(scene: SceneParts, body: str, modes: np.ndarray) -> np.ndarr
     mesh = scene.bodies[body].mesh
     loose = [each for each in scene.supports if isinstance(each, RigidSurface) and each.free.any()]
     firm = [each for each in scene.supports if each not in loose]
-    rows = [modes[scene.fixed(body, firm)]]
+    prescribed, axes = scene.prescribed_along(body, firm)
+    rows = [(modes if axes is None else axes.to_local(modes))[~np.isnan(prescribed)]]
     for surface in loose:
         if surface.body == body:
             rows.append(_of_point(surface, mesh, modes)[~surface.free])

@@ -1,4 +1,4 @@
-"""Supports: displacements prescribed on surfaces, and surfaces that move as one rigid piece."""
+"""Supports: displacements prescribed on surfaces, rollers, and surfaces that move as one rigid piece."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fenics_contact._base.checks import GivenVector, checked, floats
+from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
 from fenics_contact._scene.fields import OfPosition, evaluate
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.kernels import motions_about
@@ -86,6 +86,68 @@ class Support:
             elif given is not None:
                 result[:, component] = given
         return result
+
+
+@dataclass(frozen=True)
+@checked()
+class Roller:
+    """A surface that slides: the displacement along its normal, or another direction, alone is prescribed.
+
+    On a flat side it is a plane of symmetry, in whatever direction that lies: surfaces of contact that it
+    cuts go on smoothly behind it. On a curved side each node is held along the normal there, that of the true
+    surface where the mesh knows its shape; where the side has an edge, along the normals on both sides of it.
+
+    Attributes:
+        body: Name of the body.
+        surface: Name of its surface.
+        displacement: Displacement along the direction, along the normal positive outwards, [length]: a
+            number, zero by default, or a function that receives points, shape (n, dim), and returns it there,
+            shape (n,).
+        direction: The direction, of any length; the outward normal at every node by default.
+
+    Raises:
+        InvalidInputError: If the direction is zero, or the displacement is no finite number or function.
+
+    Example:
+        >>> tilted = Roller("sector", "cut")  # a plane of symmetry at any angle
+        >>> guided = Roller("pin", "head", direction=(1.0, 1.0, 0.0))
+        >>> round_the_hole = Roller("plate", "bore", displacement=0.02)  # mm, shrinks all around
+    """
+
+    body: str
+    surface: str
+    displacement: float | OfPosition = 0.0
+    direction: GivenVector | None = None
+
+    def __post_init__(self) -> None:
+        """Reject a direction without length and a displacement that is no number."""
+        given = self.displacement
+        if not (callable(given) or np.isfinite(given)):
+            raise InvalidInputError(
+                f"Roller.displacement of surface {self.surface!r} of body {self.body!r} must be a finite "
+                f"number or a function of the points, got {given!r}: 0.0 holds the surface where it is"
+            )
+        if self.direction is not None:
+            name = f"Roller.direction of surface {self.surface!r} of body {self.body!r}"
+            dim = 2 if len(self.direction) == 2 else 3
+            object.__setattr__(self, "direction", unit_vector(name, self.direction, dim))
+
+    @property
+    def in_words(self) -> str:
+        """Where it is and what it prescribes."""
+        amount = "function" if callable(self.displacement) else f"{self.displacement:g}"
+        along = self.direction and f"({', '.join(f'{part:.4g}' for part in self.direction)})"
+        return f"{self.body} {self.surface} slides, {amount} along {along or 'the normal'}"
+
+    def amounts(self, points: np.ndarray) -> np.ndarray:
+        """Return the prescribed displacement at points, shape (n, dim), along the direction there, (n,).
+
+        Raises:
+            InvalidInputError: If a function does not return one finite number per point.
+        """
+        if callable(self.displacement):
+            return evaluate(f"the roller on surface {self.surface!r}", self.displacement, points, ())
+        return np.full(len(points), float(self.displacement))
 
 
 #: Components of a motion: a number prescribes one, None leaves it free.
@@ -247,4 +309,4 @@ class RigidSurface:
 
 
 #: What prescribes displacements of a surface.
-AnySupport: TypeAlias = Support | RigidSurface
+AnySupport: TypeAlias = Support | RigidSurface | Roller

@@ -22,7 +22,7 @@ from fenics_contact._scene.body import Body
 from fenics_contact._scene.loads import SurfaceLoad
 from fenics_contact._scene.obstacles import DistanceObstacle
 from fenics_contact._scene.pairs import ContactPair
-from fenics_contact._scene.supports import Support
+from fenics_contact._scene.supports import Roller, Support
 from fenics_contact._scene_file.bodies import Shaped
 from fenics_contact._scene_file.part import Part, keys_of, table_of
 from fenics_contact._scene_file.values import (
@@ -241,6 +241,9 @@ def check_formulas(part: Any, bodies: Mapping[str, Body]) -> None:
     if isinstance(part, Support):
         if any(map(callable, part.value)):
             part.values(_nodes(bodies[part.body], part.surface))
+    elif isinstance(part, Roller):
+        if callable(part.displacement):
+            part.amounts(_nodes(bodies[part.body], part.surface))
     elif isinstance(part, ContactPair):
         if isinstance(part.master, DistanceObstacle):
             part.master.distance(_nodes(bodies[part.slave.body], part.slave.name))

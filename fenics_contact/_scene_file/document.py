@@ -245,7 +245,8 @@ def load_steps(
         _require_few(steps)
     dim = next(iter(bodies.values())).mesh.dim
     in_parts = any(is_nonlinear(each) for body in bodies.values() for each in body.materials)
-    held = _Values([part.name for part in supports], [part.size or (0.0,) * dim for part in supports])
+    own = [(0.0,) * dim if part.size is None else part.size for part in supports]
+    held = _Values([part.name for part in supports], own)
     acting = _Values([part.name for part in loads], [part.size for part in loads])
     built: list[LoadStep] = []
     begin = 0.0

@@ -17,7 +17,7 @@ from fenics_contact._scene.loads import Load
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
 from fenics_contact._scene.preloads import Preload, Section
-from fenics_contact._scene.supports import RigidSurface, Support
+from fenics_contact._scene.supports import RigidSurface, Roller, Support
 from fenics_contact._scene_file.part import Part, keys_of, table_of
 from fenics_contact._scene_file.values import (
     FREE,
@@ -362,6 +362,24 @@ class RigidPart(_Named):
         return float(component(np.array([self.at]))[0])  # type: ignore[attr-defined]
 
 
+@keys_of(Roller)
+class RollerPart(_Named):
+    """A surface that slides: displacement prescribed along its normal or another direction."""
+
+    changed: ClassVar[str] = "displacement"
+    kind: Literal["roller"]
+    displacement: ScalarField = Field(
+        0.0,
+        alias="value",
+        description="displacement along the direction, along the normal positive outwards, [length]: a "
+        "number, a formula in x, y, z in quotes, or a field from a file; zero by default",
+    )
+
+    def build(self, dim: int, value: Any = None) -> Roller:
+        """Return the roller, with the displacement of a load step if given."""
+        return self.made(displacement=self.displacement if value is None else value)
+
+
 @keys_of(Preload, without=("section", "name"))
 class PreloadPart(Part):
     """A bolt drawn together at a section of its body; without force and shortening held at its length."""
@@ -397,7 +415,7 @@ class PreloadAim(Part):
 
 
 AnySupportPart: TypeAlias = Annotated[
-    Any, one_of("kind", RigidPart, other=SupportPart, when=lambda part: "kind" not in part)
+    Any, one_of("kind", RigidPart, RollerPart, other=SupportPart, when=lambda part: "kind" not in part)
 ]
 LOADS = (
     table_of(loads.Traction, _Load, kind="traction"),

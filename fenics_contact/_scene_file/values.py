@@ -485,11 +485,14 @@ VectorOrFormulas: TypeAlias = Annotated[
 ]
 _HELD = f"three numbers, formulas or '{FREE}' {_AXES}, or tables {{file = ..., field = ...}} among them"
 Components: TypeAlias = Annotated[Any, _row(float | _FREE | Formula | FieldFile, 2, 3, _HELD)]
+_STEP = f"numbers, formulas or '{FREE}' in brackets, as many as the support's own value has"
 StepComponents: TypeAlias = Annotated[
     Any,
-    _row(
-        float | _FREE | Formula | FieldFile, 2, 6,
-        f"numbers, formulas or '{FREE}' in brackets, as many as the support's own value has",
+    Read(
+        Annotated[
+            float | Formula | FieldFile | _row(float | _FREE | Formula | FieldFile, 2, 6, _STEP).annotation,
+            with_message(_STEP),
+        ]
     ),
 ]  # fmt: skip
 Motion: TypeAlias = Annotated[

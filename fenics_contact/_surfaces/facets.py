@@ -324,11 +324,13 @@ class FacetedSurface:
         areas: Area, in the plane length, that belongs to each node, shape (n,), [length²] or [length]; zero
             at the corners of quadratic triangles, on which a pressure does not bear. On bodies of revolution
             that of the whole circumference.
-        mirrored: Components that the normals lack on planes of symmetry, shape (n, dim).
+        mirrored: On which planes of symmetry the nodes lie, across which the normals have no component: a
+            column for each plane, those normal to the axes first, shape (n, n_planes).
         relief: The true surface relative to the facets; None if it is unknown or coincides with them.
         whole: The quadratic facets that were cut into these, as rows of positions in ``nodes``; None if they
             are whole.
         axisymmetric: Whether it is that of a body of revolution, half of its section.
+        planes: Unit normals of the planes of symmetry, shape (n_planes, dim); None: they are the axes.
     """
 
     nodes: np.ndarray
@@ -340,6 +342,15 @@ class FacetedSurface:
     relief: Relief | None = None
     whole: np.ndarray | None = None
     axisymmetric: bool = False
+    planes: np.ndarray | None = None
+
+    def within(self, vectors: np.ndarray, mirrored: np.ndarray) -> np.ndarray:
+        """Return vectors without their components across planes of symmetry, both (n, dim), (n, n_planes)."""
+        return within_planes(vectors, mirrored, self.planes)
+
+    def across(self, vectors: np.ndarray) -> np.ndarray:
+        """Return the components of vectors across all planes of symmetry, shape (n, n_planes)."""
+        return vectors if self.planes is None else np.asarray(vectors @ self.planes.T)
 
     @cached_property
     def normals(self) -> np.ndarray:
@@ -381,8 +392,36 @@ class FacetedSurface:
         return np.asarray(areas ** (1.0 / (self.dim - 1)))
 
 
+def within_planes(
+    vectors: np.ndarray, marks: np.ndarray, planes: np.ndarray | None, same: float = 1e-6
+) -> np.ndarray:
+    """Return vectors without their components across planes, shape (n, dim).
+
+    `vectors`: shape (n, dim); `marks`: planes in which each must lie, shape (n, n_planes); `planes`: their
+    unit normals, shape (n_planes, dim), the axes first; None: the axes alone; `same`: planes are the same if
+    the sine of the angle between them is below this.
+    """
+    dim = vectors.shape[1]
+    result = np.where(marks[:, :dim], 0.0, vectors)
+    if planes is None:
+        return result
+    across = [np.where(marks[:, axis, None], np.eye(dim)[axis], 0.0) for axis in range(dim)]
+    for normal, marked in zip(planes[dim:], marks[:, dim:].T, strict=True):
+        own = np.where(marked[:, None], normal, 0.0)
+        for other in across:  # planes at one node need not be perpendicular to each other
+            own = own - np.einsum("nd,nd->n", own, other)[:, None] * other
+        size = np.linalg.norm(own, axis=1)[:, None]
+        own = np.where(size > same, own / np.where(size > 0.0, size, 1.0), 0.0)
+        across.append(own)
+        result = result - np.einsum("nd,nd->n", result, own)[:, None] * own
+    return result
+
+
 def faceted_surface(
-    points: np.ndarray, facets: np.ndarray, mirrored: np.ndarray | None = None
+    points: np.ndarray,
+    facets: np.ndarray,
+    mirrored: np.ndarray | None = None,
+    planes: np.ndarray | None = None,
 ) -> FacetedSurface:
     """Build the surface from the coordinates of a body and rows of its node numbers.
 
@@ -390,7 +429,8 @@ def faceted_surface(
 
     `points`: coordinates, shape (n_nodes, 3), or (n_nodes, 2) where the facets are edges, [length]; `facets`:
     node numbers of triangles, quadrilaterals or edges, shape (n_facets, 3, 4 or 2); `mirrored`: which nodes
-    lie on a plane of symmetry normal to each axis, shape (n_nodes, dim); by default none.
+    lie on which plane of symmetry, shape (n_nodes, n_planes), by default none; `planes`: their normals, see
+    `FacetedSurface`.
     """
     corners, dim = facets.shape[1], points.shape[1]
     if (corners, dim) not in {(2, 2), (3, 3), (4, 3)}:
@@ -405,12 +445,12 @@ def faceted_surface(
     summed = np.zeros_like(own)
     np.add.at(summed, local, products)
     flat = np.zeros(own.shape, dtype=bool) if mirrored is None else mirrored[nodes]
-    within = np.where(flat, 0.0, summed)
+    within = within_planes(summed, flat, planes)
     # A surface that lies in the plane itself is not cut by it.
     flat &= (np.linalg.norm(within, axis=1) > CUT * np.linalg.norm(summed, axis=1))[:, None]
-    summed[flat] = 0.0
-    areas = _linear_areas(own, local)
-    return FacetedSurface(nodes, local, own, summed / np.linalg.norm(summed, axis=1)[:, None], areas, flat)
+    summed = within_planes(summed, flat, planes)
+    averaged = summed / np.linalg.norm(summed, axis=1)[:, None]
+    return FacetedSurface(nodes, local, own, averaged, _linear_areas(own, local), flat, planes=planes)
 
 
 def _linear_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:

@@ -117,7 +117,7 @@ class Wedges:
     Attributes:
         of_corner: Wedge of each corner, shape (n_facets, corners).
         node: Node of each wedge, shape (n_wedges,).
-        mirrored: Planes of symmetry across which it continues smoothly, shape (n_wedges, dim).
+        mirrored: Planes of symmetry across which it continues smoothly, shape (n_wedges, n_planes).
         rim: Whether it ends at an edge, the surface's or a crease, shape (n_wedges,).
     """
 
@@ -150,7 +150,7 @@ def wedges_of(surface: FacetedSurface) -> Wedges:
     number, wedge = connected_components(graph, directed=False)
     node = np.zeros(number, dtype=np.int64)
     node[wedge] = surface.facets.ravel()
-    mirrored = np.zeros((number, surface.dim), dtype=bool)
+    mirrored = np.zeros((number, surface.mirrored.shape[1]), dtype=bool)
     start = stop = len(joints.angle)
     for axis, image in enumerate(images):
         begin, stop = stop, stop + len(image.angle)
@@ -164,20 +164,21 @@ def wedges_of(surface: FacetedSurface) -> Wedges:
 
 
 def _joints_with_images(surface: FacetedSurface) -> list[_Joints]:
-    """Return the joints of a surface with its mirror images across each axis."""
+    """Return the joints of a surface with its mirror images across each plane of symmetry."""
     count, corners = surface.facets.shape
     corner, joints = np.arange(count * corners).reshape(count, corners), []
     summed = corner_products(surface.points, surface.facets).sum(axis=1)
     unit = summed / np.linalg.norm(summed, axis=1)[:, None]
-    for axis in range(surface.dim):
-        there = surface.mirrored[surface.facets, axis]
+    planes = np.eye(surface.dim) if surface.planes is None else surface.planes
+    for number, plane in enumerate(planes):
+        there = surface.mirrored[surface.facets, number]
         if corners > 2:
             there &= np.roll(there, -1, axis=1)
         facet, place = np.nonzero(there)
         ends = corner[facet, place][:, None]
         if corners > 2:
             ends = np.column_stack([ends, corner[facet, (place + 1) % corners]])
-        angle = 2 * np.arcsin(np.minimum(np.abs(unit[facet, axis]), 1.0))
+        angle = 2 * np.arcsin(np.minimum(np.abs(unit[facet] @ plane), 1.0))
         joints.append(_Joints(np.stack([facet, facet], 1), np.stack([ends, ends], 1), angle))
     return joints
 
@@ -267,11 +268,12 @@ def _fitted(surface: FacetedSurface, wedges: Wedges, order: int) -> tuple[np.nda
     count, dim = len(node), surface.dim
     summed = np.zeros((count, dim))
     np.add.at(summed, wedges.of_corner, corner_products(surface.points, surface.facets))
-    summed[mirrored] = 0.0
+    summed = surface.within(summed, mirrored)
     mean = summed / np.linalg.norm(summed, axis=1)[:, None]
     centre, around, narrow = wedges.patches(order)
     away = surface.points[node[around]] - surface.points[node[centre]]
-    away, centre = _with_mirror_images(away, centre, mirrored)
+    planes = np.eye(dim) if surface.planes is None else surface.planes
+    away, centre = _with_mirror_images(away, centre, mirrored, planes)
     size = np.zeros(count)
     np.maximum.at(size, centre, np.linalg.norm(away, axis=1))
     # Relative to the patch's size: powers of the coordinates are then of order one, however fine the mesh.
@@ -287,7 +289,7 @@ def _fitted(surface: FacetedSurface, wedges: Wedges, order: int) -> tuple[np.nda
             bend[:, one, other] += coefficient
             bend[:, other, one] += coefficient
     normal = mean - np.einsum("na,nad->nd", slope, axes)
-    normal[mirrored] = 0.0
+    normal = surface.within(normal, mirrored)
     in_space = np.einsum("nab,nad,nbe->nde", bend, axes, axes) / size[:, None, None]
     return normal / np.linalg.norm(normal, axis=1)[:, None], in_space
 
@@ -305,12 +307,12 @@ def rings_of(wedge: np.ndarray, count: int, rings: int) -> tuple[np.ndarray, np.
 
 
 def _with_mirror_images(
-    away: np.ndarray, centre: np.ndarray, mirrored: np.ndarray
+    away: np.ndarray, centre: np.ndarray, mirrored: np.ndarray, planes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Add the mirror images of the neighbours of nodes on planes of symmetry."""
-    for axis in range(away.shape[1]):
-        across = mirrored[centre, axis]
-        image = away[across] * np.where(np.arange(away.shape[1]) == axis, -1.0, 1.0)
+    for number, plane in enumerate(planes):
+        across = mirrored[centre, number]
+        image = away[across] - 2.0 * (away[across] @ plane)[:, None] * plane
         away, centre = np.concatenate([away, image]), np.concatenate([centre, centre[across]])
     return away, centre
 
@@ -331,27 +333,29 @@ def true_surface(
     geometry: Geometry,
     *,
     mirrored: np.ndarray | None = None,
+    planes: np.ndarray | None = None,
     finer: bool = False,
     axisymmetric: bool = False,
 ) -> FacetedSurface:
     """Return a surface of a mesh with its normals and its relief: linear facets through its nodes.
 
-    `mirrored`: which nodes lie on a plane of symmetry normal to each axis, shape (n_nodes, dim); `finer`: use
-    a better representation, to estimate the error: the shape, or a reconstruction of the next order.
+    `mirrored`: which nodes lie on which plane of symmetry, shape (n_nodes, n_planes); `planes`: their
+    normals, see `FacetedSurface`; `finer`: use a better representation, to estimate the error: the shape, or
+    a reconstruction of the next order.
     """
     marks = np.zeros(mesh.points.shape, dtype=bool) if mirrored is None else mirrored
-    surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks)
+    surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks, planes)
     surface = _with_areas(surface, mesh, name, axisymmetric)
     order = 2
     if finer:
         order, geometry = (2 if geometry == "faceted" else 3), "best"
     if geometry == "faceted":
         return surface
-    key = (name, geometry, order, marks.tobytes())
+    key = (name, geometry, order, marks.tobytes(), None if planes is None else planes.tobytes())
     known = _KNOWN.setdefault(mesh.origin, {})
     if key not in known:
         shape = mesh.origin.shapes.get(name) if geometry == "best" else None
-        known[key] = _relief(mesh.origin, name, marks, shape, order)
+        known[key] = _relief(mesh.origin, name, (marks, planes), shape, order)
     return replace(surface, relief=known[key])
 
 
@@ -366,9 +370,13 @@ def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str, axisymmetric
 
 
 def _relief(
-    mesh: BodyMesh, name: str, marks: np.ndarray, shape: SurfaceShape | None, order: int
+    mesh: BodyMesh,
+    name: str,
+    mirrors: tuple[np.ndarray, np.ndarray | None],
+    shape: SurfaceShape | None,
+    order: int,
 ) -> Relief | None:
-    surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks)
+    surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], *mirrors)
     raised = reconstructed(surface, order) if shape is None else by_shape(surface, shape)
     return None if _is_flat(raised) else raised.relief
 
@@ -401,7 +409,7 @@ def by_shape(surface: FacetedSurface, shape: SurfaceShape, sharp: float = 0.02) 
         corners[mine] = _unit(shape_normals)
     normals = np.zeros_like(surface.averaged)
     np.add.at(normals, surface.facets, corners)
-    normals = _unit(np.where(surface.mirrored, 0.0, normals))
+    normals = _unit(surface.within(normals, surface.mirrored))
     turned = np.einsum("nkd,nkd->nk", corners, normals[surface.facets]) < np.cos(sharp)
     creased = np.isin(np.arange(len(normals)), surface.facets[turned])
     normals[creased] = surface.averaged[creased]

@@ -16,8 +16,9 @@ from fenics_contact._base.display import counted, displayed
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import LAST_PLACES
-from fenics_contact._scene.parts import mirrored
+from fenics_contact._scene.parts import mirrored, planes_of
 from fenics_contact._scene.scene import Scene
+from fenics_contact._surfaces.facets import within_planes
 from fenics_contact._surfaces.true_surface import height_over
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.gallery.links import DesignSurface
@@ -120,7 +121,7 @@ class SurfaceDesign:
             )
         mesh, surface = scene.bodies[self.body].mesh, self.surface
         whole = side_of(mesh, surface) if isinstance(surface, str) else surface
-        placed = replace(self, surface=self._within(whole, mirrored(scene, self.body)))
+        placed = replace(self, surface=self._within(whole, scene))
         placed._check_resolved()
         return placed
 
@@ -136,10 +137,11 @@ class SurfaceDesign:
                 f"{names} depend on one another): use fewer control points or a finer mesh"
             )
 
-    def _within(self, surface: DesignSurface, cut: np.ndarray) -> DesignSurface:
-        """Return the surface with directions within the planes of symmetry, marks of shape (n_nodes, dim)."""
+    def _within(self, surface: DesignSurface, scene: Scene) -> DesignSurface:
+        """Return the surface with directions within the planes of symmetry of a scene."""
+        cut = mirrored(scene, self.body)
         at = np.flatnonzero(cut[surface.nodes].any(axis=1))
-        inside = np.where(cut[surface.nodes[at]], 0.0, surface.directions[at])
+        inside = within_planes(surface.directions[at], cut[surface.nodes[at]], planes_of(scene))
         length = np.linalg.norm(inside, axis=1)
         leaving = int(np.count_nonzero(length <= LAST_PLACES))
         if leaving:
@@ -206,8 +208,8 @@ class SurfaceDesign:
 
         Args:
             mesh: The body in its reference shape.
-            cut: Which nodes lie on a plane of symmetry normal to each axis, shape (n_nodes, dim): behind it
-                the body continues.
+            cut: Which nodes lie on which plane of symmetry, shape (n_nodes, n_planes): behind it the body
+                continues.
         """
         surface = mesh.points[self.lattice.nodes]
         extent = float(np.linalg.norm(np.ptp(surface, axis=0)))

@@ -25,9 +25,9 @@ from fenics_contact._fem.forms import temperature_of
 from fenics_contact._fem.templates import Template, volume_measure
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.parts import mirrored
+from fenics_contact._scene.parts import mirrored, planes_of
 from fenics_contact._scene.scene import Scene
-from fenics_contact._surfaces.facets import gauss_points
+from fenics_contact._surfaces.facets import gauss_points, within_planes
 from fenics_contact.design.design import SurfaceDesign, checked_variables
 from fenics_contact.design.forms import Density, Integrand, ShapeForms, subdomain_fields, sum_over_subdomains
 from fenics_contact.design.load_derivatives import field_by_places
@@ -137,6 +137,7 @@ class MeshMotion:
         body: Body,
         moving: np.ndarray,
         held: np.ndarray,
+        cut: tuple[np.ndarray, np.ndarray] | None = None,
         *,
         stiffening: float = 2.0,
     ) -> None:
@@ -144,7 +145,9 @@ class MeshMotion:
 
         `decomposition`: which rank owns which cells; `body`: the body in its reference shape; `held`:
         components of nodes that do not move, shape (n_nodes, dim): all of them, or on a plane of symmetry the
-        one across it.
+        one across it; `cut`: where planes are not normal to the axes, which nodes lie on which plane, shape
+        (n_nodes, n_planes), and their normals: there the mesh moves as it would without them, less the
+        component across them, and the rest follows once more.
         """
         both = int(np.count_nonzero(held[moving].all(axis=1)))
         if both:
@@ -165,6 +168,14 @@ class MeshMotion:
             key = column.tobytes()
             known[key] = known.get(key) or _Component(space, matrix, given, ~(given | column))
         self._components = [known[column.tobytes()] for column in held.T]
+        self._cut, self._sliding = cut, np.zeros(0, dtype=np.int64)
+        if cut is not None:
+            tilted = cut[0][:, held.shape[1] :].any(axis=1)
+            self._sliding = np.flatnonzero(tilted & ~given & ~held.all(axis=1))
+            given[self._sliding] = True
+            self._following = [
+                _Component(space, matrix, given, ~(given | column)) for column in held.T
+            ]
         matrix.destroy()
 
     def extend(self, displacement: np.ndarray) -> np.ndarray:
@@ -174,7 +185,20 @@ class MeshMotion:
         result[self.moving] = displacement
         for component, values in zip(self._components, result.T, strict=True):
             component.extend(values)
+        if len(self._sliding) == 0:
+            return result
+        along = self._within(result[self._sliding])
+        result[:] = 0.0
+        result[self.moving], result[self._sliding] = displacement, along
+        for component, values in zip(self._following, result.T, strict=True):
+            component.extend(values)
         return result
+
+    def _within(self, vectors: np.ndarray) -> np.ndarray:
+        """Return vectors of the sliding nodes without their components across the planes."""
+        assert self._cut is not None
+        marks, planes = self._cut
+        return within_planes(vectors, marks[self._sliding], planes)
 
     def pull_back(self, gradient: np.ndarray) -> np.ndarray:
         """Return the transpose of `extend` applied to nodal derivatives, shape (n_moving, dim). Collective.
@@ -183,9 +207,17 @@ class MeshMotion:
         """
         check_not_forked()
         result = np.array(gradient, dtype=float)
+        following = np.zeros((len(self.moving), result.shape[1]))
+        if len(self._sliding):
+            for component, values in zip(self._following, result.T, strict=True):
+                component.pull_back(values)
+            following = result[self.moving]
+            along = self._within(result[self._sliding])
+            result[:] = 0.0
+            result[self._sliding] = along
         for component, values in zip(self._components, result.T, strict=True):
             component.pull_back(values)
-        return np.asarray(result[self.moving])
+        return np.asarray(result[self.moving] + following)
 
 
 def _stiffness(cell_type: str, stiffening: float) -> ufl.Form:
@@ -200,14 +232,15 @@ def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign)
     """Return how the mesh of a body follows its design. Collective."""
     name = design.body
     body = scene.bodies[name]
-    cut = mirrored(scene, name)
-    held = cut.copy()
+    cut, planes = mirrored(scene, name), planes_of(scene)
+    held = cut[:, : scene.dim].copy()
     for support in scene.supports:
         if support.body == name:
             facets = body.mesh.surfaces[support.surface]
             held[facets[~cut[facets].all(axis=1).any(axis=1)]] = True
     held[design.nodes_beyond_transition(body.mesh, cut)] = True
-    return MeshMotion(decomposition, name, body, design.lattice.nodes, held)
+    tilted = None if planes is None else (cut, planes)
+    return MeshMotion(decomposition, name, body, design.lattice.nodes, held, tilted)
 
 
 def moving_nodes(

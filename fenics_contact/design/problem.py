@@ -157,7 +157,7 @@ def check_case(first: Scene, scene: Scene) -> None:
                 f"load cases must share their bodies, but {name!r} has another mesh or material: take the "
                 "scene from dataclasses.replace(scene, loads=...) or LoadStep.applied_to(scene)"
             )
-        if not np.array_equal(scene.fixed(name), first.fixed(name)):
+        if not scene.holds_as(first, name):
             raise InvalidInputError(
                 f"load cases must hold the same components, their supports of {name!r} differ: give other "
                 "values, or hold by RigidSurface what only some cases move"

@@ -9,6 +9,7 @@ import numpy as np
 
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._large_deformations.tangent_step import tangent_adjoint
+from fenics_contact._scene.local_axes import free_part
 from fenics_contact.design.adjoint import (
     NOT_HELD,
     Adjoint,
@@ -60,8 +61,9 @@ def by_true_areas(state: State, by_area: np.ndarray) -> dict[str, np.ndarray]:
     by_places = points.met_areas_pulled_back(by_met)
     for index in range(len(torn.scene.contacts)):
         add_areas(by_places, torn, index, by_now, points.coordinates)
-    free = np.where(np.isnan(moved.prescribed), by_places, 0.0)
-    every, first = np.arange(len(free)), torn.decomposition.comm.rank == 0
+    every, axes = np.arange(len(by_places)), torn.decomposition.axes
+    free = free_part(by_places, every, ~np.isnan(moved.prescribed), axes)
+    first = torn.decomposition.comm.rank == 0
     return {
         "by_displacement": nodal_mean_transposed(torn.decomposition, every, free),
         "by_shape": by_places if first else np.zeros_like(by_places),

@@ -41,11 +41,11 @@ def normals_pulled_back(
     products = corner_products(surface.points, surface.facets)
     summed = np.zeros_like(surface.points)
     np.add.at(summed, surface.facets, products)
-    summed[surface.mirrored] = 0.0
+    summed = surface.within(summed, surface.mirrored)
     length = np.linalg.norm(summed, axis=1)
     along = np.einsum("nd,nd->n", surface.averaged, by_averaged)
     by_summed = (by_averaged - along[:, None] * surface.averaged) / length[:, None]
-    by_summed[surface.mirrored] = 0.0
+    by_summed = surface.within(by_summed, surface.mirrored)
     return _products_pulled_back(surface, by_summed[surface.facets])
 
 

@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact._pairing.points import HELD, ContactPoints, are_sliding, movable
+from fenics_contact._base.sparse import LAST_PLACES
+from fenics_contact._pairing.points import HELD, ContactPoints, FreeSpaces, are_sliding
+from fenics_contact._scene.local_axes import LocalAxes, free_part
 from fenics_contact._scene.pairs import Tie
 from fenics_contact.feti.decomposition import Rows, Tearing
 
@@ -21,12 +23,14 @@ class Relations:
         directions: d of each row, shape (n_rows, dim).
         resting: Marks of friction rows along which supports prescribe no slip, shape (n_rows,); None for
             other rows.
+        axes: Axes of nodes along which supports prescribe components; None: the coordinates' everywhere.
     """
 
     points: ContactPoints
     which: np.ndarray
     directions: np.ndarray
     resting: np.ndarray | None = None
+    axes: LocalAxes | None = None
 
     @property
     def count(self) -> int:
@@ -38,8 +42,12 @@ class Relations:
 
         `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
         """
-        moved = self.points.jump @ np.nan_to_num(prescribed)
-        return np.asarray(np.einsum("rd,rd->r", self.directions, moved[self.which]))
+        known = np.nan_to_num(prescribed)
+        moved = self.points.jump @ (known if self.axes is None else self.axes.to_global(known))
+        along = np.einsum("rd,rd->r", self.directions, moved[self.which])
+        # What is left of motions that cancel is none: slip along it would have friction.
+        least = LAST_PLACES * np.abs(known).max(initial=0.0)
+        return np.where(np.abs(along) <= least, 0.0, along)
 
     def held(self, fixed: np.ndarray, parallel: float = 1e-6) -> np.ndarray:
         """Return which rows supports determine, alone or with the normal row, shape (n_rows,).
@@ -51,12 +59,12 @@ class Relations:
         `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `parallel`: directions
         count as parallel if their sine is below this.
         """
-        free = movable(self.points, fixed)[self.which]
-        left = np.where(free, self.directions, 0.0)
+        free = FreeSpaces.of(self.points, fixed, self.axes)
+        left = free.part(self.directions, self.which)
         mine = np.einsum("rd,rd->r", left, left)
         if self.resting is None:
             return np.asarray(mine <= HELD**2)
-        normal = np.where(free, self.points.normal[self.which], 0.0)
+        normal = free.part(self.points.normal[self.which], self.which)
         other = np.einsum("rd,rd->r", normal, normal)
         across = mine * other - np.einsum("rd,rd->r", left, normal) ** 2
         tilted = (across <= parallel**2 * mine * other) & (mine < other)
@@ -64,8 +72,8 @@ class Relations:
 
     def freedom(self, fixed: np.ndarray) -> np.ndarray:
         """Return the length of the free part of each direction, from 0 to 1, shape (n_rows,)."""
-        free = movable(self.points, fixed)[self.which]
-        return np.asarray(np.linalg.norm(np.where(free, self.directions, 0.0), axis=1))
+        free = FreeSpaces.of(self.points, fixed, self.axes)
+        return np.asarray(np.linalg.norm(free.part(self.directions, self.which), axis=1))
 
     def rows(self, tearing: Tearing, fixed: np.ndarray) -> Rows:
         """Return the part of these rows of B that acts on free components, with an empty right side.
@@ -84,11 +92,10 @@ class Relations:
         # Sorted by row: every rank builds the same rows, and the owner's copy is that of the slave node.
         order = np.lexsort((jump.indices, row))
         row, node = row[order], jump.indices[order]
-        value = jump.data[order, None] * self.directions[row]
+        value = jump.data[order, None] * free_part(self.directions[row], node, fixed, self.axes)
         # Directions along an axis have no entries in other components: the preconditioner depends on the
         # pattern.
-        out = fixed[node] | self.held(fixed)[row][:, None]
-        entry, component = np.nonzero(np.where(out, 0.0, value))
+        entry, component = np.nonzero(np.where(self.held(fixed)[row][:, None], 0.0, value))
         slaves = self.points.slave[self.which]
         return on_copies(tearing, row[entry], node[entry], component, value[entry, component], slaves)
 
@@ -113,32 +120,45 @@ def on_copies(
     return Rows(row[entry], copy, component[entry], value, np.zeros(len(slaves)), owner)
 
 
-def normal_relations(points: ContactPoints) -> Relations:
+def normal_relations(points: ContactPoints, axes: LocalAxes | None = None) -> Relations:
     """Return −n·(u_slave − u_master) ≤ gap, one row for each contact point."""
-    return Relations(points, np.arange(points.count), -points.normal)
+    return Relations(points, np.arange(points.count), -points.normal, axes=axes)
 
 
-def tangential_relations(points: ContactPoints, frictional: np.ndarray, prescribed: np.ndarray) -> Relations:
+def tangential_relations(
+    points: ContactPoints,
+    frictional: np.ndarray,
+    prescribed: np.ndarray,
+    axes: LocalAxes | None = None,
+) -> Relations:
     """Return the slip t_a·(u_slave − u_master): dim − 1 consecutive rows for each frictional point.
 
-    `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
+    `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim), along their
+    `axes`.
     """
     dim = points.normal.shape[1]
     which, directions = np.repeat(frictional, dim - 1), points.tangents[frictional].reshape(-1, dim)
-    rows = Relations(points, which, directions)
+    rows = Relations(points, which, directions, axes=axes)
     return replace(rows, resting=rows.of_supports(prescribed) == 0.0)
 
 
-def tied_relations(points: ContactPoints, ties: Sequence[Tie], fixed: np.ndarray) -> Relations:
+def tied_relations(
+    points: ContactPoints, ties: Sequence[Tie], fixed: np.ndarray, axes: LocalAxes | None = None
+) -> Relations:
     """Return u_slave − u_master = 0 at tied points, only along the normal where the tie may slide.
 
     A component that a support prescribes on the slave node is left to the support.
 
-    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim), along its `axes`.
     """
     dim = points.normal.shape[1]
     sliding = are_sliding(ties, points.pair)
     bonded, component = np.nonzero(~sliding[:, None] & ~fixed[points.slave])
     gliding = np.flatnonzero(sliding)
+    along = np.eye(dim)[component]
+    if axes is not None:
+        place = axes.place(points.slave[bonded])
+        turned = place >= 0
+        along[turned] = axes.axes[place[turned], component[turned]]
     which = np.concatenate([bonded, gliding])
-    return Relations(points, which, np.concatenate([np.eye(dim)[component], -points.normal[gliding]]))
+    return Relations(points, which, np.concatenate([along, -points.normal[gliding]]), axes=axes)

@@ -15,8 +15,10 @@ from fenics_contact._base.libraries import MPI, PETSc, free_communicators, start
 from fenics_contact._base.sparse import LAST_PLACES, dispose_with, expected_seconds, sent
 from fenics_contact._fem.forms import FormLibrary, cell_stiffness
 from fenics_contact._pairing.points import NodeNumbers
+from fenics_contact._scene.local_axes import LocalAxes, joined_axes, same_axes
 from fenics_contact._scene.parts import check_axis
 from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.supports import Roller
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.inverse import Condensations
 from fenics_contact.feti.same_input import check_same_input
@@ -191,10 +193,22 @@ def stack(parts: Sequence[Rows]) -> Rows:
 def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
     """Collect the supports node by node.
 
-    Returns the value of each prescribed component, NaN where it is free, shape (n_nodes, dim), [length].
+    Returns the value of each prescribed component, NaN where it is free, shape (n_nodes, dim), [length],
+    along the axes of `prescribed_along`.
+    """
+    return prescribed_along(scene, tearing)[0]
+
+
+def prescribed_along(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalAxes | None]:
+    """Collect the supports node by node, with the axes of nodes that rollers hold.
+
+    Returns the value of each prescribed component, NaN where it is free, shape (n_nodes, dim), [length], and
+    along which axes; None: all along the coordinates'.
     """
     prescribed = np.full((tearing.n_nodes, scene.dim), np.nan)
     for support in scene.supports:
+        if isinstance(support, Roller):
+            continue
         own, given = scene.given(support)
         nodes = tearing.global_nodes(support.body, own)
         known = prescribed[nodes]
@@ -214,7 +228,13 @@ def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
             axis = tearing.global_nodes(name, np.flatnonzero(scene.bodies[name].on_axis))
             check_axis(name, prescribed[axis, 0])
             prescribed[axis, 0] = 0.0
-    return prescribed
+    parts = []
+    for body in scene.rolling_bodies:
+        first = tearing.first_of(body)
+        every = slice(first, first + scene.bodies[body].mesh.n_nodes)
+        prescribed[every], axes = scene.held_by_rollers(body, prescribed[every])
+        parts.append(None if axes is None else axes.after(first))
+    return prescribed, joined_axes(parts)
 
 
 def weighted_helmert(stiffness: np.ndarray) -> np.ndarray:
@@ -243,14 +263,22 @@ class GluingRows:
         rows: The rows; their right side is filled from the supports of a load, see `right_side`.
         dof: Node and component that each row belongs to, as node · dim + component, shape (n_rows,).
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+        axes: Axes of nodes along which the components are; None: the coordinates' everywhere.
     """
 
     rows: Rows
     dof: np.ndarray
     fixed: np.ndarray
+    axes: LocalAxes | None = None
 
-    def right_side(self, prescribed: np.ndarray) -> np.ndarray:
-        """Return c of the rows for displacements from `prescribed_displacements`."""
+    def right_side(self, prescribed: np.ndarray, axes: LocalAxes | None = None) -> np.ndarray:
+        """Return c of the rows for displacements from `prescribed_along`."""
+        if not same_axes(axes, self.axes):
+            raise InvalidInputError(
+                "the supports of a scene may change their values, not what they hold: its rollers hold nodes "
+                "along other directions than when the scene was decomposed: decompose it again, or give the "
+                "rollers a direction, which stays"
+            )
         if not np.array_equal(~np.isnan(prescribed), self.fixed):
             raise InvalidInputError(
                 "the supports of a scene may change their values, not what they hold: "
@@ -260,11 +288,12 @@ class GluingRows:
         return np.nan_to_num(prescribed).ravel()[self.dof]
 
 
-def gluing_rows(tearing: Tearing, fixed: np.ndarray) -> GluingRows:
+def gluing_rows(tearing: Tearing, fixed: np.ndarray, axes: LocalAxes | None = None) -> GluingRows:
     """Build the equality rows B_E u = c_E, for which B_E D⁻¹ B_Eᵀ is diagonal, D the stiffness of copies.
 
     A free component of a node with m copies has m − 1 gluing rows of unit length (see `weighted_helmert`, c =
-    0). A prescribed one has m rows, one for each copy, which glue it as well.
+    0). A prescribed one has m rows, one for each copy, which glue it as well. Components are along the `axes`
+    of nodes, which keeps them orthogonal.
 
     `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
     """
@@ -275,6 +304,8 @@ def gluing_rows(tearing: Tearing, fixed: np.ndarray) -> GluingRows:
     for copies in np.unique(multiplicity[multiplicity > 1]):
         parts.append(_glued_entries(tearing, fixed, start, int(copies)))
     row, copy, component, entry = (np.concatenate(column) for column in zip(*parts, strict=True))
+    if axes is not None:
+        row, copy, component, entry = _turned_entries(tearing, axes, row, copy, component, entry)
 
     dof = np.repeat(np.arange(fixed.size), counts.ravel())  # (node, component) of each row
     within = np.arange(len(dof)) - start[dof]
@@ -282,7 +313,25 @@ def gluing_rows(tearing: Tearing, fixed: np.ndarray) -> GluingRows:
     # A gluing row belongs to the rank of the node's first copy, a prescribing row to that of its own copy.
     anchor = tearing.first_copy[dof // tearing.dim] + np.where(is_fixed, within, 0)
     owner = tearing.subdomain_rank[tearing.copy_subdomain[anchor]]
-    return GluingRows(Rows(row, copy, component, entry, np.zeros(len(dof)), owner), dof, fixed)
+    return GluingRows(Rows(row, copy, component, entry, np.zeros(len(dof)), owner), dof, fixed, axes)
+
+
+def _turned_entries(
+    tearing: Tearing,
+    axes: LocalAxes,
+    row: np.ndarray,
+    copy: np.ndarray,
+    component: np.ndarray,
+    entry: np.ndarray,
+) -> tuple[np.ndarray, ...]:
+    """Return entries along the coordinates for those along the axes of nodes."""
+    place = axes.place(tearing.copy_node[copy])
+    plain, turned = np.flatnonzero(place < 0), np.flatnonzero(place >= 0)
+    value = entry[turned, None] * axes.axes[place[turned], component[turned]]
+    which, along = np.nonzero(value)
+    source = np.concatenate([plain, turned[which]])
+    component = np.concatenate([component[plain], along])
+    return row[source], copy[source], component, np.concatenate([entry[plain], value[which, along]])
 
 
 def _prescribed_entries(tearing: Tearing, fixed: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -373,6 +422,11 @@ class Decomposition:
         """Marks of prescribed components of nodes, shape (n_nodes, dim), replicated."""
         return self.gluing.fixed
 
+    @property
+    def axes(self) -> LocalAxes | None:
+        """Axes of nodes along which components are prescribed or free; None: the coordinates' everywhere."""
+        return self.gluing.axes
+
 
 def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm) -> Decomposition:
     """Cut a scene into subdomains and distribute them over ranks. Collective on ``comm``.
@@ -406,7 +460,8 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
         _check_communicators(len(here), each=20 if scene.is_nonlinear else 14)
     with together(comm):
         meshes = tuple(_cut(scene, partitions, tearing, int(number)) for number in here)
-        gluing = gluing_rows(tearing, ~np.isnan(prescribed_displacements(scene, tearing)))
+        prescribed, axes = prescribed_along(scene, tearing)
+        gluing = gluing_rows(tearing, ~np.isnan(prescribed), axes)
     block_offset = np.cumsum([0] + [len(mesh.nodes) for mesh in meshes])
     copy_block = _copy_blocks(tearing, meshes, block_offset)
     return Decomposition(comm, tearing, dict(partitions), meshes, block_offset, copy_block, gluing, forms)

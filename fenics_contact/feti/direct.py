@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
 from fenics_contact._base.display import displayed
 from fenics_contact._base.progress import PhaseTimer
+from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.torn import TornSystem
@@ -54,27 +56,36 @@ class DirectSystem:
         """Factor the stiffness."""
         self.torn = torn
         (body,) = torn.subdomains
-        self._fixed = torn.B.indices
+        self._turn = _turned(torn)
+        # Each row of a support holds one component, along the axes of its node.
+        self._fixed = (torn.B if self._turn is None else _rounded(torn.B @ self._turn.T)).indices
         self._free = np.setdiff1d(np.arange(body.mesh.size), self._fixed)
         if previous is not None and previous.torn.subdomains[0].matrix is body.matrix:
             self._factor = previous._factor
             return
         with (timer or PhaseTimer()).phase("factor"):
-            free = body.stiffness[self._free][:, self._free].tocsr()
+            free = self._stiffness[self._free][:, self._free].tocsr()
             self._factor = Factor(free) if len(self._free) else None
+
+    @property
+    def _stiffness(self) -> sp.csr_matrix:
+        """K along the axes of nodes."""
+        (body,) = self.torn.subdomains
+        stiffness, turn = body.stiffness, self._turn
+        return stiffness if turn is None else (turn @ stiffness @ turn.T).tocsr()
 
     def solve(self) -> DirectSolution:
         """Return the displacement under the present load, refined once."""
-        (body,) = self.torn.subdomains
-        stiffness, load, free = body.stiffness, self.torn.load, self._free
-        displacement = np.zeros(body.mesh.size)
+        stiffness, load, free = self._stiffness, self.torn.load, self._free
+        load = load if self._turn is None else self._turn @ load
+        displacement = np.zeros(len(load))
         displacement[self._fixed] = self.torn.right
         moved = stiffness @ displacement
         for _ in range(2):  # the second pass removes the rounding of the first
             displacement[free] += self._moved_by((load - stiffness @ displacement)[free])
         missing = load - stiffness @ displacement
         scale = max(np.linalg.norm(load), np.linalg.norm(moved), np.finfo(float).tiny)
-        error, norm = self.energy_of_residual(displacement), float(displacement @ (stiffness @ displacement))
+        error, norm = self._energy(missing), float(displacement @ (stiffness @ displacement))
         if not error <= WRONG**2 * norm:  # a body that is only moved has no energy but this sum's rounding
             summed = float(abs(displacement) @ (abs(stiffness) @ abs(displacement)))
             norm = max(norm, float(np.finfo(float).eps) * summed)
@@ -84,15 +95,19 @@ class DirectSystem:
                 f"{np.sqrt(abs(error) / (norm or 1.0)):.1e} after refinement: the body is too slender, its "
                 "cells are too flat, or its materials too different for double precision"
             )
-        return DirectSolution(
-            displacement, missing[self._fixed], float(np.linalg.norm(missing[free]) / scale)
-        )
+        reaction, residual = missing[self._fixed], float(np.linalg.norm(missing[free]) / scale)
+        if self._turn is not None:
+            displacement = self._turn.T @ displacement
+        return DirectSolution(displacement, reaction, residual)
 
     def energy_of_residual(self, displacement: np.ndarray) -> float:
         """Return rᵀK⁻¹r of the free components, r = f − K u: the energy norm of the error, squared."""
         (body,) = self.torn.subdomains
-        missing = (self.torn.load - body.stiffness @ displacement)[self._free]
-        return float(missing @ self._moved_by(missing))
+        missing = self.torn.load - body.stiffness @ displacement
+        return self._energy(missing if self._turn is None else self._turn @ missing)
+
+    def _energy(self, missing: np.ndarray) -> float:
+        return float(missing[self._free] @ self._moved_by(missing[self._free]))
 
     def _moved_by(self, force: np.ndarray) -> np.ndarray:
         """Return K⁻¹ times forces on the free components."""
@@ -108,3 +123,22 @@ class DirectSystem:
     def force(self, multiplier: np.ndarray) -> np.ndarray:
         """Return Bᵀλ, the reactions on all components, shape (torn_size,), [force]."""
         return np.asarray(self.torn.B.T @ multiplier)
+
+
+def _turned(torn: TornSystem) -> sp.csr_matrix | None:
+    """Return the matrix that turns vectors of the one subdomain into the axes of nodes, None without any."""
+    axes = torn.decomposition.axes
+    if axes is None:
+        return None
+    (mesh,) = torn.decomposition.meshes
+    block = np.argsort(mesh.nodes)[axes.nodes]  # the one body has all nodes, in blocks of another order
+    order = np.argsort(block)
+    return LocalAxes(block[order], axes.axes[order]).matrix(len(mesh.nodes))
+
+
+def _rounded(matrix: sp.csr_matrix) -> sp.csr_matrix:
+    """Return a matrix of entries one without the rounding beside them."""
+    result = sp.csr_matrix(matrix)
+    result.data[np.abs(result.data) < 0.5] = 0.0
+    result.eliminate_zeros()
+    return result

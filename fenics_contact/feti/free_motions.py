@@ -87,7 +87,11 @@ def free_motions(scene: Scene, tearing: Tearing) -> FreeMotions:
         own = np.unique(mesh.surfaces[surface.surface])
         modes = surface.modes(mesh.points[own])[:, :, surface.free]
         others = [support for place, support in enumerate(scene.supports) if place != number]
-        _require_room(surface, modes, scene.fixed(surface.body, others)[own], mesh.points[own])
+        prescribed, axes = scene.prescribed_along(surface.body, others)
+        along = np.zeros((*prescribed.shape, modes.shape[2]))
+        along[own] = modes
+        along = (along if axes is None else axes.to_local(along))[own]
+        _require_room(surface, along, ~np.isnan(prescribed[own]), mesh.points[own])
         basis, scale = np.linalg.qr(modes.reshape(-1, modes.shape[2]))
         node, component = np.indices(modes.shape[:2]).reshape(2, -1)
         row = tearing.global_nodes(surface.body, own)[node] * scene.dim + component

@@ -8,7 +8,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.display import counted
-from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact._pairing.points import (
     ContactPoints,
     NodeNumbers,
@@ -16,6 +15,7 @@ from fenics_contact._pairing.points import (
     reference_axes,
     tangent_frames,
 )
+from fenics_contact._scene.local_axes import LocalAxes, free_part
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.contact_rows import Relations
@@ -23,20 +23,30 @@ from fenics_contact.feti.free_motions import FreeMotions
 
 
 def section_points(
-    scene: Scene, ties: ContactPoints, numbers: NodeNumbers, fixed: np.ndarray
+    scene: Scene,
+    ties: ContactPoints,
+    numbers: NodeNumbers,
+    fixed: np.ndarray,
+    axes: LocalAxes | None = None,
+    slight: float = 1e-9,
 ) -> ContactPoints:
     """Return the nodes on both sides of all sections as tied points, whose pairs come after the scene's ties.
 
     The slave lies behind the section.
 
-    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim), along its `axes`; `slight`:
+    part of a normal that supports may hold: those of planes of symmetry have rounding.
     """
     found = []
     for number, preload in enumerate(scene.preloads):
         mesh = scene.bodies[preload.body].mesh
         behind, before = numbers.global_nodes(preload.body, preload.cut(mesh).pairs).T
         count, normal = len(behind), preload.normal(mesh)
-        held = (fixed[behind] | fixed[before]) @ (np.abs(normal) > LAST_PLACES)
+        along = np.tile(normal, (count, 1))
+        held = np.zeros(count, dtype=bool)
+        for side in (behind, before):
+            lost = np.abs(along - free_part(along, side, fixed, axes))
+            held |= lost.max(axis=1) > slight
         if held.any():
             raise InvalidInputError(
                 f"supports must leave sections of preloads free along their normals, but they hold "

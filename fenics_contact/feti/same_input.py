@@ -12,7 +12,7 @@ from fenics_contact._fem.load_forms import is_scalar
 from fenics_contact._scene.fields import Ufl, evaluate
 from fenics_contact._scene.loads import SurfaceLoad
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene.supports import Support
+from fenics_contact._scene.supports import Roller, Support
 from fenics_contact.errors import together
 from fenics_contact.errors.kinds import user_code
 
@@ -43,6 +43,9 @@ def _values(scene: Scene) -> dict[str, str]:
                 numbers = np.asarray(material.parameters, dtype=np.float64)
             descriptions.update(described(numbers.tolist(), f"parameters of {kind} in body {name!r}"))
     for number, support in enumerate(scene.supports):
+        if isinstance(support, Roller) and callable(support.displacement):
+            values = support.amounts(_nodes(scene, support))
+            descriptions.update(described(values, f"scene.supports[{number}] at some nodes"))
         if isinstance(support, Support) and any(callable(component) for component in support.value):
             values = support.values(_nodes(scene, support))
             descriptions.update(described(values, f"scene.supports[{number}] at some nodes"))
@@ -60,6 +63,6 @@ def _nodes(scene: Scene, part: Any, compared: int = 8) -> np.ndarray:
     `compared`: number of nodes at which functions are compared: different functions differ nearly everywhere.
     """
     mesh = scene.bodies[part.body].mesh
-    on_surface = isinstance(part, Support | SurfaceLoad)
+    on_surface = isinstance(part, Support | Roller | SurfaceLoad)
     nodes = np.unique(mesh.surfaces[part.surface]) if on_surface else np.arange(mesh.n_nodes)
     return mesh.points[nodes[np.linspace(0, len(nodes) - 1, min(compared, len(nodes))).astype(int)]]

@@ -33,7 +33,7 @@ from fenics_contact.feti.decomposition import (
     Decomposition,
     DualNumbering,
     Rows,
-    prescribed_displacements,
+    prescribed_along,
     stack,
 )
 from fenics_contact.feti.free_motions import NO_MOTIONS, FreeMotions, free_motions
@@ -82,23 +82,24 @@ def meeting_points(
 ) -> tuple[ContactPoints, ContactPoints]:
     """Search for contact and tied points, only where the scene has pairs. Collective."""
     tearing, fixed, comm = decomposition.tearing, decomposition.fixed, decomposition.comm
+    axes = decomposition.axes
     points = ties = join_points([], scene.dim, tearing.n_nodes)
     if scene.contacts:
-        points = find_contact_points(scene, fixed, comm, told=told)
+        points = find_contact_points(scene, fixed, comm, axes=axes, told=told)
         if not overlap:
             check_no_penetration(scene, points)
     if scene.ties:
-        ties = find_tied_points(scene, fixed, comm, told=told)
+        ties = find_tied_points(scene, fixed, comm, axes=axes, told=told)
         if len(scene.ties) > 1:
-            ties = tied_once(ties, scene, fixed)
+            ties = tied_once(ties, scene, fixed, axes)
         if scene.contacts:
-            points = without_tied(points, ties, scene, fixed, told=told or comm.rank > 0)
+            points = without_tied(points, ties, scene, fixed, axes, told=told or comm.rank > 0)
     if len(scene.contacts) > 1:
         points = shared_once(points, scene, told=told or comm.rank > 0)
     if scene.preloads:
         with together(comm):
             points = once_at_sections(points, scene, tearing)
-            sections = section_points(scene, ties, tearing, fixed)
+            sections = section_points(scene, ties, tearing, fixed, axes)
         ties = join_points([ties, sections], scene.dim, tearing.n_nodes)
     return points, ties
 
@@ -106,7 +107,8 @@ def meeting_points(
 def check_apart(scene: Scene, decomposition: Decomposition) -> None:
     """Search for contact and reject bodies that overlap at the start. Collective."""
     if scene.contacts:
-        points = find_contact_points(scene, decomposition.fixed, decomposition.comm, told=True)
+        fixed, axes = decomposition.fixed, decomposition.axes
+        points = find_contact_points(scene, fixed, decomposition.comm, axes=axes, told=True)
         check_no_penetration(scene, points)
 
 
@@ -294,7 +296,8 @@ class TornSystem:
         """
         decomposition, points = self.decomposition, self.points
         tearing, comm = decomposition.tearing, decomposition.comm
-        finer = find_contact_points(self.scene, decomposition.fixed, comm, finer=True)
+        fixed, axes = decomposition.fixed, decomposition.axes
+        finer = find_contact_points(self.scene, fixed, comm, axes=axes, finer=True)
         mine, theirs = (searched.pair * tearing.n_nodes + searched.slave for searched in (points, finer))
         _, here, there = np.intersect1d(mine, theirs, return_indices=True)
         gap = points.gap.copy()
@@ -405,8 +408,8 @@ def build_torn_system(
             for mesh, earlier in zip(decomposition.meshes, known, strict=True)
         )
     with together(comm):
-        prescribed = prescribed_displacements(scene, decomposition.tearing)
-        right = decomposition.gluing.right_side(prescribed)
+        prescribed, axes = prescribed_along(scene, decomposition.tearing)
+        right = decomposition.gluing.right_side(prescribed, axes)
         free = free_motions(scene, decomposition.tearing)
     if previous is not None and _meets_alike(scene, previous.scene) and previous.driven_as(prescribed):
         # Only loads and prescribed values changed: B stays the same object, which marks F as unchanged, too.
@@ -497,8 +500,10 @@ def _with_rows(
     has_friction, coefficient, tresca, strengths = friction_data(scene, points, decomposition.comm)
     frictional = np.flatnonzero(has_friction)
     gluing, tearing, fixed = decomposition.gluing.rows, decomposition.tearing, decomposition.fixed
-    tied = tied_relations(ties, scene.ties, fixed)
-    relations = (tied, normal_relations(points), tangential_relations(points, frictional, prescribed))
+    axes = decomposition.axes
+    tied = tied_relations(ties, scene.ties, fixed, axes)
+    slips = tangential_relations(points, frictional, prescribed, axes)
+    relations = (tied, normal_relations(points, axes), slips)
     rows = stack([gluing, *(relation.rows(tearing, fixed) for relation in relations), *further])
     numbering, B = _own_part(rows, decomposition, known)
     return TornSystem(

@@ -14,7 +14,7 @@ from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie, named
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene.supports import RigidSurface
+from fenics_contact._scene.supports import RigidSurface, Roller
 from fenics_contact._surfaces.facets import share_areas, surface_moments
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import nodal_sum
@@ -57,10 +57,14 @@ def nodal_forces(torn: TornSystem, multiplier: np.ndarray, displacement: np.ndar
     contact, tie = _contact_forces(torn, multiplier), _tie_forces(torn, multiplier)
     joined = torn.points.jump.T @ contact + torn.ties.jump.T @ tie
     connecting = -nodal_sum(decomposition, torn.force(multiplier))
+    acting, fixed, axes = connecting - joined, decomposition.fixed, decomposition.axes
+    reaction = np.where(fixed, acting, 0.0)
+    if axes is not None:
+        reaction = axes.to_global(np.where(fixed, axes.to_local(acting), 0.0))
     return NodalForces(
         torn.scene.points,
         nodal_sum(decomposition, torn.load),
-        np.where(decomposition.fixed, connecting - joined, 0.0),
+        reaction,
         contact,
         tie,
         nodal_sum(decomposition, -_resisted(torn, displacement)),
@@ -344,7 +348,7 @@ def support_reactions(
         surface = Surface(support.body, support.surface)
         own = np.array(support.at) if isinstance(support, RigidSurface) else centroid(scene, surface)
         point = own if about is None else point_of(about, scene.dim)
-        total = resultant(share * forces.reaction, forces.places, point, surface, scene.axisymmetric)
+        total = resultant(share.of(forces.reaction), forces.places, point, surface, scene.axisymmetric)
         if isinstance(support, RigidSurface):
             total = total - point_load(support, point, scene.axisymmetric)
         entries.append(total)
@@ -361,25 +365,66 @@ def point_load(support: RigidSurface, about: np.ndarray, axisymmetric: bool = Fa
     return Resultant(force, load.moment_about(about), about)
 
 
-def support_shares(scene: Scene, numbers: NodeNumbers) -> list[np.ndarray]:
-    """Return the part of each support in the reaction on every component of a node.
+@dataclass(frozen=True, eq=False)
+class SupportShare:
+    """The part of a support in the reactions of nodes.
+
+    Attributes:
+        components: Its part in every component, shape (n_nodes, dim), zero where it holds nothing.
+        nodes: Nodes at which rollers hold, shape (k,).
+        matrices: Its parts in the reactions there, which take the place of these, shape (k, dim, dim).
+    """
+
+    components: np.ndarray
+    nodes: np.ndarray
+    matrices: np.ndarray
+
+    def of(self, reaction: np.ndarray) -> np.ndarray:
+        """Return the part of reactions, both of shape (n_nodes, dim), [force]."""
+        part = self.components * reaction
+        part[self.nodes] = np.einsum("nde,ne->nd", self.matrices, reaction[self.nodes])
+        return part
+
+
+def support_shares(scene: Scene, numbers: NodeNumbers) -> list[SupportShare]:
+    """Return the part of each support in the reactions on nodes.
 
     A component that several supports prescribe at a node is shared by the areas that belong to the node on
-    their surfaces: the forces of an even pressure on both. The parts sum to one.
-
-    Returns the parts of each support, shape (n_nodes, dim), zero where it holds nothing.
+    their surfaces: the forces of an even pressure on both. Where rollers hold, too, each support exerts
+    forces along the directions that it holds, with the smallest sum of squares over areas. The parts sum to
+    one.
     """
-    areas = []
-    for support in scene.supports:
+    areas, count = [], numbers.n_nodes
+    held = [(number, each) for number, each in enumerate(scene.supports) if isinstance(each, Roller)]
+    rolled = {number: _rolled(scene, roller, numbers) for number, roller in held}
+    nodes = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(n for n, _ in rolled.values())]))
+    squares = np.zeros((len(scene.supports), len(nodes), scene.dim, scene.dim))
+    for number, support in enumerate(scene.supports):
         mesh = scene.bodies[support.body].mesh
-        own = share_areas(mesh, support.surface)
-        area = np.zeros((numbers.n_nodes, scene.dim))
+        own = np.zeros(count)
+        every = numbers.global_nodes(support.body, np.arange(mesh.n_nodes))
+        own[every] = share_areas(mesh, support.surface)
+        if isinstance(support, Roller):
+            place = np.searchsorted(nodes, rolled[number][0])
+            along = rolled[number][1]
+            np.add.at(squares[number], place, along[:, :, None] * along[:, None, :])
+            squares[number] *= own[nodes, None, None]
+            areas.append(np.zeros((count, scene.dim)))
+            continue
         given = (0.0,) * scene.dim if isinstance(support, RigidSurface) else support.value
-        held = [component is not None for component in given]
-        area[numbers.global_nodes(support.body, np.arange(mesh.n_nodes))] = own[:, None] * held
-        areas.append(area)
-    total = sum(areas, np.zeros((numbers.n_nodes, scene.dim)))
-    return [area / np.where(total > 0.0, total, 1.0) for area in areas]
+        components = [component is not None for component in given]
+        areas.append(own[:, None] * components)
+        squares[number] = areas[-1][nodes][:, :, None] * np.eye(scene.dim)
+    total = sum(areas, np.zeros((count, scene.dim)))
+    parts = [area / np.where(total > 0.0, total, 1.0) for area in areas]
+    inverse = np.linalg.pinv(squares.sum(axis=0), rcond=1e-10, hermitian=True)
+    return [SupportShare(part, nodes, own @ inverse) for part, own in zip(parts, squares, strict=True)]
+
+
+def _rolled(scene: Scene, roller: Roller, numbers: NodeNumbers) -> tuple[np.ndarray, np.ndarray]:
+    """Return nodes that a roller holds, numbered among all, and its directions there."""
+    held = scene.directions_of(roller)
+    return numbers.global_nodes(roller.body, held.nodes), held.directions
 
 
 def centroid(scene: Scene, surface: Surface) -> np.ndarray:

@@ -232,8 +232,7 @@ def summed_normals(surface: FacetedSurface, points: np.ndarray) -> np.ndarray:
     """
     summed = np.zeros_like(points)
     np.add.at(summed, surface.facets, corner_products(points, surface.facets))
-    summed[surface.mirrored] = 0.0
-    return summed
+    return surface.within(summed, surface.mirrored)
 
 
 def moved_surface(surface: FacetedSurface, points: np.ndarray) -> FacetedSurface:

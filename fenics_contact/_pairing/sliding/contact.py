@@ -17,6 +17,7 @@ from fenics_contact._pairing.points import (
     join_points,
     reference_axes,
     tangent_frames,
+    with_symmetry,
 )
 from fenics_contact._pairing.sliding.closest import patch_points
 from fenics_contact._pairing.sliding.means import MovingMeans
@@ -24,6 +25,7 @@ from fenics_contact._pairing.sliding.meeting import Meeting, meetings_of, shared
 from fenics_contact._pairing.sliding.points import SlidingPoints, with_given_offsets
 from fenics_contact._pairing.sliding.slip import LastPoints, MaterialPoints
 from fenics_contact._pairing.sliding.stiffness import Differential, join_differentials, without_patches
+from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import shape_functions
@@ -53,10 +55,12 @@ class SlidingContact:
     are searched anew only for nodes that leave theirs.
 
     Attributes:
-        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim), along its `axes`.
         comm: Communicator of the ranks; all have all points.
         reach: Distance beyond which nodes have no point, [length].
         meetings: What of each pair stays the same.
+        axes: Axes of nodes that supports hold along other directions than the coordinates'; None: there are
+            none.
 
     Example:
         >>> from fenics_contact.gallery import block
@@ -77,25 +81,34 @@ class SlidingContact:
     comm: MPI.Comm
     reach: float
     meetings: tuple[Meeting, ...]
+    axes: LocalAxes | None = None
 
     @classmethod
     def of(
-        cls, scene: Scene, fixed: np.ndarray, comm: MPI.Comm | None = None, *, reach: float = np.inf
+        cls,
+        scene: Scene,
+        fixed: np.ndarray,
+        comm: MPI.Comm | None = None,
+        *,
+        reach: float = np.inf,
+        axes: LocalAxes | None = None,
     ) -> SlidingContact:
         """Prepare the pairs of a scene. Collective on ``comm``.
 
-        `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `comm`: communicator of
-        the ranks that share the work; this rank alone by default; `reach`: distance beyond which nodes need
-        no point, [length].
+        `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim), along its `axes`; `comm`:
+        communicator of the ranks that share the work; this rank alone by default; `reach`: distance beyond
+        which nodes need no point, [length].
         """
         comm = comm or MPI.COMM_SELF
-        meetings = shared_once(meetings_of(scene, fixed, comm), scene)
+        meetings = shared_once(meetings_of(scene, fixed, comm, axes), scene)
         if any(pair.given_gap for pair in scene.contacts):
             origin = scene.origin
-            first = meetings if origin is scene else shared_once(meetings_of(origin, fixed, comm), origin)
+            first = meetings
+            if origin is not scene:
+                first = shared_once(meetings_of(origin, fixed, comm, axes), origin)
             stood = cls(origin, fixed, comm, np.inf, first).at(origin.points)
             meetings = with_given_offsets(meetings, origin, stood.points, fixed, comm)
-        return cls(scene, fixed, comm, reach, meetings)
+        return cls(scene, fixed, comm, reach, meetings, axes)
 
     def at(
         self,
@@ -163,7 +176,7 @@ class SlidingContact:
         points = replace(points, pair=np.full(points.count, index))
         axes = points.axes if last is None else _kept_axes(points, last, index)
         points = replace(points, axes=axes, tangents=tangent_frames(points.normal, axes))
-        return _Found(in_free_frames(points, self.fixed), differential, lost, means)
+        return _Found(in_free_frames(points, self.fixed, self.axes), differential, lost, means)
 
     def _on_obstacle(
         self, meeting: Meeting, coordinates: np.ndarray, time: float
@@ -178,7 +191,8 @@ class SlidingContact:
         curvature = evaluate_shape(shape, "curvatures", place[chosen])
         none = sp.csr_matrix((len(chosen), len(coordinates)))
         points = _points(meeting, chosen, normal[chosen], gap[chosen], none)
-        points = replace(points, symmetric=meeting.slave.mirrored[meeting.candidates[chosen]])
+        cut = meeting.slave.mirrored[meeting.candidates[chosen]]
+        points = with_symmetry(points, cut, meeting.slave.planes)
         return points, without_patches(curvature, len(coordinates))
 
     def _on_means(
@@ -191,7 +205,7 @@ class SlidingContact:
         means, chosen = replace(means, coupling=met.part(near)), chosen[near]
         met = means.coupling
         points = _points(meeting, chosen, met.normal, met.gap, means.weights(len(coordinates)))
-        points = replace(points, symmetric=means.symmetric())
+        points = with_symmetry(points, means.symmetric(), meeting.slave.planes)
         bent = np.zeros((points.count, self.scene.dim, self.scene.dim))
         return points, without_patches(bent, len(coordinates)), means
 
@@ -220,12 +234,9 @@ class SlidingContact:
             for values in (at.functions.value, *np.moveaxis(at.functions.first, 2, 0))
         )
         points = _points(meeting, hit.point, at.normal, hit.gap, weights)
-        points = replace(
-            points,
-            facet=hit.facet,
-            local=hit.local,
-            symmetric=_symmetric(meeting, points, hit.facet, hit.local),
-        )
+        points = replace(points, facet=hit.facet, local=hit.local)
+        cut = _symmetric(meeting, points, hit.facet, hit.local)
+        points = with_symmetry(points, cut, meeting.slave.planes)
         bend = np.einsum("nabd,nd->nab", at.second, at.normal)
         curvature = np.zeros((points.count, self.scene.dim, self.scene.dim))
         return points, Differential(at.tangents, bend, tuple(slopes), curvature), meeting.nodes[hit.lost]
@@ -267,7 +278,7 @@ def _kept_axes(points: ContactPoints, last: Known, index: int, steepest: float =
 
 
 def _symmetric(meeting: Meeting, points: ContactPoints, facet: np.ndarray, local: np.ndarray) -> np.ndarray:
-    """Return the components normal to symmetry planes that cut both surfaces at a point, (n, dim)."""
+    """Return the symmetry planes that cut both surfaces at a point, (n, n_planes)."""
     assert meeting.patches is not None
     corners = meeting.patches.facets[facet]
     shares, _ = shape_functions(local, corners.shape[1])

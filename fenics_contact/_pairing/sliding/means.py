@@ -207,10 +207,11 @@ class MovingMeans:
         return sp.csr_matrix(entries, shape=(weight.shape[0], n_nodes))
 
     def symmetric(self) -> np.ndarray:
-        """Return the components normal to planes of symmetry that cut both surfaces, shape (n, dim)."""
+        """Return the planes of symmetry that cut both surfaces at points, shape (n, n_planes)."""
         slave, master, met = self.slave, self.master, self.coupling.weight.tocoo()
-        node, result = self.coupling.node[met.row], np.zeros(self.coupling.normal.shape, dtype=bool)
-        apart = np.abs(slave.points[node] - master.points[met.col])
+        node = self.coupling.node[met.row]
+        result = np.zeros((len(self.coupling.node), slave.mirrored.shape[1]), dtype=bool)
+        apart = np.abs(slave.across(slave.points[node] - master.points[met.col]))
         same = apart <= coordinate_rounding(np.concatenate([slave.points, master.points]))
         np.logical_or.at(result, met.row, slave.mirrored[node] & master.mirrored[met.col] & same)
         return result
@@ -279,7 +280,7 @@ class MovingMeans:
         slave, node = self.slave, self.coupling.node
         size = np.linalg.norm(summed_normals(slave, slave.points)[node], axis=1)[:, None]
         vectors = np.zeros_like(slave.points)
-        vectors[node] = -np.where(slave.mirrored[node], 0.0, along) / size
+        vectors[node] = -slave.within(along, slave.mirrored[node]) / size
         return summed_normals_by_points(slave, vectors)[node]
 
 

@@ -13,6 +13,7 @@ from fenics_contact._pairing.points import PARALLEL, NodeNumbers, are_beside, ti
 from fenics_contact._pairing.search import find_contact_points, find_tied_points
 from fenics_contact._pairing.sliding.closest import ClosestPoints, Roles, moved_surface
 from fenics_contact._pairing.sliding.patches import SmoothPatches
+from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact._scene.obstacles import RigidObstacle, RigidPlane
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import surface_of
@@ -37,7 +38,7 @@ class Meeting:
         patches: The smooth surface of the master; None for a rigid obstacle and for mortar contact.
         facets: The master in the reference configuration for mortar contact; None for other pairs.
         master_nodes: Nodes of the master among those of all bodies; none for a rigid obstacle.
-        master_cut: Components that the normals of these lack on planes of symmetry, shape (n_master, dim).
+        master_cut: On which planes of symmetry these lie, shape (n_master, n_planes).
         obstacle: The rigid obstacle; None for a body.
         apart: Facets on which each candidate never has a point, where a body meets itself, shape
             (n_candidates, n_facets); None where bodies meet others.
@@ -108,17 +109,19 @@ class Meeting:
         return joined if self.roles is None else joined.part(self.roles.are_slaves(joined, facet))
 
 
-def meetings_of(scene: Scene, fixed: np.ndarray, comm: MPI.Comm) -> tuple[Meeting, ...]:
+def meetings_of(
+    scene: Scene, fixed: np.ndarray, comm: MPI.Comm, axes: LocalAxes | None = None
+) -> tuple[Meeting, ...]:
     """Return the pairs of a scene in its reference configuration. Collective.
 
-    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim), along its `axes`.
     """
     number = slave = np.zeros(0, dtype=np.int64)
     if scene.contacts and scene.ties:
         points, ties = (
             find(scene, fixed, comm, told=True) for find in (find_contact_points, find_tied_points)
         )
-        number, slave = tied_keys(points, ties, scene, fixed)
+        number, slave = tied_keys(points, ties, scene, fixed, axes)
     with together(comm):
         return tuple(
             _meeting(scene, pair, fixed, slave[number == index]) for index, pair in enumerate(scene.contacts)
