@@ -12,7 +12,7 @@ from fenics_contact._base.checks import GivenVector, unit_vector
 from fenics_contact._scene.pair_geometry import modulus_of
 from fenics_contact._scene.pairs import Surface, pair_number
 from fenics_contact._scene.parts import surface_of
-from fenics_contact._surfaces.facets import filled_at_corners, filled_on_axis
+from fenics_contact._surfaces.facets import filled_at_corners, filled_on_axis, nodal_areas
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.results.state import State
 
@@ -27,7 +27,8 @@ def contact_area(state: State, pair: int | str = 0) -> float:
     rim of a smooth contact the pressure is K √d, at a distance d outside the gap is 4/3 K d^(3/2) / E* with
     the same K. The sum of closed nodes' areas would jump from node to node, by a quarter where only a few are
     closed. Where a modulus varies within a material, or metal may yield, the rim is placed half way between
-    the nodes. Collective.
+    the nodes. Where the master ends, by mortar the part of the slave counts that faces it, by nodes half a
+    facet beyond the last node that does. Collective.
 
     Args:
         state: The state.
@@ -47,6 +48,7 @@ def contact_area(state: State, pair: int | str = 0) -> float:
         gram = np.linalg.det(edges @ np.swapaxes(edges, 1, 2))
         size = np.sqrt(np.maximum(gram, 0.0)) / (len(corners) - 1)
         share = surface.closed_share(facets)
+        size = size * surface.facing[facets].mean(axis=1)
         if state.scene.axisymmetric:
             size = size * _circumference(surface.places[facets, 0], surface.closed[facets], share)
         total += weight * float(size @ share)
@@ -90,12 +92,16 @@ class _SlaveSurface:
         facets: Its facets by the numbers of their corners, shape (n_facets, corners).
         pressure: Of closed nodes, zero at open ones, shape (n,).
         spread: E* times the gap of open nodes, shape (n,).
+        facing: Share of each node's area that faces the master, zero at nodes without a contact point, (n,).
+        beyond: How far contact reaches on the way to such nodes, relative to their distance.
     """
 
     places: np.ndarray
     facets: np.ndarray
     pressure: np.ndarray
     spread: np.ndarray
+    facing: np.ndarray
+    beyond: float
 
     @cached_property
     def closed(self) -> np.ndarray:
@@ -111,7 +117,7 @@ class _SlaveSurface:
         """Return where the rim crosses edges, (n_edges, 2), of which one end is closed, (m, dim)."""
         crossed = edges[self.closed[edges].sum(axis=1) == 1]
         inner, outer = np.where(self.closed[crossed[:, :1]], crossed, crossed[:, ::-1]).T
-        share = self.reach(inner, outer)[:, None]
+        share = np.where(self.facing[outer] > 0.0, self.reach(inner, outer), self.beyond)[:, None]
         return np.asarray((1.0 - share) * self.places[inner] + share * self.places[outer])
 
     def closed_share(self, facets: np.ndarray) -> np.ndarray:
@@ -157,7 +163,14 @@ def _slave_surface(state: State, which: int | str) -> _SlaveSurface:
     places = surface.points
     if scene.bodies[slave.body].deforms_much:
         places = places + state.gather_displacement(slave.body)[surface.nodes]
-    return _SlaveSurface(places, surface.facets[:, : surface.corners], pressure, spread)
+    facing, by_mortar = np.zeros(len(nodes)), scene.contacts[pair].by_mortar
+    facing[place] = 1.0
+    if by_mortar:
+        whole_area = nodal_areas(surface.points, whole, scene.axisymmetric).ravel()
+        facing[place] = contact.nominal_area[mine] / np.bincount(whole.ravel(), whole_area)[place]
+    facing = np.maximum(filled_at_corners(whole, facing), 0.0)
+    facets, beyond = surface.facets[:, : surface.corners], 0.0 if by_mortar else 0.5
+    return _SlaveSurface(places, facets, pressure, spread, facing, beyond)
 
 
 def _circumference(radii: np.ndarray, closed: np.ndarray, share: np.ndarray) -> np.ndarray:

@@ -357,6 +357,24 @@ def test_the_footprint_of_a_ball_is_round_with_the_radius_of_hertz() -> None:
     assert contact_area(state, "ball contact on rigid plane") == pytest.approx(exact.area / 4, rel=0.06)
 
 
+@pytest.mark.parametrize("discretisation", ["mortar", "node"])
+@pytest.mark.parametrize("cells", [9, 13])
+def test_contact_ends_where_the_master_ends(cells: int, discretisation: Discretisation) -> None:
+    """A plate pressed all over a smaller stamp whose edges lie within its facets."""
+    plate, stamp = block((0, 0, 1), (5, 4, 2), (cells, 7, 2)), block((1, 0.5, 0), (3.3, 2.7, 1), (6, 5, 3))
+    scene = Scene(
+        {"plate": Body(plate, SOLID), "stamp": Body(stamp, SOLID)},
+        [Support("stamp", "z0"), Support("plate", "z1", (0.0, 0.0, -0.01))],
+        contacts=[ContactPair(Surface("plate", "z0"), Surface("stamp", "z1"), None, discretisation)],
+    )
+    state = solve_scene(scene, MPI.COMM_WORLD)
+    assert state.contact.count(Status.OPEN) == 0
+    near = 1e-9 if discretisation == "mortar" else 0.06
+    assert contact_area(state) == pytest.approx(2.3 * 2.2, rel=near)
+    for axis, size, facet in (((1, 0, 0), 2.3, 5 / cells), ((0, 1, 0), 2.2, 4 / 7)):
+        assert abs(contact_width(state, axis) - size) < 1.2 * facet
+
+
 def test_a_width_reaches_over_what_is_open_between() -> None:
     """A bridge on its two feet, whose footprints lie apart; nothing touches once it is lifted."""
     mesh = block((0.0, 0.0, 0.0), (6.0, 2.0, 1.0), (6, 2, 1))
