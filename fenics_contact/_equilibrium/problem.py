@@ -130,8 +130,8 @@ class LinearEquilibria:
         with self._timer.phase("assemble"):
             torn = self._torn(scene, known, overlap=design)
             if before is not None:
-                moved = before.torn_displacement
-                torn = torn.with_slip_from(before.torn.relative(moved), before.torn.sliding(moved))
+                origin = before.torn.slip_origin(before.torn_displacement, before.solution.multiplier)
+                torn = torn.with_slip_from(*origin)
             same = known is not None and torn.points is known.torn.points
             if known is None or not same or _loads_of(torn.scene) != _loads_of(known.scene):
                 check_held(torn)

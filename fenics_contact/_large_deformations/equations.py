@@ -163,7 +163,11 @@ class ResidualState:
         """Work of friction Σ τ·slip since histories began their step, [force · length]. Collective."""
         _, friction = self.contact.at_points(self.at.multiplier)
         _, against = self.contact.at_points(self.constraint_residual)
-        return -float(np.sum(friction * against))
+        work = -float(np.sum(friction * against))
+        if self.torn.elastic_slip is not None:
+            squares = np.sum(friction[self.torn.frictional] ** 2, axis=1)
+            work -= float(self.torn.elastic_slip @ squares)
+        return work
 
     @property
     def torn(self) -> TornSystem:

@@ -417,8 +417,8 @@ class _Way:
         load = self.target.between(self.first, fraction)
         if self.begun.points is not None:
             return load
-        slipped = before.relative(at.displacement), before.sliding(at.displacement)
-        return replace(load, torn=load.torn.with_slip_from(*slipped))
+        force = at.multiplier if len(at.multiplier) else np.zeros(len(before.numbering.owned))
+        return replace(load, torn=load.torn.with_slip_from(*before.slip_origin(at.displacement, force)))
 
     def path(self, now: Progress) -> Path:
         """Return the path."""

@@ -333,6 +333,15 @@ def closures_of(scene: Scene, points: ContactPoints) -> Closures | None:
     return Closures(points.area, curve, np.ones(points.count), known)
 
 
+def elastic_slip(scene: Scene, points: ContactPoints) -> np.ndarray | None:
+    """Return the elastic slip of contact points per friction force, 1/(k A), shape (n,); None without any."""
+    stiffness = [pair.stick_stiffness for pair in scene.contacts]
+    if all(each is None for each in stiffness):
+        return None
+    by_traction = np.array([0.0 if each is None else 1.0 / each for each in stiffness])
+    return np.asarray(by_traction[points.pair] / points.area)
+
+
 def reach_of(scene: Scene, points: ContactPoints) -> np.ndarray:
     """Return the distances at which pressure begins, zero in exact contact, shape (n,), [length]."""
     reach = np.array([0.0 if pair.closure is None else pair.closure.reach for pair in scene.contacts])

@@ -55,6 +55,8 @@ class Coulomb:
         shear_limit: Largest friction traction by undeformed area, > 0, whatever the pressure, [force /
             length²], such as the shear strength of the softer body; a number, or a function of points as
             before. None: no limit.
+        stick_stiffness: Friction traction per tangential displacement of a point that sticks, > 0, [force /
+            length³]: before it slips it gives way elastically, and springs back. None: it does not move.
 
     Example:
         >>> hot_rolling = Coulomb(0.3, shear_limit=80.0)
@@ -63,9 +65,11 @@ class Coulomb:
 
     friction_coefficient: float | OfPosition | FrictionCurve
     shear_limit: float | OfPosition | None = None
+    stick_stiffness: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse negative coefficients and limits, and laws that fall."""
+        _check_stiffness("Coulomb", self.stick_stiffness)
         given, limit = self.friction_coefficient, self.shear_limit
         if not (limit is None or callable(limit) or (np.isfinite(limit) and limit > 0)):
             raise InvalidInputError(
@@ -92,12 +96,16 @@ class Tresca:
     Attributes:
         traction: Largest tangential traction by undeformed area, ≥ 0, [force / length²]; a number, or a
             function of points as for `Coulomb`.
+        stick_stiffness: Friction traction per tangential displacement of a point that sticks, > 0, [force /
+            length³]: before it slips it gives way elastically, and springs back. None: it does not move.
     """
 
     traction: float | OfPosition
+    stick_stiffness: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse a negative bound."""
+        _check_stiffness("Tresca", self.stick_stiffness)
         if not (callable(self.traction) or (np.isfinite(self.traction) and self.traction >= 0)):
             raise InvalidInputError(
                 f"Tresca.traction must be zero or positive, got {self.traction!r}: give the largest "
@@ -243,6 +251,11 @@ class ContactPair:
         return self.friction.shear_limit if isinstance(self.friction, Coulomb) else None
 
     @property
+    def stick_stiffness(self) -> float | None:
+        """Friction traction per elastic slip; None where points that stick do not move."""
+        return None if self.friction is None else self.friction.stick_stiffness
+
+    @property
     def friction_value(self) -> Any:
         """Friction coefficient, the largest of any pressure, or Tresca's traction; zero without friction."""
         match self.friction:
@@ -310,6 +323,14 @@ class Tie:
     def place(self) -> str:
         """Its surfaces: "upper z0 on lower z1"."""
         return _place(self.slave, self.master)
+
+
+def _check_stiffness(name: str, given: float | None) -> None:
+    if given is not None and not (np.isfinite(given) and given > 0):
+        raise InvalidInputError(
+            f"{name}.stick_stiffness must be positive and finite, got {given!r}: give the friction traction "
+            "per tangential displacement, or leave it out for points that stick without moving"
+        )
 
 
 def _forget_other_reason(pair: ContactPair | Tie) -> None:

@@ -79,6 +79,11 @@ class SceneParts:
             self._require(pair.slave.body, pair.slave.name, f"{kind}.slave")
             if isinstance(pair, ContactPair) and pair.within_body:
                 self._require_deforming(pair)
+            if isinstance(pair, ContactPair) and pair.stick_stiffness is not None and self.deforms_much:
+                raise InvalidInputError(
+                    f"the stick stiffness of {pair.place} needs small displacements, but some body deforms "
+                    "much: leave it out, or give all bodies materials for small strains"
+                )
             if isinstance(pair.master, Surface):
                 self._require(pair.master.body, pair.master.name, f"{kind}.master")
                 self._require_linear(pair, pair.master)

@@ -44,6 +44,7 @@ class EffectName(StrEnum):
     PRELOAD = "bolt preload"
     CONTACT = "contact"
     CLOSURE = "surfaces that give way"
+    STICK_STIFFNESS = "elastic slip"
     TRESCA = "Tresca friction"
     COULOMB = "Coulomb friction"
     FRICTION_CURVE = "friction that pressure limits or changes"
@@ -67,6 +68,7 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
     thermal = sum(isinstance(load, ThermalStrain) for load in loads)
     rubbing = [pair.friction for pair in scene.contacts if pair.has_friction]
     tresca, coulomb = (sum(isinstance(law, kind) for law in rubbing) for kind in (Tresca, Coulomb))
+    sprung = sum(pair.has_friction and pair.stick_stiffness is not None for pair in scene.contacts)
     soft = sum(pair.closure is not None for pair in scene.contacts)
     curved = sum(pair.friction_curve is not None or pair.shear_limit is not None for pair in scene.contacts)
     fixed, rough = "has a fixed slip bound", "has a friction coefficient above zero"
@@ -87,6 +89,7 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
         (names.PRELOAD, len(scene.preloads), "section is drawn together", "sections are drawn together"),
         (names.CONTACT, len(scene.contacts), "pair may touch", "pairs may touch"),
         (names.CLOSURE, soft, "pair has a law of closure", "pairs have one"),
+        (names.STICK_STIFFNESS, sprung, "pair has a stick stiffness", "pairs have one"),
         (names.TRESCA, tresca, f"pair {fixed}", f"pairs {fixed.replace('has', 'have')}"),
         (names.COULOMB, coulomb, f"pair {rough}", f"pairs {rough.replace('has', 'have')}"),
         (names.FRICTION_CURVE, curved, "pair has a shear limit or a table", "pairs have one"),

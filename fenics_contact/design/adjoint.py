@@ -19,6 +19,7 @@ from fenics_contact._surfaces.facets import edge_distance
 from fenics_contact.design.objective import Partials
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.feti.dual import DualSystem
+from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.cones import FeasibleSet
 from fenics_contact.qp.face import STEEP, Face, classify
 from fenics_contact.qp.face_system import CoupledSystem, FaceSystems
@@ -113,8 +114,11 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
     length = np.linalg.norm(trial[layout.tangential], axis=1)
     # Two slacks: every point that may be weak is counted, but only one that leans to no side is reassigned.
     uncertainty, closest = _uncertainty(torn.decomposition.comm, rows)
-    counted = _on_switch(layout, trial, bound, coefficient, uncertainty)
-    weak = _on_switch(layout, trial, bound, coefficient, closest)
+    reached = bound
+    if torn.elastic_slip is not None:
+        reached = bound * (1.0 + step[layout.tangential[:, 0]] * torn.elastic_slip[torn.owned_discs])
+    counted = _on_switch(layout, trial, reached, coefficient, uncertainty)
+    weak = _on_switch(layout, trial, reached, coefficient, closest)
 
     known = classify(layout, bound, rows.multiplier, rows.residual, step, torn.compliance)
     direction = _directions(known.direction, trial[layout.tangential], length, weak.disc | weak.vanishing)
@@ -395,7 +399,11 @@ def with_later_steps(state: State, own: Partials, by_position: np.ndarray) -> Pa
     `by_position`: derivative of the objectives of all later steps by the relative tangential displacement
     after this step, owned, zero in all other rows, shape (n_owned,).
     """
-    columns = state.torn.free.columns
+    columns, compliance = state.torn.free.columns, state.torn.compliance
+    if compliance is not None:  # the origin is without the elastic slip of this step
+        by_force = own.by_multiplier - compliance.sprung(by_position)
+        by_area = own.by_area - slips_by_area(state.torn, state.solution.multiplier, by_position)
+        own = replace(own, by_multiplier=by_force, by_area=by_area)
     moved = -np.asarray(state.torn.decomposition.comm.allreduce(columns.T @ by_position))
     return replace(
         own,
@@ -403,6 +411,20 @@ def with_later_steps(state: State, own: Partials, by_position: np.ndarray) -> Pa
         by_jump=own.by_jump + by_position,
         by_motion=moved if own.by_motion is None else own.by_motion + moved,
     )
+
+
+def slips_by_area(torn: TornSystem, multiplier: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Return weight · ∂(D τ)/∂A of elastic slips by the areas of points, replicated, (n,). Collective.
+
+    `multiplier`: λ with the friction forces τ, owned; `weight`: of their rows, owned.
+    """
+    result = np.zeros(torn.points.count)
+    if torn.elastic_slip is not None:
+        rows, width = torn.tangential_rows.ravel(), torn.dim - 1
+        tau, by_slip = (torn.numbering.gather(x, rows).reshape(-1, width) for x in (multiplier, weight))
+        area = torn.points.area[torn.frictional]
+        result[torn.frictional] = -torn.elastic_slip / area * np.einsum("na,na->n", tau, by_slip)
+    return result
 
 
 def by_slip_origin(state: State, own: Partials, adjoint_multiplier: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ from fenics_contact._scene.pairs import ContactPair, Surface, Tie, Tresca
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import Projection
-from fenics_contact.design.adjoint import LinearisedFace
+from fenics_contact.design.adjoint import LinearisedFace, slips_by_area
 from fenics_contact.design.surface_derivatives import (
     PointDerivatives,
     areas_pulled_back,
@@ -68,14 +68,17 @@ def bounds_by_area(torn: TornSystem, normal_force: np.ndarray, by_bound: np.ndar
 
 
 def closures_by_area(torn: TornSystem, multiplier: np.ndarray, adjoint: np.ndarray) -> np.ndarray | float:
-    """Return dJ by the areas of points through their closures, ζ ∂C/∂A, replicated, (n_points,). Collective.
+    """Return dJ by the areas of points through compliances, ζ ∂C/∂A, replicated, (n_points,). Collective.
 
     `multiplier`: λ, owned; `adjoint`: its ζ, owned. Zero where contact is exact.
     """
-    if torn.closures is None:
+    if torn.compliance is None:
         return 0.0
-    force, weight = (torn.numbering.gather(x, torn.normal_rows) for x in (multiplier, adjoint))
-    return np.asarray(weight * torn.closures.by_area(force))
+    by_area = slips_by_area(torn, multiplier, adjoint)
+    if torn.closures is not None:
+        force, weight = (torn.numbering.gather(x, torn.normal_rows) for x in (multiplier, adjoint))
+        by_area += weight * torn.closures.by_area(force)
+    return by_area
 
 
 def bounds_by_place(torn: TornSystem, normal_force: np.ndarray, by_bound: np.ndarray) -> np.ndarray:

@@ -391,14 +391,22 @@ class FrictionWork(Weighable):
     def partials(self, state: State, forms: ShapeForms) -> Partials:
         """∂J/∂τ = s, ∂J/∂s = τ with the slips s = B_T u − Q_T q − c_T. Collective; raises as `value` does."""
         force, slip = self._vectors(state)
+        value, by_force, torn = float((force * slip).sum()), slip, state.torn
+        by_area: np.ndarray | float = 0.0
+        if torn.elastic_slip is not None:
+            elastic = np.zeros(torn.points.count)
+            elastic[torn.frictional] = torn.elastic_slip
+            by_force = slip - elastic[:, None] * force
+            by_area = elastic / torn.points.area * np.einsum("na,na->n", force, force)
         by_slip, free = on_rows(state, None, force), state.torn.free
         by_motion = -np.asarray(state.torn.decomposition.comm.allreduce(free.columns.T @ by_slip))
         return Partials.of(
             state,
-            float((force * slip).sum()),
+            value,
             by_displacement=state.torn.force(by_slip),
-            by_multiplier=on_rows(state, None, slip),
+            by_multiplier=on_rows(state, None, by_force),
             by_motion=by_motion,
+            by_area=by_area,
             by_jump=by_slip,
         )
 

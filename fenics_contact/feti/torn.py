@@ -16,6 +16,7 @@ from fenics_contact._pairing.points import (
     HELD,
     ContactPoints,
     closures_of,
+    elastic_slip,
     friction_data,
     join_points,
     reach_of,
@@ -171,6 +172,8 @@ class TornSystem:
         strengths: Slip bounds with limits or on curves in place of μ λ_N, whose μ is then the largest ratio,
             replicated; None where there are none.
         closures: Closures of the contact points under their forces, replicated; None where contact is exact.
+        elastic_slip: Slip of sticking points per friction force, replicated, shape (n_friction,), [length /
+            force]; None where there is none.
         numbering: Owners and exchange of multipliers.
         relations: The relative displacements in the rows of ties and contacts, in their order, replicated.
         B: This rank's part of B, shape (n_local_rows, torn_size); rows of ties and contacts act on free
@@ -194,6 +197,7 @@ class TornSystem:
     tresca_bound: np.ndarray
     strengths: Strengths | None
     closures: Closures | None
+    elastic_slip: np.ndarray | None
     numbering: DualNumbering
     relations: tuple[Relations, ...]
     B: sp.csr_matrix
@@ -238,6 +242,18 @@ class TornSystem:
         if self.free.count == 0:
             return work
         return work + float(self.free.load @ self.free_motion(self.right - self.jump(displacement)))
+
+    def slip_origin(self, displacement: np.ndarray, multiplier: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return from where a next load step measures slip, for `with_slip_from`. Collective.
+
+        Elastic slip springs back: it is part of the next step's, whose friction begins as it is.
+
+        `displacement`: torn, of this rank, shape (torn_size,), [length]; `multiplier`: λ, owned.
+        """
+        relative, compliance = self.relative(displacement), self.compliance
+        if compliance is not None:
+            relative = relative - compliance.given_way(multiplier)
+        return relative, self.sliding(displacement)
 
     def with_slip_from(self, relative: np.ndarray, slid: np.ndarray) -> TornSystem:
         """Return the system in which slip is measured from an earlier displacement.
@@ -357,10 +373,12 @@ class TornSystem:
     @property
     def compliance(self) -> Compliance | None:
         """By how much this rank's contact rows give way; None where none does."""
-        if self.closures is None:
+        if self.closures is None and self.elastic_slip is None:
             return None
-        owned = self.numbering.owned_index(self.normal_rows) >= 0
-        return Compliance(self.layout, self.closures.part(owned), np.zeros(len(self.owned_discs)))
+        owned, discs = self.numbering.owned_index(self.normal_rows) >= 0, self.owned_discs
+        closures = self.closures or Closures.exact(self.points.area)
+        slip = np.zeros(len(discs)) if self.elastic_slip is None else self.elastic_slip[discs]
+        return Compliance(self.layout, closures.part(owned), slip)
 
     @property
     def reach(self) -> np.ndarray | float:
@@ -498,7 +516,7 @@ def _with_rows(
     """Build B for contact points and tied ones; the right side is left empty. Collective."""
     points, ties = met
     has_friction, coefficient, tresca, strengths = friction_data(scene, points, decomposition.comm)
-    frictional = np.flatnonzero(has_friction)
+    frictional, elastic = np.flatnonzero(has_friction), elastic_slip(scene, points)
     gluing, tearing, fixed = decomposition.gluing.rows, decomposition.tearing, decomposition.fixed
     axes = decomposition.axes
     tied = tied_relations(ties, scene.ties, fixed, axes)
@@ -510,7 +528,8 @@ def _with_rows(
         scene, decomposition, subdomains, points, ties, gluing.count + tied.count, frictional,
         coefficient[frictional], tresca[frictional],
         None if strengths is None else strengths.part(frictional), closures_of(scene, points),
-        numbering, relations, B, np.zeros(0), np.zeros(0), np.zeros((0, scene.dim - 1)), NO_MOTIONS,
+        None if elastic is None else elastic[frictional], numbering, relations, B,
+        np.zeros(0), np.zeros(0), np.zeros((0, scene.dim - 1)), NO_MOTIONS,
     )  # fmt: skip
 
 

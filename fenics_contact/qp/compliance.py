@@ -50,6 +50,11 @@ class Closures:
     scale: Vector
     curves: Sequence[ClosureCurve]
 
+    @classmethod
+    def exact(cls, area: Vector) -> Closures:
+        """Return those of exact contact."""
+        return cls(area, np.full(len(area), -1), np.ones(len(area)), ())
+
     def part(self, chosen: npt.NDArray[np.int64] | npt.NDArray[np.bool_]) -> Closures:
         """Return those of some contacts."""
         return replace(self, area=self.area[chosen], curve=self.curve[chosen], scale=self.scale[chosen])
@@ -176,9 +181,14 @@ class Compliance:
 
     def given_way(self, multiplier: Vector) -> Vector:
         """Return C(λ), owned: closures and elastic slips, zero in rows of equality."""
-        layout, result = self.layout, np.zeros(self.layout.size)
-        result[layout.normal] = self.closures.closure(multiplier[layout.normal])
-        result[layout.tangential] = self.slip[:, None] * multiplier[layout.tangential]
+        result = self.sprung(multiplier)
+        result[self.layout.normal] = self.closures.closure(multiplier[self.layout.normal])
+        return result
+
+    def sprung(self, multiplier: Vector) -> Vector:
+        """Return D τ, owned: elastic slips, zero in all other rows."""
+        rows, result = self.layout.tangential, np.zeros(self.layout.size)
+        result[rows] = self.slip[:, None] * multiplier[rows]
         return result
 
     def work(self, multiplier: Vector) -> float:

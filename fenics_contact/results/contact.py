@@ -60,7 +60,8 @@ class ContactResult:
         slip_bound: Largest friction force, shape (n,), [force].
         gap: Gap after deformation, shape (n,), [length].
         slip: Relative tangential displacement in the points' tangents since the last load step, also of
-            frictionless and open points, shape (n, dim - 1), [length].
+            frictionless and open points, shape (n, dim - 1), [length]; without its elastic part where there
+            is a stick stiffness.
         slip_before: The same of all load steps before, shape (n, dim - 1), [length].
         status: `Status` of each point, shape (n,). A closed point without friction slips.
         area: Area that belongs to each point, of mortar contact the part of it that faces the master (no less

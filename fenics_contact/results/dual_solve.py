@@ -56,7 +56,13 @@ def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray
     trial_tangential = tau - tangential_step * minus_slip
     bound = torn.slip_bound(normal[frictional])
     status = np.where(trial_normal > 0, Status.SLIP, Status.OPEN).astype(int)
-    sticks = (np.linalg.norm(trial_tangential, axis=1) < bound) & (trial_normal[frictional] > 0)
+    slip = -minus_slip
+    if torn.elastic_slip is not None:
+        slip = slip - torn.elastic_slip[:, None] * tau
+        bound_of_trial = bound * (1.0 + tangential_step[:, 0] * torn.elastic_slip)
+    else:
+        bound_of_trial = bound
+    sticks = (np.linalg.norm(trial_tangential, axis=1) < bound_of_trial) & (trial_normal[frictional] > 0)
     status[frictional[sticks]] = Status.STICK
 
     def spread(values: np.ndarray, others: float | np.ndarray = 0.0) -> np.ndarray:
@@ -72,7 +78,7 @@ def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray
         spread(tau),
         spread(bound),
         gap,
-        spread(-minus_slip, torn.sliding(displacement) - torn.slid),
+        spread(slip, torn.sliding(displacement) - torn.slid),
         spread(origin.reshape(-1, torn.dim - 1), torn.slid),
         status,
         torn.points.area,

@@ -23,6 +23,7 @@ from fenics_contact import (
     Support,
     Surface,
     Traction,
+    Tresca,
     box_partition,
     solve_scene,
 )
@@ -55,7 +56,7 @@ LAWS: dict[str, tuple[Coulomb, Callable[[float], float]]] = {
 }
 
 
-def dragged_block(friction: Coulomb, pressure: float, shift: float = 1.0) -> Scene:
+def dragged_block(friction: Coulomb | Tresca, pressure: float, shift: float = 1.0) -> Scene:
     """A block without lateral contraction on a floor, pressed uniformly and dragged along x and y."""
     mesh = block((0.0, 0.0, 0.0), (2.0, 1.0, HEIGHT), (4, 2, 2))
     way = (0.6 * shift, 0.8 * shift, -pressure * HEIGHT / MODULUS)

@@ -49,6 +49,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "floor": lambda: on_obstacle(Coulomb(0.3), "quadrilateral"),
     "blocks": lambda: on_block(Coulomb(0.3), "quadrilateral"),
     "mortar": lambda: by_mortar(on_block(Coulomb(0.3), "triangle")),
+    "springs": lambda: on_obstacle(Coulomb(0.3, stick_stiffness=200.0), "quadrilateral"),
     "space": lambda: block_on_floor(Coulomb(0.3), load=(0.0, 0.0, -2.0)),
     "space, mortar": lambda: by_mortar(block_on_block(Coulomb(0.38), load=(0.0, 0.0, -2.0))),
 }

@@ -8,7 +8,16 @@ from functools import cache
 
 import numpy as np
 
-from fenics_contact import ClosureLaw, ClosureTable, Coulomb, ExponentialClosure, FrictionTable, Scene, Tresca
+from fenics_contact import (
+    ClosureLaw,
+    ClosureTable,
+    Coulomb,
+    ExponentialClosure,
+    FrictionTable,
+    LinearClosure,
+    Scene,
+    Tresca,
+)
 from tests.shape.blocks import block_on_block, block_on_floor, problem
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Line
@@ -37,6 +46,10 @@ SCENES: dict[str, Callable[[], Scene]] = {
         block_on_block(Coulomb(0.38), "tetrahedron", load=DRAG),
         ClosureTable((0.0, 0.002, 0.003), (0.0, 1.0, 3.0)),
     ),
+    "floor, elastic slip": lambda: closing(
+        block_on_floor(Coulomb(0.3, stick_stiffness=40.0), load=PUSH), LinearClosure(300.0)
+    ),
+    "blocks, elastic slip": lambda: block_on_block(Coulomb(0.38, stick_stiffness=60.0), load=DRAG),
     "floor, table": lambda: block_on_floor(
         Coulomb(FrictionTable((0.5, 2.5, 4.0), (0.35, 0.25, 0.22))), load=PUSH
     ),

@@ -37,7 +37,7 @@ from tests.shape.quotients import Patch
 
 CLAIM = [pytest.mark.slow, pytest.mark.claim]
 SCENES = [
-    "floor", "beam", "space, mortar",
+    "floor", "beam", "springs", "space, mortar",
     *(pytest.param(name, marks=CLAIM) for name in ("blocks", "mortar", "space")),
 ]  # fmt: skip
 #: Of the last step alone: what earlier ones left behind.
