@@ -176,17 +176,17 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
     contact, slave = state.contact, state.scene.contacts[pair].slave
     mesh, edges = state.scene.bodies[slave.body].mesh, state.scene.facets(slave)
     order, starts = walk(edges)
+    sign = 1.0  # bodies lie left of their surfaces, so that the tangents of points lead forward
     if _runs_backwards(mesh.points[order], starts):
+        sign = -1.0
         lengths = np.diff([*starts, len(order)])
         order, starts = order[::-1], np.concatenate([[0], np.cumsum(lengths[::-1])[:-1]])
-    forward, axis, places = _unrolled(mesh.points[order], starts)
+    axis, places = _unrolled(mesh.points[order], starts)
     numbers = state.torn.decomposition.tearing.global_nodes(slave.body, order)
     chosen = contact.on_pair(pair)
     sorting = np.argsort(numbers)
     points = sorting[np.searchsorted(numbers, contact.points.slave[chosen], sorter=sorting)]
-    shear = np.einsum("na,nad->nd", -contact.friction_force[chosen], contact.points.tangents[chosen])
-    shear = np.einsum("nd,nd->n", shear, forward[points])
-    slip = np.einsum("nd,nd->n", contact.slip_in_space[chosen], forward[points])
+    shear, slip = -sign * contact.friction_force[chosen, 0], sign * contact.slip[chosen, 0]
     values = np.zeros((3, len(order)))
     area = contact.area[chosen]
     values[:, points] = np.stack([contact.normal_force[chosen], shear, contact.slip_bound[chosen]]) / area
@@ -236,8 +236,8 @@ def _runs_backwards(points: np.ndarray, starts: np.ndarray) -> bool:
     return bool(total[int(np.argmax(np.abs(total)))] < 0)
 
 
-def _unrolled(points: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, str, np.ndarray]:
-    """Return the direction along the surface at each node, the label of the positions, and the positions."""
+def _unrolled(points: np.ndarray, starts: np.ndarray) -> tuple[str, np.ndarray]:
+    """Return the label of the positions along a surface, and the positions."""
     steps, inside = _steps(points, starts)
     length = np.linalg.norm(steps, axis=1)
     unit = steps / np.where(length, length, 1.0)[:, None]
@@ -245,18 +245,13 @@ def _unrolled(points: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, str, 
     mean = mean / max(float(np.linalg.norm(mean)), np.finfo(float).tiny)
     if np.all(unit[inside] @ mean > STRAIGHT):
         return _over_a_coordinate(points, mean)
-    along = np.concatenate([[0.0], np.cumsum(np.where(inside, length, 0.0))])
-    # A node's direction is the mean of the edges at it, which belong to its own piece.
-    total = np.zeros_like(points)
-    total[:-1][inside] += unit[inside]
-    total[1:][inside] += unit[inside]
-    return total / np.linalg.norm(total, axis=1)[:, None], "along the surface", along
+    return "along the surface", np.concatenate([[0.0], np.cumsum(np.where(inside, length, 0.0))])
 
 
-def _over_a_coordinate(points: np.ndarray, mean: np.ndarray) -> tuple[np.ndarray, str, np.ndarray]:
+def _over_a_coordinate(points: np.ndarray, mean: np.ndarray) -> tuple[str, np.ndarray]:
     """Show a nearly straight surface over x or y if it is parallel to one, else over its direction."""
     axis = int(np.argmax(np.abs(mean)))
     plain = abs(mean[axis]) > np.cos(np.radians(20.0))
     direction = np.eye(2)[axis] if plain else mean
     name = axis_label(np.append(direction, 0.0)) if plain else "along the surface"
-    return np.tile(direction, (len(points), 1)), name, points @ direction
+    return name, points @ direction

@@ -163,7 +163,9 @@ def _slave_surface(state: State, which: int | str) -> _SlaveSurface:
     places = surface.points
     if scene.bodies[slave.body].deforms_much:
         places = places + state.gather_displacement(slave.body)[surface.nodes]
-    facing, by_mortar = np.zeros(len(nodes)), scene.contacts[pair].by_mortar
+    # Nodes that supports hold have no contact point either.
+    held, by_mortar = scene.fixed(slave.body)[surface.nodes].all(axis=1), scene.contacts[pair].by_mortar
+    facing = held.astype(float)
     facing[place] = 1.0
     if by_mortar:
         whole_area = nodal_areas(surface.points, whole, scene.axisymmetric).ravel()

@@ -40,7 +40,7 @@ from fenics_contact import (
 from fenics_contact._equilibrium.steps import stored_state
 from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.errors import ConvergenceError, InvalidInputError, MissingRequirementError
-from fenics_contact.gallery import block, half_disc, hemisphere, rectangle
+from fenics_contact.gallery import block, cylinder, half_disc, hemisphere, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.qp import FaceNewton
 from fenics_contact.results.area import _reach
@@ -373,6 +373,23 @@ def test_contact_ends_where_the_master_ends(cells: int, discretisation: Discreti
     assert contact_area(state) == pytest.approx(2.3 * 2.2, rel=near)
     for axis, size, facet in (((1, 0, 0), 2.3, 5 / cells), ((0, 1, 0), 2.2, 4 / 7)):
         assert abs(contact_width(state, axis) - size) < 1.2 * facet
+
+
+@pytest.mark.parametrize("discretisation", ["mortar", "node"])
+def test_contact_reaches_over_nodes_that_supports_hold(discretisation: Discretisation) -> None:
+    """A pin in a tube with an overlap: the ring of nodes at its clamped end has no contact points."""
+    pin, tube = cylinder(1.0, 1.5, 3, 4), cylinder(2.0, 1.5, 4, 3, hole=1.0)
+    sides = Surface("pin", "outer"), Surface("tube", "inner")
+    pair = ContactPair(*sides, discretisation=discretisation, interference=0.01)
+    scene = Scene(
+        {"pin": Body(pin, SOLID), "tube": Body(tube, SOLID)},
+        [Support("pin", "bottom"), Support("tube", "outer")],
+        contacts=[pair],
+    )
+    state = solve_scene(scene, MPI.COMM_WORLD)
+    assert state.contact.points.count == 24 * 4
+    assert contact_area(state) == pytest.approx(3.0 * np.pi, rel=0.02)
+    assert contact_width(state, (0, 0, 1)) == pytest.approx(1.5, rel=1e-9)
 
 
 def test_a_width_reaches_over_what_is_open_between() -> None:

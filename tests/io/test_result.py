@@ -71,7 +71,7 @@ def test_a_state_is_told_with_its_scene_and_its_numbers(tmp_path: Path) -> None:
     assert upper["material"]["young_modulus"] == 100.0
     (pair,) = found["scene"]["contacts"]
     assert pair["slave"] == {"body": "upper block", "surface": "z0"}
-    assert pair["friction"] == {"type": "Coulomb", "friction_coefficient": 0.4}
+    assert pair["friction"] == {"type": "Coulomb", "friction_coefficient": 0.4, "shear_limit": None}
     assert [load["type"] for load in found["scene"]["loads"]] == ["Traction", "BodyForce"]
     assert found["plan"]["effects"]["Coulomb friction"].startswith("1 pair")
     assert found["counts"] == state.counts

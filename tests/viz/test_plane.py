@@ -19,10 +19,24 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
-from fenics_contact import Body, Scene, State, Status, solve_scene
+from fenics_contact import (
+    Body,
+    ContactPair,
+    ContactProblem,
+    Coulomb,
+    LoadStep,
+    RigidPlane,
+    RigidSurface,
+    Scene,
+    State,
+    Status,
+    Surface,
+    solve_scene,
+    solve_steps,
+)
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import rectangle
-from fenics_contact.materials import PlaneStrain
+from fenics_contact.gallery import disc, rectangle
+from fenics_contact.materials import NeoHooke, PlaneStrain
 from fenics_contact.pictures import (
     Picture,
     Units,
@@ -121,6 +135,32 @@ def test_the_trace_of_a_ring_runs_along_it() -> None:
     assert len(trace.places) == len(trace.points) == 24
     np.testing.assert_allclose(np.diff(trace.places), 2 * np.sin(np.pi / 24))
     np.testing.assert_allclose(trace.pressure, trace.pressure.mean(), rtol=1e-3)
+
+
+def test_tractions_of_a_body_that_turns_are_those_along_its_surface() -> None:
+    """A rubber ring whose rigid core has turned by a right angle, pressed on a floor and pushed along it."""
+    ring = Body(disc(2.0, 4, hole=1.2), NeoHooke(1.0, 0.3))
+    floor = RigidPlane((0.0, -2.0), (0.0, 1.0))
+    pair = ContactPair(Surface("ring", "outer"), floor, Coulomb(0.3))
+
+    def held(*motion: float) -> list[RigidSurface]:
+        return [RigidSurface("ring", "inner", (0.0, 0.0), motion[:2], motion[2])]
+
+    problem = ContactProblem(Scene({"ring": ring}, held(0.0, 0.0, 0.0), contacts=[pair]), MPI.COMM_SELF)
+    turn = 0.5 * np.pi
+    steps = [
+        LoadStep("turned", supports=held(0.0, 0.0, turn)),
+        LoadStep("pressed", supports=held(0.0, -0.3, turn)),
+        LoadStep("pushed", supports=held(0.2, -0.3, turn)),
+    ]
+    state = solve_steps(problem, steps)[-1]
+    trace, contact = contact_trace(state, 0), state.contact
+    push = state.resultants().friction["ring outer"].force[0]
+    assert push < -0.01
+    assert abs(trace.shear) == pytest.approx(-push, rel=1e-9)
+    slips = trace.points[contact.status == Status.SLIP]
+    assert len(slips) > 0
+    np.testing.assert_allclose(np.abs(trace.traction[slips]), trace.bound[slips], rtol=1e-6)
 
 
 def test_a_surface_that_runs_against_x_is_shown_forwards() -> None:
