@@ -3,7 +3,7 @@
 What a script needs is here; nothing is loaded before it is used:
 
 Scenes: Scene, Body, BodyMesh, Surface, Support, Roller, RigidSurface, ContactPair, Tie, AutomaticContact,
-    LoadStep, Preload, Section, box_partition
+    LoadStep, Preload, Section, ElasticFoundation, box_partition
 
 Laws of surfaces: Coulomb, Tresca, FrictionTable, FrictionCurve, LinearClosure, ExponentialClosure,
     ClosureTable, ClosureLaw
@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from fenics_contact._scene.fields import SampledField as SampledField
     from fenics_contact._scene.fields import Ufl as Ufl
     from fenics_contact._scene.fields import read_field as read_field
+    from fenics_contact._scene.foundations import ElasticFoundation as ElasticFoundation
     from fenics_contact._scene.loads import BodyForce as BodyForce
     from fenics_contact._scene.loads import Pressure as Pressure
     from fenics_contact._scene.loads import ThermalStrain as ThermalStrain

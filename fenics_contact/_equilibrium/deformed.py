@@ -94,9 +94,11 @@ class DeformedEquilibria:
             path = steps.follow(equations, acted, load, start, timer, known, held=not self._unresisted)
         except (InfeasibleError, NotHeldError) as failure:
             if not self._unresisted:
+                _require_more_than_springs(load.torn, failure)
                 raise
             raise InfeasibleError(unresisted_in_words(self._unresisted)) from failure
         except PathEndsError as failure:
+            _require_more_than_springs(load.torn, failure)
             last = None if failure.path is None else _state_after(failure.path, before, timer, steps)
             where = "" if step is None else f"load step {step.name!r}: "
             hints = advice(scene, last or before, moves=isinstance(equations.contact, MovingContact))
@@ -137,6 +139,17 @@ class DeformedEquilibria:
         load = Loading.of(scene, self._decomposition, time, self._assembled, step=step, overlap=overlap)
         self._assembled = load.torn
         return load
+
+
+def _require_more_than_springs(torn: TornSystem, failure: Exception) -> None:
+    """Name motions that elastic foundations alone resist: Newton's method may need more. Collective."""
+    alone = unresisted_motions(torn, sprung=False) if torn.scene.foundations else ()
+    if alone:
+        raise InfeasibleError(
+            "Newton's method needs supports, ties or contacts that resist every motion beside elastic "
+            f"foundations, but nothing else resists body {alone[0]}: support it there (a symmetric part on "
+            "its planes of symmetry), or cut the body into fewer subdomains"
+        ) from failure
 
 
 def _require_prescribed(scene: Scene) -> None:

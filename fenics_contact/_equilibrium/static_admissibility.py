@@ -18,6 +18,7 @@ from fenics_contact._scene.plan import MOTION_ROUNDING, held_components, point_l
 from fenics_contact.errors import ConvergenceError, InfeasibleError, together
 from fenics_contact.errors.ranks import made_once
 from fenics_contact.feti.factor import fixing_nodes
+from fenics_contact.feti.foundations import foundation_stiffness, separated
 from fenics_contact.feti.subdomain import common_kernel
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.cuts import parts_of
@@ -103,15 +104,19 @@ def _require_closed(torn: TornSystem, bodies: list[RigidBody], found: _Motion, a
             )
 
 
-def rigid_bodies(torn: TornSystem) -> list[RigidBody]:
-    """Return the bodies regarded as rigid; sections of preloads separate some into parts."""
+def rigid_bodies(torn: TornSystem, *, sprung: bool = True) -> list[RigidBody]:
+    """Return the bodies regarded as rigid; sections of preloads separate some into parts.
+
+    `sprung`: whether elastic foundations count.
+    """
     found = []
     for index, body in enumerate(torn.scene.bodies.values()):
         if not body.mesh.cuts:
-            found.append(RigidBody(torn, index))
+            found.append(RigidBody(torn, index, sprung=sprung))
             continue
         part = parts_of(body.mesh)
-        found += [RigidBody(torn, index, part == number) for number in range(part.max() + 1)]
+        marks = (part == number for number in range(part.max() + 1))
+        found += [RigidBody(torn, index, mark, sprung=sprung) for mark in marks]
     return found
 
 
@@ -143,7 +148,9 @@ class RigidBody:
     `part`: marks of the nodes of a part of it, shape (n_nodes,); all by default.
     """
 
-    def __init__(self, torn: TornSystem, index: int, part: np.ndarray | None = None) -> None:
+    def __init__(
+        self, torn: TornSystem, index: int, part: np.ndarray | None = None, *, sprung: bool = True
+    ) -> None:
         tearing = torn.decomposition.tearing
         self.name = tearing.body_names[index]
         self._nodes = slice(int(tearing.node_offset[index]), int(tearing.node_offset[index + 1]))
@@ -156,6 +163,11 @@ class RigidBody:
         supports = resisted_motions(held_components(torn.scene, self.name, self._modes))
         #: Wrenches that supports and material can exert in both directions, shape (n_modes, n).
         self.support = _both(supports, _resisted_by_material(body, self._modes))
+        beds = [each for each in torn.scene.foundations if each.body == self.name]
+        if beds and sprung:
+            motions = self._modes.reshape(-1, self._modes.shape[2])
+            held, _ = separated(foundation_stiffness(beds, body), motions)
+            self.support = _both(self.support, held)
 
     @property
     def held(self) -> bool:
@@ -414,13 +426,15 @@ def _in_words(place: np.ndarray, size: float) -> str:
 CHUNK = 4096
 
 
-def unresisted_motions(torn: TornSystem) -> tuple[UnheldMotion, ...]:
+def unresisted_motions(torn: TornSystem, *, sprung: bool = True) -> tuple[UnheldMotion, ...]:
     """Return the rigid motions that no support, tie, contact or material resists at rest. Collective.
+
+    `sprung`: whether elastic foundations count, too.
 
     Contact counts wherever its surfaces face each other, also across a gap, and in both directions. Surfaces
     with friction and obstacles that move may meet anywhere later: they count against all motions.
     """
-    return made_once(torn.numbering.comm, lambda: _unresisted(torn))
+    return made_once(torn.numbering.comm, lambda: _unresisted(torn, sprung))
 
 
 def require_resisted(motions: tuple[UnheldMotion, ...], torn: TornSystem, prescribed: np.ndarray) -> None:
@@ -458,8 +472,8 @@ def unresisted_in_words(motions: list[UnheldMotion] | tuple[UnheldMotion, ...]) 
     )
 
 
-def _unresisted(torn: TornSystem) -> tuple[UnheldMotion, ...]:
-    bodies = rigid_bodies(torn)
+def _unresisted(torn: TornSystem, sprung: bool) -> tuple[UnheldMotion, ...]:
+    bodies = rigid_bodies(torn, sprung=sprung)
     if all(body.held for body in bodies):
         return ()
     supports = sp.block_diag([body.support for body in bodies])

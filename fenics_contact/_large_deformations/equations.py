@@ -28,6 +28,7 @@ from fenics_contact._large_deformations.tangent_step import TangentProblem
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import ConvergenceError, together
 from fenics_contact.feti.decomposition import Decomposition
+from fenics_contact.feti.subdomain import foundation_of
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.reductions import Vector, global_max, global_min, global_sum
 from fenics_contact.qp.solution import Residuals, contact_step
@@ -302,6 +303,7 @@ class Equations:
             self._mechanics = tuple(self._of(scene, number) for number in range(len(decomposition.meshes)))
         meshes = [body.mesh for body in scene.bodies.values()]
         moves = bool(scene.contacts) and scene.deforms_much
+        self._beds = self._foundations(scene)
         self.contact = MovingContact(scene, decomposition) if moves else Contact()
         self._reach = max(float(np.abs(mesh.points).max()) for mesh in meshes)
         self._cell = max(float(mesh.volume / mesh.n_cells) ** (1.0 / scene.dim) for mesh in meshes)
@@ -312,6 +314,11 @@ class Equations:
         points = body.mesh.points[np.sort(mesh.nodes)]
         parts = composition(body, mesh.cells)
         return self.decomposition.forms.mechanics(parts, body.mesh.cell_type, mesh.space, points)
+
+    def _foundations(self, scene: Scene) -> tuple[sp.csr_matrix | None, ...]:
+        """Return the stiffness of the foundations under each subdomain, None where there is none."""
+        beds = (foundation_of(m, scene.bodies[m.body], scene.foundations) for m in self.decomposition.meshes)
+        return tuple(bed if bed.nnz else None for bed in beds)
 
     def _facts(self) -> dict[str, object]:
         return {"subdomains": f"{len(self._mechanics)} on this rank"}
@@ -370,6 +377,8 @@ class Equations:
                 m.at(at.displacement[part], MaterialStep(history, duration, start))
                 for (m, part, history), start in zip(each, before, strict=True)
             )
+            moved = (at.displacement[part] for part in self.decomposition.parts)
+            responses = tuple(map(_on_bed, responses, self._beds, moved))
             external, softening = load.at(at.displacement)
         internal = np.concatenate([np.zeros(0), *(response.force for response in responses)])
         bound = torn.B.T @ torn.numbering.to_local(at.multiplier)
@@ -389,3 +398,17 @@ class Equations:
         return ResidualState(
             self, load, at, responses, external, softening, unbalanced, open_, residuals, least
         )
+
+
+def _on_bed(response: Response, bed: sp.csr_matrix | None, displacement: Vector) -> Response:
+    """Return a response with the springs of foundations, which stay as they are however far they move."""
+    if bed is None:
+        return response
+    force = bed @ displacement
+    energy = None if response.energy is None else response.energy + 0.5 * float(displacement @ force)
+    return replace(
+        response,
+        force=response.force + force,
+        tangent=lambda: (response.stiffness + bed).tocsr(),
+        energy=energy,
+    )

@@ -12,6 +12,7 @@ import numpy as np
 
 from fenics_contact._base.checks import checked
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.loads import (
     BodyForce,
     Load,
@@ -48,6 +49,7 @@ class SceneParts:
     contacts: Sequence[ContactPair] = field(default=())
     ties: Sequence[Tie] = field(default=())
     preloads: Sequence[Preload] = field(default=())
+    foundations: Sequence[ElasticFoundation] = field(default=())
 
     def __post_init__(self) -> None:
         """Reject names that do not exist, and loads and supports that do not suit their bodies."""
@@ -61,6 +63,9 @@ class SceneParts:
             self._require(part.body, surface, type(part).__name__)
         for preload in self.preloads:
             self._require(preload.body, None, "Preload")
+        for foundation in self.foundations:
+            self._require(foundation.body, foundation.surface, "ElasticFoundation")
+            foundation.require_space(self.dim)
         object.__setattr__(self, "supports", tuple(map(self._in_space, self.supports)))
         for part in (*self.supports, *self.loads):
             if not isinstance(part, RigidSurface | Roller):

@@ -36,6 +36,7 @@ class EffectName(StrEnum):
     PRESCRIBED_DISPLACEMENT = "prescribed displacement"
     ROLLER = "roller"
     RIGID_SURFACE = "rigid surface"
+    FOUNDATION = "elastic foundation"
     BODY_FORCE = "body force"
     SURFACE_LOAD = "surface load"
     FOLLOWING_PRESSURE = "following pressure"
@@ -80,6 +81,7 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
         (names.PRESCRIBED_DISPLACEMENT, len(scene.supports) - rigid - rolling, "support", "supports"),
         (names.ROLLER, rolling, "surface slides", "surfaces slide"),
         (names.RIGID_SURFACE, rigid, "surface stays rigid", "surfaces stay rigid"),
+        (names.FOUNDATION, len(scene.foundations), "surface rests on springs", "surfaces rest on springs"),
         (names.BODY_FORCE, volume, "load on a volume", "loads on volumes"),
         (names.SURFACE_LOAD, len(loads) - volume - thermal, "load on a surface", "loads on surfaces"),
         (names.FOLLOWING_PRESSURE, len(scene.following_pressures), "pressure follows its surface",

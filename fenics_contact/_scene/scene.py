@@ -39,6 +39,7 @@ class Scene(SceneParts):
         ties: Pairs of surfaces that stay together, likewise.
         preloads: Sections through bodies that are drawn together. The scene cuts the meshes of these bodies,
             whose nodes are there twice; cells and surfaces keep numbers and names.
+        foundations: Surfaces that rest on springs to the ground, the same in all load steps.
 
     Raises:
         InvalidInputError: If a part names a body or a surface that is not there, does not suit the body's
@@ -105,6 +106,7 @@ class Scene(SceneParts):
                 for pair in self.contacts
             ],
             "ties": [tie.place for tie in self.ties],
+            **({"foundations": [each.place for each in self.foundations]} if self.foundations else {}),
             **({"preloads": [preload.place for preload in self.preloads]} if self.preloads else {}),
         }
 

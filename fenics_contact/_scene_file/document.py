@@ -22,6 +22,7 @@ from fenics_contact._scene_file.model import (
     AnySupportPart,
     AutomaticPart,
     ContactPart,
+    FoundationPart,
     PreloadAim,
     PreloadPart,
     TiePart,
@@ -422,6 +423,7 @@ class Document(Part):
     )
     ties: list[TiePart] = Field([], description="pairs that stay together")
     preloads: list[PreloadPart] = Field([], description="bolts drawn together at a section")
+    foundations: list[FoundationPart] = Field([], description="surfaces on springs to the ground")
     steps: list[StepPart] = Field([], description="load steps; without them all acts at once")
     solver: SolverPart = Field(SolverPart(), description="how it is solved")
     output: OutputPart = Field(OutputPart(), description="what is written, and where")

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from fenics_contact._base.checks import meaning
 from fenics_contact._scene import automatic, loads, pairs, surface_laws
 from fenics_contact._scene import obstacles as obstacles_module
+from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.loads import Load
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
@@ -378,6 +379,15 @@ class RollerPart(_Named):
     def build(self, dim: int, value: Any = None) -> Roller:
         """Return the roller, with the displacement of a load step if given."""
         return self.made(displacement=self.displacement if value is None else value)
+
+
+@keys_of(ElasticFoundation)
+class FoundationPart(Part):
+    """A surface that rests on springs to the ground."""
+
+    stiffness: Vector | PositiveFloat = Field(
+        description="[force / length³]: a number along the normal of the surface, or one for each axis"
+    )
 
 
 @keys_of(Preload, without=("section", "name"))

@@ -123,7 +123,7 @@ class Builder:
         document, dim = self._document, next(iter(bodies.values())).mesh.dim
         empty = Scene(bodies)
         built: dict[str, list[Any]] = {}
-        for key in ("supports", "loads", "contacts", "ties", "preloads"):
+        for key in ("supports", "loads", "contacts", "ties", "preloads", "foundations"):
             built[key] = []
             for number, part in enumerate(getattr(document, key)):
                 with self._at(key, number):

@@ -234,10 +234,12 @@ def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign)
     body = scene.bodies[name]
     cut, planes = mirrored(scene, name), planes_of(scene)
     held = cut[:, : scene.dim].copy()
-    for support in scene.supports:
+    for support in (*scene.supports, *scene.foundations):
         if support.body == name:
             facets = body.mesh.surfaces[support.surface]
             held[facets[~cut[facets].all(axis=1).any(axis=1)]] = True
+    for section in body.mesh.cuts.values():
+        held[section.pairs] = True
     held[design.nodes_beyond_transition(body.mesh, cut)] = True
     tilted = None if planes is None else (cut, planes)
     return MeshMotion(decomposition, name, body, design.lattice.nodes, held, tilted)

@@ -16,9 +16,11 @@ from fenics_contact._fem.forms import FormLibrary
 from fenics_contact._fem.model_checks import check_kernel, kernel_of
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.fields import Ufl
+from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.loads import Load, SurfaceLoad
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.factor import fixing_nodes
+from fenics_contact.feti.foundations import foundation_stiffness, separated
 from fenics_contact.materials.elastic import Material
 from fenics_contact.mesh.faces import corners_of
 
@@ -125,6 +127,7 @@ class Subdomain:
 
     Attributes:
         material: The materials and their regions for which it was assembled.
+        foundations: The elastic foundations of its body.
         loads: The loads for which it was assembled.
         points: Coordinates by block, shape (n, dim), [length].
         load: f_s, shape (dim n,), [force].
@@ -134,6 +137,7 @@ class Subdomain:
 
     mesh: SubdomainMesh
     material: Composition
+    foundations: tuple[ElasticFoundation, ...]
     loads: tuple[Load, ...]
     points: np.ndarray
     load: np.ndarray
@@ -185,14 +189,16 @@ def assemble(
     loads: Sequence[Load],
     forms: FormLibrary,
     earlier: Subdomain | None = None,
+    foundations: Sequence[ElasticFoundation] = (),
 ) -> Subdomain:
     """Assemble K_s, f_s and R_s for the present coordinates of ``body``."""
     parts = composition(body, mesh.cells)
+    beds = tuple(each for each in foundations if each.body == mesh.body)
     points = body.mesh.points[mesh.nodes]
     acting = tuple(load for load in loads if _acts(load, mesh, body))
     order = np.argsort(mesh.nodes)
-    if earlier is None or not _same_stiffness(earlier, parts, points):
-        earlier = _with_stiffness(mesh, body, parts, forms, points)
+    if earlier is None or earlier.foundations != beds or not _same_stiffness(earlier, parts, points):
+        earlier = _with_stiffness(mesh, body, parts, forms, points, beds)
     elif earlier.loads == acting:
         return earlier
     force = np.zeros(mesh.size)
@@ -221,7 +227,12 @@ def _same_stiffness(earlier: Subdomain, parts: Composition, points: np.ndarray) 
 
 
 def _with_stiffness(
-    mesh: SubdomainMesh, body: Body, parts: Composition, forms: FormLibrary, points: np.ndarray
+    mesh: SubdomainMesh,
+    body: Body,
+    parts: Composition,
+    forms: FormLibrary,
+    points: np.ndarray,
+    foundations: tuple[ElasticFoundation, ...],
 ) -> Subdomain:
     """Return the subdomain without loads."""
     space, cell_type = mesh.space, body.cell_type
@@ -232,15 +243,30 @@ def _with_stiffness(
     def stiffness() -> sp.csr_matrix:
         _dolfinx.update_coordinates(space.mesh, by_input_node)
         indptr, indices, data = _dolfinx.assemble_csr(forms.stiffness(parts, cell_type, space))
-        return sp.csr_matrix((data, indices, indptr), shape=(mesh.size, mesh.size))
+        elastic = sp.csr_matrix((data, indices, indptr), shape=(mesh.size, mesh.size))
+        return (elastic + bed).tocsr() if bed.nnz else elastic
 
+    bed = foundation_of(mesh, body, foundations)
     matrix = CachedMatrix(stiffness)
     K = matrix.get()
     _check_finite(K.data, mesh)
     kernel = common_kernel(parts.materials, points, body.axisymmetric).reshape(mesh.size, -1)
+    if bed.nnz:
+        kernel = kernel @ separated(bed, kernel)[1]
     check_kernel(K, kernel, f"subdomain {mesh.number} of body {mesh.body!r}")
     typical = float(K.diagonal().mean())
-    return Subdomain(mesh, parts, (), points, np.zeros(mesh.size), kernel, typical, matrix)
+    return Subdomain(mesh, parts, foundations, (), points, np.zeros(mesh.size), kernel, typical, matrix)
+
+
+def foundation_of(
+    mesh: SubdomainMesh, body: Body, foundations: Sequence[ElasticFoundation]
+) -> sp.csr_matrix:
+    """Return the stiffness of the foundations under a subdomain, shape (size, size)."""
+    beds = [each for each in foundations if each.body == mesh.body]
+    if not beds:
+        return sp.csr_matrix((mesh.size, mesh.size))
+    dofs = (mesh.dim * mesh.nodes[:, None] + np.arange(mesh.dim)).ravel()
+    return foundation_stiffness(beds, body, mesh.cells)[dofs][:, dofs].tocsr()
 
 
 def _varies(parts: Composition, body: Body, forms: FormLibrary) -> bool:

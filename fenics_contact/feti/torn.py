@@ -422,7 +422,7 @@ def build_torn_system(
     with together(comm):
         known = (None,) * len(decomposition.meshes) if previous is None else previous.subdomains
         subdomains = tuple(
-            assemble(mesh, scene.bodies[mesh.body], loads, decomposition.forms, earlier)
+            assemble(mesh, scene.bodies[mesh.body], loads, decomposition.forms, earlier, scene.foundations)
             for mesh, earlier in zip(decomposition.meshes, known, strict=True)
         )
     with together(comm):

@@ -66,6 +66,7 @@ def described_scene(scene: Scene, subdomains: Mapping[str, int], time: float = 0
         "contacts": [_described_pair(pair, time) for pair in scene.contacts],
         "ties": [_described_pair(tie, time) for tie in scene.ties],
         **({"preloads": readable(scene.preloads)} if scene.preloads else {}),
+        **({"foundations": readable(scene.foundations)} if scene.foundations else {}),
     }
 
 
@@ -109,7 +110,9 @@ def _described_pair(pair: ContactPair | Tie, time: float) -> dict[str, Any]:
 def forces_record(state: State) -> dict[str, Any]:
     """Return reactions, forces of ties and contacts, and their balance by name. Collective."""
     pairs, balance = state.resultants(), state.balance()
-    drawn = {"preloads": preloads_record(state)} if state.scene.preloads else {}
+    drawn: dict[str, Any] = {"preloads": preloads_record(state)} if state.scene.preloads else {}
+    if state.scene.foundations:
+        drawn["foundations"] = [_on_surface(each) for each in state.foundations()]
     return {
         "reactions": [_on_surface(each) for each in state.reactions()],
         "contacts": [_on_surface(each) for each in pairs.contacts],
@@ -150,6 +153,7 @@ def listed_forces(forces: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any
     words = {"reactions": "reaction", "contacts": "contact", "ties": "tie"}
     single = [(f"{words[kind]} {k}", entry) for kind in words for k, entry in enumerate(forces[kind])]
     single += [(f"section of {each['name']}", each) for each in forces.get("preloads", ())]
+    single += [(f"foundation {k}", each) for k, each in enumerate(forces.get("foundations", ()))]
     balance = forces["balance"]
     sums = {name: entry for name, entry in balance.items() if isinstance(entry, Mapping)}
     whole = [
@@ -268,9 +272,9 @@ None where materials dissipate or are nonlinear |
 ``smallest_gap``, ``largest_slip`` in the last load step; without friction closed points count as ``slip`` |
     | ``unheld`` | rigid motions that nothing resists and nothing loads, in words; `State.unheld` |
     | ``forces`` | ``reactions`` of the supports, ``contacts`` and ``ties`` (on the slave): each with body, \
-surface, ``force``, ``moment`` and the point ``about`` which it is; of ``preloads``, where there are any, \
-``name``, ``axial_force``, ``shortening``, ``shear``, ``bending`` and ``torsion``; ``balance`` of all with \
-the loads, its ``imbalance`` and the scales to which that is relative |
+surface, ``force``, ``moment`` and the point ``about`` which it is; where there are any, ``foundations`` \
+likewise, and of ``preloads`` ``name``, ``axial_force``, ``shortening``, ``shear``, ``bending`` and \
+``torsion``; ``balance`` of all with the loads, its ``imbalance`` and the scales to which that is relative |
     | ``rigid_motions`` | of each rigid surface body, surface, ``displacement`` and ``rotation`` of the \
 point ``about`` |
     | ``more`` | further results of the caller |

@@ -12,12 +12,14 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
+from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie, named
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import RigidSurface, Roller
 from fenics_contact._surfaces.facets import share_areas, surface_moments
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import nodal_sum
+from fenics_contact.feti.subdomain import common_kernel, foundation_of
 from fenics_contact.feti.torn import TornSystem
 
 
@@ -37,6 +39,7 @@ class NodalForces:
         contact: On the slave at each contact point, shape (n_contact, dim).
         tie: On the slave at each tied point, shape (n_ties, dim).
         bed: What materials exert that resist rigid motions (elastic beds), shape (n_nodes, dim).
+        foundations: What each elastic foundation of the scene exerts, shape (n_nodes, dim) each.
     """
 
     places: np.ndarray
@@ -45,6 +48,7 @@ class NodalForces:
     contact: np.ndarray
     tie: np.ndarray
     bed: np.ndarray
+    foundations: tuple[np.ndarray, ...] = ()
 
 
 def nodal_forces(torn: TornSystem, multiplier: np.ndarray, displacement: np.ndarray) -> NodalForces:
@@ -68,6 +72,9 @@ def nodal_forces(torn: TornSystem, multiplier: np.ndarray, displacement: np.ndar
         contact,
         tie,
         nodal_sum(decomposition, -_resisted(torn, displacement)),
+        tuple(
+            nodal_sum(decomposition, -_sprung(torn, displacement, each)) for each in torn.scene.foundations
+        ),
     )
 
 
@@ -107,13 +114,24 @@ def by_node(points: ContactPoints, force: np.ndarray, chosen: np.ndarray) -> np.
 def _resisted(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:
     """Return K u of the subdomains whose material resists a rigid motion, zero on others, (torn_size,)."""
     motions = 1 if torn.scene.axisymmetric else 3 * (torn.dim - 1)
-    parts = np.split(displacement, np.cumsum([part.mesh.size for part in torn.subdomains])[:-1])
-    return np.concatenate(
-        [
-            part.stiffness @ u if part.kernel.shape[1] < motions else np.zeros(part.mesh.size)
-            for part, u in zip(torn.subdomains, parts, strict=True)
-        ]
-    )
+    found = []
+    for part, where in zip(torn.subdomains, torn.decomposition.parts, strict=True):
+        body = torn.scene.bodies[part.mesh.body]
+        kernel, force = part.kernel.shape[1], np.zeros(part.mesh.size)
+        if part.foundations:
+            kernel = common_kernel(part.material.materials, part.points, body.axisymmetric).shape[-1]
+        if kernel < motions:
+            u = displacement[where]
+            force = part.stiffness @ u - foundation_of(part.mesh, body, part.foundations) @ u
+        found.append(force)
+    return np.concatenate([np.zeros(0), *found])
+
+
+def _sprung(torn: TornSystem, displacement: np.ndarray, foundation: ElasticFoundation) -> np.ndarray:
+    """Return k u of a foundation on this rank's torn dofs, shape (torn_size,), [force]."""
+    springs = (foundation_of(p.mesh, torn.scene.bodies[p.mesh.body], [foundation]) for p in torn.subdomains)
+    pairs = zip(springs, torn.decomposition.parts, strict=True)
+    return np.concatenate([np.zeros(0), *(spring @ displacement[where] for spring, where in pairs)])
 
 
 @displayed
@@ -356,6 +374,18 @@ def support_reactions(
     return Resultants("reaction", tuple(entries), places)
 
 
+def foundation_forces(
+    scene: Scene, forces: NodalForces, about: GivenVector | np.ndarray | None
+) -> Resultants:
+    """Return the force of every elastic foundation on its body, about a point or its centroid."""
+    entries = []
+    for foundation, force in zip(scene.foundations, forces.foundations, strict=True):
+        surface = Surface(foundation.body, foundation.surface)
+        point = centroid(scene, surface) if about is None else point_of(about, scene.dim)
+        entries.append(resultant(force, forces.places, point, surface, scene.axisymmetric))
+    return Resultants("foundation", tuple(entries), tuple(each.place for each in scene.foundations))
+
+
 def point_load(support: RigidSurface, about: np.ndarray, axisymmetric: bool = False) -> Resultant:
     """Return the load at the point of a rigid surface, about a point."""
     force, moment = np.split(support.load, [support.dim])
@@ -452,7 +482,7 @@ class Balance:
         gaps: Of contacts and ties between bodies: both sides together have no force, but a moment where
             friction, a tie or a mean over facets transmits forces across a gap between the meshes, or where
             one body has moments about undeformed places and the other about deformed ones.
-        beds: Of materials that resist rigid motions, such as elastic beds; zero otherwise.
+        beds: Of elastic foundations, and of materials that resist rigid motions; zero otherwise.
         force_scale: Largest sum of the sizes of the nodal forces of one of these, [force]; where nothing acts
             a force below which bodies count as free of forces.
         moment_scale: Largest sum of the sizes of nodal forces times their distances from the point,
@@ -548,7 +578,7 @@ def _parts(torn: TornSystem, forces: NodalForces) -> dict[str, np.ndarray]:
         "reactions": forces.reaction,
         "obstacles": by_node(torn.points, forces.contact, np.flatnonzero(~meets_body)),
         "gaps": by_node(torn.points, forces.contact, np.flatnonzero(meets_body)) + tied,
-        "beds": forces.bed,
+        "beds": sum(forces.foundations, forces.bed),
     }
 
 

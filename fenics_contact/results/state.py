@@ -42,6 +42,7 @@ from fenics_contact.results.forces import (
     PairResultants,
     Resultants,
     force_balance,
+    foundation_forces,
     nodal_forces,
     pair_resultants,
     support_reactions,
@@ -435,6 +436,17 @@ class State(ABC):
             >>> state.reactions()[0].torque((0, 0, 0), (0, 0, 1))  # doctest: +SKIP
         """
         return support_reactions(self.scene, self._nodal_forces, about)
+
+    @collectively("State.foundations", comm_of)
+    def foundations(self, about: GivenVector | np.ndarray | None = None) -> Resultants:
+        """Return force and moment that every elastic foundation exerts on its body. Collective.
+
+        By number in the scene's order, or by name: "slab bottom".
+
+        Args:
+            about: Point for all moments, shape (dim,), [length]; by default the centroid of each surface.
+        """
+        return foundation_forces(self.scene, self._nodal_forces, about)
 
     @collectively("State.rigid_motions", comm_of)
     def rigid_motions(self) -> tuple[RigidMotion, ...]:
