@@ -10,7 +10,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
-from fenics_contact._fem.composition import integrate
+from fenics_contact._fem.composition import as_in_space, integrate
 from fenics_contact._fem.templates import (
     UNSEEN,
     Constants,
@@ -35,10 +35,15 @@ class Fields(NamedTuple):
     """The displacement, and the dilatation and pressure of cells, on the template.
 
     Attributes:
+        u: The displacement, as materials get it.
+        v: Its test function.
+        du: Its trial function.
         tests: Such polynomials as test and as trial function.
     """
 
     u: Expr
+    v: Expr
+    du: Expr
     dilatation: Expr
     pressure: Expr
     tests: tuple[Expr, Expr]
@@ -69,7 +74,9 @@ def _written(kind: str, materials: tuple[Material, ...], cell_type: str) -> Writ
     centre = ufl.Coefficient(_dolfinx.cellwise_space(cell_type, (len(u),)), count=3)
     q, r = (polynomial(each(space), centre, cell_type) for each in (ufl.TestFunction, ufl.TrialFunction))
     dilatation, pressure = (polynomial(each, centre, cell_type) for each in (means, pressures))
-    fields = Fields(u, dilatation, pressure, (q, r), cell_type in UNSEEN)
+    V = u.ufl_function_space()
+    moved, v, du = as_in_space(cell_type, u, ufl.TestFunction(V), ufl.TrialFunction(V))
+    fields = Fields(moved, v, du, dilatation, pressure, (q, r), cell_type in UNSEEN)
     density = (FORMS | MEAN_FORMS)[kind]
 
     def integrand(material: Material, constants: Constants) -> Expr | None:
@@ -102,7 +109,7 @@ def _energy(material: Any, fields: Fields, constants: Constants) -> Expr:
 
 def _work(material: Any, fields: Fields, constants: Constants) -> Expr:
     """Return the work of the stresses on a test function per undeformed volume."""
-    u, v = fields.u, ufl.TestFunction(fields.u.ufl_function_space())
+    u, v = fields.u, fields.v
     if has_mean_dilatation(material):
         shape = ufl.inner(material.shape_stress(deformation_gradient(u), constants), ufl.grad(v))
         return shape + _pressure_at(material, fields, constants) * volume_change(u, v)
@@ -111,8 +118,7 @@ def _work(material: Any, fields: Fields, constants: Constants) -> Expr:
 
 def _tangent(material: Any, fields: Fields, constants: Constants) -> Expr:
     """Return the growth of the work with the displacement at fixed dilatations and pressures."""
-    u, space = fields.u, fields.u.ufl_function_space()
-    v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
+    u, v, du = fields.u, fields.v, fields.du
     if has_mean_dilatation(material):
         growth = ufl.derivative(volume_change(u, v), u, du)
         volume = _pressure_at(material, fields, constants) * growth
@@ -135,8 +141,7 @@ def _volume_change(material: Any, fields: Fields, constants: Constants) -> Expr 
     """Return the change of J, tested by polynomials in cells."""
     if not has_mean_dilatation(material):
         return None
-    du = ufl.TrialFunction(fields.u.ufl_function_space())
-    return fields.tests[0] * volume_change(fields.u, du)
+    return fields.tests[0] * volume_change(fields.u, fields.du)
 
 
 def _pressure(material: Any, fields: Fields, constants: Constants) -> Expr | None:

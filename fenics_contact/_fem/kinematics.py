@@ -18,7 +18,7 @@ from fenics_contact._fem.templates import (
     quadrature_degree,
 )
 from fenics_contact.materials.hyperelastic import has_mean_dilatation
-from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_gradients
+from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_gradients, shape_values
 from fenics_contact.mesh.quality import determinants, jacobians
 
 
@@ -30,9 +30,11 @@ class Dilatation:
 
         `points`: coordinates by block, shape (n, dim), [length].
         """
-        self._positions, _ = quadrature(CELL_TYPES[cell_type], quadrature_degree(cell_type))
+        cell = CELL_TYPES[_dolfinx.of_mesh(cell_type)]
+        self._positions, _ = quadrature(cell, quadrature_degree(cell_type))
         self._points, self._cells = points, _dolfinx.vtk_cell_dofs(space)
-        self._undeformed = jacobians(points, self._cells, self._positions)
+        self._values = shape_values(cell, self._positions) if _dolfinx.is_revolved(cell_type) else None
+        self._undeformed = self._volumes(points)
         self._cell_type = cell_type
 
     @cached_property
@@ -50,7 +52,12 @@ class Dilatation:
     def at(self, displacement: np.ndarray) -> np.ndarray:
         """Return det F, shape (n_cells, n_gauss), of linear simplices (n_cells, 1)."""
         moved = self._points + displacement.reshape(self._points.shape)
-        return np.asarray(jacobians(moved, self._cells, self._positions) / self._undeformed)
+        return np.asarray(self._volumes(moved) / self._undeformed)
+
+    def _volumes(self, points: np.ndarray) -> np.ndarray:
+        """Return the Jacobians of cells, of bodies of revolution times the radius, (n_cells, n_gauss)."""
+        plane = jacobians(points, self._cells, self._positions)
+        return plane if self._values is None else plane * (points[self._cells, 0] @ self._values.T)
 
 
 #: Bulk modulus at rest of what is not projected, by the shear modulus, in cells of type `UNSEEN`.
@@ -79,12 +86,20 @@ class MeanStrain:
         media, International Journal for Numerical Methods in Engineering 15 (1980).
     """
 
-    def __init__(self, gradients: np.ndarray, polynomials: CellPolynomials, share: float = 0.0) -> None:
+    def __init__(
+        self,
+        gradients: np.ndarray,
+        polynomials: CellPolynomials,
+        share: float = 0.0,
+        hoop: np.ndarray | None = None,
+    ) -> None:
         """Project the divergence of each shape function.
 
-        `gradients`: of the shape functions, shape (n_cells, n_gauss, nodes, dim), [1 / length].
+        `gradients`: of the shape functions, shape (n_cells, n_gauss, nodes, dim), [1 / length]; `hoop`: these
+        over the radius on bodies of revolution, shape (n_cells, n_gauss, nodes), [1 / length].
         """
         self._gradients, self._polynomials, self._part = gradients, polynomials, 1.0 - share
+        self._hoop = hoop
 
     def averaged(self, tensors: np.ndarray) -> np.ndarray:
         """Return H̄ of H; of the stress on H̄ that which does the same work on H.
@@ -105,12 +120,20 @@ class MeanStrain:
         """
         G, dim = self._gradients, self._gradients.shape[-1]
         flat = (*G.shape[:2], -1)
-        apart = self._apart(G.reshape(flat))
+        divergence = G
+        if self._hoop is not None:
+            divergence = G.copy()
+            divergence[..., 0] += self._hoop
+        apart = self._apart(divergence.reshape(flat))
         by_trace = np.einsum("cqijkk->cqij", tangent)
         from_trace = np.einsum("cqiikl->cqkl", tangent)
         both = np.einsum("cqii->cq", by_trace)
-        left = (G @ by_trace[..., :dim, :dim].swapaxes(2, 3)).reshape(flat)
-        right = (G @ from_trace[..., :dim, :dim].swapaxes(2, 3)).reshape(flat) + both[..., None] * apart
+        left = G @ by_trace[..., :dim, :dim].swapaxes(2, 3)
+        right = G @ from_trace[..., :dim, :dim].swapaxes(2, 3)
+        if self._hoop is not None:
+            left[..., 0] += by_trace[..., 2, 2, None] * self._hoop
+            right[..., 0] += from_trace[..., 2, 2, None] * self._hoop
+        left, right = left.reshape(flat), right.reshape(flat) + both[..., None] * apart
         w = self._polynomials.weights[..., None]
         outer = (w * left).swapaxes(1, 2) @ apart
         return np.asarray(outer + (w * apart).swapaxes(1, 2) @ right)
@@ -124,7 +147,7 @@ class GaussPoints:
 
         `points`: coordinates by block, shape (n, dim), [length].
         """
-        cell = CELL_TYPES[cell_type]
+        cell = CELL_TYPES[_dolfinx.of_mesh(cell_type)]
         positions, weights = quadrature(cell, quadrature_degree(cell_type))
         reference = shape_gradients(cell, positions)
         self._shape, self._cells = points.shape, _dolfinx.vtk_cell_dofs(space)
@@ -132,6 +155,12 @@ class GaussPoints:
         jacobian = np.einsum("cai,qaj->cqij", points[self._cells], reference)
         self._gradients = reference @ np.linalg.inv(jacobian)
         self._weights = weights * determinants(jacobian)
+        self._hoop: np.ndarray | None = None  # N / r
+        if _dolfinx.is_revolved(cell_type):
+            values = shape_values(cell, positions)
+            radii = points[self._cells, 0] @ values.T
+            self._weights = 2 * np.pi * radii * self._weights
+            self._hoop = values / radii[..., None]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -147,6 +176,8 @@ class GaussPoints:
         nodal = displacement.reshape(self._shape)[self._cells]
         gradient = np.zeros((*self.shape, 3, 3))
         gradient[..., :dim, :dim] = nodal.swapaxes(1, 2)[:, None] @ self._gradients
+        if self._hoop is not None:
+            gradient[..., 2, 2] = np.einsum("cqa,ca->cq", self._hoop, nodal[..., 0])
         return gradient
 
     def force(self, stress: np.ndarray, cells: np.ndarray) -> np.ndarray:
@@ -157,6 +188,9 @@ class GaussPoints:
         dim = self._shape[1]
         weighted = self._weights[cells][..., None, None] * stress[..., :dim, :dim]
         nodal = (self._gradients[cells] @ weighted.swapaxes(2, 3)).sum(axis=1)
+        if self._hoop is not None:
+            hoop = self._weights[cells] * stress[..., 2, 2]
+            nodal[..., 0] += np.einsum("cqa,cq->ca", self._hoop[cells], hoop)
         return np.bincount(self._dofs[cells].ravel(), nodal.ravel(), minlength=int(np.prod(self._shape)))
 
     def mean_strain(self, cells: np.ndarray, moduli: np.ndarray) -> MeanStrain:
@@ -165,7 +199,8 @@ class GaussPoints:
         `moduli`: of the material at rest, by Voigt components, shape (6, 6), [force / length²].
         """
         share = held_share(moduli) if self._cell_type in UNSEEN else 0.0
-        return MeanStrain(self._gradients[cells], self._polynomials.of(cells), share)
+        hoop = None if self._hoop is None else self._hoop[cells]
+        return MeanStrain(self._gradients[cells], self._polynomials.of(cells), share, hoop)
 
     def stiffness(
         self, tangent: np.ndarray, cells: np.ndarray, means: MeanStrain | None = None
@@ -180,12 +215,28 @@ class GaussPoints:
         half = A.reshape(len(cells), m, dim**3, dim) @ G.swapaxes(2, 3)
         half = half.reshape(len(cells), m, dim, dim, -1).swapaxes(2, 3).reshape(len(cells), m * dim, -1)
         left = G.swapaxes(1, 2).reshape(len(cells), -1, m * dim)
-        blocks = (left @ half).reshape(len(cells), left.shape[1], dim, dim, left.shape[1])
-        entries = blocks.swapaxes(3, 4).ravel()
+        blocks = (left @ half).reshape(len(cells), left.shape[1], dim, dim, left.shape[1]).swapaxes(3, 4)
+        if self._hoop is not None:
+            blocks = blocks + self._hoop_blocks(tangent, cells)
+        entries = blocks.ravel()
         if means is not None:
             entries = entries + means.blocks(tangent).ravel()
         _, _, places = self._pattern
         return np.bincount(places[cells].ravel(), entries, minlength=self.entries)
+
+    def _hoop_blocks(self, tangent: np.ndarray, cells: np.ndarray) -> np.ndarray:
+        """Return what hoop strains add to the blocks of cells, shape (n_cells, nodes, 2, nodes, 2)."""
+        assert self._hoop is not None
+        G, N, weights = self._gradients[cells], self._hoop[cells], self._weights[cells][..., None, None]
+        by_hoop = (weights * tangent[..., :2, :2, 2, 2]).swapaxes(2, 3)  # [j, i]
+        from_hoop = weights * tangent[..., 2, 2, :2, :2]
+        shape = (len(cells), N.shape[2], 2, N.shape[2], 2)
+        blocks = np.zeros(shape)
+        blocks[..., 0] += np.einsum("cqai,cqb->caib", G @ by_hoop, N)
+        blocks[:, :, 0] += np.einsum("cqa,cqbk->cabk", N, G @ from_hoop.swapaxes(2, 3))
+        both = self._weights[cells] * tangent[..., 2, 2, 2, 2]
+        blocks[:, :, 0, :, 0] += np.einsum("cqa,cq,cqb->cab", N, both, N)
+        return blocks
 
     def assembled(self, entries: np.ndarray, others: sp.csr_matrix | None = None) -> sp.csr_matrix:
         """Return the matrix with entries from `stiffness`; its pattern is the same whatever is zero in it."""

@@ -13,8 +13,9 @@ from ufl.core.expr import Expr
 from fenics_contact import _dolfinx
 from fenics_contact._base.checks import GivenVector, floats
 from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._fem.composition import as_in_space, on_cells
 from fenics_contact._fem.load_forms import Symbol, load_fields, load_key, load_name, numbers_of
-from fenics_contact._fem.templates import Templates, Written, surface_measure
+from fenics_contact._fem.templates import Templates, Written, per_revolution, surface_measure
 from fenics_contact._scene.fields import Ufl
 from fenics_contact._scene.loads import Load, Pressure, TotalForce, Traction
 from fenics_contact._scene.scene import Scene
@@ -29,7 +30,7 @@ FORMS = ("growth", "softening")
 def prepare_following(templates: Templates, scene: Scene) -> None:
     """Compile the missing forms of a scene's following pressures. Collective."""
     for load in scene.following_pressures:
-        cell_type = scene.bodies[load.body].mesh.cell_type
+        cell_type = scene.bodies[load.body].cell_type
         for kind in FORMS:
             name = (f"{kind} of", *load_name(load, cell_type))
             templates.get(_key(kind, load, cell_type), name, partial(_written, kind, load, cell_type))
@@ -42,16 +43,19 @@ def _key(kind: str, load: Pressure, cell_type: str) -> tuple[object, ...]:
 def _written(kind: str, load: Pressure, cell_type: str) -> Written:
     (u,) = _dolfinx.field_symbols(cell_type, 1)
     space, symbol = u.ufl_function_space(), Symbol(load, cell_type)
-    v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
+    moved, v, du = as_in_space(cell_type, u, ufl.TestFunction(space), ufl.TrialFunction(space))
     normal = ufl.FacetNormal(_dolfinx.template(cell_type))
+    if len(moved) > len(normal):
+        normal = ufl.as_vector([normal[0], normal[1], 0])
 
     def growth(along: Expr) -> Expr:
-        change = cofactor(deformation_gradient(u)) - ufl.Identity(len(u))
+        change = cofactor(deformation_gradient(moved)) - ufl.Identity(len(moved))
         return -symbol.expression * ufl.dot(change * normal, along)
 
     density = growth(v)
     if kind == "softening":
-        density = -ufl.derivative(growth(v), u, du)
+        density = -ufl.derivative(growth(v), moved, du)
+    density = per_revolution(on_cells(density, cell_type), cell_type)
     return density * surface_measure(cell_type), symbol.constants, (u, *symbol.coefficients)
 
 
@@ -78,7 +82,8 @@ class FollowingPressure:
     ) -> None:
         """Bind the forms; arguments as in `FormLibrary.load`, of which the forms are prepared."""
         self._mesh = space.mesh
-        self._points = points if isinstance(load.value, Ufl) else points - points[0]
+        absolute = isinstance(load.value, Ufl) or _dolfinx.is_revolved(cell_type)
+        self._points = points if absolute else points - points[0]
         self._displacement = _dolfinx.fem.Function(space)
         fields = (self._displacement, *load_fields(load, space, points, acted))
         self._growth, self._softening = (

@@ -66,8 +66,8 @@ def history_size(body: Body) -> int:
 
 
 def _shape(body: Body) -> tuple[int, int, int]:
-    cell_type = body.mesh.cell_type
-    points = len(quadrature(CELL_TYPES[cell_type], quadrature_degree(cell_type))[1])
+    cell = CELL_TYPES[body.mesh.cell_type]
+    points = len(quadrature(cell, quadrature_degree(body.cell_type))[1])
     return body.mesh.n_cells, points, history_size(body)
 
 
@@ -286,7 +286,7 @@ def prepare_mechanics(templates: Templates, scene: Scene) -> None:
         for materials in material_sets(body):
             others = [material for material in materials if not isinstance(material, HistoryMaterial)]
             if others and any(map(is_nonlinear, materials)):
-                prepare_forms(templates, materials, body.mesh.cell_type)
+                prepare_forms(templates, materials, body.cell_type)
 
 
 class LinearMechanics:

@@ -9,7 +9,7 @@ becomes [[u_r,r, u_r,z, 0], [u_z,r, u_z,z, 0], [0, 0, u_r / r]].
 from __future__ import annotations
 
 import ufl
-from ufl.algorithms import expand_derivatives
+from ufl.algorithms import expand_derivatives, extract_coefficients
 from ufl.algorithms.map_integrands import map_integrand_dags
 from ufl.core.expr import Expr
 from ufl.corealg.multifunction import MultiFunction
@@ -76,6 +76,8 @@ class _Replaced(MultiFunction):  # type: ignore[misc]
 
     def grad(self, o: Expr) -> Expr:
         (of,) = o.ufl_operands
+        if not any(isinstance(each, StandIn) for each in extract_coefficients(of)):
+            return o
         if not isinstance(of, StandIn):
             raise InvalidInputError(
                 "materials of bodies of revolution may depend on the displacement and its gradient alone, "

@@ -210,7 +210,7 @@ UNSEEN = ("tetrahedron10",)
 
 def polynomial_size(cell_type: str) -> int:
     """Return the number of coefficients of a polynomial: one, or one more than the dimension."""
-    return 1 + CELL_TYPES[cell_type].dim if cell_type in LINEAR else 1
+    return 1 + _dolfinx.dimension(cell_type) if _dolfinx.of_mesh(cell_type) in LINEAR else 1
 
 
 class CellPolynomials:
@@ -228,11 +228,13 @@ class CellPolynomials:
         `points`: coordinates, shape (n, dim), [length]; `cells`: nodes of the cells in VTK order, shape
         (n_cells, nodes of a cell).
         """
-        cell = CELL_TYPES[cell_type]
+        cell = CELL_TYPES[_dolfinx.of_mesh(cell_type)]
         positions, weights = quadrature(cell, quadrature_degree(cell_type))
         jacobian = jacobians(points, cells, positions)
         self.weights = np.broadcast_to(jacobian, (len(cells), len(weights))) * weights
         places = shape_values(cell, positions) @ points[cells]
+        if _dolfinx.is_revolved(cell_type):
+            self.weights = 2 * np.pi * places[..., 0] * self.weights
         self.centres = np.einsum("cq,cqd->cd", self.weights, places) / self.weights.sum(axis=1)[:, None]
         linear = (places - self.centres[:, None])[..., : polynomial_size(cell_type) - 1]
         self.values = np.concatenate([np.ones((*self.weights.shape, 1)), linear], axis=2)
@@ -266,7 +268,7 @@ class CellPolynomials:
 
 def polynomial(coefficients: Expr, centre: Expr, cell_type: str) -> Expr:
     """Return a polynomial on the template."""
-    if cell_type not in LINEAR:
+    if _dolfinx.of_mesh(cell_type) not in LINEAR:
         return coefficients
     x = ufl.SpatialCoordinate(_dolfinx.template(cell_type))
     slopes = (coefficients[1 + i] * (x[i] - centre[i]) for i in range(len(x)))
@@ -275,4 +277,4 @@ def polynomial(coefficients: Expr, centre: Expr, cell_type: str) -> Expr:
 
 def coefficient_shape(cell_type: str) -> tuple[int, ...]:
     """Return the shape of a polynomial's coefficients in one cell."""
-    return (polynomial_size(cell_type),) if cell_type in LINEAR else ()
+    return (polynomial_size(cell_type),) if _dolfinx.of_mesh(cell_type) in LINEAR else ()

@@ -313,7 +313,7 @@ class Equations:
         body = scene.bodies[mesh.body]
         points = body.mesh.points[np.sort(mesh.nodes)]
         parts = composition(body, mesh.cells)
-        return self.decomposition.forms.mechanics(parts, body.mesh.cell_type, mesh.space, points)
+        return self.decomposition.forms.mechanics(parts, body.cell_type, mesh.space, points)
 
     def _foundations(self, scene: Scene) -> tuple[sp.csr_matrix | None, ...]:
         """Return the stiffness of the foundations under each subdomain, None where there is none."""

@@ -229,7 +229,7 @@ class FollowingPressures:
                         continue
                     nodes = mesh.nodes[order]
                     acted = np.isin(nodes, body.mesh.surfaces[load.surface])
-                    points, kind = body.mesh.points[nodes], body.mesh.cell_type
+                    points, kind = body.mesh.points[nodes], body.cell_type
                     self._acting.append(
                         (number, forms.following(load, kind, mesh.space, points, facets, acted))
                     )
@@ -297,7 +297,7 @@ class RigidStart:
         self._bodies = [
             slice(int(offset[number]), int(offset[number + 1]))
             for number, body in enumerate(bodies)
-            if body.deforms_much
+            if body.deforms_much and not body.axisymmetric
         ]
 
     def moved(self, before: np.ndarray, load: Loading, displacement: Vector) -> Vector | None:

@@ -407,7 +407,9 @@ def linearised(
     for subdomain, tangent in zip(torn.subdomains, tangents, strict=True):
         part = slice(start, start + subdomain.mesh.size)
         points = subdomain.points + displacement[part].reshape(subdomain.points.shape)
-        kernel = rigid_body_modes(points).reshape(subdomain.mesh.size, -1)
+        body = torn.scene.bodies[subdomain.mesh.body]
+        modes = body.rigid_modes(points) if body.axisymmetric else rigid_body_modes(points)
+        kernel = modes.reshape(subdomain.mesh.size, -1)
         matrix = CachedMatrix(partial(_itself, tangent))
         subdomains.append(
             replace(subdomain, points=points, kernel=kernel, load=unbalanced[part], matrix=matrix)

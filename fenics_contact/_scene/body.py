@@ -13,12 +13,13 @@ from fenics_contact._base.display import counted, displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material
-from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_finite_strain, is_nonlinear
+from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_finite_strain
 from fenics_contact.materials.kernels import rigid_body_modes
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.cell_types import CELL_TYPES
+from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
 from fenics_contact.mesh.faces import computed_rounding
+from fenics_contact.mesh.quality import jacobians
 
 
 @displayed
@@ -91,6 +92,17 @@ class Body:
         return modes
 
     @property
+    def volume(self) -> float:
+        """Its volume, of a plane body the area, [length³] or [length²]."""
+        if not self.axisymmetric:
+            return self.mesh.volume
+        cell = CELL_TYPES[self.mesh.cell_type]
+        positions, weights = quadrature(cell, 2 * cell.order)
+        radii = self.mesh.points[self.mesh.cells, 0] @ shape_values(cell, positions).T
+        around = 2 * np.pi * radii * jacobians(self.mesh.points, self.mesh.cells, positions)
+        return float((around @ weights).sum())
+
+    @property
     def deforms_much(self) -> bool:
         """Whether one of the materials is made for large deformations, rotations included."""
         return any(map(is_finite_strain, self.materials))
@@ -155,11 +167,6 @@ def _check_material(material: Material, dim: int, axisymmetric: bool) -> None:
         raise InvalidInputError(
             f"the material of a body of revolution must be one of space, {name} is for {material.dims}: use "
             "IsotropicElasticity, OrthotropicElasticity or others that plane bodies cannot have"
-        )
-    if axisymmetric and is_nonlinear(material):
-        raise InvalidInputError(
-            f"bodies of revolution need linear materials, {name} is nonlinear: model a sector of the body in "
-            "space between two planes of symmetry"
         )
     if axisymmetric:
         _check_symmetric_axes(material)

@@ -16,7 +16,7 @@ from fenics_contact._scene.pairs import ContactPair, Surface, Tie
 from fenics_contact._scene.parts import in_words, surface_of
 from fenics_contact._scene.rollers import direction_of
 from fenics_contact._scene.supports import RigidSurface, Roller
-from fenics_contact._surfaces.facets import FacetedSurface, heights, quadrature_areas
+from fenics_contact._surfaces.facets import FacetedSurface, gauss_points, heights, quadrature_areas
 from fenics_contact._surfaces.projection import project
 from fenics_contact.materials.elastic import PlaneStress
 from fenics_contact.materials.kernels import rigid_body_modes
@@ -71,15 +71,18 @@ def _resultant(scene: SceneParts, load: Load) -> np.ndarray | None:
         return np.zeros(scene.dim)
     if callable(load.value) or not isinstance(load.value, float | tuple):
         return None
-    mesh, value = scene.bodies[load.body].mesh, np.array(load.value)
+    body, value = scene.bodies[load.body], np.array(load.value)
     if isinstance(load, TotalForce):
         return value
     if isinstance(load, BodyForce):
-        return value * mesh.volume
-    facets = mesh.surfaces[load.surface]
+        return value * body.volume
+    points, facets = body.mesh.points, body.mesh.surfaces[load.surface]
+    if isinstance(load, Pressure) and body.axisymmetric:
+        normals = sum(at.normals.sum(axis=0) for at in gauss_points(points, facets, True))
+        return np.asarray(-value * normals)
     if isinstance(load, Pressure):
-        return np.asarray(-value * vector_areas(mesh.points, facets).sum(axis=0))
-    return value * float(quadrature_areas(mesh.points, facets).sum())
+        return np.asarray(-value * vector_areas(points, facets).sum(axis=0))
+    return value * float(quadrature_areas(points, facets, body.axisymmetric).sum())
 
 
 def modulus_of(scene: SceneParts, pair: ContactPair) -> float | None:
@@ -118,7 +121,13 @@ def _constants(body: Body) -> tuple[float, float] | None:
 
 
 def hertz_approach(
-    force: float, modulus: float, place: np.ndarray, normal: np.ndarray, gap: np.ndarray, flat: float = 1e-6
+    force: float,
+    modulus: float,
+    place: np.ndarray,
+    normal: np.ndarray,
+    gap: np.ndarray,
+    flat: float = 1e-6,
+    radius: float | None = None,
 ) -> float | None:
     """Return how far two bodies come closer by Hertz's theory; None where it does not hold, [length].
 
@@ -129,9 +138,14 @@ def hertz_approach(
     `force`: force that presses the bodies together, [force], in the plane [force / length]; `modulus`: E*,
     [force / length²]; `place`: coordinates of the nodes of one surface that face the other, shape (n, dim),
     [length]; `normal`: normals of the gaps there, shape (n, dim); `gap`: gaps, shape (n,), [length]; `flat`:
-    A gap counts as flat if its curvature times the size of the surface is below this.
+    A gap counts as flat if its curvature times the size of the surface is below this; `radius`: of the
+    contact on bodies of revolution, zero on the axis, [length].
     """
     curvatures, reach = _relative_curvatures(place, normal[np.argmin(gap)], gap)
+    if radius == 0.0:
+        curvatures, reach = np.repeat(curvatures, 2), np.repeat(reach, 2)
+    elif radius is not None:
+        force /= 2 * np.pi * radius
     if force <= 0.0 or len(curvatures) == 0:
         return None
     low, high, size = curvatures[0], curvatures[-1], reach.max()
@@ -299,8 +313,11 @@ def _approach(scene: SceneParts, pair: ContactPair, slave: FacetedSurface, met: 
     force, modulus = force_along(scene, normal), modulus_of(scene, pair)
     if force is not None and modulus is not None:
         # Each plane of symmetry through the contact halves the force.
-        whole = force * 2.0 ** np.count_nonzero(slave.mirrored[node])
-        sizes.append(hertz_approach(whole, modulus, slave.points[met.node], met.normal, met.gap) or 0.0)
+        whole, radius = force * 2.0 ** np.count_nonzero(slave.mirrored[node]), None
+        if scene.axisymmetric:
+            whole, radius = force, 0.0 if slave.mirrored[node].any() else float(slave.points[node, 0])
+        places = slave.points[met.node]
+        sizes.append(hertz_approach(whole, modulus, places, met.normal, met.gap, radius=radius) or 0.0)
     return max(sizes) or None
 
 

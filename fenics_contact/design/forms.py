@@ -12,7 +12,7 @@ from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact._base.libraries import MPI
-from fenics_contact._fem.composition import integrate
+from fenics_contact._fem.composition import as_in_space, integrate
 from fenics_contact._fem.forms import Temperature, stress_in_space, stress_left
 from fenics_contact._fem.load_forms import Symbol, load_key, load_name, load_work
 from fenics_contact._fem.templates import (
@@ -75,8 +75,12 @@ class ShapeForms:
 
         def write() -> Written:
             u, w = _dolfinx.field_symbols(cell_type, 2)
+            moved, along = as_in_space(cell_type, u, w)
             form, constants = integrate(
-                materials, cell_type, lambda m, c: _virtual_work(m, u, w, c), volume_measure(cell_type)
+                materials,
+                cell_type,
+                lambda m, c: _virtual_work(m, moved, along, c),
+                volume_measure(cell_type),
             )
             return _by_shape(form, cell_type), constants, [u, w]
 
@@ -136,10 +140,11 @@ class ShapeForms:
             change, numbers, fields = temperature.write(cell_type)
             own = scalar_constants(cell_type, density.constants)
             stress_of = stress_in_space if density.in_space else stress_left
+            (moved,) = as_in_space(cell_type, u)
 
             def write_density(material: Material, constants: Constants) -> Expr:
                 with user_code(f"the integrand of {density.name!r}"):
-                    return density.integrand(u, x, stress_of(material, u, constants, change), *own)
+                    return density.integrand(u, x, stress_of(material, moved, constants, change), *own)
 
             form, constants = integrate(materials, cell_type, write_density, volume_measure(cell_type, 2))
             if by == "displacement":

@@ -108,7 +108,7 @@ def resultant_by_shape(torn: TornSystem, load: TotalForce, w: np.ndarray) -> np.
         def density(at: GaussPoint) -> tuple[np.ndarray, np.ndarray]:
             return spread.density(at.of(points, facets), at.of(field, facets))
 
-        result[numbers] = integral_pulled_back(points, facets, density)
+        result[numbers] = integral_pulled_back(points, facets, density, torn.scene.axisymmetric)
     return result
 
 
@@ -116,10 +116,10 @@ def _spread(
     torn: TornSystem, load: TotalForce, points: np.ndarray, facets: np.ndarray, field: np.ndarray
 ) -> _Spread:
     """Return the traction of a load and the coefficients of the moments, see the class."""
-    moments = surface_moments(points, facets)
+    moments = surface_moments(points, facets, torn.scene.axisymmetric)
     centre, force = (_in_space(vector[None])[0] for vector in (moments.centroid, np.array(load.value)))
     total, turned = np.zeros(3), np.zeros(3)  # W₀ and W₁
-    for at in gauss_points(points, facets):
+    for at in gauss_points(points, facets, torn.scene.axisymmetric):
         arm, w = _in_space(at.of(points, facets)) - centre, _in_space(at.of(field, facets))
         total += at.areas @ w
         turned += at.areas @ np.cross(arm, w)
@@ -161,10 +161,10 @@ def strain_work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: 
     """
     for body in torn.scene.bodies.values():  # all ranks compile, also for bodies without a part on them
         for materials in material_sets(body):
-            forms.virtual_work_by_shape(materials, body.mesh.cell_type)
+            forms.virtual_work_by_shape(materials, body.cell_type)
 
     def on_subdomain(subdomain: Subdomain, functions: Functions) -> np.ndarray:
-        parts, cell_type = subdomain.material, torn.scene.bodies[subdomain.mesh.body].mesh.cell_type
+        parts, cell_type = subdomain.material, torn.scene.bodies[subdomain.mesh.body].cell_type
         template = forms.virtual_work_by_shape(parts.materials, cell_type)
         form = template.bind([subdomain.mesh.space], parts.parameters, functions, cells=parts.cells)
         return _dolfinx.assemble_vector(form)
@@ -179,9 +179,9 @@ def load_work_by_shape(forms: ShapeForms, torn: TornSystem, w: np.ndarray) -> np
     for load in spread:  # all ranks compile
         body = torn.scene.bodies[load.body]
         for materials in material_sets(body):
-            forms.load_by_shape(load, materials, body.mesh.cell_type)
+            forms.load_by_shape(load, materials, body.cell_type)
             if callable(load.value):
-                forms.load_by_field(load, materials, body.mesh.cell_type)
+                forms.load_by_field(load, materials, body.cell_type)
 
     def on_subdomain(subdomain: Subdomain, functions: Functions) -> np.ndarray:
         result = np.zeros(subdomain.mesh.size)
@@ -214,10 +214,10 @@ def _load_by_shape(
     cells = parts.cells if isinstance(load, ThermalStrain) else None
     fields = load_fields(load, mesh.space, body.mesh.points[nodes], acted)
     values, given = load_parameters(load, parts), [*functions, *fields]
-    template = forms.load_by_shape(load, parts.materials, body.mesh.cell_type)
+    template = forms.load_by_shape(load, parts.materials, body.cell_type)
     result = _dolfinx.assemble_vector(template.bind([mesh.space], values, given, facets, cells=cells))
     for field in fields:
-        template = forms.load_by_field(load, parts.materials, body.mesh.cell_type)
+        template = forms.load_by_field(load, parts.materials, body.cell_type)
         form = template.bind([field.function_space], values, given, facets, cells=cells)
         by_values = _dolfinx.assemble_vector(form)
         result += field_by_places(torn, subdomain, load, field.function_space, by_values, forms.moving)

@@ -259,20 +259,21 @@ def volume_of(scene: Scene, names: Sequence[str], numbers: NodeNumbers) -> tuple
     """Return the volume of some bodies and its derivative by the nodes of all, (n_nodes, dim)."""
     total, by_points = 0.0, np.zeros((numbers.n_nodes, scene.dim))
     for name in names:
-        mesh = scene.bodies[name].mesh
-        total += mesh.volume
-        by_points[numbers.global_nodes(name, np.arange(mesh.n_nodes))] = volume_by_points(mesh)
+        body, mesh = scene.bodies[name], scene.bodies[name].mesh
+        total += body.volume
+        own = volume_by_points(mesh, body.axisymmetric)
+        by_points[numbers.global_nodes(name, np.arange(mesh.n_nodes))] = own
     return total, by_points
 
 
-def volume_by_points(mesh: BodyMesh) -> np.ndarray:
+def volume_by_points(mesh: BodyMesh, axisymmetric: bool = False) -> np.ndarray:
     """Return the derivative of the volume by every node, shape (n_nodes, 3), [length²]; in 2D of the area.
 
     Moving the boundary by v changes the volume by ∫ v·n dA, so that only boundary nodes count.
     """
     faces, _ = boundary_faces(mesh.cells, mesh.dim)
     result = np.zeros_like(mesh.points)
-    for at in gauss_points(mesh.points, faces):
+    for at in gauss_points(mesh.points, faces, axisymmetric):
         np.add.at(result, faces, at.values[:, None] * at.normals[:, None])
     return result
 
@@ -410,7 +411,7 @@ class BodyIntegral:
     def _prepare(self, by: str, numbers: tuple[float, ...]) -> Bind:
         """Compile the integral or a derivative, return a function that binds it to subdomains. Collective."""
         body = self.state.scene.bodies[self.body]
-        cell_type, temperature = body.mesh.cell_type, temperature_of(self.state.scene.loads, self.body)
+        cell_type, temperature = body.cell_type, temperature_of(self.state.scene.loads, self.body)
         for materials in material_sets(body):
             self.forms.functional(self.density, materials, cell_type, by, temperature)
 

@@ -86,12 +86,7 @@ def checked_contact(contact: ContactProblem) -> ContactProblem:
 
 
 def _check_differentiable(scene: Scene) -> None:
-    """Reject bodies of revolution, and what of large deformations has no derivative by the shape."""
-    if scene.axisymmetric:
-        raise InvalidInputError(
-            "designs of bodies of revolution have no derivatives by the shape: optimise a sector in space, "
-            "or with a tool that takes plain functions, see fenics_contact.DesignResponse"
-        )
+    """Reject what of large deformations has no derivative by the shape."""
     if not scene.is_nonlinear:
         return
     reasons = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from fenics_contact._surfaces.facets import (
     slopes,
 )
 from fenics_contact._surfaces.projection import interpolated_normal, newton_matrix
+from fenics_contact.mesh.faces import computed_rounding
 
 
 def normals_pulled_back(
@@ -86,10 +88,17 @@ def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarr
 
     `by_areas`: derivative by each nodal area, shape (n,).
     """
-    if surface.whole is not None:
-        by_nodal = bearing_pulled_back(by_areas[surface.whole])
+    if surface.whole is not None or surface.axisymmetric:
+        facets = surface.facets if surface.whole is None else surface.whole
+        by_nodal = bearing_pulled_back(by_areas[facets])
+        if surface.axisymmetric and facets.shape[1] == 3:
+            on_axis = surface.points[facets[:, :2], 0] <= computed_rounding(surface.points)
+            by_nodal[:, :2] = np.where(on_axis, by_nodal[:, 2:], by_nodal[:, :2])
         return integral_pulled_back(
-            surface.points, surface.whole, lambda at: (by_nodal @ at.values, np.zeros((1, 1)))
+            surface.points,
+            facets,
+            lambda at: (by_nodal @ at.values, np.zeros((1, 1))),
+            surface.axisymmetric,
         )
     total = corner_products(surface.points, surface.facets).sum(axis=1)
     direction = total / np.linalg.norm(total, axis=1)[:, None]
@@ -102,11 +111,15 @@ def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarr
 SurfaceDensity = Callable[[GaussPoint], tuple[np.ndarray, np.ndarray]]
 
 
-def integral_pulled_back(points: np.ndarray, facets: np.ndarray, density: SurfaceDensity) -> np.ndarray:
+def integral_pulled_back(
+    points: np.ndarray, facets: np.ndarray, density: SurfaceDensity, axisymmetric: bool = False
+) -> np.ndarray:
     """Return the derivative of an integral over facets by the nodes, shape (n_nodes, dim).
 
-    `points`: coordinates, shape (n_nodes, dim), [length].
+    `points`: coordinates, shape (n_nodes, dim), [length]; `axisymmetric`: whether it goes around an axis.
     """
+    if axisymmetric:
+        return integral_pulled_back(points, facets, partial(_around, points, facets, density))
     result = np.zeros_like(points)
     for at in gauss_points(points, facets):
         value, by_place = density(at)
@@ -120,6 +133,16 @@ def integral_pulled_back(points: np.ndarray, facets: np.ndarray, density: Surfac
         by_corners = np.einsum("ka,nad->nkd", at.gradients, by_tangents)
         np.add.at(result, facets, by_corners + at.values[:, None] * (at.areas[:, None] * by_place)[:, None])
     return result
+
+
+def _around(
+    points: np.ndarray, facets: np.ndarray, density: SurfaceDensity, at: GaussPoint
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a density times the circumference, and its derivative by the place."""
+    value, by_place = density(at)
+    radius = at.of(points, facets)[:, 0]
+    outwards = np.stack([value, np.zeros_like(value)], axis=1)
+    return 2 * np.pi * radius * value, 2 * np.pi * (radius[:, None] * by_place + outwards)
 
 
 def _products_pulled_back(surface: FacetedSurface, by_products: np.ndarray) -> np.ndarray:

@@ -172,6 +172,7 @@ class ColouredField:
 
     Attributes:
         reach: Extent of details to each side of the contact's centre, [length], or None.
+        axes: Names of the coordinates of plane bodies, of bodies of revolution r and z.
     """
 
     values: Mapping[str, np.ndarray]
@@ -183,6 +184,7 @@ class ColouredField:
     reach: float | None
     units: Units
     width: int
+    axes: tuple[str, str] = ("x", "y")
 
     def on(self, bodies: Mapping[str, pv.UnstructuredGrid]) -> dict[str, pv.UnstructuredGrid]:
         """Return the bodies with the field ``shown``, the values in terms of the colours, 0 to 1."""
@@ -317,7 +319,8 @@ def _draw_plane(
         draw_cell_edges(axes, points, cells, frame)
         draw_outline(axes, points, cells)
     unit = field.units.length
-    axes.set(title=title, xlabel=f"x ({unit})", ylabel=f"y ({unit})")
+    across, up = field.axes
+    axes.set(title=title, xlabel=f"{across} ({unit})", ylabel=f"{up} ({unit})")
     frame.fit(axes)
 
 

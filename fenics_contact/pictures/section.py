@@ -359,8 +359,9 @@ def strongest_contact(contact: ContactResult, places: np.ndarray) -> Spot:
         held = points.symmetric.sum(axis=1)
         normal = points.normal[int(np.argmax(np.where(held == held[weight > 0].max(), weight, 0.0)))]
         normal = np.eye(len(normal))[int(np.argmax(np.round(np.abs(normal), 6)))]
-    area = float(points.area[weight > 0].sum())
-    radius = float(np.sqrt(area / np.pi)) if places.shape[1] == 3 else area / 2
+    near = weight > 0
+    solid = places.shape[1] == 3
+    radius = float(np.sqrt(points.area[near].sum() / np.pi) if solid else points.sizes[near].sum() / 2)
     inside = np.where(mirrors, np.sign(middle - centre), 0.0)
     return Spot(centre, normal / np.linalg.norm(normal), radius, inside)
 

@@ -72,6 +72,11 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
 
+def axes_of(scene: Scene) -> tuple[str, str]:
+    """Return the names of the coordinates of plane bodies."""
+    return ("r", "z") if scene.axisymmetric else ("x", "y")
+
+
 def plot_decomposition(
     scene: Scene,
     partitions: Mapping[str, np.ndarray],
@@ -117,7 +122,8 @@ def plot_decomposition(
     values = {name: np.asarray(body["subdomain"]) % colours.N for name, body in bodies.items()}
     norm = Normalize(-0.5, colours.N - 0.5)
     words, named = headline(title, facts), units or Units()
-    field = ColouredField(values, colours, norm, "", words, 1.0, None, named, width)
+    axes = axes_of(scene)
+    field = ColouredField(values, colours, norm, "", words, 1.0, None, named, width, axes)
     return draw_field_on_bodies(bodies, field, target, obstacles=[], comm=comm)
 
 
@@ -190,7 +196,8 @@ def plot_stress(
     norm = Normalize(*(given or (0.0, rounded_up(float(np.quantile(by_cell, QUANTILE))))))
     words = headline(title, f"{facts}; displacement × {factor:g}")
     label = f"von Mises stress ({named.stress})"
-    coloured = ColouredField(values, STRESS_MAP, norm, label, words, factor, reach, named, width)
+    axes = axes_of(state.scene)
+    coloured = ColouredField(values, STRESS_MAP, norm, label, words, factor, reach, named, width, axes)
     spot = contact_spot(state, bodies) if sections else None
     return draw_field_on_bodies(
         bodies, coloured, target, obstacles=obstacles, spot=spot, comm=state.torn.decomposition.comm
@@ -384,7 +391,8 @@ def plot_error(
     bodies, named = drawn_bodies(state), units or Units()
     shown = {name: np.repeat(part, bodies[name].n_cells // len(part)) for name, part in parts.items()}
     words, label = headline(title, facts), "part of a cell, relative"
-    coloured = ColouredField(shown, ERROR_MAP, LogNorm(*ends), label, words, 1.0, reach, named, width)
+    colours, axes = (ERROR_MAP, LogNorm(*ends)), axes_of(state.scene)
+    coloured = ColouredField(shown, *colours, label, words, 1.0, reach, named, width, axes)
     spot = contact_spot(state, bodies) if sections else None
     comm = state.torn.decomposition.comm
     return draw_field_on_bodies(bodies, coloured, target, obstacles=obstacles_of(state), spot=spot, comm=comm)

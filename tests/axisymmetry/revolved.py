@@ -12,15 +12,16 @@ from fenics_contact import (
     ContactPair,
     Coulomb,
     Pressure,
+    RigidPlane,
     RigidSphere,
     Scene,
     Support,
     Surface,
     Tie,
 )
-from fenics_contact.gallery import rectangle
+from fenics_contact.gallery import half_disc, rectangle
 from fenics_contact.gallery.blocks import rectangle_lattice
-from fenics_contact.materials import IsotropicElasticity, OrthotropicElasticity
+from fenics_contact.materials import IsotropicElasticity, NeoHooke, OrthotropicElasticity
 from fenics_contact.materials.elastic import Material
 from fenics_contact.mesh import quadratic
 
@@ -134,3 +135,23 @@ def pushed_with_friction() -> Scene:
     supports = [Support("disc", "y0", (None, 0.0)), Support("punch", "y1", (0.0, -0.002))]
     pair = ContactPair(Surface("punch", "y0"), Surface("disc", "y1"), Coulomb(0.2), "mortar")
     return Scene(bodies, supports, contacts=[pair])
+
+
+def squeezed_ring(cells: int = 5, squeeze: float = 0.3, pressure: float = 0.3) -> Scene:
+    """The lower half of an O-ring, squeezed on a plate with friction, pressed outwards by a fluid inside."""
+    half = half_disc(1.0, cells, symmetry="", grading=1.0)
+    side = half.surfaces["side"]
+    inside = side[half.points[side, 0].mean(axis=1) < 0.0]
+    lower = half.surfaces["contact"]
+    mesh = BodyMesh(
+        half.points + np.array([5.0, 0.0]),
+        half.cells,
+        {"top": half.surfaces["top"], "inside": inside, "lower": lower},
+    )
+    ring = Body(mesh, NeoHooke(5.0, 0.4), axisymmetric=True)
+    return Scene(
+        {"ring": ring},
+        [Support("ring", "top", (None, -squeeze))],
+        [Pressure("ring", "inside", pressure)],
+        [ContactPair(Surface("ring", "lower"), RigidPlane((5.0, 0.0), (0.0, 1.0)), Coulomb(0.3))],
+    )

@@ -70,6 +70,7 @@ def test_a_ball_leaves_an_imprint_in_metal_and_stress_around_it(demo: Callable[.
     more = run(demo, "ball_imprint", ranks, pictures, steps=12)
     found = (max(more["force"]), more["imprint"], more["work"], more["flow"])
     assert found == pytest.approx(BALL, rel=1e-3)
+    assert (more["turned_force"], more["turned_tabor"]) == pytest.approx((3289.27, 2.86109), rel=1e-3)
     assert more["springback"] == pytest.approx(more["hertz"], rel=0.2)
     assert abs(more["force"][-1]) < 1e-6, "the ball is away"
     assert more["flow"] + more["stored"] == pytest.approx(more["work"], rel=0.07)

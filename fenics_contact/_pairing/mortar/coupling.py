@@ -360,7 +360,10 @@ def _integrals(
 
 
 def revolved(cells: Cells, slave: FacetedSurface, facet: np.ndarray) -> Cells:
-    """Return cells whose weights have the circumference 2 π r in them; `facet`: slave facet of each pair."""
+    """Return cells whose weights have the circumference 2 π r in them.
+
+    `facet`: slave facet of each pair, shape (n_pairs,).
+    """
     radii = slave.points[slave.facets[facet[cells.pair]], 0]
     return replace(cells, weight=2 * np.pi * cells.weight * np.einsum("nqk,nk->nq", cells.slave, radii))
 

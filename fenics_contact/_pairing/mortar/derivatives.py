@@ -26,6 +26,7 @@ from fenics_contact._pairing.mortar.coupling import (
     chunks,
     inverted_pulled_back,
     relief_of_cells,
+    revolved,
 )
 from fenics_contact._pairing.mortar.planes import Planes, SumsBy, planes_of, planes_pulled_back
 from fenics_contact._surfaces.facets import FacetedSurface, heights
@@ -337,6 +338,9 @@ def _cells_of_sums(
     of_pair, along = nodes[overlaps.facet], normal[overlaps.facet]
     by_raised = np.einsum("pkd,pd->pk", sums.relief[of_pair], along)
     felt, field = by_raised.any(axis=1)[cells.pair], np.zeros(cells.weight.shape)
+    plain = cells
+    if slave.axisymmetric:
+        cells = revolved(plain, slave, pairs[0])
     basis, some = DualBasis.on(cells), cells.part(felt)
     if felt.any():
         field[felt] = relief_of_cells(some, slave, master, pairs, along)
@@ -344,11 +348,38 @@ def _cells_of_sums(
     by_integrals = np.concatenate([by_weights, by_raised[:, :, None]], axis=2)
     by, by_field = integrals_pulled_back(basis, field, sums.area[nodes], by_integrals)
     if not felt.any():
-        return by, np.zeros(normal.shape)
+        return _from_revolved(plain, slave, pairs[0], by, into[0].points), np.zeros(normal.shape)
     over_facets = SumsBy(overlaps.facet, len(facets))
     by_normal = over_facets((basis.integrals(field[:, :, None]) * sums.relief[of_pair]).sum(axis=1))
     more, by_along = relief_pulled_back(some, surfaces, pairs, along[some.pair], by_field[felt], into)
-    return by.grown(felt, more), by_normal + SumsBy(some.facet, len(facets))(by_along)
+    by = _from_revolved(plain, slave, pairs[0], by.grown(felt, more), into[0].points)
+    return by, by_normal + SumsBy(some.facet, len(facets))(by_along)
+
+
+def _from_revolved(
+    cells: Cells, slave: FacetedSurface, facet: np.ndarray, by: CellDerivatives, into: np.ndarray
+) -> CellDerivatives:
+    """Return the derivatives by plane cells; add those by radii to the slave's nodes, shape (n, dim)."""
+    if not slave.axisymmetric:
+        return by
+    by, by_radii = revolved_pulled_back(cells, slave, facet, by)
+    np.add.at(into[:, 0], slave.facets[facet], by_radii)
+    return by
+
+
+def revolved_pulled_back(
+    cells: Cells, slave: FacetedSurface, facet: np.ndarray, by: CellDerivatives
+) -> tuple[CellDerivatives, np.ndarray]:
+    """Vector-Jacobian product of `revolved` with respect to the cells and the radii of the facets' corners.
+
+    Derivatives by the cells, and by the radii of each pair's slave facet, shape (n_pairs, corners).
+    """
+    radii = slave.points[slave.facets[facet], 0]
+    around = 2 * np.pi * by.weight
+    at_points = np.einsum("nqk,nk->nq", cells.slave, radii[cells.pair])
+    by_slave = by.slave + (around * cells.weight)[..., None] * radii[cells.pair][:, None]
+    by_radii = SumsBy(cells.pair, len(facet))(np.einsum("nq,nqk->nk", around * cells.weight, cells.slave))
+    return replace(by, weight=around * at_points, slave=by_slave), by_radii
 
 
 #: Pairs of facets up to which reverse mode runs for several corners and nodes at once.
@@ -480,15 +511,20 @@ def _of_nodes(
     """Return the same for one corner and one node of the master of each pair's slave facet, −1 for none."""
     dim, n_slave, n_master = slave.dim, len(slave.nodes), len(master.nodes)
     nodes, opposite = slave.facets[chosen[overlaps.slave]], master.facets[overlaps.master]
-    cells, each = cells_of(overlaps), np.arange(len(nodes))
+    plain, each = cells_of(overlaps), np.arange(len(nodes))
+    cells = revolved(plain, slave, chosen[overlaps.slave]) if slave.axisymmetric else plain
     basis, own = DualBasis.on(cells), planes.part(overlaps.slave)
     integrals, meant = basis.integrals(cells.master), opposite == node[:, None]
     seed = np.zeros((*integrals.shape[:2], integrals.shape[2] + 1))
     seed[each, corner, :-1] = meant
     by, _ = integrals_pulled_back(basis, np.zeros_like(cells.weight), np.zeros_like(basis.coverage), seed)
-    by_subject, by_window = cells_pulled_back(overlaps, cells, by)
+    by_radii = np.zeros(nodes.shape)
+    if slave.axisymmetric:
+        by, by_radii = revolved_pulled_back(plain, slave, chosen[overlaps.slave], by)
+    by_subject, by_window = cells_pulled_back(overlaps, plain, by)
     places = master.points[opposite], each, by_subject
     both = planes_pulled_back(own, slave.points[nodes], by_window, np.zeros_like(own.normal), places)
+    both[0][:, :, 0] += by_radii
     slopes = np.concatenate(both, axis=1).reshape(len(nodes), -1)
     felt = np.flatnonzero(slopes.any(axis=1))
     met = np.concatenate([nodes, n_slave + opposite], axis=1)[felt]
