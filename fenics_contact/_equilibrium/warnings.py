@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.display import counted
 from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
+from fenics_contact._pairing.search import find_contact_points
 from fenics_contact._scene.pair_geometry import Outline, bodies_near, outline_of, unpaired
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import TILT, surface_of
@@ -90,7 +91,7 @@ class ContactWarnings:
             moved = _largest_motion(after - before, pressed_in[mine], touching)
             if moved <= computed_rounding(torn.scene.bodies[pair.slave.body].mesh.points):
                 continue  # nothing moves
-            found += _passing_nodes(state, number, moved)
+            found += _passing_nodes(state, number, moved) + _open_means(state, number, moved)
             nearest = np.minimum(before, after) + np.minimum(change[mine], 0.0)
             error = float(np.abs(change[mine][nearest <= moved]).max(initial=0.0))
             if error > SHARE * moved:  # which points press is not known then
@@ -377,6 +378,37 @@ def _passing_nodes(state: State, number: int, moved: float) -> list[tuple[int, s
         "finer surface be the slave; linear cells have discretisation='mortar', which has no such error"
     )
     return [(number, "between nodes", words)]
+
+
+def _open_means(state: State, number: int, moved: float, most: float = 0.5) -> list[tuple[int, str, str]]:
+    """Return the doubt about a pair by mortar that nothing closes although nodes lie inside the master.
+
+    A round body on coarse facets is so, as means over its facets are open where its lowest node is not.
+    Collective.
+
+    `moved`: how far its surfaces move against each other, [length]; `most`: depth of nodes, relative to it,
+    that is no doubt yet.
+    """
+    contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
+    presses = contact.normal_force[contact.on_pair(number)].any()
+    if presses or not pair.by_mortar or not isinstance(pair.master, Surface) or pair.given_gap:
+        return []
+    torn = state.torn
+    single = Scene(scene.bodies, scene.supports, contacts=(replace(pair, discretisation="node"),))
+    points = find_contact_points(
+        single, torn.decomposition.fixed, torn.numbering.comm, axes=torn.decomposition.axes, told=True
+    )
+    moves = np.concatenate([state.gather_displacement(name) for name in scene.bodies])
+    gap = points.gap + np.einsum("nd,nd->n", points.normal, points.jump @ moves)
+    deep = -float(gap.min(initial=0.0))
+    if deep <= most * moved:
+        return []
+    words = (
+        f"nothing presses on {pair.place}, as means over its facets are open, but nodes lie up to {deep:.2g} "
+        f"inside the master, where surfaces move by {moved:.2g} against each other: the facets are too large "
+        "for this contact, refine them there; discretisation='node' closes single nodes"
+    )
+    return [(number, "open means", words)]
 
 
 def _depth(state: State, number: int, pair: ContactPair, other: Surface) -> float:

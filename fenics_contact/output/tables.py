@@ -176,6 +176,7 @@ class StepTable:
     | ``normal_force``, ``friction_force`` | sums over all pairs, [force] |
     | ``peak_pressure`` | of all pairs, [force / length²] |
     | ``strain_energy``, ``load_energy``, ``friction_energy`` | as in `results.Energies`; empty if not known |
+    | ``surface_energy`` | where surfaces give way |
     | ``preload NAME`` | force of each preload |
     | ``loads Fx``, ... | force of all loads, and its moment ``loads Mx``, ... |
     | ``loads Fr``, ``loads Fz`` | the same of bodies of revolution, a revolution |
@@ -227,7 +228,9 @@ class StepTable:
             pressure = state.contact.pressure[state.contact.on_pair(number)]
             values[f"{each} pressure"] = float(pressure.max(initial=0.0))
             values[f"{each} area"] = contact_area(state, number)
-        energies = {key: getattr(state.energies, key) for key in ("strain", "load", "friction")}
+        soft = any(pair.closure is not None for pair in state.scene.contacts)
+        kinds = ("strain", "load", "friction", *(("surface",) if soft else ()))
+        energies = {key: getattr(state.energies, key) for key in kinds}
         named = {"number": len(self._rows), "name": name, "time": state.time if time is None else float(time)}
         known = {f"{key}_energy": value if np.isfinite(value) else None for key, value in energies.items()}
         self._rows.append({**named, **step_row(len(self._rows), name, state), **known, **values})
@@ -253,7 +256,9 @@ class StepTable:
 
     def _text(self) -> str:
         names = list(dict.fromkeys(name for row in self._rows for name in row))
-        about = (f"{each} ({', '.join(f'{x:.6g}' for x in point)})" for each, point in self._about.items())
+        size = max(float(np.abs(point).max()) for point in self._about.values())
+        places = {name: rounded(point, size) for name, point in self._about.items()}
+        about = (f"{each} ({', '.join(f'{x:.6g}' for x in point)})" for each, point in places.items())
         remarks = [
             "one row a load step; forces of pairs act on the slave; units are those of the scene",
             f"moments about: {'; '.join(about)}",

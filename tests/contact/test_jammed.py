@@ -32,8 +32,9 @@ from fenics_contact import (
 )
 from fenics_contact._equilibrium import followed_loads
 from fenics_contact._scene.pair_geometry import outline_of, unpaired
+from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.errors import InfeasibleError
-from fenics_contact.gallery import block, rectangle, rectangle_lattice
+from fenics_contact.gallery import block, disc, rectangle, rectangle_lattice
 from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
 from fenics_contact.mesh import bisection_partition
 from fenics_contact.qp import FaceNewton, Smalse
@@ -432,3 +433,41 @@ def test_a_rigid_surface_that_turns_far_moves_rubber_on_an_arc_and_not_along_its
     turned = RigidSurface("wheel", "x1", at=(0.0, 0.0), displacement=(0.0, 0.0), rotation=2.0 * np.pi)
     bodies = {name: Body(mesh, NeoHooke(1.0, 0.3)) for name, mesh in meshes.items()}
     assert Scene(bodies, [turned, Support("near", "x1")]).plan().unpaired == ()
+
+
+# A round body on facets so large that their means are open although its lowest node is not.
+def about_open_means(caplog: pytest.LogCaptureFixture, scene: Scene) -> tuple[State, list[str]]:
+    caplog.clear()
+    with caplog.at_level(logging.WARNING):
+        state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-8)
+    words = [record.getMessage() for record in caplog.records]
+    return state, [each for each in words if each.startswith("nothing presses on ")]
+
+
+@pytest.mark.parametrize(("push", "discretisation"), [(-0.01, "mortar"), (0.01, "mortar"), (-0.01, "node")])
+def test_round_bodies_on_facets_that_are_too_large_are_reported(
+    push: float, discretisation: Discretisation, caplog: pytest.LogCaptureFixture
+) -> None:
+    material = PlaneStrain(1000.0, 0.3)
+    bodies = {
+        "disc": Body(disc(1.0, 5), material),
+        "bed": Body(rectangle((-2, -2), (2, -1), (9, 4)), material),
+    }
+    pair = ContactPair(Surface("disc", "y0"), Surface("bed", "y1"), discretisation=discretisation)
+    supports = [Support("bed", "y0"), Support("disc", "y1", (0.0, push))]
+    state, found = about_open_means(caplog, Scene(bodies, supports, contacts=[pair]))
+    assert bool(found) == (push < 0 and discretisation == "mortar")
+    assert (state.contact.normal_force.max() > 0.0) == (discretisation == "node")
+    if found:
+        assert "nodes lie up to 0.01 inside the master, where surfaces move by 0.0" in found[0]
+
+
+def test_a_pin_that_moves_in_a_wider_hole_is_not_reported(caplog: pytest.LogCaptureFixture) -> None:
+    """The facets of the hole come nearer than the hole itself; gaps are those of the true circles."""
+    material = PlaneStrain(1000.0, 0.3)
+    bodies = {"pin": Body(disc(0.988, 3), material), "ring": Body(disc(2.0, 2, hole=1.0), material)}
+    pair = ContactPair(Surface("pin", "outer"), Surface("ring", "inner"), discretisation="mortar")
+    supports = [Support("ring", "outer"), Support("pin", "y1", (0.0, -0.01))]
+    state, found = about_open_means(caplog, Scene(bodies, supports, contacts=[pair]))
+    assert state.contact.normal_force.max() == 0.0
+    assert found == []
