@@ -181,6 +181,7 @@ class StepTable:
     | ``loads Fx``, ... | force of all loads, and its moment ``loads Mx``, ... |
     | ``loads Fr``, ``loads Fz`` | the same of bodies of revolution, a revolution |
     | ``lid top Fx``, ... | reaction of the supports of the surface "top" of the body "lid" |
+    | ``foundation slab bottom Fx``, ... | force of springs to the ground |
     | ``lid bottom on pot rim Fx``, ... | force on the slave of a pair or tie |
     | ``lid bottom on pot rim pressure``, ``... area`` | the largest pressure, and the area of contact |
 
@@ -244,6 +245,9 @@ class StepTable:
         balance, pairs = state.balance(self._about.get("loads")), state.resultants()
         reactions = state.reactions()
         found = {"loads": balance.loads, **{place: reactions[place] for place in reactions.places}}
+        if state.scene.foundations:
+            springs = state.foundations()
+            found |= {f"foundation {place}": springs[place] for place in springs.places}
         for listed in (pairs.contacts, pairs.ties):
             found |= dict(zip(_names(listed.places), listed, strict=True))
         columns: dict[str, float] = {}

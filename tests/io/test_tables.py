@@ -15,6 +15,8 @@ from fenics_contact import (
     Body,
     ContactPair,
     ContactProblem,
+    ElasticFoundation,
+    LinearClosure,
     LoadSequence,
     LoadStep,
     RigidPlane,
@@ -171,6 +173,23 @@ def test_what_materials_do_not_define_is_empty(tmp_path: Path) -> None:
     _, (row,) = read(table.add(solve_scene(scene, COMM)))
     assert row["strain_energy"] == ""
     assert row["bar x1 Fx"] > 100.0
+
+
+def test_springs_and_surfaces_that_give_way_have_columns(tmp_path: Path) -> None:
+    scene = Scene(
+        {"slab": Body(rectangle((0, 0), (2, 1), (5, 2)), PlaneStrain(100.0, 0.3))},
+        [Support("slab", "x0", (0.0, None))],
+        [TotalForce("slab", "y1", (0.0, -1.0))],
+        [ContactPair(Surface("slab", "y0"), RigidPlane((0, 0), (0, 1)), closure=LinearClosure(50.0))],
+        foundations=[ElasticFoundation("slab", "x1", (0.0, 30.0))],
+    )
+    state = solve_scene(scene, COMM, tolerance=1e-9)
+    _, (row,) = read(StepTable(tmp_path / "steps.csv", COMM).add(state))
+    springs, floor = row["foundation slab x1 Fy"], row["slab y0 on rigid plane Fy"]
+    assert springs > 0.1
+    assert springs + floor == pytest.approx(1.0, rel=1e-6)
+    assert row["surface_energy"] == pytest.approx(state.energies.surface, rel=1e-9)
+    assert row["surface_energy"] > 1e-3
 
 
 def test_tables_of_bodies_of_revolution_have_radial_and_axial_forces(tmp_path: Path) -> None:
