@@ -6,7 +6,7 @@ Scenes: Scene, Body, BodyMesh, Surface, Support, Roller, RigidSurface, ContactPa
     LoadStep, Preload, Section, ElasticFoundation, box_partition
 
 Laws of surfaces: Coulomb, Tresca, FrictionTable, FrictionCurve, LinearClosure, ExponentialClosure,
-    ClosureTable, ClosureLaw
+    ClosureTable, ClosureLaw, FluidPressure
 
 Rigid obstacles: RigidPlane, RigidSphere, RigidCylinder, DistanceObstacle, MovingObstacle
 
@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from fenics_contact._scene.fields import SampledField as SampledField
     from fenics_contact._scene.fields import Ufl as Ufl
     from fenics_contact._scene.fields import read_field as read_field
+    from fenics_contact._scene.fluid import FluidPressure as FluidPressure
     from fenics_contact._scene.foundations import ElasticFoundation as ElasticFoundation
     from fenics_contact._scene.loads import BodyForce as BodyForce
     from fenics_contact._scene.loads import Pressure as Pressure

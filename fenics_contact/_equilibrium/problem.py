@@ -141,6 +141,13 @@ class LinearEquilibria:
         # Derivatives need the status of every contact point, which a balanced state leaves uncertain.
         if tolerance is None and (self._solver is not None or design):
             tolerance = solver.tolerance
+        if any(pair.fluid is not None for pair in scene.contacts):
+            if design:
+                raise InvalidInputError(
+                    "derivatives by the shape are not available with fluid that enters a contact: load the "
+                    "wetted surfaces by Pressure"
+                )
+            return self._penetrated(torn, tolerance, solver, known or start, before)
         system = DualSystem(torn, self._timer, previous=reused)
         first = _start_from(start, system)
         solve = solve_dual if reused is None else FollowedLoads(reused, self._timer).solve
@@ -150,6 +157,29 @@ class LinearEquilibria:
             solution = solve(system, solver.with_tolerance(tolerance), first)
         return self._state(system, solution, tolerance=tolerance)
 
+    def _penetrated(
+        self,
+        torn: TornSystem,
+        tolerance: Tolerance,
+        solver: DualSolver,
+        known: State | None,
+        before: State | None,
+    ) -> LinearState:
+        """Compute the state in which fluid is where contact is open to it. Collective."""
+        from fenics_contact._equilibrium.penetration import penetrated
+
+        # The front needs the status of every point, which a balanced state leaves uncertain.
+        wanted = tolerance if isinstance(tolerance, float) else solver.tolerance
+
+        def solve(system_of: TornSystem, last: LinearState | None) -> LinearState:
+            reused = known_system(last)
+            system = DualSystem(system_of, self._timer, previous=reused)
+            with self._timer.phase("solve"):
+                solution = solve_dual(system, solver.with_tolerance(wanted), _start_from(last, system))
+            return self._state(system, solution, tolerance=wanted)
+
+        return penetrated(solve, torn, known, before)
+
     def restored(self, stored: Stored, scene: Scene, known: State | None) -> LinearState:
         """Build a state from what `stored_state` returned, with at most one product. Collective."""
         torn = self._torn(scene, known, overlap=True)
@@ -157,6 +187,10 @@ class LinearEquilibria:
             return self._directly(torn, known)
         with self._timer.phase("assemble"):
             torn = with_stored_slip(torn, stored)
+        if "wet" in stored:
+            from fenics_contact._equilibrium.penetration import Front
+
+            torn = Front.of(torn).at(torn, stored["wet"])
         system = DualSystem(torn, self._timer, previous=known_system(known))
         with self._timer.phase("state"):
             solution = restored_solution(system, stored)

@@ -57,6 +57,7 @@ def stored_state(state: State) -> dict[str, np.ndarray]:
         "slid": torn.slid,
         "motion": np.asarray(solution.alpha),
         **held_lengths(state.scene),
+        **({} if torn.fluid is None else {"wet": torn.fluid.wet}),
     }
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from fenics_contact._base.checks import checked
 from fenics_contact._base.display import name_in_words
 from fenics_contact._scene.fields import OfPosition, evaluate
+from fenics_contact._scene.fluid import FluidPressure
 from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact._scene.surface_laws import ClosureLaw, FrictionCurve, check_closing, check_rising
 from fenics_contact._surfaces.true_surface import Geometry
@@ -143,6 +144,7 @@ class ContactPair:
         closure: How far the surfaces approach under pressure: `LinearClosure`, `ExponentialClosure`,
             `ClosureTable` or a `ClosureLaw` of your own, for rough surfaces, coats and gaskets. None: contact
             is exact. With one, the gap of a closed point is minus its closure.
+        fluid: Fluid under pressure that enters where contact opens, see `FluidPressure`; small strains only.
         adjust: Slave points whose measured clearance or overlap is at most this, [length], are put in touch
             without strain, or get ``gap`` or ``interference`` if these are given; all others keep the
             measured gap. None: no point is put in touch, and ``gap`` and ``interference`` hold at all points.
@@ -167,6 +169,7 @@ class ContactPair:
     interference: float | OfPosition | Literal["measured"] | None = None
     adjust: float | None = None
     closure: ClosureLaw | None = None
+    fluid: FluidPressure | None = None
     reason: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:

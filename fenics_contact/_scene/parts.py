@@ -84,6 +84,8 @@ class SceneParts:
             self._require(pair.slave.body, pair.slave.name, f"{kind}.slave")
             if isinstance(pair, ContactPair) and pair.within_body:
                 self._require_deforming(pair)
+            if isinstance(pair, ContactPair) and pair.fluid is not None:
+                self._require_inlet(pair)
             if isinstance(pair, ContactPair) and pair.stick_stiffness is not None and self.deforms_much:
                 raise InvalidInputError(
                     f"the stick stiffness of {pair.place} needs small displacements, but some body deforms "
@@ -226,6 +228,17 @@ class SceneParts:
                 f"an obstacle must lie in the space of the bodies, {type(obstacle).__name__} is for {dim} "
                 f"dimensions and the bodies have {self.dim}: give it {self.dim} coordinates, or in the plane "
                 "a RigidSphere for a round bar"
+            )
+
+    def _require_inlet(self, pair: ContactPair) -> None:
+        """Reject fluid that enters at an unknown surface, and between bodies with nonlinear materials."""
+        enters = pair.fluid.enters if pair.fluid is not None else ""
+        if isinstance(enters, str):
+            self._require(pair.slave.body, enters, "FluidPressure.enters")
+        if any(is_nonlinear(m) for body in self.bodies.values() for m in body.materials):
+            raise InvalidInputError(
+                f"the fluid between {pair.place} needs linear materials in all bodies: load the wetted "
+                "surfaces by Pressure where materials are nonlinear"
             )
 
     def _require_deforming(self, pair: ContactPair) -> None:

@@ -46,6 +46,7 @@ class EffectName(StrEnum):
     CONTACT = "contact"
     CLOSURE = "surfaces that give way"
     STICK_STIFFNESS = "elastic slip"
+    FLUID = "fluid that enters where contact opens"
     TRESCA = "Tresca friction"
     COULOMB = "Coulomb friction"
     FRICTION_CURVE = "friction that pressure limits or changes"
@@ -69,6 +70,7 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
     thermal = sum(isinstance(load, ThermalStrain) for load in loads)
     rubbing = [pair.friction for pair in scene.contacts if pair.has_friction]
     tresca, coulomb = (sum(isinstance(law, kind) for law in rubbing) for kind in (Tresca, Coulomb))
+    wetted = sum(pair.fluid is not None for pair in scene.contacts)
     sprung = sum(pair.has_friction and pair.stick_stiffness is not None for pair in scene.contacts)
     soft = sum(pair.closure is not None for pair in scene.contacts)
     curved = sum(pair.friction_curve is not None or pair.shear_limit is not None for pair in scene.contacts)
@@ -91,6 +93,7 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
         (names.PRELOAD, len(scene.preloads), "section is drawn together", "sections are drawn together"),
         (names.CONTACT, len(scene.contacts), "pair may touch", "pairs may touch"),
         (names.CLOSURE, soft, "pair has a law of closure", "pairs have one"),
+        (names.FLUID, wetted, "pair is a seal", "pairs are seals"),
         (names.STICK_STIFFNESS, sprung, "pair has a stick stiffness", "pairs have one"),
         (names.TRESCA, tresca, f"pair {fixed}", f"pairs {fixed.replace('has', 'have')}"),
         (names.COULOMB, coulomb, f"pair {rough}", f"pairs {rough.replace('has', 'have')}"),

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from fenics_contact._base.checks import meaning
 from fenics_contact._scene import automatic, loads, pairs, surface_laws
 from fenics_contact._scene import obstacles as obstacles_module
+from fenics_contact._scene.fluid import FluidPressure
 from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.loads import Load
 from fenics_contact._scene.obstacles import MovingObstacle
@@ -206,6 +207,13 @@ AnyFriction: TypeAlias = Annotated[Any, one_of("law", *FRICTION_LAWS)]
 AnyClosure: TypeAlias = Annotated[Any, one_of("law", *CLOSURE_LAWS)]
 
 
+@keys_of(FluidPressure)
+class FluidPart(Part):
+    """Fluid that enters a contact as far as it is open."""
+
+    enters: str = Field(description="surface of the slave's body with which the slave shares an edge")
+
+
 @keys_of(ContactPair, without={"reason"})
 class ContactPart(Part):
     """Two surfaces that may touch, or a surface and a rigid obstacle."""
@@ -214,6 +222,7 @@ class ContactPart(Part):
     master: Master
     friction: AnyFriction | None
     closure: AnyClosure | None
+    fluid: FluidPart | None
     gap: NotNegativeField | None = Field(
         description="clearance in place of the measured one, [length]: a number, a formula in x, y, z in "
         "quotes, or a field from a file"

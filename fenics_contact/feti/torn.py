@@ -151,6 +151,19 @@ def _explained(points: ContactPoints) -> np.ndarray:
 _LOG = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True, eq=False)
+class FluidLoad:
+    """What fluid between surfaces exerts.
+
+    Attributes:
+        load: On this rank's torn dofs, shape (torn_size,), [force].
+        wet: Contact points where it is, replicated, shape (n_contact,).
+    """
+
+    load: np.ndarray
+    wet: np.ndarray
+
+
 @displayed
 @dataclass(frozen=True)
 class TornSystem:
@@ -183,6 +196,7 @@ class TornSystem:
         right: c of the owned rows less the contribution of supports, shape (n_owned,), [length].
         slid: Tangential displacement of the points without friction, which have no such rows, at the origin
             of slip, replicated, shape (n_contact − n_friction, dim − 1), [length].
+        fluid: Load and place of fluid between surfaces; None without any.
         free: The free motions of rigid surfaces and unknown shortenings of preloads, which add Q q to c.
     """
 
@@ -205,6 +219,7 @@ class TornSystem:
     right: np.ndarray
     slid: np.ndarray
     free: FreeMotions
+    fluid: FluidLoad | None = None
 
     def jump(self, displacement: np.ndarray) -> np.ndarray:
         """Return B u for a torn displacement of this rank, owned, [length]. Collective."""
@@ -394,7 +409,19 @@ class TornSystem:
     @property
     def load(self) -> np.ndarray:
         """This rank's torn load f, shape (torn_size,), [force]."""
-        return np.concatenate([subdomain.load for subdomain in self.subdomains])
+        load = np.concatenate([subdomain.load for subdomain in self.subdomains])
+        return load if self.fluid is None else load + self.fluid.load
+
+    def with_fluid(self, pressure: np.ndarray, wet: np.ndarray) -> TornSystem:
+        """Return the system with fluid that presses surfaces apart as normal forces do. Collective.
+
+        `pressure`: at each contact point, shape (n_contact,), [force / length²]; `wet`: where it is,
+        (n_contact,).
+        """
+        force = np.zeros(len(self.numbering.owned))
+        place = self.numbering.owned_index(self.normal_rows)
+        force[place[place >= 0]] = (pressure * self.points.area)[place >= 0]
+        return replace(self, fluid=FluidLoad(-self.force(force), wet))
 
 
 def build_torn_system(
@@ -431,7 +458,7 @@ def build_torn_system(
         free = free_motions(scene, decomposition.tearing)
     if previous is not None and _meets_alike(scene, previous.scene) and previous.driven_as(prescribed):
         # Only loads and prescribed values changed: B stays the same object, which marks F as unchanged, too.
-        system = replace(previous, scene=scene, subdomains=subdomains)
+        system = replace(previous, scene=scene, subdomains=subdomains, fluid=None)
     else:
         system = _joined(scene, decomposition, subdomains, overlap, previous, prescribed)
     with together(comm):

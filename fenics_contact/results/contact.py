@@ -68,6 +68,8 @@ class ContactResult:
             than a half of it with large deformations): where the slave's material is made for these that of
             the deformed slave, else ``nominal_area``, shape (n,), [length²] or in the plane [length].
         nominal_area: The same of the undeformed slave, shape (n,).
+        wet: Whether fluid has reached a point, shape (n,); None where no fluid is. Its pressure is no part of
+            the contact pressure.
     """
 
     points: ContactPoints
@@ -80,6 +82,7 @@ class ContactResult:
     status: np.ndarray
     area: np.ndarray
     nominal_area: np.ndarray
+    wet: np.ndarray | None = None
 
     def _facts(self) -> dict[str, Any]:
         normal = self.normal_force

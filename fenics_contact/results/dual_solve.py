@@ -83,4 +83,5 @@ def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray
         status,
         torn.points.area,
         torn.points.area,
+        None if torn.fluid is None else torn.fluid.wet,
     )

@@ -3,7 +3,8 @@
 The numbers are those that CalculiX 2.20 (Debian 12) prints for the decks contact1, contact3 and contact6 of
 its tests (package calculix-ccx-test, GPL 2 or later; facts alone are used, no text). Its slave is a single
 node there, with an area of 0.03 (three faces of the small cube meet in it); here the whole face, 0.04, is the
-slave: pressures are in that ratio.
+slave: pressures are in that ratio. The hysteresis is that of fricloop with its upper face driven as a whole
+(in the deck, the set of its four nodes in place of one of them), in increments of 0.05 of time.
 """
 
 from __future__ import annotations
@@ -18,7 +19,11 @@ from fenics_contact import (
     ClosureLaw,
     ClosureTable,
     ContactPair,
+    ContactProblem,
+    Coulomb,
     ExponentialClosure,
+    LinearClosure,
+    LoadStep,
     RigidSurface,
     Scene,
     State,
@@ -26,6 +31,7 @@ from fenics_contact import (
     Surface,
     TotalForce,
     solve_scene,
+    solve_steps,
 )
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
@@ -102,3 +108,35 @@ def test_linear_closure_of_contact3_and_contact6(
     # Displacements are printed with seven digits.
     assert closure == pytest.approx(theirs, rel=5e-3, abs=2e-9 if bottom > 0.99 else 1e-8)
     assert down(state, "upper", bottom + 0.2) - upper == pytest.approx(top - faces[1], rel=5e-3)
+
+
+#: Displacement of the upper face and the mean friction traction, as CalculiX has it.
+HYSTERESIS = (
+    (0.005, 4.97585), (0.01, 9.95165), (0.02, 19.90328), (0.05, 19.9926), (0.1, 19.9926), (0.09, 10.0401),
+    (0.06, -19.8171), (-0.1, -19.9926), (-0.08, -0.08772), (-0.05, 19.9926), (-0.02, 19.9926),
+)  # fmt: skip
+
+
+def test_elastic_slip_and_hysteresis_of_fricloop() -> None:
+    bodies = {
+        "lower": Body(block((0, 0, 0), (1, 1, 1), (1, 1, 1)), STEEL),
+        "upper": Body(small_cube(1.0), STEEL),
+    }
+    held = [  # a pressure of 100: faces are flat there, too
+        Support("lower", "z0"),
+        Support("lower", "z1", (None, None, -1.73387e-5)),
+        Support("upper", "z0", (None, None, -2.73387e-5)),
+    ]
+    law, surfaces = Coulomb(0.2, stick_stiffness=1e3), (Surface("upper", "z0"), Surface("lower", "z1"))
+    pair = ContactPair(*surfaces, law, "node", closure=LinearClosure(1e7))
+    top = [Support("upper", "z1", (0.0, way, -1.22e-4)) for way, _ in HYSTERESIS]
+    scene = Scene(bodies, [*held, top[0]], contacts=[pair])
+    steps = [
+        LoadStep(f"{way:g}", supports=[*held, last]) for (way, _), last in zip(HYSTERESIS, top, strict=True)
+    ]
+    states = solve_steps(ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-9), steps)
+    for (way, theirs), state in zip(HYSTERESIS, states, strict=True):
+        contact = state.contact
+        assert contact.pressure.mean() == pytest.approx(100.0, rel=1e-3)
+        ours = -(contact.force[:, 1] / contact.area).mean()
+        assert ours == pytest.approx(theirs, abs=5e-3 * 20.0), way

@@ -22,12 +22,17 @@ from fenics_contact import (
     BodyForce,
     BodyMesh,
     Checkpoint,
+    ClosureTable,
     ContactProblem,
     Coulomb,
     DesignResponse,
     DistanceObstacle,
     ElasticFoundation,
+    ExponentialClosure,
     FixedPoint,
+    FluidPressure,
+    FrictionTable,
+    LinearClosure,
     LoadSequence,
     LoadStep,
     MovingObstacle,
@@ -111,7 +116,8 @@ FACES = ("materials", "mesh", "results", "design")
 MOST_PRINTED = 25
 #: Protocols, and classes to derive from.
 NO_OBJECTS = {
-    "Elasticity", "EnergyModel", "HistoryMaterial", "Hyperelasticity", "Inexact", "Kinked", "Material",
+    "ClosureLaw", "Elasticity", "EnergyModel", "FrictionCurve",
+    "HistoryMaterial", "Hyperelasticity", "Inexact", "Kinked", "Material",
     "NearlyIncompressible", "Objective", "Pieced", "Resumable", "RigidObstacle", "State", "SurfaceShape",
     "Thermoelastic", "Transverse", "Weighable",
 }  # fmt: skip
@@ -159,6 +165,8 @@ def objects() -> dict[str, Any]:
         SampledField(np.eye(3), np.ones(3)),
         Support("block", "z1", (None, lambda x: x[:, 0], 0.0)), LoadStep("push", loads=weights),
         *CELL_TYPES.values(), ThermalStrain("block", 20.0), TotalForce("block", "z1", (0, 0, -1)),
+        LinearClosure(1.0), ExponentialClosure(1.0, 0.1), ClosureTable((0.0, 0.1), (0.0, 1.0)),
+        FrictionTable((0.0, 1.0), (0.3, 0.2)), FluidPressure(1.0, "x0"),
         Pressure("block", "z1", 1.0), Tresca(1.0), Tie(Surface("a", "z0"), Surface("b", "z1")),
         MooneyRivlin(1.0, 0.0, 9.0), Ogden((1.0,), (2.0,), 9.0), StVenantKirchhoff(1.0, 0.3),
         PlaneStrain(1.0, 0.3), PlaneStress(1.0, 0.3), NeoHooke(1.0, 0.3), J2Plasticity(1.0, 0.3, 1.0),

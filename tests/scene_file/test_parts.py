@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import BodyMesh, Coulomb, read_scene_file
+from fenics_contact import BodyMesh, Coulomb, FluidPressure, read_scene_file
 from fenics_contact._scene import loads as loads_module
 from fenics_contact._scene import obstacles, pairs, surface_laws
 from fenics_contact._scene import supports as supports_module
@@ -280,6 +280,9 @@ def test_laws_of_surfaces_are_those_of_the_package() -> None:
         (found,) = file_of(contacts=[pair]).scene.contacts
         assert found.closure == law
         assert found.friction == pairs.Coulomb(surface_laws.FrictionTable((1.0, 5.0), (0.3, 0.2)), 2.0)
+    fluid = {"pressure": 2, "enters": "x0", "critical": 1}
+    (wet,) = file_of(contacts=[{"slave": slave, "master": FLOOR, "fluid": fluid}]).scene.contacts
+    assert wet.fluid == FluidPressure(2.0, "x0", 1.0)
     falling = {"law": "table", "closures": [0, 0.1, 0.2], "pressures": [0, 3, 2]}
     with pytest.raises(SceneFileError, match=r"contacts\.0: .* must rise with the closures"):
         _ = file_of(contacts=[{"slave": slave, "master": FLOOR, "closure": falling}]).scene

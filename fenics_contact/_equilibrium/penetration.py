@@ -1,0 +1,131 @@
+"""How far fluid enters a contact: solved again until its front stays where it is."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from fenics_contact._base.display import counted
+from fenics_contact._pairing.points import NodeNumbers
+from fenics_contact.errors import ConvergenceError, together
+from fenics_contact.errors.kinds import safe_log
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.qp.solution import DualSolution, SolverStep
+from fenics_contact.results.contact import ContactResult
+from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.state import State
+
+_LOG = logging.getLogger(__name__)
+
+#: Solves a system from the state before, if there is one.
+Solve = Callable[[TornSystem, LinearState | None], LinearState]
+
+
+@dataclass(frozen=True, eq=False)
+class Front:
+    """The contact points that fluid may reach, and from where; replicated.
+
+    Attributes:
+        neighbours: Points that share a facet of the slave, shape (n, n).
+        inlet: Points where fluid enters, shape (n,).
+        pressure: Of the fluid at each point, zero where there is none, shape (n,), [force / length²].
+        critical: Contact pressures up to which points count as open, shape (n,).
+    """
+
+    neighbours: sp.csr_matrix
+    inlet: np.ndarray
+    pressure: np.ndarray
+    critical: np.ndarray
+
+    def at(self, torn: TornSystem, wet: np.ndarray) -> TornSystem:
+        """Return a system with fluid at wet points, shape (n,). Collective."""
+        return torn.with_fluid(np.where(wet, self.pressure, 0.0), wet)
+
+    @classmethod
+    def of(cls, torn: TornSystem) -> Front:
+        """Prepare the graph of points of pairs with a fluid. Collective."""
+        scene, points, count = torn.scene, torn.points, torn.points.count
+        inlet, (pressure, critical) = np.zeros(count, dtype=bool), np.zeros((2, count))
+        rows: list[np.ndarray] = []
+        columns: list[np.ndarray] = []
+        with together(torn.decomposition.comm):
+            for number, pair in enumerate(scene.contacts):
+                if pair.fluid is None:
+                    continue
+                body, first = (
+                    scene.bodies[pair.slave.body].mesh,
+                    NodeNumbers.of(scene).first_of(pair.slave.body),
+                )
+                mine = np.flatnonzero(points.pair == number)
+                nodes = points.slave[mine] - first
+                named = pair.fluid.enters if isinstance(pair.fluid.enters, str) else pair.slave.name
+                shared = np.isin(nodes, body.surfaces[named])
+                inlet[mine] = pair.fluid.inlet(body.points[nodes], shared)
+                pressure[mine], critical[mine] = pair.fluid.pressure, pair.fluid.critical
+                number_of = np.full(body.n_nodes, -1)
+                number_of[nodes] = mine
+                facets = number_of[body.surfaces[pair.slave.name]]
+                one, other = (
+                    np.broadcast_arrays(facets[:, :, None], facets[:, None, :])[k].ravel() for k in (0, 1)
+                )
+                both = (one >= 0) & (other >= 0)
+                rows.append(one[both])
+                columns.append(other[both])
+        row, column = np.concatenate(rows), np.concatenate(columns)
+        neighbours = sp.csr_matrix((np.ones(len(row)), (row, column)), shape=(count, count))
+        return cls(neighbours, inlet, pressure, critical)
+
+    def reached(self, contact: ContactResult) -> np.ndarray:
+        """Return the open points that are connected with the inlet, shape (n,)."""
+        open_ = contact.pressure <= self.critical
+        kept = sp.diags(open_.astype(float))
+        _, part = connected_components(kept @ self.neighbours @ kept, directed=False)
+        return open_ & np.isin(part, part[open_ & self.inlet])
+
+
+def penetrated(solve: Solve, torn: TornSystem, known: State | None, before: State | None) -> LinearState:
+    """Return the state in which fluid is just where contact is open to it. Collective.
+
+    Every pass is one solution; fluid that opens the next points moves on. Where the front comes back to an
+    earlier place, pressures and friction let it move forth and back, and there is no such state.
+
+    Raises:
+        ConvergenceError: If the front does not come to rest; carries the history of all passes.
+    """
+    front = Front.of(torn)
+    wet = np.zeros(torn.points.count, dtype=bool)
+    if before is not None and before.contact.wet is not None and len(before.contact.wet) == len(wet):
+        wet = before.contact.wet
+    state = known if isinstance(known, LinearState) else None
+    history: list[SolverStep] = []
+    earlier: list[bytes] = []
+    products = 0
+    while wet.tobytes() not in earlier:
+        earlier.append(wet.tobytes())
+        state = solve(front.at(torn, wet), state)
+        solution = state.solution
+        assert isinstance(solution, DualSolution)
+        words = f"fluid pass {len(earlier)}: {counted(int(wet.sum()), 'point')} wet"
+        safe_log(_LOG.info, "%s", words)
+        steps = [
+            replace(step, products=step.products + products, outer=len(earlier) - 1)
+            for step in solution.history
+        ]
+        steps[-1] = replace(steps[-1], note=f"{steps[-1].note}; {words}")
+        history, products = [*history, *steps], products + solution.products
+        following = front.reached(state.contact)
+        if np.array_equal(following, wet):
+            found = replace(solution, history=tuple(history), iterations=len(history), products=products)
+            return replace(state, solution=found)
+        wet = following
+    raise ConvergenceError(
+        f"the front of a fluid must come to rest, but after {counted(len(earlier), 'pass', 'passes')} it "
+        f"returns to {counted(int(wet.sum()), 'wet point')} where it was before: apply pressure and load in "
+        "smaller load steps, refine the contact, or give the fluid a critical pressure",
+        history,
+    )
