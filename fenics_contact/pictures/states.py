@@ -420,7 +420,7 @@ def plot_contact_status(
     states: State | Mapping[str, State],
     path: str | Path | None = None,
     *,
-    pair: int = 0,
+    pair: int | str = 0,
     reach: float | None = None,
     title: str = "",
     units: Units | None = None,
@@ -433,7 +433,7 @@ def plot_contact_status(
 
     Args:
         states: A state of a scene in space, or name -> state, for instance after each load step.
-        pair: Number of the contact pair in the scenes.
+        pair: Number of the contact pair in the scenes, or its name: its slave, or both surfaces.
         reach: How far a map reaches around the contact's middle, [length]; chosen unless given.
 
     Raises:
@@ -444,6 +444,8 @@ def plot_contact_status(
         states = {"": states}
     if not states:
         raise InvalidInputError("maps of the status need a state, got none: pass one, or {'name': state}")
+    if isinstance(pair, str):
+        pair = checked_pair(next(iter(states.values())), pair)
     for name, state in states.items():
         if state.scene.dim == 2 or not 0 <= pair < len(state.scene.contacts):
             raise InvalidInputError(
@@ -469,10 +471,13 @@ def _draw_status(
     height = round((0.09 + rows * (0.09 + 0.9 / (proportion * columns))) * width)
     with sheet(paper, (width, height), title) as figure:
         panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+        tips = []
         for axes, (name, patch) in zip(panels, patches.items(), strict=False):
-            draw_status(axes, patch, counted=False)
+            tips.append(draw_status(axes, patch, counted=False))
             axes.set_title(_words(patch, units) if not name else f"{name}\n{_words(patch, units)}")
             label_patch(axes, patch, units, mirror=True)
+        every, (low, high) = np.concatenate(tips), panels[0].get_ylim()
+        panels[0].set_ylim(every.min(initial=low), every.max(initial=high))  # arrows do not reach into titles
         for axes in panels[len(patches) :]:
             axes.set_axis_off()
         handles, labels = panels[0].get_legend_handles_labels()
@@ -486,8 +491,11 @@ def _words(patch: ContactPatch, units: Units) -> str:
     return words + patch.behind
 
 
-def draw_status(axes: Axes, patch: ContactPatch, *, counted: bool = True) -> None:
-    """Draw projected facets, a symbol on each contact point, and arrows for slip."""
+def draw_status(axes: Axes, patch: ContactPatch, *, counted: bool = True) -> np.ndarray:
+    """Draw projected facets, a symbol on each contact point, and arrows for slip.
+
+    Returns how high the tips of the arrows are, (n,), [length].
+    """
     axes.add_collection(PolyCollection(patch.places[patch.facets], facecolors=PALE, edgecolors="white"))
     places = patch.places[patch.points]
     for status, (name, look) in symbols_of(patch.rubs).items():
@@ -506,6 +514,8 @@ def draw_status(axes: Axes, patch: ContactPatch, *, counted: bool = True) -> Non
         shown = patch.slips & patch.frame.holds(places)
         drawn = axes.quiver(*places[shown].T, *(reach * patch.slip[shown]).T, clip_on=False, **arrows)
         drawn.set_in_layout(False)  # its extent is not known before it is drawn
+        return np.asarray((places[shown] + reach * patch.slip[shown])[:, 1])
+    return np.zeros(0)
 
 
 #: Surfaces wider than this relative to their height are drawn one above the other.
@@ -516,7 +526,7 @@ def plot_contact_pressure(
     state: State,
     path: str | Path | None = None,
     *,
-    pair: int = 0,
+    pair: int | str = 0,
     clim: tuple[float, float] | None = None,
     reach: float | None = None,
     title: str = "",
@@ -532,7 +542,7 @@ def plot_contact_pressure(
 
     Args:
         state: The state.
-        pair: Number of the contact pair in the scene.
+        pair: Number of the contact pair in the scene, or its name: its slave, or both surfaces.
         clim: Range of the pressure, [force / length²]; from zero to the largest pressure unless given. Give
             two pictures the same range to compare them.
         reach: How far the picture reaches around the contact's middle, [length]; chosen unless given.
@@ -540,17 +550,16 @@ def plot_contact_pressure(
     Raises:
         InvalidInputError: If the scene has no such pair, or a range or the name of the file cannot be used.
     """
-    target = png_path(path)
-    checked_pair(state, pair)
+    target, number = png_path(path), checked_pair(state, pair)
     checked_reach(reach)
     given = None if clim is None else checked_range(clim)
     named = units or Units()
 
     def draw(paper: BinaryIO) -> None:
         if state.scene.dim == 2:
-            draw_traction(contact_trace(state, pair), paper, (given, reach), title, named, width)
+            draw_traction(contact_trace(state, number), paper, (given, reach), title, named, width)
         else:
-            _draw_pressure(contact_patches([state], pair, reach)[0], paper, given, title, named, width)
+            _draw_pressure(contact_patches([state], number, reach)[0], paper, given, title, named, width)
 
     return draw_picture(state.torn.decomposition.comm, target, draw)
 

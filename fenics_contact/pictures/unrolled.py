@@ -12,6 +12,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
+from fenics_contact._scene.pairs import pair_number
 from fenics_contact._surfaces.facets import filled_at_corners
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.faces import vector_areas
@@ -184,13 +185,16 @@ class ContactPatch:
         return float(np.linalg.norm(self.slip[self.slips], axis=1).max(initial=0.0))
 
 
-def checked_pair(state: State, pair: int) -> None:
-    """Reject a number that no contact pair of the scene has."""
+def checked_pair(state: State, pair: int | str) -> int:
+    """Return the number of a contact pair, if the scene has one of that number or name."""
+    if isinstance(pair, str):
+        return pair_number(state.scene.contacts, pair)
     if not 0 <= pair < len(state.scene.contacts):
         raise InvalidInputError(
             f"pair must number one of the scene's {len(state.scene.contacts)} contact pairs from 0, got "
             f"{pair}: draw a scene with contact"
         )
+    return pair
 
 
 def contact_patches(states: Sequence[State], pair: int, reach: float | None) -> list[ContactPatch]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.quiver import Quiver
 from mpi4py import MPI
 
 from fenics_contact import (
@@ -24,12 +26,13 @@ from fenics_contact import (
     solve_scene,
 )
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block
+from fenics_contact.gallery import block, cylinder
 from fenics_contact.gallery.blocks import extrude
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.pictures import Units, plot_contact_pressure, plot_contact_status, plot_error, plot_stress
 from fenics_contact.pictures import drawing as painting
-from fenics_contact.pictures.canvas import ERROR_MAP, Frame, face_on, oblique_view
+from fenics_contact.pictures import states as status
+from fenics_contact.pictures.canvas import ERROR_MAP, Frame, face_on, oblique_view, sheet
 from fenics_contact.pictures.section import (
     Section,
     Spot,
@@ -551,3 +554,42 @@ def test_unrolled_surfaces_are_drawn(tmp_path: Path) -> None:
     assert image.shape[1] == 800
     assert painted(image[:, :600]) > 0.15
     assert painted(pixels(plot_contact_status(state, tmp_path / "status.png", width=800))) > 0.05
+
+
+def test_a_pair_is_drawn_by_its_name() -> None:
+    state = touching_blocks()
+    for draw in (plot_contact_pressure, plot_contact_status):
+        by_number, slave, both = (
+            pixels(draw(state, pair=pair, width=SMALL)) for pair in (0, "upper z0", "upper z0 on lower z1")
+        )
+        np.testing.assert_array_equal(by_number, slave)
+        np.testing.assert_array_equal(by_number, both)
+        with pytest.raises(InvalidInputError, match=r"which has 'upper z0 on lower z1'; got 'lower z1'"):
+            draw(state, pair="lower z1")
+
+
+def test_arrows_of_slip_stay_below_titles(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pin that is pushed along its tube: all arrows point along the axis, those at the end beyond it."""
+    steel = IsotropicElasticity(1000.0, 0.3)
+    pin, tube = cylinder(1.0, 1.5, 2, 3), cylinder(2.0, 1.5, 3, 2, hole=1.0)
+    pair = ContactPair(Surface("pin", "outer"), Surface("tube", "inner"), Coulomb(0.1), interference=0.01)
+    scene = Scene(
+        {"pin": Body(pin, steel), "tube": Body(tube, steel)},
+        [Support("tube", "outer"), Support("pin", "bottom", (None, None, 0.1))],
+        contacts=[pair],
+    )
+    state, seen, original = solve_scene(scene, MPI.COMM_SELF), list[Any](), sheet
+
+    @contextmanager
+    def kept(*given: Any) -> Iterator[Any]:
+        with original(*given) as figure:
+            seen.append(figure)
+            yield figure
+
+    monkeypatch.setattr(status, "sheet", kept)
+    plot_contact_status(state, width=SMALL)
+    (axes,) = seen[0].axes
+    (arrows,) = (drawn for drawn in axes.collections if isinstance(drawn, Quiver))
+    tips = arrows.XY[:, 1] + arrows.V
+    assert tips.max() > 1.5 + 0.02, "they reach beyond the surface"
+    assert tips.max() <= axes.get_ylim()[1] + 1e-12
