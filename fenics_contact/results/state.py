@@ -502,12 +502,17 @@ class State(ABC):
         return nodal_forces(self.torn, self.solution.multiplier, self.torn_displacement)
 
     @collectively("State.to_pyvista", comm_of)
-    def to_pyvista(self, deformed: float = 0.0, *, linear: bool = False) -> pyvista.MultiBlock:
+    def to_pyvista(
+        self, deformed: float = 0.0, *, linear: bool = False, revolved: float = 0.0
+    ) -> pyvista.MultiBlock:
         """Return all bodies with their fields for pyvista, the same on every rank. Collective.
 
         Args:
             deformed: Scale factor of the displacement added to the points; 0 for the undeformed bodies.
             linear: Cut quadratic cells into linear ones on the same nodes, as `pictures` do.
+            revolved: Angle in degrees by which the sections of bodies of revolution are turned around their
+                axis, then that of z, into linear cells of space with vectors and stresses there; 0 leaves
+                the sections.
 
         Returns:
             A ``pyvista.MultiBlock`` with an ``UnstructuredGrid`` for each body under its name, which holds
@@ -516,7 +521,8 @@ class State(ABC):
             ``principal_stress`` and ``subdomain``. Plane bodies lie in the plane z = 0.
 
         Raises:
-            InvalidInputError: If ``deformed`` is not finite.
+            InvalidInputError: If ``deformed`` is not finite, or other bodies are to be turned, or further
+                than 360 degrees.
             MissingRequirementError: If pyvista is not installed.
 
         Example:
@@ -526,7 +532,15 @@ class State(ABC):
         from fenics_contact.results.multi_block import multi_block
 
         meshes = {name: body.mesh for name, body in self.scene.bodies.items()}
-        return multi_block(comm_of(self), meshes, self.gather_fields, deformed, linear=linear)
+        if not revolved:
+            return multi_block(comm_of(self), meshes, self.gather_fields, deformed, linear=linear)
+        from fenics_contact.results.revolved import check_turned, turned_around
+
+        check_turned(revolved, self.scene.axisymmetric)
+        blocks = multi_block(comm_of(self), meshes, self.gather_fields, deformed, linear=True)
+        for name in meshes:
+            blocks[name] = turned_around(blocks[name], revolved)
+        return blocks
 
     @property
     def counts(self) -> dict[str, int]:

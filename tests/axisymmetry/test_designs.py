@@ -25,6 +25,7 @@ from fenics_contact import (
     Tresca,
 )
 from fenics_contact._scene.pairs import Discretisation, Friction
+from fenics_contact._scene.parts import surface_of
 from fenics_contact.design import ContactArea, Movement, PressureNorm
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import IsotropicElasticity
@@ -67,8 +68,10 @@ def on_block(friction: Friction, by: Discretisation, *, order: int = 1, heat: fl
 
 
 def on_ball() -> Scene:
-    """A disc on a rigid ball, which it touches on its axis."""
+    """A disc on a rigid ball, which it touches on its axis, with the tip of a flat cone."""
     mesh = rectangle((0.0, 0.0), (1.0, 0.6), (9, 4))
+    r, z = mesh.points.T
+    mesh = mesh.moved(np.column_stack([r, z + 0.03 * r * (0.6 - z)]))
     return Scene(
         {"block": Body(mesh, RUBBER, axisymmetric=True)},
         loads=[Pressure("block", "y1", 3.0)],
@@ -90,8 +93,17 @@ def line(name: str) -> Line:
     return line_of(SCENES[name]())
 
 
-@pytest.mark.parametrize("objective", OBJECTIVES)
-@pytest.mark.parametrize("name", SCENES)
+#: Those that depend on different derivatives: of forces, of areas, of displacements, of stresses.
+FEW = ("energy", "friction forces", "pressure norm", "displacement")
+CASES = [
+    (name, objective)
+    for name in SCENES
+    for objective in OBJECTIVES
+    if name in ("node", "mortar, warm") or objective in FEW
+]
+
+
+@pytest.mark.parametrize(("name", "objective"), CASES)
 def test_the_adjoint_agrees_with_central_differences(name: str, objective: str) -> None:
     if (name, objective) != ("mortar, warm", "strain energy"):  # heat stores none
         check_adjoint(line(name), OBJECTIVES[objective], 2e-3)
@@ -123,6 +135,8 @@ def test_nodes_stay_on_the_axis() -> None:
     here = line("ball")
     body = here.problem.scene_of(here.alpha + here.direction * 0.01).bodies["block"]
     before = here.problem.scene.bodies["block"]
+    tip = surface_of(here.problem.scene, Surface("block", "y0"), "faceted")
+    np.testing.assert_array_equal(tip.normals[tip.points[:, 0] == 0.0], [[0.0, -1.0]])
     assert np.array_equal(body.on_axis, before.on_axis)
     assert np.abs(body.mesh.points - before.mesh.points)[before.on_axis, 1].max() > 0.0
 

@@ -43,6 +43,7 @@ from fenics_contact.materials import (
 )
 from fenics_contact.mesh import bisection_partition, quadratic
 from fenics_contact.output import read_result
+from fenics_contact.results.fields import tensors, von_mises_of
 from tests.axisymmetry.revolved import (
     BORE,
     KINDS,
@@ -372,7 +373,7 @@ def test_mistakes_are_named(make: object, words: str) -> None:
 def test_cut_bodies_have_the_answer_of_whole_ones() -> None:
     scene = pushed_with_friction()
     fields = []
-    for cuts in (1, 4):
+    for cuts in (1, 8):
         parts = {name: bisection_partition(body.mesh, cuts) for name, body in scene.bodies.items()}
         state = solve_scene(scene, MPI.COMM_SELF, partitions=parts, tolerance=1e-12)
         fields.append(np.vstack([state.gather_displacement(name) for name in scene.bodies]))
@@ -463,3 +464,29 @@ def test_scene_files_and_their_results_say_that_all_is_per_revolution(tmp_path: 
     assert record["forces"]["balance"]["loads"]["moment"] == []
     assert CliRunner().invoke(cli.app, ["view", out, "--page"], obj=console()).exit_code == 0
     assert "radial and axial force" in (tmp_path / "out" / "page.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("kind", ["triangle", "quadrilateral9"])
+def test_sections_are_turned_into_bodies_with_their_fields(kind: Kind) -> None:
+    mesh = section((0.5, 0), (3, 2), (4, 3), kind)
+    load = Pressure("disc", "x1", PRESSURE)
+    scene = Scene(
+        {"disc": Body(mesh, STEEL, axisymmetric=True)}, [Support("disc", "y0", (None, 0.0))], [load]
+    )
+    state = solved(scene)
+    whole = state.to_pyvista(revolved=90.0)["disc"]
+    sector = 18 * np.sin(np.pi / 36) / (np.pi / 2)  # of chords in place of arcs
+    assert whole.volume == pytest.approx(sector * scene.bodies["disc"].volume / 4, rel=1e-6)
+    flat, x = state.to_pyvista(linear=True)["disc"], np.asarray(whole.points)
+    moved, n = np.asarray(whole.point_data["displacement"]), flat.n_points
+    radial = np.einsum("nd,nd->n", moved[:, :2], x[:, :2]) / np.linalg.norm(x[:, :2], axis=1)
+    np.testing.assert_allclose(radial, np.tile(flat.point_data["displacement"][:, 0], 19), atol=1e-12)
+    np.testing.assert_allclose(moved[:, 2], np.tile(flat.point_data["displacement"][:, 1], 19), atol=1e-12)
+    stress = np.asarray(whole.point_data["nodal_stress"])
+    hoop = np.asarray(flat.point_data["nodal_stress"])[:, 2]
+    np.testing.assert_allclose(stress[:n, 1], hoop, atol=1e-9)  # along y where the section lies in x, z
+    np.testing.assert_allclose(stress[-n:, 0], hoop, atol=1e-9)
+    mises = von_mises_of(tensors(stress))
+    np.testing.assert_allclose(mises, np.tile(flat.point_data["nodal_von_mises"], 19), rtol=1e-9)
+    with pytest.raises(InvalidInputError, match="above 0 and up to 360"):
+        state.to_pyvista(revolved=400.0)
