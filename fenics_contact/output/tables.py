@@ -42,6 +42,7 @@ def write_contact_table(state: State, path: str | Path, *, pair: int | str | Non
     | ``total_slip_x``, ... | the same since the undeformed state, [length] |
     | ``normal_x``, ... | unit normal from master to slave |
     | ``area`` | that belongs to the point, [length²], in the plane [length] |
+    | ``wet`` | 1 where fluid has reached it, else 0; only where a pair has a fluid |
 
     Rows are in the order of pairs and nodes, on any number of ranks.
 
@@ -112,6 +113,7 @@ def _contact_columns(state: State, displacement: np.ndarray) -> dict[str, np.nda
         **split["total_slip"],
         **split["normal"],
         "area": contact.area,
+        **({} if contact.wet is None else {"wet": contact.wet.astype(int)}),
     }
 
 

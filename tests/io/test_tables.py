@@ -16,6 +16,7 @@ from fenics_contact import (
     ContactPair,
     ContactProblem,
     ElasticFoundation,
+    FluidPressure,
     LinearClosure,
     LoadSequence,
     LoadStep,
@@ -34,6 +35,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, J2Plasticity, NeoHooke, PlaneStrain
 from fenics_contact.output import StepTable, write_contact_table
+from tests.contact.fluid_case import FLUID, seal
 from tests.io.states import touching_blocks
 
 COMM = MPI.COMM_SELF
@@ -190,6 +192,16 @@ def test_springs_and_surfaces_that_give_way_have_columns(tmp_path: Path) -> None
     assert springs + floor == pytest.approx(1.0, rel=1e-6)
     assert row["surface_energy"] == pytest.approx(state.energies.surface, rel=1e-9)
     assert row["surface_energy"] > 1e-3
+
+
+def test_points_that_fluid_has_reached_are_marked(tmp_path: Path) -> None:
+    state = solve_scene(seal(FluidPressure(FLUID, enters="x1")), COMM, tolerance=1e-8)
+    _, rows = read(write_contact_table(state, tmp_path / "contact.csv"))
+    assert state.contact.wet is not None
+    wet = column(rows, "wet")[:, 0]
+    np.testing.assert_array_equal(wet, state.contact.wet)
+    assert 0 < wet.sum() < len(rows)
+    assert "wet" not in read(write_contact_table(touching_blocks(), tmp_path / "dry.csv"))[1][0]
 
 
 def test_tables_of_bodies_of_revolution_have_radial_and_axial_forces(tmp_path: Path) -> None:
