@@ -26,6 +26,7 @@ from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.supports import RigidSurface
 from fenics_contact.errors import InfeasibleError, InvalidInputError, LoadStepError
 from fenics_contact.feti.decomposition import Decomposition
+from fenics_contact.feti.preloads import shortening_columns, shortening_scales
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.qp.solution import Solution
@@ -85,6 +86,8 @@ class DeformedEquilibria:
         self._require_later(scene, start.time, time)
         with timer.phase("assemble"):
             load = self._loading(scene, time, step, overlap)
+            if scene.preloads and isinstance(before, DeformedState) and acted is not None:
+                acted = _drawn_as(before, acted, load)
             if acted is None:
                 check_held(load.torn)
             if self._unresisted is None:  # supports stay what they are in later steps
@@ -141,6 +144,26 @@ class DeformedEquilibria:
         return load
 
 
+def _drawn_as(before: DeformedState, acted: Loading, load: Loading) -> Loading:
+    """Return the load of the state before with the sections free that are now. Collective.
+
+    Those that were held have the force that they transmitted, those that were free are held where they were.
+    """
+    now, torn, sections = load.torn, acted.torn, list(before.preloads().values())
+    drawn = shortening_columns(now.scene, now.relations[0])
+    scales = shortening_scales(now.scene)
+    free = [number for number, preload in enumerate(now.scene.preloads) if preload.is_free]
+    forces = np.array([sections[number].force / scales[number] for number in free])
+    lengths = np.array([0.0 if n in free else section.shortening for n, section in enumerate(sections)])
+    owned = torn.numbering.owned
+    right = np.zeros(torn.numbering.total)
+    right[torn.n_gluing : torn.n_gluing + drawn.shape[0]] = drawn @ lengths
+    at_sections = np.zeros(torn.numbering.total, dtype=bool)
+    at_sections[torn.n_gluing : torn.n_gluing + drawn.shape[0]] = np.diff(drawn.indptr) > 0
+    kept = np.where(at_sections[owned], right[owned], torn.right)
+    return replace(acted, torn=replace(torn, right=kept, free=replace(now.free, load=forces)))
+
+
 def _require_more_than_springs(torn: TornSystem, failure: Exception) -> None:
     """Name motions that elastic foundations alone resist: Newton's method may need more. Collective."""
     alone = unresisted_motions(torn, sprung=False) if torn.scene.foundations else ()
@@ -153,14 +176,7 @@ def _require_more_than_springs(torn: TornSystem, failure: Exception) -> None:
 
 
 def _require_prescribed(scene: Scene) -> None:
-    """Reject rigid surfaces that forces move, and preloads by a force."""
-    for preload in scene.preloads:
-        if preload.is_free:
-            raise InvalidInputError(
-                "preloads must have a shortening where materials are nonlinear, got a force of "
-                f"{preload.force:g} for body {preload.body!r}: give the shortening and read the force from "
-                "the state's preloads()"
-            )
+    """Reject rigid surfaces that forces move."""
     for support in scene.supports:
         if isinstance(support, RigidSurface) and support.free.any():
             kinds = {type(each).__name__ for body in scene.bodies.values() for each in body.materials}

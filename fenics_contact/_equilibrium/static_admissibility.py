@@ -56,11 +56,7 @@ def _check_balance(torn: TornSystem, bodies: list[RigidBody], loads: np.ndarray)
     if scale == 0.0:
         return
     support = sp.block_diag([body.support for body in bodies])
-    tied = sp.vstack([body.tie_wrenches(torn) for body in bodies])
-    drawn = any(preload.is_free for preload in torn.scene.preloads)
-    along = _along_sections(torn)[0] if drawn else None
-    if along is not None:  # sections that forces draw together transmit nothing else along their normals
-        tied = tied - (tied @ along) @ along.T
+    tied, along = _of_ties(torn, bodies)
     reactions, right = sp.hstack([support, tied]), -loads.ravel() / scale
     contact = sp.vstack([body.contact_wrenches(torn) for body in bodies])
     bound = torn.tresca_bound / scale
@@ -102,6 +98,18 @@ def _require_closed(torn: TornSystem, bodies: list[RigidBody], found: _Motion, a
                 "both sides of its section. Let head and nut, and what they clamp, have contacts or ties, or "
                 "give a shortening in place of the force"
             )
+
+
+def _of_ties(torn: TornSystem, bodies: list[RigidBody]) -> tuple[sp.csr_matrix, sp.csr_matrix | None]:
+    """Return the wrenches of ties, and the directions in which forces draw sections; None without any.
+
+    Sections that forces draw together transmit nothing else along their normals.
+    """
+    tied = sp.vstack([body.tie_wrenches(torn) for body in bodies])
+    if not any(preload.is_free for preload in torn.scene.preloads):
+        return tied, None
+    along, _ = _along_sections(torn)
+    return tied - (tied @ along) @ along.T, along
 
 
 def rigid_bodies(torn: TornSystem, *, sprung: bool = True) -> list[RigidBody]:
@@ -477,7 +485,7 @@ def _unresisted(torn: TornSystem, sprung: bool) -> tuple[UnheldMotion, ...]:
     if all(body.held for body in bodies):
         return ()
     supports = sp.block_diag([body.support for body in bodies])
-    ties = sp.vstack([body.tie_wrenches(torn) for body in bodies])
+    ties, _ = _of_ties(torn, bodies)
     wrenches = sp.hstack([supports, ties, *_of_contact(torn, bodies)], format="csc")
     basis, resistance = np.zeros((wrenches.shape[0], 0)), np.zeros(0)
     for start in range(0, wrenches.shape[1], CHUNK):  # each is on two bodies at most, so all are many zeros

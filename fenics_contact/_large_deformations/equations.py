@@ -243,6 +243,9 @@ class ResidualState:
                 torn = self.contact.with_rows_of(turning)
                 further = FurtherRows.of(torn, self.torn, turning)
         right = np.concatenate([self.constraint_residual, np.zeros(further.count)])
+        if torn.free.count:
+            load = self.torn.free_imbalance(self.at.multiplier)
+            torn = replace(torn, free=replace(torn.free, load=load))
         increments = linearised(torn, self.at.displacement, tangents, self.unbalanced, right)
         diagonal = self.at.diagonal
         if diagonal is not None:
@@ -314,6 +317,13 @@ class Equations:
         points = body.mesh.points[np.sort(mesh.nodes)]
         parts = composition(body, mesh.cells)
         return self.decomposition.forms.mechanics(parts, body.cell_type, mesh.space, points)
+
+    def _with_free(self, torn: TornSystem, unbalanced: Vector, multiplier: Vector) -> Vector:
+        """Return forces out of balance, on the first rank with those at free motions. Collective."""
+        if torn.free.count == 0:
+            return unbalanced
+        there = torn.free_imbalance(multiplier)
+        return np.append(unbalanced, there) if self.decomposition.comm.rank == 0 else unbalanced
 
     def _foundations(self, scene: Scene) -> tuple[sp.csr_matrix | None, ...]:
         """Return the stiffness of the foundations under each subdomain, None where there is none."""
@@ -390,7 +400,7 @@ class Equations:
         trial, compliance = at.multiplier - step * open_, torn.compliance
         mapped = feasible.project(trial) if compliance is None else compliance.resolve(feasible, trial, step)
         natural = beyond(at.multiplier - mapped, ROUNDED * self._reach * step)
-        forces = unbalanced, internal, bound, external
+        forces = self._with_free(torn, unbalanced, at.multiplier), internal, bound, external
         residuals = relative_residuals(
             torn, natural, feasible.violation(at.multiplier), forces, open_, at.displacement, at.largest,
             self.stiffness,

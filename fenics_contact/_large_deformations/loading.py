@@ -95,7 +95,11 @@ class Loading:
         def mixed(name: str) -> np.ndarray:
             return np.asarray((1.0 - part) * getattr(first.torn, name) + part * getattr(self.torn, name))
 
-        torn = replace(self.torn, subdomains=subdomains, right=mixed("right"), supported=mixed("supported"))
+        drawn = (1.0 - part) * first.torn.free.load + part * self.torn.free.load
+        free = replace(self.torn.free, load=drawn)
+        torn = replace(
+            self.torn, subdomains=subdomains, right=mixed("right"), supported=mixed("supported"), free=free
+        )
         prescribed = (1.0 - part) * first.prescribed + part * self.prescribed
         weighted = [((1.0 - part) * weight, each) for weight, each in first.following]
         weighted += [(part * weight, each) for weight, each in self.following]
@@ -115,7 +119,10 @@ class Loading:
         equality = torn.numbering.owned < torn.n_equality
         right = np.where(equality, 0.0, torn.right + torn.supported)
         subdomains = tuple(replace(part, load=np.zeros_like(part.load)) for part in torn.subdomains)
-        torn = replace(torn, subdomains=subdomains, right=right, supported=np.zeros_like(torn.supported))
+        free = replace(torn.free, load=np.zeros_like(torn.free.load))
+        torn = replace(
+            torn, subdomains=subdomains, right=right, supported=np.zeros_like(torn.supported), free=free
+        )
         still = tuple(each.between(None, 0.0) for each in self.turned)
         return Loading(torn, 0.0 * self.prescribed, 0.0, turned=still)
 

@@ -306,7 +306,7 @@ class ContactConfiguration:
 
         Gaps, minus the slip, and openings of glued rows.
         """
-        residual = self.torn.right - self.torn.jump(displacement)
+        residual = self.torn.closed(self.torn.right - self.torn.jump(displacement))
         if self.points is None or self.start is None:
             return residual
         gap = self.points.points.gap - self.torn.reach

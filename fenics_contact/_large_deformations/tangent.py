@@ -372,8 +372,14 @@ class TangentSystem(DualSystem):
         self.softened = sum(count for _, count in blocks.values())
         offset = np.concatenate([[0], np.cumsum([len(block) for block in stiffnesses])])
         mine = offset[[part.mesh.number for part in self.torn.subdomains]]
-        self.points = sp.csr_matrix((0, int(offset[-1])))
-        return kernel_matrix(self.torn.subdomains, int(offset[-1]), mine)
+        total, count = int(offset[-1]), self.torn.free.count
+        motions = kernel_matrix(self.torn.subdomains, total, mine)
+        self.points = sp.csr_matrix((count, total))
+        if count:  # free motions move nothing but the right sides of rows, and have no stiffness
+            self.points = sp.hstack([self.points, sp.identity(count)], format="csr")
+            self.stiffness = sp.csr_matrix(sp.block_diag([self.stiffness, sp.csr_matrix((count, count))]))
+            motions = sp.hstack([motions, sp.csr_matrix((motions.shape[0], count))], format="csr")
+        return motions
 
     def _without_unheld(self, coarse: CoarseSpace) -> CoarseSpace:
         """Leave the motions as they are: under stress they may have a stiffness."""

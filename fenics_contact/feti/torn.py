@@ -251,6 +251,21 @@ class TornSystem:
         sums = self.decomposition.comm.allreduce(sums)
         return np.asarray(np.linalg.solve(sums[:, :-1], sums[:, -1]))
 
+    def closed(self, residual: np.ndarray) -> np.ndarray:
+        """Return the residual c − B u of rows, owned, after the free motions that fit it best. Collective."""
+        return residual + self.free.columns @ self.free_motion(residual) if self.free.count else residual
+
+    def free_imbalance(self, multiplier: np.ndarray) -> np.ndarray:
+        """Return g + Qᵀλ, the loads at free motions that multipliers do not balance. Collective.
+
+        Args:
+            multiplier: λ, owned, [force].
+
+        Returns:
+            Shape (n_free,), replicated.
+        """
+        return self.free.load + self.decomposition.comm.allreduce(self.free.columns.T @ multiplier)
+
     def load_work(self, displacement: np.ndarray) -> float:
         """Return the work of all loads, those at points of rigid surfaces included. Collective."""
         work = float(self.decomposition.comm.allreduce(self.load @ displacement))
@@ -527,7 +542,10 @@ def meeting_at(
     normal = (owned >= torn.n_equality) & (owned < torn.n_equality + points.count)
     right[normal] = points.gap[owned[normal] - torn.n_equality]
     slid = np.zeros((len(system.frictionless), system.dim - 1))
-    free = replace(torn.free, columns=sp.csr_matrix((len(owned), 0)))
+    there = np.flatnonzero(torn.numbering.owned < torn.n_equality)
+    entries = np.ones(len(there)), (np.flatnonzero(equality), there)
+    rows = sp.csr_matrix(entries, shape=(len(owned), len(torn.numbering.owned)))
+    free = replace(torn.free, columns=(rows @ torn.free.columns).tocsr())
     return replace(system, right=right, supported=supported, slid=slid, free=free)
 
 

@@ -29,7 +29,7 @@ from fenics_contact import (
 from fenics_contact.__main__ import main
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.materials import NeoHooke
+from fenics_contact.materials import IsotropicElasticity, NeoHooke
 from fenics_contact.output import read_result
 from tests.contact.bolts import (
     BOLT,
@@ -359,3 +359,49 @@ def test_mistakes_in_scene_files_are_named(old, new, message):
     assert text != TOML
     with pytest.raises(InvalidInputError, match=message):
         read_scene_file(tomllib.loads(textwrap.dedent(text)), MPI.COMM_SELF).scene.plan()
+
+
+@pytest.mark.parametrize("boxes", [1, 2])
+def test_a_force_in_rubber_is_reached_by_exact_tangents(boxes):
+    stretch = (LENGTH + 0.4) / LENGTH
+    force = 500.0 * (stretch - 1.0 / stretch)
+    bodies = {"bar": Body(bar(), NeoHooke(1000.0, 0.0))}
+    supports = [Support("bar", "z0"), Support("bar", "z1")]
+    scene = Scene(bodies, supports, preloads=[Preload("bar", MIDDLE, force=force)])
+    parts = {"bar": box_partition(bar(), (1, 1, boxes))}
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=parts)
+    section = state.preloads()["bar"]
+    assert section.force == pytest.approx(force, rel=1e-8)
+    assert section.shortening == pytest.approx(0.4, rel=1e-7)
+    residuals = [step.residuals.coarse for step in state.solution.history]
+    assert len(residuals) <= 4
+    assert residuals[-1] < 1e-4 * residuals[-2]
+
+
+def test_a_joint_of_rubber_is_tightened_held_pulled_and_tightened_again():
+    scene = joint(Preload("bolt", MIDDLE, force=50.0))
+    rubber, stiff = NeoHooke(1000.0, 0.0), IsotropicElasticity(1e6, 0.0)
+    bodies = {name: Body(body.mesh, rubber) for name, body in scene.bodies.items()}
+    bodies["head"] = Body(scene.bodies["head"].mesh, stiff)
+    scene = Scene(bodies, scene.supports, contacts=scene.contacts, ties=scene.ties, preloads=scene.preloads)
+    again = LoadStep("again", loads=[], preloads=[Preload("bolt", MIDDLE, force=70.0)])
+    steps = [LoadStep("tighten"), pulled(20.0), pulled(100.0), again]
+    tightened, little, apart, more = solve_steps(ContactProblem(scene, MPI.COMM_SELF), steps)
+    length = tightened.preloads()["bolt"].shortening
+    for state, force in ((tightened, 50.0), (apart, 100.0), (more, 70.0)):
+        assert state.preloads()["bolt"].force == pytest.approx(force, rel=1e-6)
+    assert little.preloads()["bolt"].shortening == pytest.approx(length, rel=1e-7)
+    assert apart.preloads()["bolt"].shortening == pytest.approx(length, rel=1e-7)
+    assert more.preloads()["bolt"].shortening > 1.3 * length
+    sleeve = little.contact.normal_force.sum()
+    assert little.preloads()["bolt"].force == pytest.approx(20.0 + sleeve, rel=1e-5)
+    assert more.contact.normal_force.sum() == pytest.approx(70.0, rel=1e-5)
+    # Both get stiffer or softer by their strains: the load factor is 0.4 to some percent.
+    assert (little.preloads()["bolt"].force - 50.0) / 20.0 == pytest.approx(0.4, abs=0.05)
+
+
+def test_rubber_preloaded_against_an_open_joint_is_refused():
+    bodies = {"bar": Body(bar(), NeoHooke(1000.0, 0.0))}
+    scene = Scene(bodies, [Support("bar", "z0")], preloads=[Preload("bar", MIDDLE, 3.0)])
+    with pytest.raises(InfeasibleError, match="acts against an open joint: nothing resists its force of 3"):
+        solve_scene(scene, MPI.COMM_SELF)
