@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,8 +19,10 @@ from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tie, Tres
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import together
 from fenics_contact.errors.kinds import safe_log
-from fenics_contact.qp.compliance import Closures
 from fenics_contact.qp.cones import Strengths
+
+if TYPE_CHECKING:
+    from fenics_contact.qp.compliance import Closures
 
 #: Weights of nodes below this fraction of all are rounding, which must not keep a supported point free.
 HELD = 1e-6
@@ -328,6 +331,8 @@ def closures_of(scene: Scene, points: ContactPoints) -> Closures | None:
     known = tuple(law for law in laws if law is not None)
     if not known:
         return None
+    from fenics_contact.qp.compliance import Closures  # of no use in exact contact
+
     number_of = np.cumsum([law is not None for law in laws]) - 1
     curve = np.where([law is not None for law in laws], number_of, -1)[points.pair]
     return Closures(points.area, curve, np.ones(points.count), known)

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -46,9 +47,11 @@ from fenics_contact.feti.preloads import (
     with_shortenings,
 )
 from fenics_contact.feti.subdomain import Subdomain, assemble
-from fenics_contact.qp.compliance import Closures, Compliance
 from fenics_contact.qp.cones import CoulombLaw, SlipLaw, Strengths, TrescaLaw
 from fenics_contact.qp.layout import ContactLayout
+
+if TYPE_CHECKING:
+    from fenics_contact.qp.compliance import Closures, Compliance
 
 #: Penetration attributable to faceting, relative to the size of a slave facet.
 FACETING = 0.1
@@ -405,6 +408,8 @@ class TornSystem:
         """By how much this rank's contact rows give way; None where none does."""
         if self.closures is None and self.elastic_slip is None:
             return None
+        from fenics_contact.qp.compliance import Closures, Compliance  # of no use in exact contact
+
         owned, discs = self.numbering.owned_index(self.normal_rows) >= 0, self.owned_discs
         closures = self.closures or Closures.exact(self.points.area)
         slip = np.zeros(len(discs)) if self.elastic_slip is None else self.elastic_slip[discs]

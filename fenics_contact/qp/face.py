@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
 from fenics_contact._base.libraries import MPI
-from fenics_contact.qp.compliance import Compliance, SoftRows
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector, global_sum
+
+if TYPE_CHECKING:
+    from fenics_contact.qp.compliance import Compliance, SoftRows
 
 #: A boolean for each multiplier.
 Marks = npt.NDArray[np.bool_]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -14,11 +14,13 @@ import scipy.sparse as sp
 from fenics_contact._base.libraries import MPI
 from fenics_contact.errors import InfeasibleError, InvalidInputError, together
 from fenics_contact.qp.coarse import CoarseSpace
-from fenics_contact.qp.compliance import Compliance
 from fenics_contact.qp.cones import FeasibleSet, SlipLaw, TrescaLaw
 from fenics_contact.qp.face import Marks
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector, global_sum
+
+if TYPE_CHECKING:
+    from fenics_contact.qp.compliance import Compliance
 
 Operator = Callable[[Vector], Vector]
 #: Called with the number of F-products so far and, after a step of a solver, with its residual.

@@ -302,7 +302,10 @@ NEVER = {
     "fenics_contact._pairing.sliding", "pyvista", "matplotlib", "vtk", "vtkmodules", "gmsh",
     "meshio",
 }  # fmt: skip
-AT_NEED = {"fenics_contact._pairing.mortar", "fenics_contact._accuracy", "clarabel"}
+COMPLIANCE, PENETRATION = "fenics_contact.qp.compliance", "fenics_contact._equilibrium.penetration"
+AT_NEED = {
+    "fenics_contact._pairing.mortar", "fenics_contact._accuracy", "clarabel", COMPLIANCE, PENETRATION
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -312,6 +315,7 @@ AT_NEED = {"fenics_contact._pairing.mortar", "fenics_contact._accuracy", "clarab
         ("None", "node", HELD, None, {"fenics_contact._accuracy"}),
         ("Coulomb(0.3)", "mortar", HELD, 1e-6, {"fenics_contact._pairing.mortar"}),
         ("Coulomb(0.3)", "node", FLOATING, 1e-6, {"clarabel"}),
+        ("Coulomb(0.3, stick_stiffness=9.0)", "node", HELD, 1e-6, {COMPLIANCE}),
     ],
 )
 def test_only_modules_that_a_scene_calls_for_are_imported(
