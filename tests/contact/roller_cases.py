@@ -48,9 +48,11 @@ def stack(
     discretisation: Discretisation = "node",
     push: tuple[float, float, float] = (3.0, 0.0, -10.0),
     cells: tuple[int, int, int] = (4, 3, 2),
+    slope: float = 0.0,
 ) -> Scene:
     """Half of a block pushed along a wider one, cut at a plane of symmetry, straight or turned as a whole."""
     lower = block((0, 0, 0), (2, 1, 1), (cells[0] + 1, *cells[1:]))
+    lower = lower.moved(lower.points - slope * np.prod(lower.points[:, 1:], axis=1)[:, None] * np.eye(3)[2])
     upper = block((0.1, 0, 1), (1.9, 1, 2), cells)
     load = Traction("upper", "z1", tuple((TURN @ push).tolist()) if turn else push)
     meshes = {"lower": lower, "upper": upper}
