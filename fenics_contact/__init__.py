@@ -2,8 +2,8 @@
 
 What a script needs is here; nothing is loaded before it is used:
 
-Scenes: Scene, Body, BodyMesh, Surface, Support, Roller, RigidSurface, ContactPair, Tie, AutomaticContact,
-    LoadStep, Preload, Section, ElasticFoundation, box_partition
+Scenes: Scene, Body, BodyMesh, Surface, Support, Roller, RigidSurface, ContactPair, Tie, CyclicSymmetry,
+    AutomaticContact, LoadStep, Preload, Section, ElasticFoundation, box_partition
 
 Laws of surfaces: Coulomb, Tresca, FrictionTable, FrictionCurve, LinearClosure, ExponentialClosure,
     ClosureTable, ClosureLaw, FluidPressure
@@ -94,6 +94,7 @@ if TYPE_CHECKING:
     from fenics_contact._scene.preloads import Section as Section
     from fenics_contact._scene.scene import LoadStep as LoadStep
     from fenics_contact._scene.scene import Scene as Scene
+    from fenics_contact._scene.sectors import CyclicSymmetry as CyclicSymmetry
     from fenics_contact._scene.supports import RigidSurface as RigidSurface
     from fenics_contact._scene.supports import Roller as Roller
     from fenics_contact._scene.supports import Support as Support

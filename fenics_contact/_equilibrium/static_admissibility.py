@@ -27,7 +27,8 @@ from fenics_contact.results.rigid_motions import UnheldMotion, motion_in_words
 #: A load that needs all but this fraction of the friction is at the limit: how far the body slides would be
 #: decided by rounding.
 MARGIN = 1e-6
-#: Loads count as balanced when less than this fraction of them remains; the conic solver is run to a tenth.
+#: Loads count as balanced when less than this fraction of them remains; the conic solver is run to a
+#: hundredth.
 LEFT = 1e-8
 
 
@@ -214,9 +215,7 @@ class RigidBody:
 
     def arms(self, points: ContactPoints) -> np.ndarray:
         """Return the jump at each point when the body alone moves, shape (n, dim, n_modes)."""
-        jump = points.jump[:, self._nodes]
-        moved = jump @ self._modes.reshape(self._modes.shape[0], -1)
-        return np.asarray(moved).reshape(points.count, *self._modes.shape[1:])
+        return points.relative(self._modes, self._nodes)
 
     def axis(self, motion: np.ndarray) -> str:
         """Return in words what a motion with a rotation, shape (n_modes,), turns the body about."""
@@ -303,7 +302,7 @@ class _Balance:
         admissible = sp.hstack([admissible, sp.csr_matrix((admissible.shape[0], 1 + len(left)))])
         settings = clarabel.DefaultSettings()
         settings.verbose = False
-        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 0.1 * LEFT
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 0.01 * LEFT
         solution = clarabel.DefaultSolver(
             sp.csc_matrix((balance.shape[1],) * 2),
             np.concatenate([cost, [1.0], np.zeros(len(left))]),

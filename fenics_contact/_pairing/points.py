@@ -15,8 +15,9 @@ from fenics_contact._base.display import counted, displayed
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
 from fenics_contact._scene.local_axes import LocalAxes, free_part
-from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tie, Tresca
+from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tresca
 from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.errors import together
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.qp.cones import Strengths
@@ -59,6 +60,8 @@ class ContactPoints:
         length: `sizes` on bodies of revolution, shape (n,), [length]; None elsewhere, where areas give them.
         tilted: Unit normals of planes of symmetry that are not normal to an axis, as `symmetric`, zero where
             a plane does not cut a point, shape (n, n_planes, dim); None: the scene has none.
+        turns: Rotations R of the master's displacement in that of the slave less R times that of the master,
+            between the sides of sectors, shape (n, dim, dim); None: there are none.
     """
 
     pair: np.ndarray
@@ -77,6 +80,7 @@ class ContactPoints:
     taken: sp.csr_matrix | None = None
     length: np.ndarray | None = None
     tilted: np.ndarray | None = None
+    turns: np.ndarray | None = None
 
     @property
     def sizes(self) -> np.ndarray:
@@ -111,8 +115,54 @@ class ContactPoints:
     @cached_property
     def jump(self) -> sp.csr_matrix:
         """Weights of the nodes in slave minus master displacement, shape (n, n_nodes)."""
+        return (self.own - self.master).tocsr()
+
+    @property
+    def own(self) -> sp.csr_matrix:
+        """Weights of the nodes in the slave's displacement, shape (n, n_nodes)."""
         entries = np.ones(self.count), self.slave, np.arange(self.count + 1)
-        return (sp.csr_matrix(entries, shape=self.master.shape) - self.master).tocsr()
+        return sp.csr_matrix(entries, shape=self.master.shape)
+
+    def relative(self, values: np.ndarray, nodes: slice = slice(None)) -> np.ndarray:
+        """Return slave minus master displacement, shape (n, dim, ...).
+
+        `values`: displacements of nodes, shape (n_nodes, dim, ...); `nodes`: which they are, all by default.
+        """
+        flat, shape = values.reshape(len(values), -1), (self.count, *values.shape[1:])
+        if self.turns is None:
+            return np.asarray(self.jump[:, nodes] @ flat).reshape(shape)
+        own, theirs = (np.asarray(part[:, nodes] @ flat).reshape(shape) for part in (self.own, self.master))
+        return np.asarray(own - np.einsum("nde,ne...->nd...", self.turns, theirs))
+
+    def on_nodes(self, force: np.ndarray) -> np.ndarray:
+        """Return forces on all nodes for those on the slave at each point, (n, dim) to (n_nodes, dim)."""
+        if self.turns is None:
+            return np.asarray(self.jump.T @ force)
+        back = np.einsum("nde,nd->ne", self.turns, force)
+        return np.asarray(self.own.T @ force - self.master.T @ back)
+
+    def entries(self, which: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return the entries of rows d·(u_slave − R u_master) of some points, sorted by row, then by node.
+
+        `which`: point of each row, shape (n_rows,); `directions`: d, shape (n_rows, dim).
+
+        Returns row, node, weight and the vector along which the displacement of the node is measured.
+        """
+        if self.turns is None:
+            jump = self.jump[which]
+            row = np.repeat(np.arange(len(which)), np.diff(jump.indptr))
+            order = np.lexsort((jump.indices, row))
+            row = row[order]
+            return row, jump.indices[order], jump.data[order], directions[row]
+        parts, back = (self.own[which], -self.master[which]), np.einsum(
+            "nde,nd->ne", self.turns[which], directions
+        )
+        rows = [np.repeat(np.arange(len(which)), np.diff(part.indptr)) for part in parts]
+        along = np.concatenate([directions[rows[0]], back[rows[1]]])
+        row, node = np.concatenate(rows), np.concatenate([part.indices for part in parts])
+        order = np.lexsort((node, row))
+        weight = np.concatenate([part.data for part in parts])
+        return row[order], node[order], weight[order], along[order]
 
 
 def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> ContactPoints:
@@ -142,7 +192,7 @@ def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> Conta
         strung("normal"), strung("tangents"), strung("gap"), strung("area"), strung("facet"), strung("local"),
         strung("axes"), strung("symmetric"), strung("distance"), strung("given"), taken,
         None if parts[0].length is None else strung("length"),
-        _strung_planes(parts, dim),
+        _strung_planes(parts, dim), _strung_turns(parts, dim),
     )  # fmt: skip
 
 
@@ -154,6 +204,14 @@ def _strung_planes(parts: Sequence[ContactPoints], dim: int) -> np.ndarray | Non
     none = [np.zeros((part.count, most, dim)) for part in parts]
     each = [zero if part.tilted is None else part.tilted for part, zero in zip(parts, none, strict=True)]
     return np.concatenate(each)
+
+
+def _strung_turns(parts: Sequence[ContactPoints], dim: int) -> np.ndarray | None:
+    """Return the rotations of all points, identities where parts have none; None if no part has any."""
+    if all(part.turns is None for part in parts):
+        return None
+    every = [np.tile(np.eye(dim), (part.count, 1, 1)) if part.turns is None else part.turns for part in parts]
+    return np.concatenate(every)
 
 
 def reference_axes(normals: np.ndarray) -> np.ndarray:
@@ -202,22 +260,25 @@ class FreeSpaces:
     def of(cls, points: ContactPoints, fixed: np.ndarray, axes: LocalAxes | None) -> FreeSpaces:
         """Return those of points; `fixed`: whether components are prescribed, along the axes of nodes."""
         dim, components = points.normal.shape[1], movable(points, fixed)
-        if axes is None and points.tilted is None:
+        if axes is None and points.tilted is None and points.turns is None:
             return cls(components, np.zeros(0, dtype=np.int64), np.zeros((0, dim, dim)))
-        turned, jump = np.zeros(fixed.shape[0], dtype=bool), points.jump
+        turned = np.zeros(fixed.shape[0], dtype=bool)
         if axes is not None:
             turned[axes.nodes] = True
-        touched = np.asarray(abs(jump) @ turned.astype(float)) > 0.0
+        touched = np.asarray(abs(points.jump) @ turned.astype(float)) > 0.0
         if points.tilted is not None:
             touched |= points.tilted.any(axis=(1, 2))
+        if points.turns is not None:
+            touched |= (points.turns != np.eye(dim)).any(axis=(1, 2))
         at = np.flatnonzero(touched)
-        chosen = jump[at]
-        row, node = np.repeat(np.arange(len(at)), np.diff(chosen.indptr)), chosen.indices
-        square = np.zeros((len(at), dim, dim))
+        square, every = np.zeros((len(at), dim, dim)), np.zeros(len(at))
+        moved = []
         for axis in range(dim):
-            part = free_part(np.tile(np.eye(dim)[axis], (len(node), 1)), node, fixed, axes)
-            np.add.at(square[:, axis], row, chosen.data[:, None] ** 2 * part)
-        every = np.bincount(row, chosen.data**2, len(at))
+            row, node, weight, along = points.entries(at, np.tile(np.eye(dim)[axis], (len(at), 1)))
+            moved.append(weight[:, None] * free_part(along, node, fixed, axes))
+            every += np.bincount(row, weight**2, len(at)) / dim
+        for one, other in np.ndindex(dim, dim):
+            square[:, one, other] = np.bincount(row, np.sum(moved[one] * moved[other], axis=1), len(at))
         value, vector = np.linalg.eigh(square / every[:, None, None])
         held = np.einsum("nda,na,nea->nde", vector, value <= HELD**2, vector)
         across = np.eye(dim) * points.symmetric[at][:, :, None]
@@ -386,7 +447,7 @@ class NodeNumbers:
         return nodes + self.first_of(body)
 
 
-def are_sliding(ties: Sequence[Tie], pair: np.ndarray) -> np.ndarray:
+def are_sliding(ties: Sequence[AnyTie], pair: np.ndarray) -> np.ndarray:
     """Return whether tied points may slide, by the numbers of their pairs; those after the ties do not."""
     sliding = np.array([*(tie.sliding for tie in ties), False], dtype=bool)
     return np.asarray(sliding[np.minimum(pair, len(ties))])
@@ -570,7 +631,7 @@ def _unit_rows(jump: sp.csr_matrix) -> sp.csr_matrix:
 
 
 #: Pairs, their points, and numbers of some of them.
-_Side = tuple[Sequence[ContactPair | Tie], ContactPoints, np.ndarray]
+_Side = tuple[Sequence[ContactPair | AnyTie], ContactPoints, np.ndarray]
 
 
 def _tell(words: str, lost: _Side, kept: _Side) -> None:

@@ -24,8 +24,9 @@ from scipy.sparse.linalg import cg
 from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.points import HELD
 from fenics_contact._scene.pair_geometry import master_share
-from fenics_contact._scene.pairs import ContactPair, Surface, Tie
+from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.sectors import AnyTie
 from fenics_contact._surfaces.facets import FacetedSurface, bearing_areas, nodal_areas, shape_functions
 from fenics_contact._surfaces.projection import Projection, join, node_weights, project
 from fenics_contact._surfaces.true_surface import Geometry
@@ -88,7 +89,7 @@ def warn_of_surface(
 
 
 def warn_of_edge(
-    tie: Tie,
+    tie: AnyTie,
     slave: FacetedSurface,
     held: np.ndarray,
     master: FacetedSurface,
@@ -124,7 +125,7 @@ def warn_of_edge(
 
 def warn_of_uneven_pressure(
     scene: Scene,
-    pair: ContactPair | Tie,
+    pair: ContactPair | AnyTie,
     slave: FacetedSurface,
     master: FacetedSurface,
     comm: MPI.Comm,

@@ -35,12 +35,14 @@ from fenics_contact._pairing.projection import (
     warn_of_surface,
     warn_of_uneven_pressure,
 )
+from fenics_contact._pairing.sectors import check_sides, with_turn
 from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact._scene.pair_geometry import master_share
-from fenics_contact._scene.pairs import ContactPair, Surface, Tie
+from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import Projection, node_weights
 from fenics_contact._surfaces.true_surface import Geometry
@@ -319,6 +321,12 @@ class _Side:
         own = surface_of(scene, surface, geometry, finer=finer)
         return cls(own, numbers.global_nodes(surface.body, own.nodes), numbers.n_nodes)
 
+    def turned(self, sector: CyclicSymmetry, angle: float) -> _Side:
+        """Return the side where a sector has its other one."""
+        points = sector.turned(self.surface.points, angle)
+        averaged = self.surface.averaged @ sector.matrix(angle).T
+        return replace(self, surface=replace(self.surface, points=points, averaged=averaged))
+
     def weights(self, hit: Projection) -> sp.csr_matrix:
         """Return the weights of the nodes of all bodies at projections on this side, (n, n_nodes)."""
         own = node_weights(self.surface, hit)
@@ -327,7 +335,7 @@ class _Side:
 
 def _points_of_pairs(
     scene: Scene,
-    pairs: Sequence[ContactPair | Tie],
+    pairs: Sequence[ContactPair | AnyTie],
     supported: tuple[np.ndarray, LocalAxes | None],
     comm: MPI.Comm,
     finer: bool = False,
@@ -352,7 +360,7 @@ def _points_of_pairs(
 
 def _measured(
     scene: Scene,
-    pair: ContactPair | Tie,
+    pair: ContactPair | AnyTie,
     index: int,
     fixed: np.ndarray,
     comm: MPI.Comm,
@@ -363,6 +371,9 @@ def _measured(
     numbers = NodeNumbers.of(scene)
     slave = _Side.of(scene, pair.slave, pair.geometry, numbers, finer)
     movable = ~fixed[slave.nodes].all(axis=1)
+    if isinstance(pair, CyclicSymmetry):
+        axial = pair.axial_nodes(scene.bodies[pair.slave.body].mesh, pair.slave.name)
+        movable &= ~np.isin(slave.nodes, numbers.global_nodes(pair.slave.body, axial))
     bearing = movable & (slave.surface.areas > 0.0) if isinstance(pair, ContactPair) else movable
     if not told:
         warn_of_surface(scene, pair.slave, pair.geometry, slave.surface, comm)
@@ -373,6 +384,10 @@ def _measured(
         require_alike(comm, described((points.slave, points.normal, points.gap), name))
     else:
         master = _Side.of(scene, pair.master, pair.geometry, numbers, finer)
+        if isinstance(pair, CyclicSymmetry):
+            master = master.turned(pair, scene.sector_angle(pair))
+            with together(comm):
+                check_sides(pair, scene.sector_angle(pair), slave.surface, master.surface)
         if not told:
             warn_of_surface(scene, pair.master, pair.geometry, master.surface, comm)
         if pair.discretisation == "mortar":
@@ -381,10 +396,13 @@ def _measured(
             points = _by_projection(slave, bearing, master, comm)
             if not told:
                 warn_of_uneven_pressure(scene, pair, slave.surface, master.surface, comm)
-            if isinstance(pair, Tie):
+            if not isinstance(pair, ContactPair):
                 held = ~movable | np.isin(slave.nodes, points.slave)
                 warn_of_edge(pair, slave.surface, held, master.surface, comm)
-        points = with_symmetry(points, _symmetric(points, slave, master), slave.surface.planes)
+        if isinstance(pair, CyclicSymmetry):
+            points = with_turn(points, pair.matrix(scene.sector_angle(pair)))
+        else:
+            points = with_symmetry(points, _symmetric(points, slave, master), slave.surface.planes)
     if comm.rank == 0 and not movable.all():
         safe_log(
             _LOG.info,

@@ -12,9 +12,10 @@ from scipy.spatial import cKDTree
 
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._scene.loads import BodyForce, Load, Pressure, ThermalStrain, TotalForce
-from fenics_contact._scene.pairs import ContactPair, Surface, Tie
+from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import in_words, surface_of
 from fenics_contact._scene.rollers import direction_of
+from fenics_contact._scene.sectors import AnyTie
 from fenics_contact._scene.supports import RigidSurface, Roller
 from fenics_contact._surfaces.facets import FacetedSurface, gauss_points, heights, quadrature_areas
 from fenics_contact._surfaces.projection import project
@@ -99,7 +100,7 @@ def modulus_of(scene: SceneParts, pair: ContactPair) -> float | None:
     return contact_modulus(young_1, poisson_1, young_2, poisson_2)
 
 
-def master_share(scene: SceneParts, pair: ContactPair | Tie) -> float:
+def master_share(scene: SceneParts, pair: ContactPair | AnyTie) -> float:
     """Return the master's share of the compliance 1/E* of two bodies; a half where one is not isotropic."""
     assert isinstance(pair.master, Surface)
     own, other = (_constants(scene.bodies[surface.body]) for surface in (pair.slave, pair.master))
@@ -462,7 +463,7 @@ def _moved_by_supports(scene: SceneParts, name: str) -> np.ndarray:
 def _named(scene: SceneParts, both: tuple[str, str]) -> dict[str, np.ndarray]:
     """Return for each of two bodies its nodes on surfaces of the pairs and ties between them."""
     nodes: dict[str, list[np.ndarray]] = {name: [] for name in both}
-    pairs: list[ContactPair | Tie] = [*scene.contacts, *scene.ties]
+    pairs: list[ContactPair | AnyTie] = [*scene.contacts, *scene.ties]
     for pair in pairs:
         sides = [side for side in (pair.slave, pair.master) if isinstance(side, Surface)]
         if {side.body for side in sides} == set(both):

@@ -24,10 +24,12 @@ from fenics_contact._scene.loads import (
 )
 from fenics_contact._scene.local_axes import HeldDirections, LocalAxes, held_along, same_axes
 from fenics_contact._scene.obstacles import RigidObstacle
-from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface, Tie
+from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.rollers import direction_of, flat_normal, held_directions, widest_angle
+from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support
+from fenics_contact._surfaces.continued import Neighbour, continued
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
 from fenics_contact._surfaces.projection import surfaces_match
 from fenics_contact._surfaces.true_surface import Geometry, true_surface
@@ -47,7 +49,7 @@ class SceneParts:
     supports: Sequence[AnySupport] = field(default=())
     loads: Sequence[Load] = field(default=())
     contacts: Sequence[ContactPair] = field(default=())
-    ties: Sequence[Tie] = field(default=())
+    ties: Sequence[AnyTie] = field(default=())
     preloads: Sequence[Preload] = field(default=())
     foundations: Sequence[ElasticFoundation] = field(default=())
 
@@ -78,7 +80,7 @@ class SceneParts:
                 part.value.require_axis(self.dim, self.axisymmetric)
             if isinstance(part, ThermalStrain):
                 self._require_expansion(part)
-        pairs: list[ContactPair | Tie] = [*self.contacts, *self.ties]
+        pairs: list[ContactPair | AnyTie] = [*self.contacts, *self.ties]
         for pair in pairs:
             kind = type(pair).__name__
             self._require(pair.slave.body, pair.slave.name, f"{kind}.slave")
@@ -93,6 +95,8 @@ class SceneParts:
                 )
             if isinstance(pair.master, Surface):
                 self._require(pair.master.body, pair.master.name, f"{kind}.master")
+                if isinstance(pair, CyclicSymmetry):
+                    self._require_sector(pair)
                 self._require_linear(pair, pair.master)
             else:
                 self._require_dimension(pair.master)
@@ -254,7 +258,21 @@ class SceneParts:
     def _materials(self, surface: Surface) -> tuple[Material, ...]:
         return self.bodies[surface.body].materials
 
-    def _require_linear(self, pair: ContactPair | Tie, master: Surface) -> None:
+    def _require_sector(self, sector: CyclicSymmetry) -> None:
+        """Reject an axis in another space, and sides that are no part of a turn apart."""
+        if len(sector.at) != self.dim or self.axisymmetric:
+            raise InvalidInputError(
+                f"CyclicSymmetry.at of {sector.place} must have {self.dim} coordinates, and bodies of "
+                f"revolution have no sectors, got {sector.at!r}: give a point of the bodies' space"
+            )
+        self.sector_angle(sector)
+
+    def sector_angle(self, sector: CyclicSymmetry) -> float:
+        """Return the angle that turns the master of a sector onto its slave, in radians."""
+        slave, master = (self.bodies[s.body].mesh.origin for s in (sector.slave, sector.master))
+        return sector.measured_angle(slave, master)
+
+    def _require_linear(self, pair: ContactPair | AnyTie, master: Surface) -> None:
         """Reject mortar coupling of quadratic facets, unless a scene of other meshes chose it."""
         orders = {side.name: self.bodies[side.body].mesh.order for side in (pair.slave, master)}
         if pair.discretisation == "mortar" and not pair.reason and max(orders.values()) > 1:
@@ -328,22 +346,40 @@ class SceneParts:
 
     @property
     def rolling_bodies(self) -> tuple[str, ...]:
-        """Names of the bodies with rollers."""
+        """Names of the bodies with rollers, or with a side of a sector, which may end at the axis."""
         rolling = {support.body for support in self.supports if isinstance(support, Roller)}
+        for sector in self.sectors:
+            rolling |= {sector.slave.body, sector.master.body}
         return tuple(name for name in self.bodies if name in rolling)
+
+    @property
+    def sectors(self) -> tuple[CyclicSymmetry, ...]:
+        """The sides of sectors among its ties."""
+        return tuple(tie for tie in self.ties if isinstance(tie, CyclicSymmetry))
 
     def held_by_rollers(
         self, body: str, prescribed: np.ndarray, supports: Sequence[AnySupport] | None = None
     ) -> tuple[np.ndarray, LocalAxes | None]:
-        """Return prescribed components of a body with those of its rollers, and along which axes.
+        """Return prescribed components of a body with those of rollers and sectors, and along which axes.
 
         `prescribed`: those of other supports, NaN where free, shape (n_nodes, dim), [length].
         """
         chosen = self.supports if supports is None else supports
         rollers = [each for each in chosen if isinstance(each, Roller) and each.body == body]
-        if not rollers:
+        held = [self.directions_of(roller) for roller in rollers]
+        if supports is None:
+            held += self._held_on_axes(body)
+        if not any(len(each.nodes) for each in held):
             return prescribed, None
-        return held_along(prescribed, [self.directions_of(roller) for roller in rollers], body)
+        return held_along(prescribed, held, body)
+
+    def _held_on_axes(self, body: str) -> list[HeldDirections]:
+        """Return what holds nodes on the axes of sectors: there both sides are one."""
+        mesh, held = self.bodies[body].mesh, []
+        for sector in self.sectors:
+            sides = {side.name for side in (sector.slave, sector.master) if side.body == body}
+            held += [sector.held_on_axis(mesh, name) for name in sorted(sides)]
+        return held
 
     def directions_of(self, roller: Roller) -> HeldDirections:
         """Return along what a roller holds which nodes of its body, and by how much they move."""
@@ -433,7 +469,7 @@ def check_axis(body: str, prescribed: np.ndarray) -> None:
         )
 
 
-def _require_different(pairs: Sequence[ContactPair | Tie]) -> None:
+def _require_different(pairs: Sequence[ContactPair | AnyTie]) -> None:
     """Reject two pairs of the same slave and master: how they share the force is not determined."""
     for number, pair in enumerate(pairs):
         for earlier in range(number):
@@ -451,7 +487,7 @@ RIGID = "as the master is rigid"
 #: Reason of a choice that other meshes do not change.
 REMESHED = "as on the meshes before the last one"
 
-Pair = TypeVar("Pair", ContactPair, Tie)
+Pair = TypeVar("Pair", bound=ContactPair | AnyTie)
 AnyScene = TypeVar("AnyScene", bound="SceneParts")
 
 _KNOWN: WeakKeyDictionary[BodyMesh, WeakKeyDictionary[BodyMesh, dict[tuple[str, str], bool]]] = (
@@ -473,7 +509,7 @@ def keeping_discretisation(scene: AnyScene) -> AnyScene:
     return replace(scene, contacts=[*map(_kept, scene.contacts)], ties=[*map(_kept, scene.ties)])
 
 
-def in_words(pair: ContactPair | Tie) -> str:
+def in_words(pair: ContactPair | AnyTie) -> str:
     """Return the discretisation of a pair and, where the scene chose it, why."""
     if not isinstance(pair.master, Surface):
         return f"node, {RIGID}"
@@ -494,11 +530,11 @@ def _kept(pair: Pair) -> Pair:
     return replace(pair, reason=f"{pair.discretisation}, {REMESHED}") if pair.reason else pair
 
 
-def _choice(scene: SceneParts, pair: ContactPair | Tie) -> tuple[Discretisation, str]:
+def _choice(scene: SceneParts, pair: ContactPair | AnyTie) -> tuple[Discretisation, str]:
     """Return the better discretisation of a pair, and why."""
     if not isinstance(pair.master, Surface):
         return "node", RIGID
-    if pair.master.body == pair.slave.body:
+    if isinstance(pair, ContactPair) and pair.within_body:
         return "node", "as the body meets itself"
     sides = pair.slave, pair.master
     slave, master = (scene.bodies[side.body].mesh.origin for side in sides)
@@ -506,9 +542,19 @@ def _choice(scene: SceneParts, pair: ContactPair | Tie) -> tuple[Discretisation,
         return "node", "as there is no mortar for quadratic cells"
     known = _KNOWN.setdefault(slave, WeakKeyDictionary()).setdefault(master, {})
     names = pair.slave.name, pair.master.name
+    if isinstance(pair, CyclicSymmetry):
+        match = _sides_match(scene, pair, slave, master)
+        return ("node", "as the meshes match") if match else ("mortar", "as the meshes do not match")
     if names not in known:
         known[names] = surfaces_match(*map(_faceted, (slave, master), names))
     return ("node", "as the meshes match") if known[names] else ("mortar", "as the meshes do not match")
+
+
+def _sides_match(scene: SceneParts, sector: CyclicSymmetry, slave: BodyMesh, master: BodyMesh) -> bool:
+    """Return whether the meshes of both sides of a sector do."""
+    turned = sector.turned(master.points, scene.sector_angle(sector))
+    facets = slave.surfaces[sector.slave.name], master.surfaces[sector.master.name]
+    return surfaces_match(faceted_surface(slave.points, facets[0]), faceted_surface(turned, facets[1]))
 
 
 def _faceted(mesh: BodyMesh, surface: str) -> FacetedSurface:
@@ -574,9 +620,28 @@ def mirrored(scene: SceneParts, body: str) -> np.ndarray:
 def surface_of(
     scene: SceneParts, surface: Surface, geometry: Geometry, *, finer: bool = False
 ) -> FacetedSurface:
-    """Return a named surface; its normals lie in the planes of symmetry that cut it."""
+    """Return a named surface; its normals lie in planes of symmetry that cut it, and go around sectors."""
     body, marks = scene.bodies[surface.body], mirrored(scene, surface.body)
-    return true_surface(
+    found = true_surface(
         body.mesh, surface.name, geometry, mirrored=marks, planes=planes_of(scene), finer=finer,
         axisymmetric=body.axisymmetric,
     )  # fmt: skip
+    known = (geometry == "best" or finer) and surface.name in body.mesh.origin.shapes
+    neighbours = () if known else _neighbours(scene, surface.body)
+    if not neighbours:
+        return found
+    if geometry == "faceted" and not finer:
+        return continued(found, neighbours, order=None)
+    return continued(found, neighbours, order=3 if finer and geometry != "faceted" else 2)
+
+
+def _neighbours(scene: SceneParts, body: str) -> tuple[Neighbour, ...]:
+    """Return how a body goes on behind both sides of its sectors."""
+    mesh, found = scene.bodies[body].mesh, []
+    for sector in scene.sectors:
+        if sector.slave.body == body == sector.master.body:
+            angle = scene.sector_angle(sector)
+            slave, master = (np.unique(mesh.surfaces[s.name]) for s in (sector.slave, sector.master))
+            found.append(Neighbour(slave, master, sector.turned(mesh.points, angle)))
+            found.append(Neighbour(master, slave, sector.turned(mesh.points, -angle)))
+    return tuple(found)

@@ -42,6 +42,7 @@ class EffectName(StrEnum):
     FOLLOWING_PRESSURE = "following pressure"
     THERMAL_STRAIN = "thermal strain"
     TIE = "tied surfaces"
+    CYCLIC_SYMMETRY = "cyclic symmetry"
     PRELOAD = "bolt preload"
     CONTACT = "contact"
     CLOSURE = "surfaces that give way"
@@ -89,7 +90,8 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
         (names.FOLLOWING_PRESSURE, len(scene.following_pressures), "pressure follows its surface",
          "pressures follow their surfaces"),
         (names.THERMAL_STRAIN, thermal, "change of temperature", "temperatures"),
-        (names.TIE, len(scene.ties), "pair stays together", "pairs stay together"),
+        (names.TIE, len(scene.ties) - len(scene.sectors), "pair stays together", "pairs stay together"),
+        (names.CYCLIC_SYMMETRY, len(scene.sectors), "sector repeats", "sectors repeat"),
         (names.PRELOAD, len(scene.preloads), "section is drawn together", "sections are drawn together"),
         (names.CONTACT, len(scene.contacts), "pair may touch", "pairs may touch"),
         (names.CLOSURE, soft, "pair has a law of closure", "pairs have one"),
@@ -302,9 +304,9 @@ def choose_solver(scene: SceneParts, subdomains: int, *, sensitivity: bool = Fal
         return SolverKind.TANGENT_NEWTON
     if EffectName.CONTACT in effects:
         return SolverKind.FACE_NEWTON
-    # A body that its supports alone do not hold has a singular stiffness.
+    # A body that its supports alone do not hold has a singular stiffness; ties need multipliers.
     loose = any(isinstance(support, RigidSurface) and support.free.any() for support in scene.supports)
-    loose = loose or bool(scene.preloads)
+    loose = loose or bool(scene.preloads or scene.ties)
     if subdomains == 1 and not (sensitivity or loose) and held_by_supports(scene, scene.body_names[0]):
         return SolverKind.DIRECT
     return SolverKind.PROJECTED_CG

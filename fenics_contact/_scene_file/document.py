@@ -20,12 +20,12 @@ from fenics_contact._scene_file.design import DesignPart, check_formulas
 from fenics_contact._scene_file.model import (
     AnyLoad,
     AnySupportPart,
+    AnyTiePart,
     AutomaticPart,
     ContactPart,
     FoundationPart,
     PreloadAim,
     PreloadPart,
-    TiePart,
 )
 from fenics_contact._scene_file.part import Part
 from fenics_contact._scene_file.source import Mistake, Source, as_toml, branches, written
@@ -421,7 +421,7 @@ class Document(Part):
     automatic_contact: AutomaticPart | None = Field(
         None, description="pairs that are found where boundaries face each other, in place of [[contacts]]"
     )
-    ties: list[TiePart] = Field([], description="pairs that stay together")
+    ties: list[AnyTiePart] = Field([], description="pairs that stay together")
     preloads: list[PreloadPart] = Field([], description="bolts drawn together at a section")
     foundations: list[FoundationPart] = Field([], description="surfaces on springs to the ground")
     steps: list[StepPart] = Field([], description="load steps; without them all acts at once")

@@ -19,6 +19,7 @@ from fenics_contact._scene.loads import Load
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
 from fenics_contact._scene.preloads import Preload, Section
+from fenics_contact._scene.sectors import CyclicSymmetry
 from fenics_contact._scene.supports import RigidSurface, Roller, Support
 from fenics_contact._scene_file.part import Part, keys_of, table_of
 from fenics_contact._scene_file.values import (
@@ -246,6 +247,20 @@ class TiePart(Part):
 
     slave: SurfaceOfBody
     master: SurfaceOfBody
+
+
+@keys_of(CyclicSymmetry, without={"reason"})
+class CyclicPart(Part):
+    """Both sides of a sector that repeats around an axis."""
+
+    kind: Literal["cyclic"]
+    slave: SurfaceOfBody
+    master: SurfaceOfBody
+
+
+AnyTiePart: TypeAlias = Annotated[
+    Any, one_of("kind", CyclicPart, other=TiePart, when=lambda part: "kind" not in part)
+]
 
 
 class _Named(Part):

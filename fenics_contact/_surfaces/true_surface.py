@@ -378,10 +378,10 @@ def _relief(
 ) -> Relief | None:
     surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], *mirrors)
     raised = reconstructed(surface, order) if shape is None else by_shape(surface, shape)
-    return None if _is_flat(raised) else raised.relief
+    return None if is_flat(raised) else raised.relief
 
 
-def _is_flat(surface: FacetedSurface) -> bool:
+def is_flat(surface: FacetedSurface) -> bool:
     """Return whether the facets coincide with the surface, up to rounding."""
     relief = surface.relief
     assert relief is not None

@@ -421,6 +421,7 @@ def ties_by_shape(torn: TornSystem, fields: PairedFields) -> np.ndarray:
     forces = _forces(torn, fields.multipliers)
     for index, tie in enumerate(torn.scene.ties):
         mine = np.flatnonzero(torn.ties.pair == index)
+        assert isinstance(tie, Tie)
         add = _add_tie if tie.discretisation == "node" else _add_mortar_tie
         add(result, torn, tie, motions, forces[:, mine], mine)
     return result

@@ -292,6 +292,11 @@ class DesignGeometry:
 
         `scene`: the scene in its reference shape.
         """
+        if scene.sectors:
+            raise InvalidInputError(
+                f"designs have no derivatives of cyclic symmetry, the scene ties {scene.sectors[0].place}: "
+                "model the whole, or a sector between planes of symmetry by Roller"
+            )
         self.designs = tuple(design.on(scene) for design in designs)
         self.size = sum(design.size for design in self.designs)
         self._bodies, self._decomposition = dict(scene.bodies), decomposition

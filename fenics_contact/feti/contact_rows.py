@@ -10,7 +10,7 @@ import numpy as np
 from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact._pairing.points import HELD, ContactPoints, FreeSpaces, are_sliding
 from fenics_contact._scene.local_axes import LocalAxes, free_part
-from fenics_contact._scene.pairs import Tie
+from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.feti.decomposition import Rows, Tearing
 
 
@@ -43,7 +43,7 @@ class Relations:
         `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
         """
         known = np.nan_to_num(prescribed)
-        moved = self.points.jump @ (known if self.axes is None else self.axes.to_global(known))
+        moved = self.points.relative(known if self.axes is None else self.axes.to_global(known))
         along = np.einsum("rd,rd->r", self.directions, moved[self.which])
         # What is left of motions that cancel is none: slip along it would have friction.
         least = LAST_PLACES * np.abs(known).max(initial=0.0)
@@ -87,12 +87,9 @@ class Relations:
         if self.count == 0:
             none = np.zeros(0, dtype=np.int64)
             return Rows(none, none, none, np.zeros(0), np.zeros(0), none)
-        jump = self.points.jump[self.which]
-        row = np.repeat(np.arange(self.count), np.diff(jump.indptr))
         # Sorted by row: every rank builds the same rows, and the owner's copy is that of the slave node.
-        order = np.lexsort((jump.indices, row))
-        row, node = row[order], jump.indices[order]
-        value = jump.data[order, None] * free_part(self.directions[row], node, fixed, self.axes)
+        row, node, weight, along = self.points.entries(self.which, self.directions)
+        value = weight[:, None] * free_part(along, node, fixed, self.axes)
         # Directions along an axis have no entries in other components: the preconditioner depends on the
         # pattern.
         entry, component = np.nonzero(np.where(self.held(fixed)[row][:, None], 0.0, value))
@@ -143,7 +140,7 @@ def tangential_relations(
 
 
 def tied_relations(
-    points: ContactPoints, ties: Sequence[Tie], fixed: np.ndarray, axes: LocalAxes | None = None
+    points: ContactPoints, ties: Sequence[AnyTie], fixed: np.ndarray, axes: LocalAxes | None = None
 ) -> Relations:
     """Return u_slave − u_master = 0 at tied points, only along the normal where the tie may slide.
 

@@ -10,8 +10,9 @@ import scipy.sparse as sp
 
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._base.sparse import LAST_PLACES
-from fenics_contact._scene.pairs import ContactPair, Tie
+from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.sectors import AnyTie
 from fenics_contact._scene.supports import AnySupport, RigidSurface
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.contact_rows import Relations
@@ -108,7 +109,7 @@ def free_motions(scene: Scene, tearing: Tearing) -> FreeMotions:
 
 def _require_flexible_slaves(scene: Scene, tearing: Tearing, moving: np.ndarray) -> None:
     """Reject slaves with nodes that rigid surfaces move: prescribed nodes have no multipliers."""
-    pairs: list[ContactPair | Tie] = [*scene.contacts, *scene.ties]
+    pairs: list[ContactPair | AnyTie] = [*scene.contacts, *scene.ties]
     for pair in pairs:
         nodes = tearing.global_nodes(pair.slave.body, np.unique(scene.facets(pair.slave)))
         if moving[nodes].any():

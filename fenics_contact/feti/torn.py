@@ -26,6 +26,7 @@ from fenics_contact._pairing.points import (
     without_tied,
 )
 from fenics_contact._pairing.search import find_contact_points, find_tied_points
+from fenics_contact._pairing.sectors import check_held_alike, joined_around
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.errors.kinds import safe_log
@@ -96,6 +97,11 @@ def meeting_points(
         ties = find_tied_points(scene, fixed, comm, axes=axes, told=told)
         if len(scene.ties) > 1:
             ties = tied_once(ties, scene, fixed, axes)
+        if scene.sectors:
+            with together(comm):
+                check_held_alike(ties, scene, fixed, axes)
+            ties = joined_around(ties, ties, scene, areas=False)
+            points = joined_around(points, ties, scene)
         if scene.contacts:
             points = without_tied(points, ties, scene, fixed, axes, told=told or comm.rank > 0)
     if len(scene.contacts) > 1:

@@ -24,9 +24,10 @@ from fenics_contact import _dolfinx
 from fenics_contact._base.libraries import MPI, PETSc
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.obstacles import MovingObstacle
-from fenics_contact._scene.pairs import ContactPair, Surface, Tie
+from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.plan import SolverKind
 from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti.direct import DirectSolution
 from fenics_contact.materials.elastic import Material
@@ -94,7 +95,7 @@ def _material(material: Material) -> dict[str, Any]:
     return known if is_dataclass(material) else {**known, "parameters": readable(material.parameters)}
 
 
-def _described_pair(pair: ContactPair | Tie, time: float) -> dict[str, Any]:
+def _described_pair(pair: ContactPair | AnyTie, time: float) -> dict[str, Any]:
     entries = {part.name: readable(getattr(pair, part.name)) for part in fields(pair)}
     for side in ("slave", "master"):
         surface = getattr(pair, side)

@@ -13,8 +13,9 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.foundations import ElasticFoundation
-from fenics_contact._scene.pairs import ContactPair, Surface, Tie, named
+from fenics_contact._scene.pairs import ContactPair, Surface, named
 from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.sectors import AnyTie
 from fenics_contact._scene.supports import RigidSurface, Roller
 from fenics_contact._surfaces.facets import share_areas, surface_moments
 from fenics_contact.errors import InvalidInputError
@@ -59,7 +60,7 @@ def nodal_forces(torn: TornSystem, multiplier: np.ndarray, displacement: np.ndar
     """
     decomposition = torn.decomposition
     contact, tie = _contact_forces(torn, multiplier), _tie_forces(torn, multiplier)
-    joined = torn.points.jump.T @ contact + torn.ties.jump.T @ tie
+    joined = torn.points.on_nodes(contact) + torn.ties.on_nodes(tie)
     connecting = -nodal_sum(decomposition, torn.force(multiplier))
     acting, fixed, axes = connecting - joined, decomposition.fixed, decomposition.axes
     reaction = np.where(fixed, acting, 0.0)
@@ -108,7 +109,7 @@ def by_node(points: ContactPoints, force: np.ndarray, chosen: np.ndarray) -> np.
 
     `force`: force on the slave at each of all points, shape (n, dim), [force].
     """
-    return np.asarray(points.jump[chosen].T @ force[chosen])
+    return points.part(chosen).on_nodes(force[chosen])
 
 
 def _resisted(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:
@@ -615,7 +616,7 @@ def pair_resultants(
     scene = torn.scene
 
     def of(
-        kind: str, pairs: Sequence[ContactPair | Tie], points: ContactPoints, force: np.ndarray
+        kind: str, pairs: Sequence[ContactPair | AnyTie], points: ContactPoints, force: np.ndarray
     ) -> Resultants:
         found = []
         for number, pair in enumerate(pairs):

@@ -12,8 +12,9 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from scipy.optimize import linprog
 
-from fenics_contact import ContactPair, Coulomb, Surface, Tie, Tresca
+from fenics_contact import ContactPair, Coulomb, Surface, Tresca
 from fenics_contact._pairing.points import ContactPoints
+from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.errors import FenicsContactError, InfeasibleError, InvalidInputError
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
 from fenics_contact.materials import rigid_body_modes
@@ -62,7 +63,7 @@ def _contradicting(made: Sample, message: str) -> bool:
     return False
 
 
-def _named_pair(made: Sample, message: str) -> ContactPair | Tie:
+def _named_pair(made: Sample, message: str) -> ContactPair | AnyTie:
     found = re.match(r"(ContactPair|Tie) (\d+)", message)
     assert found, message
     return (made.scene.contacts if found[1] == "ContactPair" else made.scene.ties)[int(found[2])]

@@ -19,6 +19,7 @@ from fenics_contact import (
     BodyMesh,
     ContactPair,
     Coulomb,
+    CyclicSymmetry,
     DistanceObstacle,
     ElasticFoundation,
     LoadStep,
@@ -312,6 +313,7 @@ SAMPLES: dict[type, Any] = {
     for sample in (
         PLANE, IRON, FACE, BODY, Coulomb(0.3), Tresca(1.0), SampledField(np.eye(3), np.ones(3)),
         ContactPair(FACE, PLANE), Tie(FACE, OTHER), RigidSurface("a", "b", (0, 0, 0)), Roller("a", "b"),
+        CyclicSymmetry(FACE, OTHER, (0, 0, 0), (0, 0, 1)),
         Support("a", "b"), Traction("a", "b", DOWN), TotalForce("a", "b", DOWN), Pressure("a", "b", 1),
         BodyForce("a", DOWN), ThermalStrain("a", 1.0), Ufl(lambda x: x), LoadStep("a"), Scene({"a": BODY}),
         RigidSphere((0, 0, 0), 1.0), RigidCylinder((0, 0, 0), (0, 0, 1), 1.0),

@@ -581,46 +581,6 @@ def test_a_rigid_surface_that_is_none_is_refused(given: dict[str, Any], words: s
         _ = file_with_rigid_surface(supports=[{**RIGID, **given}]).scene
 
 
-ROLLER = {"kind": "roller", "body": "a", "surface": "z1"}
-
-
-def test_a_roller_is_that_of_the_package_and_steps_move_it() -> None:
-    Roller = supports_module.Roller
-    given = {**ROLLER, "value": -0.1, "direction": [0, 3, 4]}
-    for table, expected in (
-        (ROLLER, Roller("a", "z1")),
-        (given, Roller("a", "z1", -0.1, (0.0, 0.6, 0.8))),
-    ):
-        assert list(file_with_rigid_surface(supports=[table]).scene.supports) == [expected]
-    steps: list[dict[str, Any]] = [
-        {"count": 2, "supports": {"top": 0.04}},
-        {"supports": {"top": "0.01 * t"}},
-        {"supports": {"top": "0.01 * x"}},
-    ]
-    supports = [{**ROLLER, "name": "top"}, {"body": "a", "surface": "z0"}]
-    found = [step.supports[0] for step in file_with_rigid_surface(supports=supports, steps=steps).steps]
-    at = np.array([[2.0, 0.0, 1.0]])
-    np.testing.assert_allclose([each.amounts(at)[0] for each in found], [0.02, 0.04, 0.03, 0.02])
-
-
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({"value": [0, 0, 0]}, "supports.0.value must be a finite number, a formula in x, y and z in quotes"),
-        ({"value": "x / (x - 2)"}, "must have a finite value at every node, got inf"),
-        ({"direction": [0, 0, 0]}, "Roller.direction of surface 'z1' of body 'a' must be 3 finite numbers"),
-        ({"surface": "top"}, "supports.0.surface must be a surface of the body 'a'"),
-    ],
-)
-def test_a_roller_that_is_none_is_refused(given: dict[str, Any], words: str) -> None:
-    with pytest.raises(SceneFileError, match=words):
-        _ = file_with_rigid_surface(supports=[{**ROLLER, **given}]).scene
-    with pytest.raises(SceneFileError, match="must have the form of 'top' itself, 0"):
-        _ = file_with_rigid_surface(
-            supports=[{**ROLLER, "name": "top"}], steps=[{"supports": {"top": [0, 0, 1]}}]
-        ).scene
-
-
 # Bodies from mesh files and CAD files in scene files.
 def mesh_from_file(mesh: dict[str, Any], **body: Any) -> BodyMesh:
     """The mesh of the only body of a scene."""

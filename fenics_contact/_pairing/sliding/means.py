@@ -326,7 +326,8 @@ class PointAreas:
             surface, body = surface_of(scene, pair.slave, "faceted"), pair.slave.body
             nodes = NodeNumbers.of(scene).global_nodes(body, surface.nodes)
             slave, point = points.of_surface(index, np.arange(count))
-            areas.now[point] += surface.areas_at(coordinates[nodes])[np.searchsorted(nodes, slave)]
+            own = surface.areas_at(coordinates[nodes])[np.searchsorted(nodes, slave)]
+            np.add.at(areas.now, point, own)  # a point may have the areas of several nodes
             mine = points.pair == index
             areas.much[mine] = scene.bodies[body].deforms_much
             if met is not None:

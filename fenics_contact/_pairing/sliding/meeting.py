@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.points import PARALLEL, NodeNumbers, are_beside, tied_keys
 from fenics_contact._pairing.search import find_contact_points, find_tied_points
+from fenics_contact._pairing.sectors import around_once
 from fenics_contact._pairing.sliding.closest import ClosestPoints, Roles, moved_surface
 from fenics_contact._pairing.sliding.patches import SmoothPatches
 from fenics_contact._scene.local_axes import LocalAxes
@@ -20,7 +21,7 @@ from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import Projection, join
-from fenics_contact.errors import together
+from fenics_contact.errors import InvalidInputError, together
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,8 @@ def meetings_of(
 
     `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim), along its `axes`.
     """
+    with together(comm):
+        _require_inside(scene)
     number = slave = np.zeros(0, dtype=np.int64)
     if scene.contacts and scene.ties:
         points, ties = (
@@ -123,9 +126,53 @@ def meetings_of(
         )
         number, slave = tied_keys(points, ties, scene, fixed, axes)
     with together(comm):
-        return tuple(
+        meetings = tuple(
             _meeting(scene, pair, fixed, slave[number == index]) for index, pair in enumerate(scene.contacts)
         )
+        if scene.sectors and scene.contacts:
+            lost, onto = around_once(points, ties, scene)
+            kept = np.asarray(onto.argmax(axis=1)).ravel()
+            mine = [points.pair[lost] == index for index in range(len(meetings))]
+            nodes = [(points.slave[lost[own]], points.slave[kept[own]]) for own in mine]
+            meetings = tuple(
+                _joined_around(met, *nodes[index], (index, len(meetings)))
+                for index, met in enumerate(meetings)
+            )
+        return meetings
+
+
+def _require_inside(scene: Scene) -> None:
+    """Reject masters that end at a side of a sector: nodes that slide over it would meet the neighbour's."""
+    for sector in scene.sectors:
+        for pair in scene.contacts:
+            for side in (sector.slave, sector.master):
+                master = pair.master
+                if not isinstance(master, Surface) or master.body != side.body:
+                    continue
+                surfaces = scene.bodies[side.body].mesh.surfaces
+                if np.isin(surfaces[master.name], surfaces[side.name]).any():
+                    raise InvalidInputError(
+                        "contact of bodies that deform much does not go on around a sector, but the master "
+                        f"of {pair.place} ends at the side {side.name!r} of {sector.place}: model the whole, "
+                        "let the master end before, or take a rigid obstacle as master"
+                    )
+
+
+def _joined_around(
+    meeting: Meeting, lost: np.ndarray, kept: np.ndarray, number: tuple[int, int]
+) -> Meeting:
+    """Return a pair without nodes on the slave side of a sector; those on the other side have their areas."""
+    there = np.flatnonzero(np.isin(meeting.nodes, lost))
+    if not len(there):
+        return meeting
+    order = np.argsort(lost)
+    place = np.searchsorted(meeting.nodes, kept[order])
+    area = meeting.area.copy()
+    np.add.at(area, place, meeting.area[there])
+    entries = meeting.nodes[there] + 1, (place, np.full(len(place), number[0]))
+    taken = sp.csr_matrix(entries, shape=(len(area), number[1]))
+    joined = replace(meeting, area=area, taken=taken)
+    return joined.part(np.setdiff1d(np.arange(len(area)), there))
 
 
 def _meeting(scene: Scene, pair: ContactPair, fixed: np.ndarray, tied: np.ndarray) -> Meeting:

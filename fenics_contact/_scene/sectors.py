@@ -1,0 +1,174 @@
+"""Sectors of bodies that repeat around an axis: both sides move alike, turned by the angle of the sector."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
+from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._scene.local_axes import HeldDirections
+from fenics_contact._scene.pairs import AnyDiscretisation, Surface, Tie
+from fenics_contact._surfaces.facets import surface_moments
+from fenics_contact._surfaces.true_surface import Geometry
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.shapes.simple import tangent_bases
+
+
+@dataclass(frozen=True)
+@checked()
+class CyclicSymmetry:
+    """Both sides of a sector that repeats around an axis: u_slave = R u_master, R turns master onto slave.
+
+    One of the `Scene.ties`. The sector is 360°/N of a whole whose loads and supports repeat, too; all its
+    quantities are those of the sector. Meshes of both sides need not match. The whole may turn about the axis
+    and move along it, and nothing else, unless supports or contact hold it.
+
+    Attributes:
+        slave: One side of the sector, whose nodes carry the forces; the finer mesh is the better slave.
+        master: The other side, of the same body, or of another one of the sector.
+        at: A point on the axis, [length].
+        axis: Direction of the axis, of any length; None in the plane.
+        angle: Angle by which R turns about the axis, in radians, positive by the right-hand rule, in the
+            plane from x to y. By default it is measured between the sides.
+        discretisation: As in `Tie`.
+        reason: As in `ContactPair`.
+
+    Raises:
+        InvalidInputError: If the point or the axis is not finite, or the angle is not 360°/N.
+
+    Example:
+        >>> sides = Surface("rotor", "end"), Surface("rotor", "start")
+        >>> sector = CyclicSymmetry(*sides, at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    """
+
+    slave: Surface
+    master: Surface
+    at: GivenVector
+    axis: GivenVector | None = None
+    angle: float | None = None
+    discretisation: AnyDiscretisation = "best"
+    reason: str = field(default="", repr=False)
+
+    def __post_init__(self) -> None:
+        """Reject points and axes that are not finite, and an angle that does not divide a turn."""
+        if len(self.at) not in (2, 3) or not np.isfinite(self.at).all():
+            raise InvalidInputError(
+                f"CyclicSymmetry.at must be three finite coordinates (two in the plane), got {self.at!r}: "
+                "give a point on the axis"
+            )
+        object.__setattr__(self, "at", floats(np.asarray(self.at, dtype=np.float64)))
+        if (self.axis is None) != (len(self.at) == 2):
+            raise InvalidInputError(
+                f"CyclicSymmetry needs an axis in space and none in the plane, got at={self.at!r} and axis="
+                f"{self.axis!r}: give its direction with three coordinates, or leave it out"
+            )
+        if self.axis is not None:
+            object.__setattr__(self, "axis", unit_vector("CyclicSymmetry.axis", self.axis, 3))
+        if self.angle is not None:
+            whole_sectors(self.place, self.angle)
+        if self.slave == self.master:
+            raise InvalidInputError(
+                f"CyclicSymmetry needs both sides of a sector, got {self.place}: name the other side as "
+                "master"
+            )
+        if not self.reason.startswith(f"{self.discretisation}, "):
+            object.__setattr__(self, "reason", "")
+
+    @property
+    def sliding(self) -> bool:
+        """Whether the sides may slide along each other."""
+        return False
+
+    @property
+    def geometry(self) -> Geometry:
+        """Facets, as for ties."""
+        return "faceted"
+
+    @property
+    def place(self) -> str:
+        """Its surfaces: "rotor end on rotor start"."""
+        return f"{self.slave.body} {self.slave.name} on {self.master.body} {self.master.name}"
+
+    def matrix(self, angle: float) -> np.ndarray:
+        """Return the rotation about the axis by an angle, shape (dim, dim)."""
+        axis = (0.0, 0.0, 1.0) if self.axis is None else self.axis
+        turn = Rotation.from_rotvec(angle * np.array(axis)).as_matrix()
+        return np.asarray(turn[: len(self.at), : len(self.at)])
+
+    @property
+    def across(self) -> np.ndarray:
+        """Orthonormal directions across the axis, shape (2, dim)."""
+        return np.eye(2) if self.axis is None else np.asarray(tangent_bases(np.array([self.axis]))[0])
+
+    def measured_angle(self, slave: BodyMesh, master: BodyMesh) -> float:
+        """Return the angle that turns the master onto the slave, in radians, a whole part of a turn.
+
+        Raises:
+            InvalidInputError: If it cannot be measured, or is not 360°/N.
+        """
+        if self.angle is not None:
+            return whole_sectors(self.place, self.angle)
+        sides = ((slave, self.slave.name), (master, self.master.name))
+        first = self.across
+        second = np.cross(self.axis, first[0]) if self.axis is not None else first[1]
+        middles = [surface_moments(mesh.points, mesh.surfaces[name]).centroid for mesh, name in sides]
+        arms = np.array([middle - np.array(self.at) for middle in middles]) @ np.array([first[0], second]).T
+        near = [1e-6 * np.ptp(mesh.points[mesh.surfaces[name]], axis=(0, 1)).max() for mesh, name in sides]
+        if np.any(np.linalg.norm(arms, axis=1) <= np.array(near)):
+            raise InvalidInputError(
+                f"the angle between the sides {self.place} cannot be measured, as the middle of a side lies "
+                "on the axis: give CyclicSymmetry its angle, or sides that end at the axis"
+            )
+        turned = np.arctan2(arms[0, 1], arms[0, 0]) - np.arctan2(arms[1, 1], arms[1, 0])
+        return whole_sectors(self.place, float((turned + np.pi) % (2.0 * np.pi) - np.pi))
+
+    def turned(self, points: np.ndarray, angle: float) -> np.ndarray:
+        """Return points, shape (n, dim), turned about the axis."""
+        at = np.array(self.at)
+        return np.asarray((points - at) @ self.matrix(angle).T + at)
+
+    def axial_nodes(self, mesh: BodyMesh, surface: str, near: float = 1e-6) -> np.ndarray:
+        """Return the nodes of a side that lie on the axis, ascending.
+
+        `near`: distance from the axis, relative to the size of the side, below which they do.
+        """
+        nodes = np.unique(mesh.surfaces[surface])
+        points = mesh.points[nodes]
+        away = np.linalg.norm((points - np.array(self.at)) @ self.across.T, axis=1)
+        return np.asarray(nodes[away <= near * np.linalg.norm(np.ptp(points, axis=0))])
+
+    def held_on_axis(self, mesh: BodyMesh, surface: str) -> HeldDirections:
+        """Return what holds the nodes of a side on the axis, which move along it alone."""
+        nodes = self.axial_nodes(mesh, surface)
+        directions = np.tile(self.across, (len(nodes), 1))
+        return HeldDirections(surface, np.repeat(nodes, 2), directions, np.zeros(2 * len(nodes)))
+
+
+#: What ties surfaces of bodies.
+AnyTie: TypeAlias = Tie | CyclicSymmetry
+
+
+def whole_sectors(place: str, angle: float, off: float = 1e-2) -> float:
+    """Return an angle as an exact part of a turn, of the same sign.
+
+    `off`: by how much the number of sectors may differ from a whole one: nodes of sides that are curved and
+    meshes that do not match have other middles.
+
+    Raises:
+        InvalidInputError: If it is not 360°/N.
+    """
+    count = 2.0 * np.pi / abs(angle) if np.isfinite(angle) and abs(angle) > ROUNDING else np.inf
+    whole = float(np.round(count)) if np.isfinite(count) else 0.0
+    if whole < 2 or abs(count - whole) > off:
+        nearest = f", the nearest is {360.0 / max(whole, 2.0):.6g}°" if np.isfinite(count) else ""
+        raise InvalidInputError(
+            f"the sides of a sector must be 360°/N apart, those of {place} are {np.degrees(angle):.6g}° "
+            f"apart, a part of 1/{count:.6g}{nearest}: check the surfaces, at and axis of CyclicSymmetry, or "
+            "give it the angle"
+        )
+    return float(np.copysign(2.0 * np.pi / whole, angle))
