@@ -8,7 +8,8 @@ Scenes: Scene, Body, BodyMesh, Surface, Support, Roller, RigidSurface, ContactPa
 Laws of surfaces: Coulomb, Tresca, FrictionTable, FrictionCurve, LinearClosure, ExponentialClosure,
     ClosureTable, ClosureLaw, FluidPressure
 
-Rigid obstacles: RigidPlane, RigidSphere, RigidCylinder, DistanceObstacle, MovingObstacle
+Rigid obstacles: RigidPlane, RigidSphere, RigidCylinder, DistanceObstacle, MovingObstacle,
+    RigidTool, ToolMotion
 
 Loads: Traction, Pressure, TotalForce, BodyForce, gravity, centrifugal, point_mass, ThermalStrain
 
@@ -85,6 +86,7 @@ if TYPE_CHECKING:
     from fenics_contact._scene.obstacles import RigidCylinder as RigidCylinder
     from fenics_contact._scene.obstacles import RigidPlane as RigidPlane
     from fenics_contact._scene.obstacles import RigidSphere as RigidSphere
+    from fenics_contact._scene.obstacles import RigidTool as RigidTool
     from fenics_contact._scene.pairs import ContactPair as ContactPair
     from fenics_contact._scene.pairs import Coulomb as Coulomb
     from fenics_contact._scene.pairs import Surface as Surface
@@ -98,6 +100,7 @@ if TYPE_CHECKING:
     from fenics_contact._scene.supports import RigidSurface as RigidSurface
     from fenics_contact._scene.supports import Roller as Roller
     from fenics_contact._scene.supports import Support as Support
+    from fenics_contact._scene.supports import ToolMotion as ToolMotion
     from fenics_contact._scene.surface_laws import ClosureLaw as ClosureLaw
     from fenics_contact._scene.surface_laws import ClosureTable as ClosureTable
     from fenics_contact._scene.surface_laws import ExponentialClosure as ExponentialClosure

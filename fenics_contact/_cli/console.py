@@ -307,5 +307,5 @@ def step_table(rows: Sequence[Mapping[str, Any]], file: SceneFile) -> Table:
 
 
 def _largest_displacement(state: State) -> float:
-    moved = [np.linalg.norm(state.gather_displacement(name), axis=1).max() for name in state.scene.bodies]
+    moved = [np.linalg.norm(state.gather_displacement(name), axis=1).max() for name in state.scene.deforming]
     return float(max(moved))

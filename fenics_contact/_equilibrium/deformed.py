@@ -24,6 +24,7 @@ from fenics_contact._large_deformations.moving_contact import Contact, ContactCo
 from fenics_contact._large_deformations.newton import Effort, NonlinearEquilibrium, NotHeldError
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.supports import RigidSurface
+from fenics_contact._scene.tools import ToolBody
 from fenics_contact.errors import InfeasibleError, InvalidInputError, LoadStepError
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.preloads import shortening_columns, shortening_scales
@@ -176,7 +177,13 @@ def _require_more_than_springs(torn: TornSystem, failure: Exception) -> None:
 
 
 def _require_prescribed(scene: Scene) -> None:
-    """Reject rigid surfaces that forces move."""
+    """Reject rigid tools, and rigid surfaces that forces move."""
+    for name, body in scene.bodies.items():
+        if isinstance(body, ToolBody):
+            raise InvalidInputError(
+                f"a RigidTool needs linear materials, but {name!r} meets bodies of nonlinear ones: give the "
+                "pair its shape in a MovingObstacle, whose motion is prescribed"
+            )
     for support in scene.supports:
         if isinstance(support, RigidSurface) and support.free.any():
             kinds = {type(each).__name__ for body in scene.bodies.values() for each in body.materials}

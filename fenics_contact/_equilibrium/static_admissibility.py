@@ -19,7 +19,7 @@ from fenics_contact.errors import ConvergenceError, InfeasibleError, together
 from fenics_contact.errors.ranks import made_once
 from fenics_contact.feti.factor import fixing_nodes
 from fenics_contact.feti.foundations import foundation_stiffness, separated
-from fenics_contact.feti.subdomain import common_kernel
+from fenics_contact.feti.subdomain import kernel_of_body
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.cuts import parts_of
 from fenics_contact.results.rigid_motions import UnheldMotion, motion_in_words
@@ -233,7 +233,7 @@ def _resisted_by_material(body: Body, modes: np.ndarray) -> np.ndarray:
     """Return an orthonormal basis of the rigid motions that cost energy, shape (n_modes, n)."""
     count = modes.shape[2]
     flat = modes.reshape(-1, count)
-    kernel = common_kernel(body.materials, body.mesh.points, body.axisymmetric).reshape(len(flat), -1)
+    kernel = kernel_of_body(body, body.mesh.points).reshape(len(flat), -1)
     if kernel.shape[1] == count:
         return np.zeros((count, 0))
     free, _ = np.linalg.qr(np.linalg.lstsq(flat, kernel, rcond=None)[0])

@@ -108,7 +108,7 @@ class ContactWarnings:
         comm = state.torn.decomposition.comm
         moved = state.torn_displacement.reshape(-1, state.torn.dim)
         longest = float(comm.allreduce(np.linalg.norm(moved, axis=1).max(initial=0.0), op=MPI.MAX))
-        for name, body in state.scene.bodies.items():
+        for name, body in state.scene.deforming.items():
             if body.deforms_much or name in self._given or longest * self._bound(name, body.mesh) <= FAR:
                 continue
             angle = rotation_of(body.mesh, state.gather_displacement(name))

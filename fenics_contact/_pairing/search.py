@@ -37,12 +37,13 @@ from fenics_contact._pairing.projection import (
 )
 from fenics_contact._pairing.sectors import check_sides, with_turn
 from fenics_contact._scene.local_axes import LocalAxes
-from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
 from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
+from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import Projection, node_weights
 from fenics_contact._surfaces.true_surface import Geometry
@@ -380,6 +381,8 @@ def _measured(
     if not isinstance(pair.master, Surface):
         with together(comm):
             points = _on_obstacle(slave, bearing, pair.master)
+            if isinstance(pair.master, RigidTool):
+                points = _carried(points, slave, pair.master, scene, numbers)
         name = f"what ContactPair {index} asks its obstacle, {type(pair.master).__name__}"
         require_alike(comm, described((points.slave, points.normal, points.gap), name))
     else:
@@ -477,6 +480,19 @@ def _on_obstacle(slave: _Side, movable: np.ndarray, obstacle: RigidObstacle) -> 
     gap = evaluate_shape(obstacle, "distance", slave.surface.points[chosen])
     points = _points(slave, chosen, normals[facing], gap, sp.csr_matrix((len(chosen), slave.n_nodes)))
     return with_symmetry(points, slave.surface.mirrored[chosen], slave.surface.planes)
+
+
+def _carried(
+    points: ContactPoints, slave: _Side, tool: RigidTool, scene: Scene, numbers: NodeNumbers
+) -> ContactPoints:
+    """Return points of a tool with the weights of the nodes that carry its motion."""
+    body = scene.bodies[tool.name]
+    assert isinstance(body, ToolBody)
+    weight = body.weights(scene.points[points.slave])
+    nodes = np.tile(numbers.global_nodes(tool.name, np.arange(body.mesh.n_nodes)), points.count)
+    rows = weight.shape[1] * np.arange(points.count + 1)
+    master = sp.csr_matrix((weight.ravel(), nodes, rows), shape=(points.count, slave.n_nodes))
+    return replace(points, master=master)
 
 
 def _points(

@@ -14,7 +14,7 @@ from fenics_contact._base.checks import checked
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.pairs import AnyDiscretisation, ContactPair, Friction, Surface
-from fenics_contact._scene.supports import Roller
+from fenics_contact._scene.supports import Roller, ToolMotion
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import safe_log
@@ -170,6 +170,7 @@ def _largest_motion(scene: SceneParts) -> float:
             mesh = scene.bodies[support.body].mesh
             values = support.amounts(mesh.points[np.unique(mesh.surfaces[support.surface])])[:, None]
         else:
+            assert not isinstance(support, ToolMotion)
             values = np.nan_to_num(scene.given(support)[1])
         sizes.append(float(np.linalg.norm(values, axis=1).max(initial=0.0)))
     return max(sizes)

@@ -1,4 +1,4 @@
-"""Rigid obstacles, given by the shapes of their surfaces: they are fixed or move as prescribed."""
+"""Rigid obstacles, given by the shapes of their surfaces: they are fixed, or move, or forces move them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
-from fenics_contact._base.checks import checked
+from fenics_contact._base.checks import GivenVector, checked, floats
 from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
@@ -127,3 +127,64 @@ class MovingObstacle:
     def curvatures(self, points: np.ndarray) -> np.ndarray:
         """Return the second derivatives of the distance at time zero, (n, dim) -> (n, dim, dim)."""
         return evaluate_shape(self.at(0.0), "curvatures", points)
+
+
+@displayed
+@dataclass(frozen=True)
+@checked()
+class RigidTool:
+    """A rigid body of any shape that is the master of contact pairs and moves as a `ToolMotion` asks.
+
+    Without a `ToolMotion` among the supports it is at rest.
+
+    Attributes:
+        name: Its name, which no body of the scene has.
+        shape: Its shape before it moves: any of `fenics_contact.shapes`, or a class with their members.
+        at: The reference point p, which need not belong to it: its motion is that of p and a rotation about
+            p, forces act at p, moments about p, [length].
+
+    Raises:
+        InvalidInputError: If the point is not one of the shape's space, or the shape moves by itself.
+
+    Example:
+        >>> from fenics_contact import ContactPair, RigidSphere, Surface, ToolMotion
+        >>> indenter = RigidTool("indenter", RigidSphere((0, 0, 5), 5.0), at=(0, 0, 5))  # mm
+        >>> pair = ContactPair(Surface("block", "z1"), indenter)
+        >>> pressed = ToolMotion("indenter", (0, 0, None), (0, 0, 0), force=(0, 0, -200))  # N
+    """
+
+    name: str
+    shape: RigidObstacle
+    at: GivenVector
+
+    def __post_init__(self) -> None:
+        """Reject points of another space and shapes that move."""
+        if isinstance(self.shape, MovingObstacle | RigidTool):
+            raise InvalidInputError(
+                f"the shape of tool {self.name!r} must not move by itself, got a "
+                f"{type(self.shape).__name__}: give its shape at rest, and its motion by a ToolMotion"
+            )
+        dim = getattr(self.shape, "dim", len(self.at))
+        if not self.name or len(self.at) != dim or dim not in (2, 3) or not np.isfinite(self.at).all():
+            raise InvalidInputError(
+                f"RigidTool needs a name and a point of {dim} finite coordinates, as its shape has, got "
+                f"{self.name!r} and {self.at!r}: give the point whose motion is prescribed or loaded"
+            )
+        object.__setattr__(self, "at", floats(np.asarray(self.at, dtype=np.float64)))
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space that it lies in."""
+        return len(self.at)
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """Return the signed distance before it moves, (n, dim) -> (n,), [length]."""
+        return evaluate_shape(self.shape, "distance", points)
+
+    def normals(self, points: np.ndarray) -> np.ndarray:
+        """Return the gradient of the distance, (n, dim) -> (n, dim)."""
+        return evaluate_shape(self.shape, "normals", points)
+
+    def curvatures(self, points: np.ndarray) -> np.ndarray:
+        """Return the second derivatives of the distance, (n, dim) -> (n, dim, dim)."""
+        return evaluate_shape(self.shape, "curvatures", points)

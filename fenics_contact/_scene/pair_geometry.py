@@ -12,11 +12,13 @@ from scipy.spatial import cKDTree
 
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._scene.loads import BodyForce, Load, Pressure, ThermalStrain, TotalForce
+from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import in_words, surface_of
 from fenics_contact._scene.rollers import direction_of
 from fenics_contact._scene.sectors import AnyTie
-from fenics_contact._scene.supports import RigidSurface, Roller
+from fenics_contact._scene.supports import RigidSurface, Roller, ToolMotion
+from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import FacetedSurface, gauss_points, heights, quadrature_areas
 from fenics_contact._surfaces.projection import project
 from fenics_contact.materials.elastic import PlaneStress
@@ -46,6 +48,7 @@ def displacement_along(scene: SceneParts, normal: np.ndarray) -> float:
             if along is not None and not callable(support.displacement):
                 sizes.append(abs(support.displacement * float(along @ normal)))
             continue
+        assert not isinstance(support, ToolMotion)
         given = support.motion[: scene.dim] if isinstance(support, RigidSurface) else support.value
         value = [0.0 if number is None or callable(number) else number for number in given]
         sizes.append(abs(float(np.array(value) @ normal)))
@@ -63,6 +66,9 @@ def force_along(scene: SceneParts, normal: np.ndarray) -> float | None:
         if resultant is None:
             return None
         total[load.body] += resultant
+    for support in scene.supports:
+        if isinstance(support, RigidSurface) and isinstance(scene.bodies[support.body], ToolBody):
+            total[support.body] += support.load[: scene.dim]
     return max(abs(float(force @ normal)) for force in total.values())
 
 
@@ -283,6 +289,8 @@ def _name(scene: SceneParts, pair: ContactPair, surface: Surface, faceted: Facet
 
 
 def _shape_name(shape: SurfaceShape) -> str:
+    if isinstance(shape, RigidTool):
+        return f"{shape.name} ({_shape_name(shape.shape)})"
     if isinstance(shape, Placed):
         return _shape_name(shape.shape)
     if isinstance(shape, Joined):
@@ -402,6 +410,7 @@ def bodies_near(scene: SceneParts, reach: float) -> list[tuple[str, str]]:
     boxes = {
         name: (body.mesh.points.min(axis=0) - reach, body.mesh.points.max(axis=0) + reach)
         for name, body in scene.bodies.items()
+        if not isinstance(body, ToolBody)
     }
     slack = TOUCHING * max(float(np.max(high - low)) for low, high in boxes.values())
 

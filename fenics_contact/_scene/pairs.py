@@ -12,7 +12,7 @@ from fenics_contact._base.checks import checked
 from fenics_contact._base.display import name_in_words
 from fenics_contact._scene.fields import OfPosition, evaluate
 from fenics_contact._scene.fluid import FluidPressure
-from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
 from fenics_contact._scene.surface_laws import ClosureLaw, FrictionCurve, check_closing, check_rising
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
@@ -374,7 +374,8 @@ def _in_words(value: float | OfPosition | str) -> str:
 def _place(slave: Surface, master: Surface | RigidObstacle) -> str:
     if isinstance(master, Surface):
         return f"{slave.in_words} on {master.in_words}"
-    return f"{slave.in_words} on {name_in_words(type(master).__name__)}"
+    name = master.name if isinstance(master, RigidTool) else name_in_words(type(master).__name__)
+    return f"{slave.in_words} on {name}"
 
 
 def named(which: str, surfaces: Sequence[str], places: Sequence[str]) -> list[int]:

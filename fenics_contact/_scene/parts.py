@@ -28,7 +28,8 @@ from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.rollers import direction_of, flat_normal, held_directions, widest_angle
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
-from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support
+from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support, ToolMotion
+from fenics_contact._scene.tools import ToolBody, bodies_with_tools, with_motions
 from fenics_contact._surfaces.continued import Neighbour, continued
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
 from fenics_contact._surfaces.projection import surfaces_match
@@ -59,6 +60,9 @@ class SceneParts:
             raise InvalidInputError(
                 "a scene needs at least one body, got none: pass bodies={'name': Body(...)}"
             )
+        bodies, supports = with_motions(bodies_with_tools(self.bodies, self.contacts), self.supports)
+        object.__setattr__(self, "bodies", bodies)
+        object.__setattr__(self, "supports", supports)
         self._require_one_dimension()
         for part in (*self.supports, *self.loads):
             surface = part.surface if isinstance(part, SurfaceLoad | AnySupport) else None
@@ -70,7 +74,7 @@ class SceneParts:
             foundation.require_space(self.dim)
         object.__setattr__(self, "supports", tuple(map(self._in_space, self.supports)))
         for part in (*self.supports, *self.loads):
-            if not isinstance(part, RigidSurface | Roller):
+            if not isinstance(part, RigidSurface | Roller | ToolMotion):
                 self._require_components(part)
             if self.axisymmetric:
                 self._require_off_axis(part)
@@ -107,6 +111,11 @@ class SceneParts:
     def deforms_much(self) -> bool:
         """Whether one of its bodies does."""
         return any(body.deforms_much for body in self.bodies.values())
+
+    @property
+    def deforming(self) -> dict[str, Body]:
+        """The bodies without those that carry the motions of tools."""
+        return {name: body for name, body in self.bodies.items() if not isinstance(body, ToolBody)}
 
     @property
     def following_pressures(self) -> tuple[Pressure, ...]:
@@ -157,6 +166,7 @@ class SceneParts:
         if isinstance(support, Roller):
             self._require_direction(support)
             return support
+        assert isinstance(support, RigidSurface)
         if self.axisymmetric:
             support = support.along_axis()
         if support.dim != dim:
@@ -331,7 +341,7 @@ class SceneParts:
         chosen = self.supports if supports is None else supports
         values = np.full(self.bodies[body].mesh.points.shape, np.nan)
         for support in chosen:
-            if support.body == body and not isinstance(support, Roller):
+            if support.body == body and not isinstance(support, Roller | ToolMotion):
                 nodes, given = self.given(support)
                 values[nodes] = np.where(np.isnan(given), values[nodes], given)
         axis = self.bodies[body].on_axis
@@ -599,7 +609,7 @@ def mirrored(scene: SceneParts, body: str) -> np.ndarray:
     planes = np.eye(scene.dim) if planes is None else planes
     marks = np.zeros((mesh.n_nodes, len(planes)), dtype=bool)
     for support in scene.supports:
-        if support.body != body or isinstance(support, RigidSurface):
+        if support.body != body or isinstance(support, RigidSurface | ToolMotion):
             continue
         if isinstance(support, Roller):
             normal = _plane(scene, support)

@@ -16,6 +16,7 @@ from fenics_contact._scene.loads import BodyForce, ThermalStrain
 from fenics_contact._scene.pairs import Coulomb, Surface, Tresca
 from fenics_contact._scene.parts import in_words
 from fenics_contact._scene.supports import RigidSurface, Roller
+from fenics_contact._scene.tools import ToolBody, with_tool_parts
 from fenics_contact._surfaces.facets import has_midside_pressure
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -37,6 +38,7 @@ class EffectName(StrEnum):
     ROLLER = "roller"
     RIGID_SURFACE = "rigid surface"
     FOUNDATION = "elastic foundation"
+    RIGID_TOOL = "rigid tool"
     BODY_FORCE = "body force"
     SURFACE_LOAD = "surface load"
     FOLLOWING_PRESSURE = "following pressure"
@@ -66,7 +68,9 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
     names, loads = EffectName, scene.loads
     turned = sum(body.axisymmetric for body in scene.bodies.values())
     nonlinear = sum(any(map(is_nonlinear, body.materials)) for body in scene.bodies.values())
+    tools = sum(isinstance(body, ToolBody) for body in scene.bodies.values())
     rigid, rolling = (sum(isinstance(s, kind) for s in scene.supports) for kind in (RigidSurface, Roller))
+    held, rigid = len(scene.supports) - rigid - rolling, rigid - tools
     volume = sum(isinstance(load, BodyForce) for load in loads)
     thermal = sum(isinstance(load, ThermalStrain) for load in loads)
     rubbing = [pair.friction for pair in scene.contacts if pair.has_friction]
@@ -77,14 +81,15 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
     curved = sum(pair.friction_curve is not None or pair.shear_limit is not None for pair in scene.contacts)
     fixed, rough = "has a fixed slip bound", "has a friction coefficient above zero"
     found = (
-        (names.ELASTICITY, len(scene.bodies), "elastic body", "elastic bodies"),
+        (names.ELASTICITY, len(scene.bodies) - tools, "elastic body", "elastic bodies"),
         (names.AXISYMMETRY, turned, "body of revolution, all per revolution",
          "bodies of revolution, all per revolution"),
         (names.NONLINEAR_MATERIAL, nonlinear, "body deforms much or yields", "bodies do"),
-        (names.PRESCRIBED_DISPLACEMENT, len(scene.supports) - rigid - rolling, "support", "supports"),
+        (names.PRESCRIBED_DISPLACEMENT, held, "support", "supports"),
         (names.ROLLER, rolling, "surface slides", "surfaces slide"),
         (names.RIGID_SURFACE, rigid, "surface stays rigid", "surfaces stay rigid"),
         (names.FOUNDATION, len(scene.foundations), "surface rests on springs", "surfaces rest on springs"),
+        (names.RIGID_TOOL, tools, "tool moves as one piece", "tools move as one piece each"),
         (names.BODY_FORCE, volume, "load on a volume", "loads on volumes"),
         (names.SURFACE_LOAD, len(loads) - volume - thermal, "load on a surface", "loads on surfaces"),
         (names.FOLLOWING_PRESSURE, len(scene.following_pressures), "pressure follows its surface",
@@ -252,6 +257,7 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
     """
     from fenics_contact._scene.pair_geometry import pair_geometry, unpaired_bodies
 
+    partitions = with_tool_parts(scene.bodies, partitions)
     effects = effects_of(scene)
     partitions = {name: pieces(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
     names = {effect.name for effect in effects}

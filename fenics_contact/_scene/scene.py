@@ -84,8 +84,9 @@ class Scene(SceneParts):
         Returns:
             Body name -> subdomain of every cell, numbered from 0 within the body.
         """
-        each = -(-ranks // len(self.bodies))
-        return {name: default_partition(body.mesh, each, body=name) for name, body in self.bodies.items()}
+        bodies = self.deforming
+        each = -(-ranks // len(bodies))
+        return {name: default_partition(body.mesh, each, body=name) for name, body in bodies.items()}
 
     @property
     def is_nonlinear(self) -> bool:

@@ -308,5 +308,93 @@ class RigidSurface:
         return np.asarray(shift + arms @ about.as_matrix()[: self.dim, : self.dim].T - arms)
 
 
-#: What prescribes displacements of a surface.
-AnySupport: TypeAlias = Support | RigidSurface | Roller
+#: Name of the surface of a tool.
+TOOL = "tool"
+
+
+@dataclass(frozen=True)
+@checked()
+class ToolMotion:
+    """What moves a `RigidTool`: prescribed components, forces, moments and springs, for a support.
+
+    Components of displacement and rotation that are given are prescribed; the others follow from equilibrium
+    with the contact, the force, the moment, and springs between the point and the ground, which are free of
+    force where the tool is before it moves. With small displacements rotations are small.
+
+    Attributes:
+        tool: Name of the tool.
+        displacement: Of its point: for each direction a number, [length], or None where it is free; all free
+            by default.
+        rotation: About each axis through the point, in the plane one number, positive from x to y, in
+            radians; None leaves a component free; all free by default.
+        force: At the point along free directions, [force] (in the plane: per unit of thickness).
+        moment: Around free axes, in the plane one number, [force·length].
+        stiffness: Of springs along free directions, ≥ 0, [force / length]; none by default.
+        rotational_stiffness: Of springs around free axes, in the plane one number, ≥ 0, [force·length].
+
+    Raises:
+        InvalidInputError: If numbers are missing or not finite, a stiffness is negative, or a load or a
+            spring acts on a prescribed component. When the scene is made: if it has no such tool.
+
+    Example:
+        >>> floating = ToolMotion("pad", (0, 0, None), force=(0, 0, -50))  # N: moves down and tilts
+        >>> sprung = ToolMotion("arm", (0, 0, None), (0, 0, 0), stiffness=(0, 0, 120))  # N/mm
+    """
+
+    tool: str
+    displacement: Motion | None = None
+    rotation: Motion | float | None = None
+    force: GivenVector | None = None
+    moment: GivenVector | float | None = None
+    stiffness: GivenVector | None = None
+    rotational_stiffness: GivenVector | float | None = None
+
+    @property
+    def body(self) -> str:
+        """The body that carries the motion of the tool in a scene."""
+        return self.tool
+
+    @property
+    def surface(self) -> str:
+        """The surface of that body."""
+        return TOOL
+
+    @property
+    def in_words(self) -> str:
+        """Which tool it moves."""
+        return f"tool {self.tool}"
+
+    def of(self, at: GivenVector) -> RigidSurface:
+        """Return the motion of a tool with a reference point."""
+        given = self.displacement, self.rotation, self.force, self.moment
+        return RigidSurface(self.tool, TOOL, at, *given)
+
+    def springs(self, at: GivenVector) -> GivenVector:
+        """Return the stiffness of the springs along and around all axes, () without any."""
+        if self.stiffness is None and self.rotational_stiffness is None:
+            return ()
+        turns = 2 * len(at) - 3
+        parts = [self.stiffness, self.rotational_stiffness]
+        rows = [
+            np.zeros(count) if part is None else np.atleast_1d(np.asarray(part, dtype=np.float64))
+            for part, count in zip(parts, (len(at), turns), strict=True)
+        ]
+        known = np.concatenate(rows)
+        fits = [len(row) for row in rows] == [len(at), turns]
+        if not fits or not (np.isfinite(known).all() and (known >= 0).all()):
+            raise InvalidInputError(
+                f"springs of tool {self.tool!r} must have {len(at)} stiffnesses along and {turns} around the "
+                f"axes, zero or positive, got {self.stiffness!r} and {self.rotational_stiffness!r}: give "
+                "zeros where there is none"
+            )
+        if (known[~self.of(at).free] > 0).any():
+            raise InvalidInputError(
+                f"springs of tool {self.tool!r} must act on free components, got {known.tolist()} beside "
+                f"displacement {self.displacement!r} and rotation {self.rotation!r}: leave the component "
+                "free (None), or the spring away"
+            )
+        return floats(known) if known.any() else ()
+
+
+#: What prescribes displacements of a surface; a scene holds motions of tools as those of their surfaces.
+AnySupport: TypeAlias = Support | RigidSurface | Roller | ToolMotion

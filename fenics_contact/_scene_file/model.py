@@ -16,11 +16,11 @@ from fenics_contact._scene import obstacles as obstacles_module
 from fenics_contact._scene.fluid import FluidPressure
 from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.loads import Load
-from fenics_contact._scene.obstacles import MovingObstacle
+from fenics_contact._scene.obstacles import MovingObstacle, RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
 from fenics_contact._scene.preloads import Preload, Section
 from fenics_contact._scene.sectors import CyclicSymmetry
-from fenics_contact._scene.supports import RigidSurface, Roller, Support
+from fenics_contact._scene.supports import RigidSurface, Roller, Support, ToolMotion
 from fenics_contact._scene_file.part import Part, keys_of, table_of
 from fenics_contact._scene_file.values import (
     FREE,
@@ -82,12 +82,23 @@ class ObstaclePart(Part):
         "follow it through the load steps",
     )
     about: Vector | None = Field(None, description="point about which it turns, the origin by default")
+    tool: str | None = Field(
+        None, description="name of a rigid tool, which supports of the kind 'tool' move; about is its point"
+    )
 
     def made(self, **other: Any) -> Any:
         """Build the obstacle, one that moves if there is a motion."""
         return self._moving(super().made(**other))
 
     def _moving(self, still: Any) -> Any:
+        if self.tool is not None:
+            if self.motion is not None or self.about is None:
+                raise InvalidInputError(
+                    f"the tool {self.tool!r} must have the point 'about' which it turns and no motion, which "
+                    f"supports of the kind 'tool' give it, got {self.about!r} and {self.motion!r}: give the "
+                    "point, and the motion there"
+                )
+            return RigidTool(self.tool, still, tuple(self.about))
         if self.motion is None:
             return still
         dim = 2 if len(self.motion) == 3 else 3
@@ -110,11 +121,19 @@ class TriangulationPart(ObstaclePart):
     )
     scale: PositiveFloat = Field(1.0, description="factor of its coordinates")
 
-    def read(self, folder: Path, comm: MPI.Comm) -> Any:
-        """Return the obstacle, with its triangles read on rank 0. Collective."""
-        smooth: float = self.smooth  # type: ignore[attr-defined]
-        still = read_triangulation(folder / self.file, scale=self.scale, smooth=smooth, comm=comm)
-        return self._moving(still)
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """What is read once for all tables that share it."""
+        return self.file, self.scale, self.smooth  # type: ignore[attr-defined]
+
+    def read(self, folder: Path, comm: MPI.Comm) -> Triangulation:
+        """Return the triangles, read on rank 0. Collective."""
+        file, scale, smooth = self.key
+        return read_triangulation(folder / file, scale=scale, smooth=smooth, comm=comm)
+
+    def of_shape(self, shape: Triangulation) -> Any:
+        """Return the obstacle of triangles that were read."""
+        return self._moving(shape)
 
 
 @keys_of(Surface)
@@ -448,8 +467,47 @@ class PreloadAim(Part):
     shortening: float | None = Field(None, description="how much shorter the bolt gets, [length]")
 
 
+@keys_of(ToolMotion, without=("displacement", "rotation"))
+class ToolPart(_Named):
+    """Motion, forces, moments and springs of a rigid tool."""
+
+    kind: Literal["tool"]
+    value: Motion | None = Field(
+        None,
+        description="displacement of its point along x, y and z, [length], then its rotation about them, in "
+        f'radians (in the plane along x and y, then one rotation): a number or "{FREE}"; free by default. '
+        "In load steps followed by force and moment",
+    )
+
+    @property
+    def size(self) -> Any:
+        """Motion, force and moment; None where the tool is free, zero where nothing acts."""
+        force, moment = self.force, self.moment  # type: ignore[attr-defined]
+        turns = np.size(moment) if moment is not None else None
+        dim = len(force) if force is not None else 3 if turns == 3 else 2 if turns == 1 else None
+        count = len(self.value) if self.value is not None else 3 * (dim or 3) - 3
+        dim = count // 3 + 1
+        turned = np.broadcast_to(0.0 if moment is None else moment, 2 * dim - 3)
+        loads = (*(force or (0.0,) * dim), *turned)
+        return (*(self.value or (None,) * count), *map(float, loads))
+
+    def build(self, dim: int, value: tuple[Any, ...] | None = None) -> ToolMotion:
+        """Return the motion of the tool, with motion, force and moment of a load step if given."""
+        row, count = value or self.size, 3 * dim - 3
+        numbers = [
+            float(each(np.zeros((1, dim)))[0]) if isinstance(each, Expression) else each for each in row
+        ]
+        motion, load = tuple(numbers[:count]), tuple(numbers[count:])
+        turned, moment = motion[dim:], load[dim:]
+        return self.made(
+            displacement=motion[:dim], rotation=turned[0] if dim == 2 else turned,
+            force=load[:dim], moment=moment[0] if dim == 2 else moment,
+        )  # fmt: skip
+
+
 AnySupportPart: TypeAlias = Annotated[
-    Any, one_of("kind", RigidPart, RollerPart, other=SupportPart, when=lambda part: "kind" not in part)
+    Any,
+    one_of("kind", RigidPart, RollerPart, ToolPart, other=SupportPart, when=lambda part: "kind" not in part),
 ]
 LOADS = (
     table_of(loads.Traction, _Load, kind="traction"),

@@ -24,6 +24,7 @@ from fenics_contact._optimize.result import Result
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.fields import read_field
 from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact._scene.supports import ToolMotion
 from fenics_contact._scene_file.bodies import Shaped
 from fenics_contact._scene_file.design import (
     DesignPart,
@@ -123,12 +124,14 @@ class Builder:
         document, dim = self._document, next(iter(bodies.values())).mesh.dim
         empty = Scene(bodies)
         built: dict[str, list[Any]] = {}
-        for key in ("supports", "loads", "contacts", "ties", "preloads", "foundations"):
+        for key in ("contacts", "supports", "loads", "ties", "preloads", "foundations"):
             built[key] = []
             for number, part in enumerate(getattr(document, key)):
                 with self._at(key, number):
                     one = self._made(part, dim)
                     alone: dict[str, Any] = {key: (one,)}
+                    if isinstance(one, ToolMotion):
+                        alone["contacts"] = tuple(built["contacts"])
                     replace(empty, **alone)  # rejects what does not suit the bodies
                     built[key].append(one)
                     with self._at(key, number, *_FORMULAS.get(key, ())):
@@ -188,25 +191,25 @@ def with_fields_read(source: Source, document: AnyDocument, comm: MPI.Comm) -> A
         if isinstance(part, FieldFile) and _key(part) not in read:
             with located(source, path, mistakes):
                 read[_key(part)] = read_field(source.folder / part.file, part.field, comm=comm)
-        if isinstance(part, TriangulationPart):
+        if isinstance(part, TriangulationPart) and part.key not in read:
             with located(source, path, mistakes):
-                read[_key(part)] = part.read(source.folder, comm)
+                read[part.key] = part.read(source.folder, comm)
     with together(comm):
         if mistakes:
             raise SceneFileError(source.name, mistakes)
     return _replaced(document, read) if read else document
 
 
-def _key(part: FieldFile | TriangulationPart) -> tuple[Any, ...]:
-    if isinstance(part, TriangulationPart):
-        return (id(part),)
+def _key(part: FieldFile) -> tuple[Any, ...]:
     return part.file, tuple(part.field) if isinstance(part.field, list) else part.field
 
 
 def _replaced(value: Any, read: Mapping[tuple[Any, ...], Any]) -> Any:
     """Return a copy of a part of a document with what was read from files."""
-    if isinstance(value, FieldFile | TriangulationPart):
+    if isinstance(value, FieldFile):
         return read[_key(value)]
+    if isinstance(value, TriangulationPart):
+        return value.of_shape(read[value.key])
     if isinstance(value, BaseModel):
         own = {name: (part, _replaced(part, read)) for name, part in value}
         changed = {name: new for name, (old, new) in own.items() if new is not old}

@@ -490,7 +490,7 @@ StepComponents: TypeAlias = Annotated[
     Any,
     Read(
         Annotated[
-            float | Formula | FieldFile | _row(float | _FREE | Formula | FieldFile, 2, 6, _STEP).annotation,
+            float | Formula | FieldFile | _row(float | _FREE | Formula | FieldFile, 2, 12, _STEP).annotation,
             with_message(_STEP),
         ]
     ),

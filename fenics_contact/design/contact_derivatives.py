@@ -16,10 +16,11 @@ from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._pairing.search import MortarPoints
 from fenics_contact._scene.fields import gradients_of
-from fenics_contact._scene.obstacles import RigidObstacle
+from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
 from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie, Tresca
 from fenics_contact._scene.parts import surface_of
+from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import Projection
 from fenics_contact.design.adjoint import LinearisedFace, slips_by_area
@@ -334,10 +335,17 @@ def _by_mortar(torn: TornSystem, index: int, rows: RowFields, by_area: np.ndarra
 def _by_obstacle(torn: TornSystem, obstacle: RigidObstacle, rows: RowFields, mine: np.ndarray) -> np.ndarray:
     """Return the derivative by the slave nodes that face an obstacle, shape (n, dim)."""
     by, normal = _by_point(torn.points, rows, mine), torn.points.normal[mine]
+    carried = np.zeros(normal.shape)
+    if isinstance(obstacle, RigidTool):  # a point farther from its reference point moves more
+        body = torn.scene.bodies[obstacle.name]
+        assert isinstance(body, ToolBody)
+        nodes = torn.decomposition.tearing.global_nodes(obstacle.name, np.arange(body.mesh.n_nodes))
+        moved = np.broadcast_to(rows.at(nodes)[:, None], (2, len(mine), len(nodes), torn.dim))
+        carried = _by_point(torn.points, rows, mine, moved).weight @ body.weight_slopes
     with together(torn.decomposition.comm):
         bending = evaluate_shape(obstacle, "curvatures", torn.scene.points[torn.points.slave[mine]])
     turning = by.normal + frames_pulled_back(normal, by.tangents, by.axes)
-    return np.asarray(by.gap[:, None] * normal + np.einsum("nde,ne->nd", bending, turning))
+    return np.asarray(carried + by.gap[:, None] * normal + np.einsum("nde,ne->nd", bending, turning))
 
 
 def _add_projected(

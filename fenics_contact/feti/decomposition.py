@@ -18,7 +18,8 @@ from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.local_axes import LocalAxes, joined_axes, same_axes
 from fenics_contact._scene.parts import check_axis
 from fenics_contact._scene.scene import Scene
-from fenics_contact._scene.supports import Roller
+from fenics_contact._scene.supports import Roller, ToolMotion
+from fenics_contact._scene.tools import with_tool_parts
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.inverse import Condensations
 from fenics_contact.feti.same_input import check_same_input
@@ -207,7 +208,7 @@ def prescribed_along(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalA
     """
     prescribed = np.full((tearing.n_nodes, scene.dim), np.nan)
     for support in scene.supports:
-        if isinstance(support, Roller):
+        if isinstance(support, Roller | ToolMotion):
             continue
         own, given = scene.given(support)
         nodes = tearing.global_nodes(support.body, own)
@@ -441,6 +442,8 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
             ranks than subdomains, or scene or partitions differ from rank to rank.
     """
     start(comm)
+    if isinstance(partitions, Mapping):
+        partitions = with_tool_parts(scene.bodies, partitions)
     check_same_input(comm, scene, partitions=partitions)
     with together(comm):
         _check_partitions(scene, partitions)

@@ -18,6 +18,7 @@ from fenics_contact._scene.body import Body
 from fenics_contact._scene.fields import Ufl
 from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.loads import Load, SurfaceLoad
+from fenics_contact._scene.tools import ToolBody
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.factor import fixing_nodes
 from fenics_contact.feti.foundations import foundation_stiffness, separated
@@ -133,6 +134,7 @@ class Subdomain:
         load: f_s, shape (dim n,), [force].
         kernel: R_s, shape (dim n, n_modes): zero-energy modes as columns.
         typical_stiffness: Mean diagonal entry of K_s, [force / length].
+        springs: Those of the tool for which it was assembled.
     """
 
     mesh: SubdomainMesh
@@ -144,6 +146,7 @@ class Subdomain:
     kernel: np.ndarray
     typical_stiffness: float
     matrix: CachedMatrix
+    springs: tuple[float, ...] = ()
 
     @property
     def stiffness(self) -> sp.csr_matrix:
@@ -197,7 +200,9 @@ def assemble(
     points = body.mesh.points[mesh.nodes]
     acting = tuple(load for load in loads if _acts(load, mesh, body))
     order = np.argsort(mesh.nodes)
-    if earlier is None or earlier.foundations != beds or not _same_stiffness(earlier, parts, points):
+    springs = body.springs if isinstance(body, ToolBody) else ()
+    known = earlier is not None and earlier.foundations == beds and earlier.springs == springs
+    if earlier is None or not known or not _same_stiffness(earlier, parts, points):
         earlier = _with_stiffness(mesh, body, parts, forms, points, beds)
     elif earlier.loads == acting:
         return earlier
@@ -244,23 +249,25 @@ def _with_stiffness(
         _dolfinx.update_coordinates(space.mesh, by_input_node)
         indptr, indices, data = _dolfinx.assemble_csr(forms.stiffness(parts, cell_type, space))
         elastic = sp.csr_matrix((data, indices, indptr), shape=(mesh.size, mesh.size))
+        if isinstance(body, ToolBody) and body.springs:
+            return (elastic + sp.csr_matrix(body.spring_matrix(points))).tocsr()
         return (elastic + bed).tocsr() if bed.nnz else elastic
 
     bed = foundation_of(mesh, body, foundations)
     matrix = CachedMatrix(stiffness)
     K = matrix.get()
     _check_finite(K.data, mesh)
-    kernel = common_kernel(parts.materials, points, body.axisymmetric).reshape(mesh.size, -1)
+    kernel = kernel_of_body(body, points, parts.materials).reshape(mesh.size, -1)
     if bed.nnz:
         kernel = kernel @ separated(bed, kernel)[1]
     check_kernel(K, kernel, f"subdomain {mesh.number} of body {mesh.body!r}")
     typical = float(K.diagonal().mean())
-    return Subdomain(mesh, parts, foundations, (), points, np.zeros(mesh.size), kernel, typical, matrix)
+    springs = body.springs if isinstance(body, ToolBody) else ()
+    nothing = np.zeros(mesh.size)
+    return Subdomain(mesh, parts, foundations, (), points, nothing, kernel, typical, matrix, springs)
 
 
-def foundation_of(
-    mesh: SubdomainMesh, body: Body, foundations: Sequence[ElasticFoundation]
-) -> sp.csr_matrix:
+def foundation_of(mesh: SubdomainMesh, body: Body, foundations: Sequence[ElasticFoundation]) -> sp.csr_matrix:
     """Return the stiffness of the foundations under a subdomain, shape (size, size)."""
     beds = [each for each in foundations if each.body == mesh.body]
     if not beds:
@@ -277,6 +284,16 @@ def _varies(parts: Composition, body: Body, forms: FormLibrary) -> bool:
 def _from_own_origin(points: np.ndarray) -> np.ndarray:
     """Return coordinates relative to one of the points: as exact far from the origin as near it."""
     return np.asarray(points - points[0])
+
+
+def kernel_of_body(body: Body, points: np.ndarray, materials: Sequence[Material] | None = None) -> np.ndarray:
+    """Return the modes without energy of a body at points, (n, dim, n_modes).
+
+    `materials`: those at the points; all of the body by default.
+    """
+    if isinstance(body, ToolBody):
+        return body.kernel(points)
+    return common_kernel(body.materials if materials is None else materials, points, body.axisymmetric)
 
 
 def common_kernel(

@@ -210,7 +210,7 @@ def write_vtu(
         name: Beginning of the files' names: "state" gives "state.vtm" and, for a body "link 1",
             "state_link_1.vtu". Files are replaced when the new ones are complete.
         cell_fields: Further fields: name -> body -> a number or a row for every cell, such as
-            ``{"discretisation_error": {body: estimate.by_cell(body) for body in state.scene.bodies}}``.
+            ``{"discretisation_error": {body: estimate.by_cell(body) for body in state.scene.deforming}}``.
 
     Returns:
         The multi-block file.
@@ -221,8 +221,8 @@ def write_vtu(
     import meshio  # takes a tenth of a second
 
     index = checked_name(folder, name, ".vtm")
-    more = {body: _checked(state, body, cell_fields or {}) for body in state.scene.bodies}
-    meshes = {body: _gathered(state, body, more[body]) for body in state.scene.bodies}
+    more = {body: _checked(state, body, cell_fields or {}) for body in state.scene.deforming}
+    meshes = {body: _gathered(state, body, more[body]) for body in state.scene.deforming}
     files = list(file_of_each(meshes, index.parent, name, ".vtu").values())
     comm = state.torn.decomposition.comm
     with together(comm):

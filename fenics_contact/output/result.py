@@ -61,7 +61,7 @@ def described_scene(scene: Scene, subdomains: Mapping[str, int], time: float = 0
     return {
         "dimension": scene.dim,
         **({"axisymmetric": True} if scene.axisymmetric else {}),
-        "bodies": {name: _body(body, subdomains[name]) for name, body in scene.bodies.items()},
+        "bodies": {name: _body(body, subdomains[name]) for name, body in scene.deforming.items()},
         "supports": readable(scene.supports),
         "loads": readable(scene.loads),
         "contacts": [_described_pair(pair, time) for pair in scene.contacts],
@@ -278,6 +278,8 @@ likewise, and of ``preloads`` ``name``, ``axial_force``, ``shortening``, ``shear
 ``torsion``; ``balance`` of all with the loads, its ``imbalance`` and the scales to which that is relative |
     | ``rigid_motions`` | of each rigid surface body, surface, ``displacement`` and ``rotation`` of the \
 point ``about`` |
+    | ``tools`` | of each rigid tool by name ``displacement``, ``rotation``, and ``force`` and ``moment`` of \
+contact on it |
     | ``more`` | further results of the caller |
 
     Entries may be added without a new version; changing or removing one requires a new version.
@@ -453,7 +455,11 @@ def _residual_history(history: Sequence[SolverStep]) -> dict[str, list[Any]]:
 
 def _read_off(state: State) -> dict[str, Any]:
     """Return forces and motions of rigid surfaces. Collective."""
-    return {"forces": forces_record(state), "rigid_motions": motions_record(state)}
+    return {
+        "forces": forces_record(state),
+        "rigid_motions": motions_record(state),
+        "tools": {name: readable(each) for name, each in state.tools().items()},
+    }
 
 
 def _pair_summary(state: State, number: int) -> dict[str, Any]:

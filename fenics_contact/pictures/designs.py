@@ -152,7 +152,8 @@ def _retreat(first: State, best: State, pair: int) -> float:
 
 def _check(first: State, best: State, pair: int) -> None:
     cells = [
-        {name: body.mesh.cells.shape for name, body in state.scene.bodies.items()} for state in (first, best)
+        {name: body.mesh.cells.shape for name, body in state.scene.deforming.items()}
+        for state in (first, best)
     ]
     if cells[0] != cells[1]:
         raise InvalidInputError(
@@ -254,7 +255,7 @@ class _Outlines:
 def _outlines(first: State, best: State, reach: float | None, unit: str) -> list[_Outlines]:
     """Return the outlines around the strongest contact before: in the plane one, in space two sections."""
     bodies: dict[str, pv.DataSet] = {}
-    for name, body in first.scene.bodies.items():
+    for name, body in first.scene.deforming.items():
         bodies[name] = body_grid(body.mesh.linear, in_space(body.mesh.points))
         bodies[name].point_data["moves"] = in_space(best.scene.bodies[name].mesh.points - body.mesh.points)
     spot, points = strongest_contact(first.contact, first.contact_places), points_of(bodies)

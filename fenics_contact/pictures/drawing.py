@@ -14,9 +14,10 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
 from matplotlib.figure import Figure
+from scipy.spatial.transform import Rotation
 
-from fenics_contact._base.checks import GivenVector, unit_vector
-from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle
+from fenics_contact._base.checks import GivenVector, floats, unit_vector
+from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidTool
 from fenics_contact._scene.pairs import Surface
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.pictures.canvas import (
@@ -54,7 +55,7 @@ from fenics_contact.pictures.section import (
 )
 from fenics_contact.pictures.unrolled import label_axes
 from fenics_contact.results.state import State
-from fenics_contact.shapes.combined import simplified
+from fenics_contact.shapes.combined import placed, simplified
 from fenics_contact.shapes.simple import Cylinder, Plane, Sphere, SurfaceShape
 
 if TYPE_CHECKING:
@@ -77,8 +78,19 @@ def obstacles_of(state: State) -> list[SurfaceShape]:
     for pair in state.scene.contacts:
         if not isinstance(pair.master, Surface) and pair.master not in obstacles:
             obstacles.append(pair.master)
-    now = [each.at(state.time) if isinstance(each, MovingObstacle) else each for each in obstacles]
-    return [simplified(each) for each in now]
+    return [simplified(_where_it_is(each, state)) for each in obstacles]
+
+
+def _where_it_is(obstacle: RigidObstacle, state: State) -> SurfaceShape:
+    """Return an obstacle where it is in a state. Collective."""
+    if isinstance(obstacle, MovingObstacle):
+        return obstacle.at(state.time)
+    if not isinstance(obstacle, RigidTool):
+        return obstacle
+    motion, about = state.tools()[obstacle.name], np.array(obstacle.at)
+    angle = np.pad(np.atleast_1d(motion.rotation), (3 - np.size(motion.rotation), 0))
+    turn = Rotation.from_rotvec(angle).as_matrix()[: len(about), : len(about)]
+    return placed(obstacle.shape, turn, floats(about - turn @ about + motion.displacement))
 
 
 def shade_obstacles(axes: Axes, obstacles: list[SurfaceShape], frame: Frame) -> None:

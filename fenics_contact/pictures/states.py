@@ -101,7 +101,7 @@ def plot_decomposition(
     target = png_path(path)
     if not 0.0 <= explode < 1.0:
         raise InvalidInputError(f"explode must be at least 0 and below 1, got {explode}: try 0.1")
-    for name, body in scene.bodies.items():
+    for name, body in scene.deforming.items():
         shape = np.shape(partitions[name]) if name in partitions else "none"
         if shape != (body.mesh.n_cells,):
             raise InvalidInputError(
@@ -110,13 +110,13 @@ def plot_decomposition(
             )
     bodies: dict[str, pv.UnstructuredGrid] = {}
     count = 0
-    for name, body in scene.bodies.items():
+    for name, body in scene.deforming.items():
         mesh, numbers = body.mesh.linear, np.unique(partitions[name], return_inverse=True)[1]
         grid = body_grid(mesh, in_space(mesh.points))
         grid.cell_data["subdomain"] = count + np.repeat(numbers, mesh.n_cells // body.mesh.n_cells)
         bodies[name] = _shrunk(grid, 1.0 - explode) if explode else grid
         count += int(numbers.max()) + 1
-    total = written(sum(body.mesh.n_cells for body in scene.bodies.values()))
+    total = written(sum(body.mesh.n_cells for body in scene.deforming.values()))
     facts = f"{counted(count, 'subdomain')} of {counted(len(bodies), 'body', 'bodies')}, {total} cells"
     colours = colormaps["tab20"]
     values = {name: np.asarray(body["subdomain"]) % colours.N for name, body in bodies.items()}
@@ -382,8 +382,8 @@ def plot_error(
         raise InvalidInputError(f"clim of a logarithmic scale must be positive, got {clim}: try (1e-5, 1e-2)")
     if by_cell is None:
         errors = as_linear(state, "errors").estimate_errors(geometry=False)
-        by_cell = {name: errors.by_cell(name) for name in state.scene.bodies}
-    parts = {name: _checked(name, body.mesh.n_cells, by_cell) for name, body in state.scene.bodies.items()}
+        by_cell = {name: errors.by_cell(name) for name in state.scene.deforming}
+    parts = {name: _checked(name, body.mesh.n_cells, by_cell) for name, body in state.scene.deforming.items()}
     every = np.concatenate(list(parts.values()))
     total, top = float(np.linalg.norm(every)), float(every.max()) or 1.0
     ends = given or (min(max(float(every.min()), SPAN * top), top / 10), top)

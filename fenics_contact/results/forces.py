@@ -16,7 +16,8 @@ from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.pairs import ContactPair, Surface, named
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
-from fenics_contact._scene.supports import RigidSurface, Roller
+from fenics_contact._scene.supports import RigidSurface, Roller, Support
+from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import share_areas, surface_moments
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import nodal_sum
@@ -442,7 +443,7 @@ def support_shares(scene: Scene, numbers: NodeNumbers) -> list[SupportShare]:
             squares[number] *= own[nodes, None, None]
             areas.append(np.zeros((count, scene.dim)))
             continue
-        given = (0.0,) * scene.dim if isinstance(support, RigidSurface) else support.value
+        given = support.value if isinstance(support, Support) else (0.0,) * scene.dim
         components = [component is not None for component in given]
         areas.append(own[:, None] * components)
         squares[number] = areas[-1][nodes][:, :, None] * np.eye(scene.dim)
@@ -549,7 +550,10 @@ def force_balance(
 
     `least`: A force below which bodies count as free of forces, [force].
     """
-    point = _middle(forces.places) if about is None else point_of(about, torn.dim)
+    if about is None:
+        carriers = [isinstance(body, ToolBody) for body in torn.scene.bodies.values()]
+        of_tool = np.repeat(carriers, np.diff(torn.decomposition.tearing.node_offset))
+    point = _middle(forces.places[~of_tool]) if about is None else point_of(about, torn.dim)
     parts, turned = _parts(torn, forces), torn.scene.axisymmetric
     acting = {name: force * [0.0, 1.0] for name, force in parts.items()} if turned else parts
     resultants = {

@@ -49,6 +49,7 @@ from fenics_contact.results.forces import (
 )
 from fenics_contact.results.preloads import Preloads, section_forces
 from fenics_contact.results.rigid_motions import RigidMotion, UnheldMotion, rigid_motion
+from fenics_contact.results.tools import ToolResult, tool_results
 
 if TYPE_CHECKING:
     import dolfinx
@@ -467,6 +468,15 @@ class State(ABC):
         """
         return section_forces(self.torn, self._nodal_forces, self.torn_displacement)
 
+    @collectively("State.tools", comm_of)
+    def tools(self) -> dict[str, ToolResult]:
+        """Return motion, force and moment of every `RigidTool` by its name. Collective.
+
+        Example:
+            >>> state.tools()["indenter"].displacement  # doctest: +SKIP
+        """
+        return tool_results(self.torn, self._nodal_forces, self.rigid_motions())
+
     @collectively("State.resultants", comm_of)
     def resultants(self, about: GivenVector | np.ndarray | None = None) -> PairResultants:
         """Return force and moment on the slave of every contact pair and tie. Collective.
@@ -531,7 +541,7 @@ class State(ABC):
         """
         from fenics_contact.results.multi_block import multi_block
 
-        meshes = {name: body.mesh for name, body in self.scene.bodies.items()}
+        meshes = {name: body.mesh for name, body in self.scene.deforming.items()}
         if not revolved:
             return multi_block(comm_of(self), meshes, self.gather_fields, deformed, linear=linear)
         from fenics_contact.results.revolved import check_turned, turned_around

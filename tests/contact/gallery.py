@@ -88,7 +88,7 @@ def stack(upper: Friction, lower: Friction) -> Scene:
 
 def partitions(scene: Scene, boxes: tuple[int, int, int] = (2, 1, 1)) -> dict[str, np.ndarray]:
     """Cut every body into the same boxes."""
-    return {name: box_partition(body.mesh, boxes[: scene.dim]) for name, body in scene.bodies.items()}
+    return {name: box_partition(body.mesh, boxes[: scene.dim]) for name, body in scene.deforming.items()}
 
 
 def guided(scene: Scene, body: str) -> Scene:

@@ -1,0 +1,55 @@
+"""Motion, force and moment of rigid tools."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact._base.display import displayed
+from fenics_contact._pairing.points import NodeNumbers
+from fenics_contact._scene.tools import ToolBody
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.results.forces import NodalForces, by_node, resultant
+from fenics_contact.results.rigid_motions import RigidMotion
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class ToolResult:
+    """A rigid tool in a state.
+
+    Attributes:
+        displacement: Of its reference point, shape (dim,), [length].
+        rotation: About that point, shape (3,) in space; one number in the plane, positive from x to y; in
+            radians.
+        force: That bodies exert on it by contact, shape (dim,), [force]. It balances what drives the tool:
+            its force, springs, and reactions of prescribed components.
+        moment: Of that force about the reference point, with small displacements where it is before it moves,
+            shape (3,) in space, one number in the plane, [force·length].
+    """
+
+    displacement: np.ndarray
+    rotation: np.ndarray | float
+    force: np.ndarray
+    moment: np.ndarray | float
+
+
+def tool_results(
+    torn: TornSystem, forces: NodalForces, motions: Iterable[RigidMotion]
+) -> dict[str, ToolResult]:
+    """Return the tools of a scene by name."""
+    scene, numbers, found = torn.scene, NodeNumbers.of(torn.scene), {}
+    every = by_node(torn.points, forces.contact, np.arange(torn.points.count))
+    if scene.axisymmetric:  # radial forces around the axis balance each other
+        every = every * [0.0, 1.0]
+    for motion in motions:
+        name = motion.surface.body
+        body = scene.bodies[name]
+        if isinstance(body, ToolBody):
+            nodes = numbers.global_nodes(name, np.arange(body.mesh.n_nodes))
+            point = motion.about + (motion.displacement if scene.deforms_much else 0.0)
+            total = resultant(every[nodes], forces.places[nodes], point)
+            found[name] = ToolResult(motion.displacement, motion.rotation, total.force, total.moment)
+    return found

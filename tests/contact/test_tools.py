@@ -1,0 +1,299 @@
+"""Rigid tools that forces, moments, springs and prescribed motions move, with small displacements."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import (
+    Body,
+    ContactPair,
+    ContactProblem,
+    Coulomb,
+    LoadStep,
+    MovingObstacle,
+    RigidSphere,
+    RigidTool,
+    Scene,
+    State,
+    Support,
+    Surface,
+    ToolMotion,
+    solve_scene,
+    solve_steps,
+)
+from fenics_contact.errors import InfeasibleError, InvalidInputError
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
+from fenics_contact.mesh import quadratic
+from fenics_contact.study.scenes.nested_box import mirrored, nested_box
+from tests.contact.checks import assert_solved
+from tests.contact.tooling import BASE, DOWN, LEFT, PLATE, RIGHT, SOFT, STRAIGHT, TOLERANCE, pressed, sprung
+
+
+def solved(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF) -> State:
+    state = solve_scene(scene, comm, tolerance=TOLERANCE)
+    assert_solved(state, TOLERANCE)
+    return state
+
+
+def test_a_tool_that_moves_as_prescribed_is_the_obstacle_at_its_place() -> None:
+    """The ball comes 0.05 lower: the same as one that lies there, and its reaction is the force on it."""
+    way = (0.0, 0.0, -0.05)
+    driven = solved(pressed(ToolMotion("left", way, STRAIGHT), friction=0.0))
+    lower = RigidSphere((-0.5, 0.0, 1.95), 2.0)
+    scene = Scene(
+        driven.scene.deforming, [BASE],
+        contacts=[ContactPair(Surface("block", "z1"), lower, interference="measured")],
+    )  # fmt: skip
+    still = solved(scene)
+    # Gaps are measured along normals at the place before the tool moves.
+    size = np.abs(still.contact.force).max()
+    np.testing.assert_allclose(driven.contact.force, still.contact.force, atol=3e-3 * size)
+    tool = driven.tools()["left"]
+    np.testing.assert_allclose(tool.displacement, way, atol=1e-15)
+    np.testing.assert_allclose(tool.force, -driven.contact.force.sum(axis=0), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(driven.reactions()["left tool"].force, -tool.force, atol=1e-9 * size)
+    assert driven.balance().imbalance < 1e-10
+
+
+def test_the_force_that_a_prescribed_motion_needs_causes_that_motion() -> None:
+    """Also where points slip; with two tools on one body, and of each other components free."""
+    motion = (
+        ToolMotion("left", (0.01, 0.0, -0.05), (0.0, 0.002, 0.0)),
+        ToolMotion("right", (0, 0, -0.04), STRAIGHT),
+    )
+    given = solved(pressed(*motion, tools=(LEFT, RIGHT)))
+    assert min(given.contact.counts_in_words.count(word) for word in ("stick", "slip", "open")) == 1
+    forces = {name: given.reactions()[f"{name} tool"] for name in ("left", "right")}
+    left, right = forces["left"], forces["right"]
+    loaded = (
+        ToolMotion(
+            "left", (None, 0, None), (0, None, 0), (left.force[0], 0, left.force[2]), (0, left.moment[1], 0)
+        ),
+        ToolMotion("right", DOWN, STRAIGHT, (0, 0, right.force[2])),
+    )
+    found = solved(pressed(*loaded, tools=(LEFT, RIGHT)))
+    np.testing.assert_allclose(found.tools()["left"].displacement, (0.01, 0, -0.05), atol=1e-8)
+    np.testing.assert_allclose(found.tools()["left"].rotation, (0, 0.002, 0), atol=1e-8)
+    np.testing.assert_allclose(found.tools()["right"].displacement, (0, 0, -0.04), atol=1e-8)
+    u, v = (each.gather_displacement("block") for each in (given, found))
+    np.testing.assert_allclose(v, u, atol=1e-7 * np.abs(u).max())
+    assert found.balance().imbalance < 1e-9
+
+
+def test_a_free_plate_tilts_until_its_contact_has_no_moment_about_the_force() -> None:
+    state = solved(
+        pressed(ToolMotion("plate", DOWN, (None, None, 0), (0, 0, -30)), tools=(PLATE,), friction=0.0)
+    )
+    plate = state.tools()["plate"]
+    np.testing.assert_allclose(plate.force, (0, 0, 30.0), atol=1e-9)
+    np.testing.assert_allclose(plate.moment, 0.0, atol=1e-8)
+    assert plate.rotation[1] == pytest.approx(0.00422, rel=0.02)  # type: ignore[index]
+    # All nodes under it lie in its plane.
+    moved = state.gather_displacement("block")[state.contact.points.slave]
+    arms = state.contact_places - np.array(PLATE.at)
+    carried = plate.displacement[2] + np.cross(np.atleast_1d(plate.rotation), arms)[:, 2]
+    closed = state.contact.normal_force > 1e-6
+    assert closed.sum() > 70
+    np.testing.assert_allclose(moved[closed, 2], carried[closed], atol=1e-8)
+
+
+def test_a_spring_takes_what_the_block_leaves() -> None:
+    state = solved(pressed(ToolMotion("left", DOWN, STRAIGHT, (0, 0, -6.0), stiffness=(0, 0, 100.0))))
+    tool = state.tools()["left"]
+    assert tool.displacement[2] < -0.01
+    assert tool.force[2] - 100.0 * tool.displacement[2] == pytest.approx(6.0, rel=1e-9)
+    assert state.balance().beds.force[2] == pytest.approx(-100.0 * tool.displacement[2], rel=1e-9)
+    # It is the tool that a force less that of the spring drives.
+    other = solved(pressed(ToolMotion("left", DOWN, STRAIGHT, (0, 0, -tool.force[2]))))
+    assert other.tools()["left"].displacement[2] == pytest.approx(tool.displacement[2], rel=1e-6)
+
+
+def test_a_spring_holds_a_tool_that_nothing_touches() -> None:
+    high = RigidTool("high", RigidSphere((0, 0, 3.0), 2.0), at=(0, 0, 3.0))
+    springs = {"stiffness": (10.0, 20.0, 40.0), "rotational_stiffness": (5.0, 5.0, 5.0)}
+    motion = ToolMotion("high", force=(1.0, 2.0, -4.0), moment=(0.5, 0, 0), **springs)  # type: ignore[arg-type]
+    state = solved(pressed(motion, tools=(high,)))
+    np.testing.assert_allclose(state.tools()["high"].displacement, (0.1, 0.1, -0.1), rtol=1e-9)
+    np.testing.assert_allclose(state.tools()["high"].rotation, (0.1, 0, 0), atol=1e-9)
+    assert state.contact.normal_force.max() < 1e-9
+
+
+def test_load_steps_change_what_drives_a_tool() -> None:
+    """Loaded, held where a step says, then on a spring; friction remembers."""
+    problem = ContactProblem(
+        pressed(ToolMotion("left", DOWN, STRAIGHT, (0, 0, -3.0))), MPI.COMM_SELF, tolerance=TOLERANCE
+    )
+    motions = [
+        ToolMotion("left", DOWN, STRAIGHT, (0, 0, -3.0)),
+        ToolMotion("left", (0.01, 0.0, -0.02), STRAIGHT),
+        ToolMotion("left", (0.01, 0.0, None), STRAIGHT, (0, 0, -6.0), stiffness=(0, 0, 100.0)),
+    ]
+    steps = [LoadStep(f"{k}", supports=[BASE, motion]) for k, motion in enumerate(motions)]
+    first, second, third = solve_steps(problem, steps)
+    assert first.tools()["left"].force[2] == pytest.approx(3.0, rel=1e-9)
+    np.testing.assert_allclose(second.tools()["left"].displacement, (0.01, 0, -0.02), atol=1e-12)
+    assert second.contact.force[:, 0].sum() > 0.5
+    z = third.tools()["left"].displacement[2]
+    assert third.tools()["left"].force[2] == pytest.approx(6.0 + 100.0 * z, rel=1e-8)
+    at_rest = solve_steps(problem, [LoadStep("away", supports=[BASE])])[0]
+    np.testing.assert_array_equal(at_rest.tools()["left"].displacement, 0.0)
+
+
+def test_tools_press_plane_bodies_and_quadratic_cells() -> None:
+    """A disc on a rectangle, of triangles, and the same by quadratic cells."""
+    disc = RigidTool("disc", RigidSphere((1.0, 4.0), 3.0), at=(1.0, 1.0))
+    motion = ToolMotion("disc", (0.0, None), None, (0.0, -5.0), 0.4)
+    found = []
+    for mesh in (
+        rectangle((0, 0), (2, 1), (24, 12), "triangle"),
+        quadratic(rectangle((0, 0), (2, 1), (16, 8))),
+    ):
+        pair = ContactPair(Surface("block", "y1"), disc, Coulomb(0.5))
+        scene = Scene(
+            {"block": Body(mesh, PlaneStrain(100.0, 0.3))}, [Support("block", "y0"), motion], contacts=[pair]
+        )
+        tool = solved(scene).tools()["disc"]
+        np.testing.assert_allclose(tool.force[1], 5.0, rtol=1e-9)
+        assert tool.moment == pytest.approx(-0.4, abs=1e-8)
+        found.append([*tool.displacement, tool.rotation])
+    np.testing.assert_allclose(found[0], found[1], rtol=0.05, atol=1e-3)
+
+
+def test_a_tool_of_revolution_moves_along_the_axis() -> None:
+    """Force, spring and prescribed motion on bodies of revolution, and what is no motion of these."""
+    ball = RigidTool("ball", RigidSphere((0.0, 2.0), 2.0), at=(0.0, 2.0))
+    body = Body(rectangle((0, -1), (1, 0), (12, 12)), SOFT, axisymmetric=True)
+
+    def under(motion: ToolMotion, tool: RigidTool = ball) -> Scene:
+        pair = ContactPair(Surface("block", "y1"), tool)
+        return Scene({"block": body}, [Support("block", "y0"), motion], contacts=[pair])
+
+    loaded = solved(under(ToolMotion("ball", force=(0, -30.0))))
+    way = loaded.tools()["ball"].displacement
+    moved = solved(under(ToolMotion("ball", (0.0, float(way[1])), 0.0)))
+    for state in (loaded, moved):
+        np.testing.assert_allclose(state.tools()["ball"].force, (0, 30.0), rtol=1e-7)
+        assert state.balance().imbalance < 1e-9
+    sprung = solved(under(ToolMotion("ball", force=(0, -30.0), stiffness=(0, 100.0)))).tools()["ball"]
+    assert sprung.force[1] - 100.0 * sprung.displacement[1] == pytest.approx(30.0, rel=1e-7)
+    with pytest.raises(InvalidInputError, match="can move along the axis alone, got displacement None"):
+        under(ToolMotion("ball", None, 0.1))
+    with pytest.raises(
+        InvalidInputError, match=r"point of tool 'off' must lie on the axis .* got \(1.0, 2.0\)"
+    ):
+        under(ToolMotion("off"), RigidTool("off", ball.shape, (1.0, 2.0)))
+
+
+def test_what_nothing_holds_is_named() -> None:
+    with pytest.raises(
+        InfeasibleError, match=r"body 'left' can move away under the load: translation \(0, 0, 1\)"
+    ):
+        solved(pressed(ToolMotion("left", DOWN, STRAIGHT, (0, 0, 3.0))))
+    with pytest.raises(
+        InfeasibleError, match=r"body 'left' can move away .* rotation \(0, 0, 1\) meets too little"
+    ):
+        solved(pressed(ToolMotion("left", DOWN, (0, 0, None), (0, 0, -3.0), (0, 0, 9.0))))
+    free = solved(pressed(ToolMotion("left", force=(0, 0, -3.0)), friction=0.0))
+    assert len(free.unheld) == 3
+    np.testing.assert_allclose(free.tools()["left"].rotation, 0.0, atol=1e-12)
+
+
+def test_bodies_that_deform_much_need_obstacles_that_move_as_prescribed() -> None:
+    scene = pressed(ToolMotion("left", DOWN, STRAIGHT, (0, 0, -3.0)))
+    rubber = Body(scene.bodies["block"].mesh, NeoHooke(1000.0, 0.3))
+    with pytest.raises(InvalidInputError, match="RigidTool needs linear materials, but 'left' meets bodies"):
+        solve_scene(Scene({"block": rubber}, [BASE], contacts=scene.contacts), MPI.COMM_SELF)
+
+
+def test_effects_and_plan_name_tools() -> None:
+    scene = pressed(ToolMotion("left", DOWN, STRAIGHT, (0, 0, -3.0)))
+    assert [effect.reason for effect in scene.effects()][:3] == [
+        "1 elastic body", "1 support", "1 tool moves as one piece",
+    ]  # fmt: skip
+    plan = scene.plan()
+    assert plan.contacts[0].master == "left (RigidSphere)"
+    assert plan.contacts[0].approach is not None
+    assert list(scene.partition(3)) == ["block"]
+    assert [pair.place for pair in scene.contacts] == ["block z1 on left"]
+    still = pressed()
+    assert still.supports[-1].in_words == "left tool as rigid: displacement (0, 0, 0), rotation (0, 0, 0)"
+
+
+@pytest.mark.parametrize(
+    ("scene", "message"),
+    [
+        (lambda: pressed(ToolMotion("lft", DOWN)), r"tool 'lft', .* of the scene have \['left'\]"),
+        (lambda: pressed(*[ToolMotion("left", DOWN)] * 2), "'left' must have one ToolMotion, got"),
+        (lambda: pressed(tools=(LEFT, RigidTool("left", PLATE.shape, (0, 0, 0)))), "two different"),
+        (lambda: pressed(tools=(RigidTool("block", PLATE.shape, (0, 0, 0)),)), r"names, got \['block'\]"),
+        (lambda: pressed(tools=(RigidTool("l", RigidSphere((0, 0), 1.0), (0, 0)),)), "'l' lies in 2 dim"),
+        (lambda: RigidTool("l", LEFT, (0, 0, 0)), "must not move"),
+        (lambda: RigidTool("l", MovingObstacle(PLATE.shape, lambda t: (None, (0, 0, t))), (0, 0, 0)), "not"),
+        (lambda: RigidTool("l", PLATE.shape, (0, 0)), "a point of 3 finite coordinates, as its"),
+        (lambda: pressed(ToolMotion("left", stiffness=(0, 1))), "have 3 stiffnesses"),
+        (lambda: pressed(ToolMotion("left", stiffness=(0, 0, -1.0))), "zero or positive, got"),
+        (lambda: pressed(ToolMotion("left", (0, 0, 0), stiffness=(0, 0, 1.0))), "must act on free"),
+        (lambda: pressed(ToolMotion("left", (0, 0, 0), force=(0, 0, 1.0))), "of body 'left' must"),
+    ],
+)  # fmt: skip
+def test_tools_that_cannot_be_are_refused(scene: object, message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        scene()  # type: ignore[operator]
+
+
+CASE = """
+from mpi4py import MPI
+from fenics_contact import box_partition, solve_scene
+from tests.contact.tooling import sprung
+scene = sprung()
+cut = {"block": box_partition(scene.bodies["block"].mesh, (2, 2, 1))}
+tools = solve_scene(scene, MPI.COMM_WORLD, partitions=cut, tolerance=1e-10).tools()
+if MPI.COMM_WORLD.rank == 0:
+    print(*[*tools["left"].displacement, *tools["left"].rotation, *tools["right"].displacement])
+"""
+
+
+@pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=[pytest.mark.slow, pytest.mark.claim])])
+def test_tools_move_alike_on_any_number_of_ranks(mpirun: Callable[..., str], ranks: int) -> None:
+    found = np.array(mpirun(CASE, ranks).split(), dtype=float)
+    left, right = (solved(sprung()).tools()[name] for name in ("left", "right"))
+    alone = np.array([*left.displacement, *np.atleast_1d(left.rotation), *right.displacement])
+    np.testing.assert_allclose(found, alone, atol=1e-9 * np.abs(alone).max())
+
+
+def hertz(size: int) -> tuple[Scene, float]:
+    """A quarter of a half space under a rigid ball, by a force; and the peak."""
+    young, ratio, radius = 1000.0, 0.3, 1000.0
+    modulus = young / (1.0 - ratio**2)
+    force = 4.0 * modulus / (3.0 * radius)  # contact radius 1
+    mesh = mirrored(nested_box(1.25, 40.0, size, "hexahedron"))
+    ball = RigidTool("ball", RigidSphere((0, 0, radius), radius), at=(0, 0, 0))
+    guides = [Support("block", side, (0.0, None, None)) for side in ("x0", "x1")]
+    guides += [Support("block", side, (None, 0.0, None)) for side in ("y0", "y1")]
+    guides.append(Support("block", "z0", (None, None, 0.0)))
+    bodies = {"block": Body(mesh, IsotropicElasticity(young, ratio))}
+    pair = ContactPair(Surface("block", "z1"), ball)
+    by_force = ToolMotion("ball", DOWN, STRAIGHT, (0, 0, -force / 4.0))
+    return Scene(bodies, [*guides, by_force], contacts=[pair]), 1.5 * force / np.pi
+
+
+@pytest.mark.slow
+@pytest.mark.claim
+def test_a_ball_under_a_force_has_the_pressure_of_hertz_to_a_percent() -> None:
+    """And takes at most twice the seconds of the ball that is moved by as much."""
+    loaded, peak = hertz(8)
+    start = time.perf_counter()
+    state = solve_scene(loaded, MPI.COMM_SELF)
+    by_force = time.perf_counter() - start
+    assert state.contact.pressure.max() == pytest.approx(peak, rel=0.01)
+    way = ToolMotion("ball", tuple(map(float, state.tools()["ball"].displacement)), STRAIGHT)
+    moved = Scene(loaded.deforming, [*loaded.supports[:-1], way], contacts=loaded.contacts)
+    start = time.perf_counter()
+    solve_scene(moved, MPI.COMM_SELF)
+    assert by_force < 2.0 * (time.perf_counter() - start)
