@@ -39,6 +39,19 @@ def test_the_sign_is_right_at_edges_and_corners_that_point_in() -> None:
     np.testing.assert_array_equal(body.distance(x) < 0, inside)
 
 
+def test_the_sign_is_right_at_edges_sharper_than_a_right_angle() -> None:
+    """Beyond such an edge points lie behind one of its triangles: only their mean normal has the sign."""
+    tip = np.array([[0, -1, 0.05], [0, 1, 0.05], [0, 1, -0.05], [0, -1, -0.05], [2, -1, 0], [2, 1, 0]])
+    sides = [[0, 4, 1], [4, 5, 1], [3, 2, 4], [4, 2, 5], [0, 1, 3], [1, 2, 3], [0, 3, 4], [1, 5, 2]]
+    blade = Triangulation(tip, np.array(sides))
+    x = np.random.default_rng(3).uniform(-1.0, 1.0, (4000, 3)) * np.array([0.3, 0.9, 0.3]) + np.array(
+        [2.0, 0, 0]
+    )
+    inside = (x[:, 0] < 2.0) & (np.abs(x[:, 2]) < 0.05 * (1.0 - x[:, 0] / 2.0))
+    assert 5 < inside.sum() < 1000
+    np.testing.assert_array_equal(blade.distance(x) < 0, inside)
+
+
 def test_the_closest_triangle_is_that_of_all() -> None:
     points, triangles = ball(300)
     corners = points[triangles] * np.array([1.0, 0.05, 3.0])  # slivers
