@@ -88,7 +88,7 @@ class DeformedEquilibria:
         with timer.phase("assemble"):
             load = self._loading(scene, time, step, overlap)
             if scene.preloads and isinstance(before, DeformedState) and acted is not None:
-                acted = _drawn_as(before, acted, load)
+                acted = drawn_as(before, acted, load)
             if acted is None:
                 check_held(load.torn)
             if self._unresisted is None:  # supports stay what they are in later steps
@@ -145,7 +145,7 @@ class DeformedEquilibria:
         return load
 
 
-def _drawn_as(before: DeformedState, acted: Loading, load: Loading) -> Loading:
+def drawn_as(before: DeformedState, acted: Loading, load: Loading) -> Loading:
     """Return the load of the state before with the sections free that are now. Collective.
 
     Those that were held have the force that they transmitted, those that were free are held where they were.

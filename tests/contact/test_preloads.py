@@ -10,6 +10,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import (
+    AutomaticSteps,
     Body,
     Checkpoint,
     ContactPair,
@@ -27,7 +28,9 @@ from fenics_contact import (
     solve_steps,
 )
 from fenics_contact.__main__ import main
+from fenics_contact._equilibrium.deformed import drawn_as
 from fenics_contact.errors import InfeasibleError, InvalidInputError
+from fenics_contact.feti.preloads import shortening_scales
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke
 from fenics_contact.output import read_result
@@ -386,7 +389,9 @@ def test_a_joint_of_rubber_is_tightened_held_pulled_and_tightened_again():
     scene = Scene(bodies, scene.supports, contacts=scene.contacts, ties=scene.ties, preloads=scene.preloads)
     again = LoadStep("again", loads=[], preloads=[Preload("bolt", MIDDLE, force=70.0)])
     steps = [LoadStep("tighten"), pulled(20.0), pulled(100.0), again]
-    tightened, little, apart, more = solve_steps(ContactProblem(scene, MPI.COMM_SELF), steps)
+    problem = ContactProblem(scene, MPI.COMM_SELF, steps=AutomaticSteps(first=0.5))
+    tightened, little, apart, more = solve_steps(problem, steps)
+    assert more.fractions == (0.5, 1.0)
     length = tightened.preloads()["bolt"].shortening
     for state, force in ((tightened, 50.0), (apart, 100.0), (more, 70.0)):
         assert state.preloads()["bolt"].force == pytest.approx(force, rel=1e-6)
@@ -396,6 +401,13 @@ def test_a_joint_of_rubber_is_tightened_held_pulled_and_tightened_again():
     sleeve = little.contact.normal_force.sum()
     assert little.preloads()["bolt"].force == pytest.approx(20.0 + sleeve, rel=1e-5)
     assert more.contact.normal_force.sum() == pytest.approx(70.0, rel=1e-5)
+    # On the way forces start from what held bolts carried, and lengths from where free ones were.
+    half = more.load.between(drawn_as(apart, apart.load, more.load), 0.5)
+    assert half.torn.free.load * shortening_scales(scene) == pytest.approx(85.0, rel=1e-6)
+    half = little.load.between(drawn_as(tightened, tightened.load, little.load), 0.5)
+    open_ = half.torn.right - half.torn.jump(tightened.torn_displacement)
+    ties = slice(half.torn.n_gluing, half.torn.n_equality)
+    assert np.abs(half.torn.numbering.gather(open_, np.arange(half.torn.n_equality))[ties]).max() < 1e-6
     # Both get stiffer or softer by their strains: the load factor is 0.4 to some percent.
     assert (little.preloads()["bolt"].force - 50.0) / 20.0 == pytest.approx(0.4, abs=0.05)
 
