@@ -5,7 +5,7 @@ What a script needs is here; nothing is loaded before it is used:
 Scenes: Scene, Body, BodyMesh, Surface, Support, Roller, RigidSurface, ContactPair, Tie, CyclicSymmetry,
     AutomaticContact, LoadStep, Preload, Section, ElasticFoundation, box_partition
 
-Laws of surfaces: Coulomb, Tresca, FrictionTable, FrictionCurve, LinearClosure, ExponentialClosure,
+Laws of surfaces: Coulomb, Tresca, FrictionTable, FrictionCurve, SlipTable, LinearClosure, ExponentialClosure,
     ClosureTable, ClosureLaw, FluidPressure
 
 Rigid obstacles: RigidPlane, RigidSphere, RigidCylinder, DistanceObstacle, MovingObstacle,
@@ -107,6 +107,7 @@ if TYPE_CHECKING:
     from fenics_contact._scene.surface_laws import FrictionCurve as FrictionCurve
     from fenics_contact._scene.surface_laws import FrictionTable as FrictionTable
     from fenics_contact._scene.surface_laws import LinearClosure as LinearClosure
+    from fenics_contact._scene.surface_laws import SlipTable as SlipTable
     from fenics_contact._scene_file.reading import read_scene_file as read_scene_file
     from fenics_contact.design.design import SurfaceDesign as SurfaceDesign
     from fenics_contact.design.problem import ShapeProblem as ShapeProblem

@@ -141,13 +141,14 @@ class LinearEquilibria:
         # Derivatives need the status of every contact point, which a balanced state leaves uncertain.
         if tolerance is None and (self._solver is not None or design):
             tolerance = solver.tolerance
-        if any(pair.fluid is not None for pair in scene.contacts):
+        if any(pair.fluid is not None or pair.slip_table is not None for pair in scene.contacts):
             if design:
                 raise InvalidInputError(
-                    "derivatives by the shape are not available with fluid that enters a contact: load the "
-                    "wetted surfaces by Pressure"
+                    "derivatives by the shape are not available with fluid that enters a contact, nor with "
+                    "friction by slip: load the wetted surfaces by Pressure, or give a number or a function "
+                    "of the place"
                 )
-            return self._penetrated(torn, tolerance, solver, known or start, before)
+            return self._by_passes(torn, tolerance, solver, known or start, before)
         system = DualSystem(torn, self._timer, previous=reused)
         first = _start_from(start, system)
         solve = solve_dual if reused is None else FollowedLoads(reused, self._timer).solve
@@ -157,7 +158,7 @@ class LinearEquilibria:
             solution = solve(system, solver.with_tolerance(tolerance), first)
         return self._state(system, solution, tolerance=tolerance)
 
-    def _penetrated(
+    def _by_passes(
         self,
         torn: TornSystem,
         tolerance: Tolerance,
@@ -165,9 +166,7 @@ class LinearEquilibria:
         known: State | None,
         before: State | None,
     ) -> LinearState:
-        """Compute the state in which fluid is where contact is open to it. Collective."""
-        from fenics_contact._equilibrium.penetration import penetrated
-
+        """Compute a state whose fluid is where contact is open, or friction fits its slip. Collective."""
         # The front needs the status of every point, which a balanced state leaves uncertain.
         wanted = tolerance if isinstance(tolerance, float) else solver.tolerance
 
@@ -178,6 +177,12 @@ class LinearEquilibria:
                 solution = solve_dual(system, solver.with_tolerance(wanted), _start_from(last, system))
             return self._state(system, solution, tolerance=wanted)
 
+        if any(pair.slip_table is not None for pair in torn.scene.contacts):
+            from fenics_contact._equilibrium.slip_dependence import consistent
+
+            return consistent(solve, torn, known, before, wanted)
+        from fenics_contact._equilibrium.penetration import penetrated
+
         return penetrated(solve, torn, known, before)
 
     def restored(self, stored: Stored, scene: Scene, known: State | None) -> LinearState:
@@ -187,6 +192,10 @@ class LinearEquilibria:
             return self._directly(torn, known)
         with self._timer.phase("assemble"):
             torn = with_stored_slip(torn, stored)
+        if "coefficient" in stored:
+            from fenics_contact._equilibrium.slip_dependence import with_coefficients
+
+            torn = with_coefficients(torn, stored["coefficient"])
         if "wet" in stored:
             from fenics_contact._equilibrium.penetration import Front
 

@@ -58,7 +58,12 @@ def stored_state(state: State) -> dict[str, np.ndarray]:
         "motion": np.asarray(solution.alpha),
         **held_lengths(state.scene),
         **({} if torn.fluid is None else {"wet": torn.fluid.wet}),
+        **({"coefficient": torn.friction_coefficient} if _by_slip(state.scene) else {}),
     }
+
+
+def _by_slip(scene: Scene) -> bool:
+    return any(pair.slip_table is not None for pair in scene.contacts)
 
 
 def held_lengths(scene: Scene) -> dict[str, np.ndarray]:

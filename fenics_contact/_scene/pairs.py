@@ -13,7 +13,13 @@ from fenics_contact._base.display import name_in_words
 from fenics_contact._scene.fields import OfPosition, evaluate
 from fenics_contact._scene.fluid import FluidPressure
 from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
-from fenics_contact._scene.surface_laws import ClosureLaw, FrictionCurve, check_closing, check_rising
+from fenics_contact._scene.surface_laws import (
+    ClosureLaw,
+    FrictionCurve,
+    SlipTable,
+    check_closing,
+    check_rising,
+)
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 
@@ -52,7 +58,8 @@ class Coulomb:
     Attributes:
         friction_coefficient: Friction coefficient μ ≥ 0, dimensionless. Zero is frictionless contact. A
             function receives points of the slave, shape (n, dim), and returns μ there, shape (n,). One that
-            depends on the pressure is a `FrictionTable`, or a `FrictionCurve` of your own.
+            depends on the pressure is a `FrictionTable`, or a `FrictionCurve` of your own; on the slip, with
+            linear materials, a `SlipTable`.
         shear_limit: Largest friction traction by undeformed area, > 0, whatever the pressure, [force /
             length²], such as the shear strength of the softer body; a number, or a function of points as
             before. None: no limit.
@@ -64,7 +71,7 @@ class Coulomb:
         >>> dry = Coulomb(FrictionTable(pressure=(0.0, 100.0), coefficient=(0.3, 0.2)))
     """
 
-    friction_coefficient: float | OfPosition | FrictionCurve
+    friction_coefficient: float | OfPosition | FrictionCurve | SlipTable
     shear_limit: float | OfPosition | None = None
     stick_stiffness: float | None = None
 
@@ -79,7 +86,9 @@ class Coulomb:
             )
         if isinstance(given, FrictionCurve):
             check_rising(given)
-        elif not (callable(given) or (np.isfinite(given) and given >= 0)):
+        elif not isinstance(given, SlipTable) and not (
+            callable(given) or (np.isfinite(given) and given >= 0)
+        ):
             raise InvalidInputError(
                 f"friction_coefficient must be zero or positive, got {given!r}: "
                 "steel on steel has about 0.3; omit friction for a frictionless pair"
@@ -249,6 +258,12 @@ class ContactPair:
         return given if isinstance(given, FrictionCurve) else None
 
     @property
+    def slip_table(self) -> SlipTable | None:
+        """How the friction coefficient follows the slip; None where it does not."""
+        given = self.friction.friction_coefficient if isinstance(self.friction, Coulomb) else None
+        return given if isinstance(given, SlipTable) else None
+
+    @property
     def shear_limit(self) -> float | OfPosition | None:
         """Largest friction traction, whatever the pressure; None if there is none."""
         return self.friction.shear_limit if isinstance(self.friction, Coulomb) else None
@@ -264,6 +279,8 @@ class ContactPair:
         match self.friction:
             case Coulomb(friction_coefficient=FrictionCurve() as curve):
                 return curve.largest_coefficient
+            case Coulomb(friction_coefficient=SlipTable(coefficient=values)):
+                return max(values)
             case Coulomb(friction_coefficient=value) | Tresca(traction=value):
                 return value
         return 0.0

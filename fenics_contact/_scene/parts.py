@@ -92,6 +92,8 @@ class SceneParts:
                 self._require_deforming(pair)
             if isinstance(pair, ContactPair) and pair.fluid is not None:
                 self._require_inlet(pair)
+            if isinstance(pair, ContactPair) and pair.slip_table is not None:
+                self._require_slip_alone(pair)
             if isinstance(pair, ContactPair) and pair.stick_stiffness is not None and self.deforms_much:
                 raise InvalidInputError(
                     f"the stick stiffness of {pair.place} needs small displacements, but some body deforms "
@@ -242,6 +244,15 @@ class SceneParts:
                 f"an obstacle must lie in the space of the bodies, {type(obstacle).__name__} is for {dim} "
                 f"dimensions and the bodies have {self.dim}: give it {self.dim} coordinates, or in the plane "
                 "a RigidSphere for a round bar"
+            )
+
+    def _require_slip_alone(self, pair: ContactPair) -> None:
+        """Reject friction by slip with nonlinear materials or with fluid in a contact."""
+        nonlinear = any(is_nonlinear(m) for body in self.bodies.values() for m in body.materials)
+        if nonlinear or any(each.fluid is not None for each in self.contacts):
+            raise InvalidInputError(
+                f"the SlipTable of {pair.place} needs linear materials and no fluid in contacts: give the "
+                "coefficient of each load step as a number or a function of the place"
             )
 
     def _require_inlet(self, pair: ContactPair) -> None:

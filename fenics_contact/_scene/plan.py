@@ -78,7 +78,10 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
     wetted = sum(pair.fluid is not None for pair in scene.contacts)
     sprung = sum(pair.has_friction and pair.stick_stiffness is not None for pair in scene.contacts)
     soft = sum(pair.closure is not None for pair in scene.contacts)
-    curved = sum(pair.friction_curve is not None or pair.shear_limit is not None for pair in scene.contacts)
+    by_slip = sum(pair.slip_table is not None for pair in scene.contacts)
+    curved = by_slip + sum(
+        pair.friction_curve is not None or pair.shear_limit is not None for pair in scene.contacts
+    )
     fixed, rough = "has a fixed slip bound", "has a friction coefficient above zero"
     found = (
         (names.ELASTICITY, len(scene.bodies) - tools, "elastic body", "elastic bodies"),

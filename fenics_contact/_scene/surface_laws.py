@@ -123,6 +123,51 @@ class FrictionTable(FrictionCurve):
         return np.asarray(np.interp(pressure, p, mu) + slope[np.searchsorted(p, pressure)] * pressure)
 
 
+@dataclass(frozen=True)
+@checked()
+class SlipTable:
+    """A friction coefficient that depends on the slip of a point, as from static to kinetic friction.
+
+    Linear between values, constant beyond them. The slip is the tangential displacement that has been left
+    behind over all load steps, its length and not its way.
+
+    Attributes:
+        slip: Slips ≥ 0, ascending, [length].
+        coefficient: The coefficient μ ≥ 0 at each of them. Where it falls fast there may be several states.
+
+    Raises:
+        InvalidInputError: If the numbers do not fit each other.
+
+    Example:
+        >>> table = SlipTable(slip=(0.0, 0.01), coefficient=(0.3, 0.2))
+        >>> table.at(np.array([0.005, 1.0]))
+        array([0.25, 0.2 ])
+    """
+
+    slip: Sequence[float]
+    coefficient: Sequence[float]
+
+    def __post_init__(self) -> None:
+        """Reject incomplete tables."""
+        s, mu = (np.array(each, dtype=np.float64) for each in (self.slip, self.coefficient))
+        if not (
+            s.ndim == 1 and s.shape == mu.shape and len(s) > 1 and s[0] >= 0 and (np.diff(s) > 0).all()
+            and np.isfinite(s).all() and np.isfinite(mu).all() and (mu >= 0).all()
+        ):  # fmt: skip
+            raise InvalidInputError(
+                "SlipTable needs two or more slips of at least zero in ascending order, and a coefficient of "
+                f"at least zero for each, got {self.slip!r} and {self.coefficient!r}"
+            )
+
+    def at(self, slip: np.ndarray) -> np.ndarray:
+        """Return the coefficients at slips, shape (n,).
+
+        Args:
+            slip: Lengths of slips, shape (n,), [length].
+        """
+        return np.asarray(np.interp(slip, self.slip, self.coefficient))
+
+
 def check_rising(curve: FrictionCurve, decades: int = 12) -> None:
     """Reject a curve that falls, or starts above zero; pressures of ``decades`` above and below one."""
     p = np.concatenate([[0.0], np.logspace(-decades, decades, 40 * decades + 1)])

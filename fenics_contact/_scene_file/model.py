@@ -192,7 +192,10 @@ FRICTION_LAWS = (
         pairs.Coulomb,
         law="coulomb",
         friction_coefficient=(
-            field_or(table_of(surface_laws.FrictionTable), "{pressure = [...], coefficient = [...]}"),
+            field_or(
+                table_of(surface_laws.FrictionTable) | table_of(surface_laws.SlipTable),
+                "{pressure = [...], coefficient = [...]}, or {slip = [...], coefficient = [...]}",
+            ),
             Field(
                 alias="coefficient",
                 description="friction coefficient; a table is linear between pressures, constant beyond",

@@ -278,6 +278,9 @@ def test_laws_of_surfaces_are_those_of_the_package() -> None:
         (found,) = file_of(contacts=[pair]).scene.contacts
         assert found.closure == law
         assert found.friction == pairs.Coulomb(surface_laws.FrictionTable((1.0, 5.0), (0.3, 0.2)), 2.0)
+    by_slip = {"law": "coulomb", "coefficient": {"slip": [0, 0.1], "coefficient": [0.3, 0.2]}}
+    (rubbed,) = file_of(contacts=[{"slave": slave, "master": FLOOR, "friction": by_slip}]).scene.contacts
+    assert rubbed.friction == pairs.Coulomb(surface_laws.SlipTable((0.0, 0.1), (0.3, 0.2)))
     fluid = {"pressure": 2, "enters": "x0", "critical": 1}
     (wet,) = file_of(contacts=[{"slave": slave, "master": FLOOR, "fluid": fluid}]).scene.contacts
     assert wet.fluid == FluidPressure(2.0, "x0", 1.0)

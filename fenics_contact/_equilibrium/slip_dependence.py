@@ -1,0 +1,93 @@
+"""Friction coefficients that depend on the slip: solved again until coefficients and slips agree."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from fenics_contact._base.display import counted
+from fenics_contact.errors import ConvergenceError
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.qp.solution import DualSolution, SolverStep
+from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.state import State
+
+#: Solves a system from the state before, if there is one.
+Solve = Callable[[TornSystem, LinearState | None], LinearState]
+
+
+def coefficients(torn: TornSystem, slip: np.ndarray) -> np.ndarray:
+    """Return μ of the frictional points at slips of all points, shape (n, dim − 1); others keep theirs."""
+    result, way = torn.friction_coefficient.copy(), np.linalg.norm(slip, axis=1)[torn.frictional]
+    pairs = torn.points.pair[torn.frictional]
+    for number, pair in enumerate(torn.scene.contacts):
+        if pair.slip_table is not None:
+            result[pairs == number] = pair.slip_table.at(way[pairs == number])
+    return result
+
+
+def with_coefficients(torn: TornSystem, coefficient: np.ndarray) -> TornSystem:
+    """Return a system with other friction coefficients of its frictional points."""
+    strengths = torn.strengths
+    if strengths is not None:
+        strengths = replace(strengths, coefficient=coefficient)
+    return replace(torn, friction_coefficient=coefficient, strengths=strengths)
+
+
+def consistent(
+    solve: Solve,
+    torn: TornSystem,
+    known: State | None,
+    before: State | None,
+    tolerance: float,
+    *,
+    max_passes: int = 60,
+    progress: float = 0.7,
+    least: float = 0.05,
+) -> LinearState:
+    """Return the state whose friction coefficients are those of its slips. Collective.
+
+    Every pass is one solution at given coefficients. They are taken over whole, and by a smaller part where
+    slip bounds do not get closer to each other, as where friction falls faster with the slip than bodies are
+    stiff: there may be several states, or none.
+
+    `tolerance`: largest change of a slip bound relative to the largest; `progress`: factor on that change
+    below which a pass makes progress; `least`: smallest part of new coefficients before giving up.
+
+    Raises:
+        ConvergenceError: If they do not agree; carries the history of all passes.
+    """
+    slip = np.zeros((torn.points.count, torn.dim - 1)) if before is None else before.contact.total_slip
+    mu, part, last = coefficients(torn, slip), 1.0, np.inf
+    state = known if isinstance(known, LinearState) else None
+    history: list[SolverStep] = []
+    products = passes = 0
+    while passes < max_passes and part >= least:
+        state, passes = solve(with_coefficients(torn, mu), state), passes + 1
+        solution, contact = state.solution, state.contact
+        assert isinstance(solution, DualSolution)
+        target = coefficients(torn, contact.total_slip)
+        pressed = contact.normal_force[torn.frictional]
+        size = float((np.maximum(mu, target) * pressed).max(initial=0.0))
+        change = float((np.abs(target - mu) * pressed).max(initial=0.0)) / (size or 1.0)
+        steps = [
+            replace(each, products=each.products + products, outer=passes - 1) for each in solution.history
+        ]
+        words = f"slip pass {passes}: slip bounds changed by {change:.1e}"
+        steps[-1] = replace(steps[-1], note=f"{steps[-1].note}; {words}")
+        history, products = [*history, *steps], products + solution.products
+        if change <= tolerance:
+            found = replace(solution, history=tuple(history), iterations=len(history), products=products)
+            return replace(state, solution=found)
+        if change > progress * last:
+            part *= 0.5
+        mu, last = (1.0 - part) * mu + part * target, change
+    raise ConvergenceError(
+        f"friction coefficients must agree with the slips, but after {counted(passes, 'pass', 'passes')} "
+        f"slip bounds still change by {last:.1e} of the largest: friction that falls with the slip faster "
+        "than bodies are stiff has several states or none, as in stick-slip; take smaller load steps, drive "
+        "the bodies by displacements, or let the coefficient fall over a longer slip",
+        history,
+    )

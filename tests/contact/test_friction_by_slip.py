@@ -1,0 +1,99 @@
+"""Friction coefficients that depend on the slip: closed forms of a rigid block, steps, and states that are
+none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import (
+    Body,
+    ContactPair,
+    ContactProblem,
+    Coulomb,
+    LinearClosure,
+    LoadStep,
+    Scene,
+    SlipTable,
+    State,
+    Support,
+    Surface,
+    solve_steps,
+)
+from fenics_contact._equilibrium import slip_dependence
+from fenics_contact._equilibrium.steps import stored_state
+from fenics_contact.errors import ConvergenceError, InvalidInputError
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity, NeoHooke
+from tests.contact.law_cases import FLOOR, dragged_block, solved
+
+TABLE = SlipTable(slip=(0.0, 0.1, 0.2), coefficient=(0.4, 0.2, 0.3))
+PRESSURE, AREA = 10.0, 2.0
+
+
+def test_a_rigid_block_has_the_friction_of_its_slip_over_load_steps() -> None:
+    mesh, stiff = block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (2, 1, 1)), IsotropicElasticity(1e9, 0.0)
+    pair = ContactPair(Surface("block", "z0"), FLOOR, Coulomb(TABLE), closure=LinearClosure(1e6))
+    down = -PRESSURE / 1e6
+    flat, ways = Support("block", "z0", (None, None, down)), (0.05, 0.15, 0.3, 0.12)
+    tops = [Support("block", "z1", (0.6 * x, 0.8 * x, down)) for x in ways]
+    steps = [LoadStep(f"{x}", supports=[flat, top]) for x, top in zip(ways, tops, strict=True)]
+    scene = Scene({"block": Body(mesh, stiff)}, contacts=[pair])
+    states = solve_steps(ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-8), steps)
+    for x, sign, state in zip(ways, (1, 1, 1, -1), states, strict=True):
+        force = -state.contact.force.sum(axis=0)[:2] @ (0.6, 0.8)
+        expected = sign * float(TABLE.at(np.array([x]))[0]) * PRESSURE * AREA
+        assert force == pytest.approx(expected, rel=1e-5)
+    notes = [step.note for step in states[0].solution.history if "slip pass" in step.note]
+    assert 2 <= len(notes) <= 6
+
+
+def test_bodies_that_give_way_agree_with_their_slips_point_by_point() -> None:
+    table = SlipTable((0.0, 0.004), (0.4, 0.3))
+    contact = solved(dragged_block(Coulomb(table), 6.0, shift=0.005)).contact
+    slip = np.linalg.norm(contact.total_slip, axis=1)
+    assert slip.max() > 2.0 * slip.min()
+    np.testing.assert_allclose(contact.slip_bound, table.at(slip) * contact.normal_force, rtol=1e-6)
+    constant = solved(dragged_block(Coulomb(SlipTable((0.0, 1.0), (0.3, 0.3))), 6.0, shift=0.005))
+    plain = solved(dragged_block(Coulomb(0.3), 6.0, shift=0.005))
+    np.testing.assert_allclose(constant.contact.friction_force, plain.contact.friction_force, atol=1e-8)
+    assert constant.solution.products == plain.solution.products
+
+
+def test_a_stored_state_keeps_its_coefficients() -> None:
+    scene = dragged_block(Coulomb(SlipTable((0.0, 0.004), (0.4, 0.3))), 6.0, shift=0.005)
+    problem = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-9)
+    state = problem.solve()
+    found = problem._linear(scene).restored(stored_state(state), scene, None)
+    np.testing.assert_allclose(found.contact.slip_bound, state.contact.slip_bound, rtol=1e-9)
+    assert found.solution.residuals.within(1e-7)  # type: ignore[union-attr]
+
+
+def test_coefficients_that_do_not_agree_are_an_error_with_their_history() -> None:
+    state: State = solved(dragged_block(Coulomb(SlipTable((0.0, 0.1), (0.4, 0.1))), 6.0))
+    slips = [0.0, 0.1]
+
+    def solve(torn: Any, last: Any) -> Any:
+        slips.reverse()
+        slip = np.full_like(state.contact.slip, slips[0])
+        return replace(state, contact=replace(state.contact, slip=slip, slip_before=0.0 * slip))
+
+    with pytest.raises(
+        ConvergenceError, match=r"must agree with the slips, .* as in stick-slip; take"
+    ) as error:
+        slip_dependence.consistent(solve, state.torn, None, None, 1e-6)
+    assert "slip pass 3" in error.value.history[-1].note or len(error.value.history) > 3
+
+
+def test_bad_tables_and_scenes_are_refused() -> None:
+    with pytest.raises(
+        InvalidInputError, match="SlipTable needs two or more slips of at least zero in ascending"
+    ):
+        SlipTable((0.1, 0.0), (0.1, 0.2))
+    scene = dragged_block(Coulomb(TABLE), 1.0)
+    with pytest.raises(InvalidInputError, match="needs linear materials and no fluid in contacts"):
+        replace(scene, bodies={"block": Body(scene.bodies["block"].mesh, NeoHooke(1.0, 0.3))})
