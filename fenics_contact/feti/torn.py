@@ -447,7 +447,11 @@ class TornSystem:
         force = np.zeros(len(self.numbering.owned))
         place = self.numbering.owned_index(self.normal_rows)
         force[place[place >= 0]] = (pressure * self.points.area)[place >= 0]
-        return replace(self, fluid=FluidLoad(-self.force(force), wet))
+        free = self.free
+        if free.count:  # it presses tools that are free to move, too
+            on_points = np.asarray(self.numbering.comm.allreduce(free.columns.T @ force))
+            free = replace(free, load=free.load + on_points)
+        return replace(self, fluid=FluidLoad(-self.force(force), wet), free=free)
 
 
 def build_torn_system(

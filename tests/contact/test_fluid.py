@@ -16,9 +16,13 @@ from fenics_contact import (
     Coulomb,
     FluidPressure,
     LinearState,
+    RigidTool,
     ShapeProblem,
     Status,
+    Support,
     SurfaceDesign,
+    ToolMotion,
+    solve_scene,
 )
 from fenics_contact._equilibrium import penetration
 from fenics_contact._equilibrium.steps import stored_state
@@ -26,7 +30,7 @@ from fenics_contact.design import TotalPotential
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.materials import NeoHooke
 from tests.contact.fluid_case import FLUID, both_ends, seal
-from tests.contact.law_cases import solved
+from tests.contact.law_cases import FLOOR, solved
 
 
 def test_a_seal_in_fluid_is_the_dry_one_in_uniform_pressure() -> None:
@@ -87,6 +91,23 @@ def test_load_steps_go_on_from_the_front_that_there_was() -> None:
     np.testing.assert_array_equal(again.contact.wet, first.contact.wet)
     assert sum("fluid pass" in step.note for step in again.solution.history) == 1
     assert again.solution.products < 0.5 * first.solution.products
+
+
+def test_fluid_presses_a_tool_that_a_force_drives() -> None:
+    # The tool lies below the seal, whose upper side is held: both fluid and contact balance the force.
+    scene, force = seal(FluidPressure(2.0, "x0"), extra=0.0), 12.0
+    tool = RigidTool("floor", FLOOR, at=(1.5, 0.5, 0.0))
+    driven = ToolMotion("floor", (0.0, 0.0, None), (0.0, 0.0, 0.0), force=(0.0, 0.0, force))
+    held = [Support("seal", "z1"), driven]
+    pair = replace(scene.contacts[0], master=tool)
+    state = solve_scene(
+        replace(scene, supports=held, loads=[], contacts=[pair]), MPI.COMM_SELF, tolerance=1e-9
+    )
+    contact = state.contact
+    assert contact.wet is not None
+    wet = 2.0 * contact.area[contact.wet].sum()
+    assert wet > 0.5
+    assert contact.normal_force.sum() + wet == pytest.approx(force, rel=1e-6)
 
 
 def test_a_stored_state_keeps_its_fluid() -> None:
