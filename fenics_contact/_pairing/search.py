@@ -35,7 +35,6 @@ from fenics_contact._pairing.projection import (
     warn_of_surface,
     warn_of_uneven_pressure,
 )
-from fenics_contact._pairing.sectors import check_sides, with_turn
 from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
 from fenics_contact._scene.pair_geometry import master_share
@@ -388,6 +387,8 @@ def _measured(
     else:
         master = _Side.of(scene, pair.master, pair.geometry, numbers, finer)
         if isinstance(pair, CyclicSymmetry):
+            from fenics_contact._pairing.sectors import check_sides
+
             master = master.turned(pair, scene.sector_angle(pair))
             with together(comm):
                 check_sides(pair, scene.sector_angle(pair), slave.surface, master.surface)
@@ -403,7 +404,8 @@ def _measured(
                 held = ~movable | np.isin(slave.nodes, points.slave)
                 warn_of_edge(pair, slave.surface, held, master.surface, comm)
         if isinstance(pair, CyclicSymmetry):
-            points = with_turn(points, pair.matrix(scene.sector_angle(pair)))
+            turn = np.tile(pair.matrix(scene.sector_angle(pair)), (points.count, 1, 1))
+            points = replace(points, turns=turn)
         else:
             points = with_symmetry(points, _symmetric(points, slave, master), slave.surface.planes)
     if comm.rank == 0 and not movable.all():

@@ -17,11 +17,6 @@ from fenics_contact._surfaces.projection import project
 from fenics_contact.errors import InvalidInputError
 
 
-def with_turn(points: ContactPoints, turn: np.ndarray) -> ContactPoints:
-    """Return tied points whose masters are turned, by a rotation of shape (dim, dim)."""
-    return replace(points, turns=np.tile(turn, (points.count, 1, 1)))
-
-
 def check_sides(
     sector: CyclicSymmetry,
     angle: float,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Self, TypeVar
+from typing import TYPE_CHECKING, Self, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -30,7 +30,6 @@ from fenics_contact._scene.rollers import direction_of, flat_normal, held_direct
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support, ToolMotion
 from fenics_contact._scene.tools import ToolBody, bodies_with_tools, with_motions
-from fenics_contact._surfaces.continued import Neighbour, continued
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
 from fenics_contact._surfaces.projection import surfaces_match
 from fenics_contact._surfaces.true_surface import Geometry, true_surface
@@ -39,6 +38,9 @@ from fenics_contact.materials.elastic import Material, can_expand
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import vector_areas
+
+if TYPE_CHECKING:
+    from fenics_contact._surfaces.continued import Neighbour
 
 
 @dataclass(frozen=True)
@@ -651,6 +653,8 @@ def surface_of(
     neighbours = () if known else _neighbours(scene, surface.body)
     if not neighbours:
         return found
+    from fenics_contact._surfaces.continued import continued
+
     if geometry == "faceted" and not finer:
         return continued(found, neighbours, order=None)
     return continued(found, neighbours, order=3 if finer and geometry != "faceted" else 2)
@@ -658,6 +662,10 @@ def surface_of(
 
 def _neighbours(scene: SceneParts, body: str) -> tuple[Neighbour, ...]:
     """Return how a body goes on behind both sides of its sectors."""
+    if not scene.sectors:
+        return ()
+    from fenics_contact._surfaces.continued import Neighbour
+
     mesh, found = scene.bodies[body].mesh, []
     for sector in scene.sectors:
         if sector.slave.body == body == sector.master.body:

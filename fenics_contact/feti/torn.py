@@ -26,7 +26,6 @@ from fenics_contact._pairing.points import (
     without_tied,
 )
 from fenics_contact._pairing.search import find_contact_points, find_tied_points
-from fenics_contact._pairing.sectors import check_held_alike, joined_around
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.errors.kinds import safe_log
@@ -98,6 +97,8 @@ def meeting_points(
         if len(scene.ties) > 1:
             ties = tied_once(ties, scene, fixed, axes)
         if scene.sectors:
+            from fenics_contact._pairing.sectors import check_held_alike, joined_around
+
             with together(comm):
                 check_held_alike(ties, scene, fixed, axes)
             ties = joined_around(ties, ties, scene, areas=False)

@@ -304,7 +304,8 @@ NEVER = {
 }  # fmt: skip
 COMPLIANCE, PENETRATION = "fenics_contact.qp.compliance", "fenics_contact._equilibrium.penetration"
 AT_NEED = {
-    "fenics_contact._pairing.mortar", "fenics_contact._accuracy", "clarabel", COMPLIANCE, PENETRATION
+    "fenics_contact._pairing.mortar", "fenics_contact._accuracy", "clarabel", COMPLIANCE, PENETRATION,
+    "fenics_contact._pairing.sectors", "fenics_contact._surfaces.continued",
 }  # fmt: skip
 
 

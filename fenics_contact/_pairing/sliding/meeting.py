@@ -11,7 +11,6 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.points import PARALLEL, NodeNumbers, are_beside, tied_keys
 from fenics_contact._pairing.search import find_contact_points, find_tied_points
-from fenics_contact._pairing.sectors import around_once
 from fenics_contact._pairing.sliding.closest import ClosestPoints, Roles, moved_surface
 from fenics_contact._pairing.sliding.patches import SmoothPatches
 from fenics_contact._scene.local_axes import LocalAxes
@@ -130,6 +129,8 @@ def meetings_of(
             _meeting(scene, pair, fixed, slave[number == index]) for index, pair in enumerate(scene.contacts)
         )
         if scene.sectors and scene.contacts:
+            from fenics_contact._pairing.sectors import around_once
+
             lost, onto = around_once(points, ties, scene)
             kept = np.asarray(onto.argmax(axis=1)).ravel()
             mine = [points.pair[lost] == index for index in range(len(meetings))]
