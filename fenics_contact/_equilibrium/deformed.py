@@ -178,13 +178,20 @@ def _require_more_than_springs(torn: TornSystem, failure: Exception) -> None:
 
 def _require_prescribed(scene: Scene) -> None:
     """Reject rigid tools, and rigid surfaces that forces move."""
-    for name, body in scene.bodies.items():
-        if isinstance(body, ToolBody):
-            raise InvalidInputError(
-                f"a RigidTool needs linear materials, but {name!r} meets bodies of nonlinear ones: give the "
-                "pair its shape in a MovingObstacle, whose motion is prescribed"
-            )
+    if not scene.deforms_much and any(isinstance(body, ToolBody) for body in scene.bodies.values()):
+        raise InvalidInputError(
+            "a RigidTool needs linear materials or those for large deformations, got materials that are "
+            "nonlinear with small displacements: give a body a material for large deformations"
+        )
     for support in scene.supports:
+        if isinstance(support, RigidSurface) and isinstance(scene.bodies[support.body], ToolBody):
+            if support.free.any():
+                raise InvalidInputError(
+                    f"the whole motion of tool {support.body!r} must be prescribed where bodies deform much, "
+                    f"got force {support.force!r} and moment {support.moment!r} with free components: "
+                    "prescribe displacement and rotation and read the force from State.tools()"
+                )
+            continue
         if isinstance(support, RigidSurface) and support.free.any():
             kinds = {type(each).__name__ for body in scene.bodies.values() for each in body.materials}
             raise InvalidInputError(

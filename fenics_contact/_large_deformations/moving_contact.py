@@ -15,9 +15,10 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import ROUNDING, scaled_columns, scaled_rows
 from fenics_contact._large_deformations.loading import Loading
 from fenics_contact._scene.local_axes import free_matrix
-from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidPlane
+from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidPlane, RigidTool
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import share_areas
 from fenics_contact.errors import together
 from fenics_contact.feti.averages import nodal_mean_at
@@ -453,6 +454,11 @@ class MovingContact(Contact):
             side for pair in scene.contacts for side in (pair.slave, pair.master) if isinstance(side, Surface)
         ]
         numbers = [decomposition.tearing.global_nodes(s.body, np.unique(scene.facets(s))) for s in surfaces]
+        tools = [name for name, body in scene.bodies.items() if isinstance(body, ToolBody)]
+        numbers += [
+            decomposition.tearing.global_nodes(name, np.arange(scene.bodies[name].mesh.n_nodes))
+            for name in tools
+        ]
         self._nodes = np.unique(np.concatenate(numbers))
         # No node passes through a half space: it is known everywhere on which side of a plane a node lies.
         searched = [pair for pair in scene.contacts if not isinstance(_shape(pair.master), RigidPlane)]
@@ -509,6 +515,8 @@ class MovingContact(Contact):
 
 def _shape(master: Surface | RigidObstacle) -> Surface | RigidObstacle:
     """Return the obstacle that moves, where one does, else the master itself."""
+    if isinstance(master, RigidTool):
+        return master.shape
     return master.obstacle if isinstance(master, MovingObstacle) else master
 
 

@@ -319,7 +319,8 @@ class ToolMotion:
 
     Components of displacement and rotation that are given are prescribed; the others follow from equilibrium
     with the contact, the force, the moment, and springs between the point and the ground, which are free of
-    force where the tool is before it moves. With small displacements rotations are small.
+    force where the tool is before it moves. With small displacements rotations are small; where bodies deform
+    much everything must be prescribed, and the tool turns about the axis of the rotation by its length.
 
     Attributes:
         tool: Name of the tool.

@@ -60,6 +60,14 @@ class ToolBody(Body):
         motion = np.linalg.pinv(self.modes(points).reshape(points.size, -1))
         return np.asarray(motion.T @ np.diag(self.springs) @ motion)
 
+    def frame(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return rotation R and translation c of the tool, R x + c, from places of its nodes, (n, dim)."""
+        arms, at = self.mesh.points - self.mesh.points.mean(axis=0), self.mesh.points.mean(axis=0)
+        middle = places.mean(axis=0)
+        left, _, right = np.linalg.svd((places - middle).T @ arms)
+        turn = left @ right
+        return turn, middle - turn @ at
+
     def weights(self, points: np.ndarray) -> np.ndarray:
         """Return affine weights of the nodes in points of the tool, (n, dim) -> (n, n_nodes)."""
         slopes = self.weight_slopes

@@ -356,12 +356,13 @@ def _in_brackets(values: np.ndarray) -> str:
 
 
 def support_reactions(
-    scene: Scene, forces: NodalForces, about: GivenVector | np.ndarray | None
+    torn: TornSystem, forces: NodalForces, about: GivenVector | np.ndarray | None
 ) -> Resultants:
     """Return the reaction of every support, about a point or the centroid of its surface.
 
     That of a rigid surface is less the load at its point, to which it refers by default.
     """
+    scene = torn.scene
     shares = support_shares(scene, NodeNumbers.of(scene))
     entries = []
     for support, share in zip(scene.supports, shares, strict=True):
@@ -371,9 +372,21 @@ def support_reactions(
         total = resultant(share.of(forces.reaction), forces.places, point, surface, scene.axisymmetric)
         if isinstance(support, RigidSurface):
             total = total - point_load(support, point, scene.axisymmetric)
+        if scene.deforms_much and isinstance(scene.bodies[support.body], ToolBody):
+            total = on_tool(torn, forces, support.body, point)  # its rows act on the slave alone
+            total = Resultant(-total.force, -total.moment, point, surface)
         entries.append(total)
     places = tuple(Surface(each.body, each.surface).in_words for each in scene.supports)
     return Resultants("reaction", tuple(entries), places)
+
+
+def on_tool(torn: TornSystem, forces: NodalForces, tool: str, about: np.ndarray) -> Resultant:
+    """Return the resultant of the contact on a rigid tool, about a point."""
+    pairs = [k for k, pair in enumerate(torn.scene.contacts) if getattr(pair.master, "name", None) == tool]
+    mine = np.flatnonzero(np.isin(torn.points.pair, pairs))
+    places, turned = forces.places[torn.points.slave[mine]], torn.scene.axisymmetric
+    acting = -forces.contact[mine] * ([0.0, 1.0] if turned else 1.0)  # radial ones balance each other
+    return resultant(acting, places, about, None, turned)
 
 
 def foundation_forces(

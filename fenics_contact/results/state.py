@@ -436,7 +436,7 @@ class State(ABC):
             >>> state.reactions()["lid top"].force  # of the surface "top" of the body "lid"  # doctest: +SKIP
             >>> state.reactions()[0].torque((0, 0, 0), (0, 0, 1))  # doctest: +SKIP
         """
-        return support_reactions(self.scene, self._nodal_forces, about)
+        return support_reactions(self.torn, self._nodal_forces, about)
 
     @collectively("State.foundations", comm_of)
     def foundations(self, about: GivenVector | np.ndarray | None = None) -> Resultants:

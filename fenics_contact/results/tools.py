@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact._base.display import displayed
-from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact.feti.torn import TornSystem
-from fenics_contact.results.forces import NodalForces, by_node, resultant
+from fenics_contact.results.forces import NodalForces, on_tool
 from fenics_contact.results.rigid_motions import RigidMotion
 
 
@@ -40,16 +39,11 @@ def tool_results(
     torn: TornSystem, forces: NodalForces, motions: Iterable[RigidMotion]
 ) -> dict[str, ToolResult]:
     """Return the tools of a scene by name."""
-    scene, numbers, found = torn.scene, NodeNumbers.of(torn.scene), {}
-    every = by_node(torn.points, forces.contact, np.arange(torn.points.count))
-    if scene.axisymmetric:  # radial forces around the axis balance each other
-        every = every * [0.0, 1.0]
+    scene, found = torn.scene, {}
     for motion in motions:
         name = motion.surface.body
-        body = scene.bodies[name]
-        if isinstance(body, ToolBody):
-            nodes = numbers.global_nodes(name, np.arange(body.mesh.n_nodes))
+        if isinstance(scene.bodies[name], ToolBody):
             point = motion.about + (motion.displacement if scene.deforms_much else 0.0)
-            total = resultant(every[nodes], forces.places[nodes], point)
+            total = on_tool(torn, forces, name, point)
             found[name] = ToolResult(motion.displacement, motion.rotation, total.force, total.moment)
     return found

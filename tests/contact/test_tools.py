@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scipy.spatial.transform import Rotation
 
 from fenics_contact import (
     Body,
@@ -27,8 +28,8 @@ from fenics_contact import (
     solve_steps,
 )
 from fenics_contact.errors import InfeasibleError, InvalidInputError
-from fenics_contact.gallery import rectangle
-from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, J2Plasticity, NeoHooke, PlaneStrain
 from fenics_contact.mesh import quadratic
 from fenics_contact.study.scenes.nested_box import mirrored, nested_box
 from tests.contact.checks import assert_solved
@@ -204,11 +205,47 @@ def test_what_nothing_holds_is_named() -> None:
     np.testing.assert_allclose(free.tools()["left"].rotation, 0.0, atol=1e-12)
 
 
-def test_bodies_that_deform_much_need_obstacles_that_move_as_prescribed() -> None:
-    scene = pressed(ToolMotion("left", DOWN, STRAIGHT, (0, 0, -3.0)))
-    rubber = Body(scene.bodies["block"].mesh, NeoHooke(1000.0, 0.3))
-    with pytest.raises(InvalidInputError, match="RigidTool needs linear materials, but 'left' meets bodies"):
-        solve_scene(Scene({"block": rubber}, [BASE], contacts=scene.contacts), MPI.COMM_SELF)
+def rubber(*supports: ToolMotion, obstacle: RigidTool | MovingObstacle = LEFT) -> Scene:
+    body = Body(block((-1, -1, -1), (1, 1, 0), (6, 6, 3)), NeoHooke(1000.0, 0.3))
+    pair = ContactPair(Surface("block", "z1"), obstacle, Coulomb(0.3))
+    return Scene({"block": body}, [BASE, *supports], contacts=[pair])
+
+
+def test_a_tool_on_rubber_moves_and_turns_as_an_obstacle_that_moves() -> None:
+    """Pressed, then dragged and turned by 0.4 rad: friction is carried along."""
+
+    def path(time: float) -> tuple[np.ndarray, np.ndarray]:
+        later, about = max(time - 1.0, 0.0), np.array(LEFT.at)
+        turn = Rotation.from_rotvec((0.0, 0.4 * later, 0.0)).as_matrix()
+        return turn, about - turn @ about + np.array([0.3 * later, 0.0, -0.2 * min(time, 1.0)])
+
+    steps = [LoadStep("press", time=1.0), LoadStep("drag", time=2.0)]
+    moving = ContactProblem(rubber(obstacle=MovingObstacle(LEFT.shape, path)), MPI.COMM_SELF)
+    motions = ToolMotion("left", (0, 0, -0.2), STRAIGHT), ToolMotion("left", (0.3, 0, -0.2), (0, 0.4, 0))
+    driven = ContactProblem(rubber(ToolMotion("left", STRAIGHT, STRAIGHT)), MPI.COMM_SELF)
+    given = [
+        LoadStep(step.name, supports=[BASE, motion], time=step.time)
+        for step, motion in zip(steps, motions, strict=True)
+    ]
+    for one, other in zip(solve_steps(moving, steps), solve_steps(driven, given), strict=True):
+        size = np.abs(one.contact.force).max()
+        np.testing.assert_allclose(other.contact.force, one.contact.force, atol=1e-6 * size)
+    tool = other.tools()["left"]
+    assert abs(tool.force[0]) > 0.1 * tool.force[2]
+    np.testing.assert_allclose(tool.force, -other.contact.force.sum(axis=0), atol=1e-9 * size)
+    np.testing.assert_allclose(other.reactions()["left tool"].force, -tool.force, rtol=1e-9)
+    assert other.balance().imbalance < 1e-7
+
+
+def test_forces_move_tools_with_small_displacements_alone() -> None:
+    with pytest.raises(
+        InvalidInputError, match="whole motion of tool 'left' must be prescribed where bodies"
+    ):
+        solve_scene(rubber(ToolMotion("left", DOWN, STRAIGHT, (0, 0, -3.0))), MPI.COMM_SELF)
+    yielding = rubber(ToolMotion("left", (0, 0, -0.1), STRAIGHT))
+    metal = Body(yielding.deforming["block"].mesh, J2Plasticity(1000.0, 0.3, 5.0))
+    with pytest.raises(InvalidInputError, match="RigidTool needs linear materials or those for large deform"):
+        solve_scene(Scene({"block": metal}, yielding.supports, contacts=yielding.contacts), MPI.COMM_SELF)
 
 
 def test_effects_and_plan_name_tools() -> None:

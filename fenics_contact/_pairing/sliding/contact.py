@@ -9,10 +9,12 @@ from typing import TypeAlias
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.checks import floats
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.points import (
     ContactPoints,
+    NodeNumbers,
     in_free_frames,
     join_points,
     reference_axes,
@@ -26,10 +28,12 @@ from fenics_contact._pairing.sliding.points import SlidingPoints, with_given_off
 from fenics_contact._pairing.sliding.slip import LastPoints, MaterialPoints
 from fenics_contact._pairing.sliding.stiffness import Differential, join_differentials, without_patches
 from fenics_contact._scene.local_axes import LocalAxes
-from fenics_contact._scene.obstacles import MovingObstacle
+from fenics_contact._scene.obstacles import MovingObstacle, RigidObstacle, RigidTool
 from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import shape_functions
 from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.shapes.combined import placed
 from fenics_contact.shapes.simple import evaluate_shape
 
 Known: TypeAlias = ContactPoints | LastPoints
@@ -130,10 +134,7 @@ class SlidingContact:
                     f"coordinates must be finite numbers of shape {needed}, one row for each node of all "
                     f"bodies, got {given}: add the displacements to scene.points"
                 )
-            places = tuple(
-                each.obstacle.frame(time) if isinstance(each.obstacle, MovingObstacle) else None
-                for each in self.meetings
-            )
+            places = tuple(self._frame(each.obstacle, coordinates, time) for each in self.meetings)
         known = last.points if isinstance(last, SlidingPoints) else last
         parts = [self._pair(index, coordinates, known, time, start) for index in range(len(self.meetings))]
         points = join_points([part.points for part in parts], self.scene.dim, len(coordinates))
@@ -178,12 +179,26 @@ class SlidingContact:
         points = replace(points, axes=axes, tangents=tangent_frames(points.normal, axes))
         return _Found(in_free_frames(points, self.fixed, self.axes), differential, lost, means)
 
+    def _frame(
+        self, obstacle: RigidObstacle | None, coordinates: np.ndarray, time: float
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return rotation and translation of an obstacle that moves, None of others."""
+        if isinstance(obstacle, MovingObstacle):
+            return obstacle.frame(time)
+        if not isinstance(obstacle, RigidTool):
+            return None
+        body, numbers = self.scene.bodies[obstacle.name], NodeNumbers.of(self.scene)
+        assert isinstance(body, ToolBody)
+        return body.frame(coordinates[numbers.global_nodes(obstacle.name, np.arange(body.mesh.n_nodes))])
+
     def _on_obstacle(
         self, meeting: Meeting, coordinates: np.ndarray, time: float
     ) -> tuple[ContactPoints, Differential]:
         obstacle = meeting.obstacle
         assert obstacle is not None
-        shape = obstacle.at(time) if isinstance(obstacle, MovingObstacle) else obstacle
+        frame = self._frame(obstacle, coordinates, time)
+        still = obstacle.obstacle if isinstance(obstacle, MovingObstacle) else obstacle
+        shape = still if frame is None else placed(still, frame[0], floats(frame[1]))
         place = coordinates[meeting.nodes]
         gap, normal = evaluate_shape(shape, "distance", place), evaluate_shape(shape, "normals", place)
         facing = np.einsum("nd,nd->n", meeting.normals(coordinates), normal) < 0
