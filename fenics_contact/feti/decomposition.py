@@ -474,7 +474,7 @@ def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> Non
     if not isinstance(partitions, Mapping):
         raise InvalidInputError(
             f"partitions must give the subdomain of each cell by the names of bodies, got {partitions!r}: "
-            "leave them out, or cut bodies by bisection_partition or box_partition of fenics_contact.mesh"
+            "leave them out, or cut bodies by fenics_contact.box_partition or mesh.bisection_partition"
         )
     for name, body in scene.bodies.items():
         if name not in partitions:
@@ -487,8 +487,8 @@ def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> Non
             given = partition.shape if isinstance(partition, np.ndarray) else repr(partition)
             raise InvalidInputError(
                 f"the partition of body {name!r} must have shape ({body.mesh.n_cells},), one "
-                f"subdomain per cell, got {given}: bisection_partition or box_partition of "
-                "fenics_contact.mesh cuts a mesh into a number of subdomains"
+                f"subdomain per cell, got {given}: fenics_contact.box_partition or "
+                "mesh.bisection_partition cuts a mesh into a number of subdomains"
             )
         check_face_connected(body.mesh, pieces(body.mesh, partition))
 
