@@ -191,7 +191,7 @@ def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> Conta
         strung("pair"), strung("slave"), sp.vstack([part.master for part in parts], format="csr"),
         strung("normal"), strung("tangents"), strung("gap"), strung("area"), strung("facet"), strung("local"),
         strung("axes"), strung("symmetric"), strung("distance"), strung("given"), taken,
-        None if parts[0].length is None else strung("length"),
+        None if all(part.length is None for part in parts) else strung("sizes"),
         _strung_planes(parts, dim), _strung_turns(parts, dim),
     )  # fmt: skip
 

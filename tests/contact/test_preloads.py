@@ -22,6 +22,8 @@ from fenics_contact import (
     Section,
     Support,
     Surface,
+    Tie,
+    TotalForce,
     box_partition,
     read_scene_file,
     solve_scene,
@@ -41,6 +43,7 @@ from tests.contact.bolts import (
     MIDDLE,
     SLEEVE,
     SOFT,
+    STIFF,
     bar,
     clamped,
     joint,
@@ -100,6 +103,28 @@ def test_a_bolt_of_revolution_has_the_force_of_a_full_one():
     section = solve_scene(scene, MPI.COMM_SELF).preloads()["bar"]
     assert section.force == pytest.approx(10.0)
     assert section.shortening == pytest.approx(10.0 * LENGTH / 1000.0 / (4.0 * np.pi))
+
+
+def test_a_joint_of_revolution_is_that_of_its_diagram():
+    """The joint above, revolved: bars of the areas π and 1.5 π, so that the load factor is 0.4 again."""
+    rim = np.sqrt(1.44 + 1.5)
+    sections = {
+        "bolt": (rectangle((0.0, 0.0), (1.0, LENGTH), (2, 8)), SOFT),
+        "sleeve": (rectangle((1.2, 0.0), (rim, LENGTH), (3, 7)), SOFT),
+        "head": (rectangle((0.0, LENGTH), (rim, LENGTH + 1), (5, 2)), STIFF),
+    }
+    scene = Scene(
+        {name: Body(*section, axisymmetric=True) for name, section in sections.items()},
+        [Support("bolt", "y0", (None, 0.0)), Support("sleeve", "y0", (None, 0.0))],
+        contacts=[ContactPair(Surface("sleeve", "y1"), Surface("head", "y0"))],
+        ties=[Tie(Surface("bolt", "y1"), Surface("head", "y0"))],
+        preloads=[Preload("bolt", Section((0.0, 1.9), (0.0, 1.0)), force=50.0)],
+    )
+    load = LoadStep("pull", loads=[TotalForce("head", "y1", (0.0, 60.0))], preloads=[])
+    states = solve_steps(ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-9), [LoadStep("tighten"), load])
+    assert [state.preloads()["bolt"].force for state in states] == pytest.approx([50.0, 74.0], rel=1e-5)
+    pressed = [state.contact.normal_force.sum() for state in states]
+    assert pressed == pytest.approx([50.0, 14.0], rel=1e-5)
 
 
 def test_a_section_at_the_face_of_two_regions_is_that_of_the_plane():
