@@ -22,12 +22,8 @@ from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
 from fenics_contact.mesh.quality import jacobians
 
 #: Gauss rule of the volume by shape: two points per direction on tensor-product cells, one on simplices suit
-#: linear elasticity; quadratic cells get twice the degree. The hoop strain of bodies of revolution varies
-#: also in linear triangles.
-QUADRATURE_DEGREE = {
-    "hexahedron": 2, "tetrahedron": 1, "quadrilateral": 2, "triangle": 1,
-    _dolfinx.revolved("quadrilateral"): 2, _dolfinx.revolved("triangle"): 2,
-}  # fmt: skip
+#: linear elasticity; quadratic cells get twice the degree.
+QUADRATURE_DEGREE = {"hexahedron": 2, "tetrahedron": 1, "quadrilateral": 2, "triangle": 1}
 #: Tag of every loaded surface inside a load form.
 LOADED = 1
 
@@ -180,10 +176,11 @@ def volume_measure(cell_type: str, degree: int | None = None) -> ufl.Measure:
 
 def quadrature_degree(cell_type: str, degree: int | None = None) -> int:
     """Return the degree of the package's quadrature on cells, or of that given for linear ones."""
-    shape = _dolfinx.shape(cell_type)
-    shape = _dolfinx.revolved(shape) if _dolfinx.is_revolved(cell_type) else shape
-    linear = QUADRATURE_DEGREE[shape] if degree is None else degree
-    return int(linear * _dolfinx.degree(cell_type))
+    if degree is None:
+        degree = QUADRATURE_DEGREE[_dolfinx.shape(cell_type)]
+        if _dolfinx.is_revolved(cell_type):
+            degree = max(degree, 2)  # the hoop strain varies in linear triangles, too
+    return int(degree * _dolfinx.degree(cell_type))
 
 
 def surface_measure(cell_type: str) -> ufl.Measure:

@@ -7,9 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-#: Candidates, pairs of a point and a box, that are compared at a time.
-CHUNK = 200_000
-
 
 @dataclass(frozen=True, eq=False)
 class ClosestOnTriangles:
@@ -71,15 +68,25 @@ class TriangleTree:
             self._search(points[part], bound[part], part, result)
         return result
 
-    def _search(self, points: np.ndarray, bound: np.ndarray, part: slice, result: ClosestOnTriangles) -> None:
-        """Write the closest points of some points into a result; bounds are distances that suffice."""
+    def _search(
+        self,
+        points: np.ndarray,
+        bound: np.ndarray,
+        part: slice,
+        result: ClosestOnTriangles,
+        chunk: int = 200_000,
+    ) -> None:
+        """Write the closest points of some points into a result; bounds are distances that suffice.
+
+        `chunk`: pairs of a point and a box that are compared at a time, for the memory.
+        """
         who, box = np.arange(len(points)), np.zeros(len(points), dtype=np.int64)
         for level in range(1, self._depth + 1):
             who, box = np.repeat(who, 2), (2 * box[:, None] + np.array([0, 1])).ravel()
             low, high = self._boxes[level]
             near = np.zeros(len(who), dtype=bool)
-            for start in range(0, len(who), CHUNK):
-                some = slice(start, start + CHUNK)
+            for start in range(0, len(who), chunk):
+                some = slice(start, start + chunk)
                 own = points[who[some]]
                 out = np.maximum(np.maximum(low[box[some]] - own, own - high[box[some]]), 0.0)
                 near[some] = (out**2).sum(axis=1) <= (bound[who[some]] * (1.0 + 1e-12)) ** 2

@@ -30,7 +30,7 @@ def test_a_body_without_partition_is_refused() -> None:
     [
         (
             {"block": 4},
-            r"the partition of body 'block' must have shape \(64,\), .* got 4: bisection_partition",
+            r"the partition of body 'block' must have shape \(64,\), .* got 4: fenics_contact.box_partition",
         ),
         (4, "partitions must give the subdomain of each cell by the names of bodies, got 4: leave them out"),
     ],

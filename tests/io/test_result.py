@@ -71,7 +71,9 @@ def test_a_state_is_told_with_its_scene_and_its_numbers(tmp_path: Path) -> None:
     assert upper["material"]["young_modulus"] == 100.0
     (pair,) = found["scene"]["contacts"]
     assert pair["slave"] == {"body": "upper block", "surface": "z0"}
-    assert pair["friction"] == {"type": "Coulomb", "friction_coefficient": 0.4, "shear_limit": None}
+    assert pair["friction"] == {
+        "type": "Coulomb", "friction_coefficient": 0.4, "shear_limit": None, "stick_stiffness": None,
+    }  # fmt: skip
     assert [load["type"] for load in found["scene"]["loads"]] == ["Traction", "BodyForce"]
     assert found["plan"]["effects"]["Coulomb friction"].startswith("1 pair")
     assert found["counts"] == state.counts
@@ -177,7 +179,7 @@ def test_functions_are_told_by_their_names_and_regions_by_theirs() -> None:
     assert found["loads"][0]["value"] == {"function": "deeper"}
     assert found["loads"][1]["value"] == {"type": "Ufl", "function": {"function": "deeper"}}
     assert found["contacts"][0]["master"]["function"] == {"type": "Wall", "place": -0.5}
-    assert found["contacts"][0]["friction"] == {"type": "Tresca", "traction": 2.0}
+    assert found["contacts"][0]["friction"] == {"type": "Tresca", "traction": 2.0, "stick_stiffness": None}
     assert found["ties"][0]["sliding"] is True
 
 
