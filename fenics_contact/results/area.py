@@ -157,8 +157,8 @@ def _slave_surface(state: State, which: int | str) -> _SlaveSurface:
     spread[place] = _modulus(state, pair) * np.maximum(contact.gap[mine], 0.0)
     whole = np.searchsorted(surface.nodes, scene.bodies[slave.body].mesh.surfaces[slave.name])
     pressure, spread = filled_at_corners(whole, pressure), np.maximum(filled_at_corners(whole, spread), 0.0)
+    on_axis = scene.bodies[slave.body].on_axis[surface.nodes]
     if scene.axisymmetric:
-        on_axis = scene.bodies[slave.body].on_axis[surface.nodes]
         pressure = np.maximum(filled_on_axis(whole, pressure, on_axis), 0.0)
     places = surface.points
     if scene.bodies[slave.body].deforms_much:
@@ -171,6 +171,8 @@ def _slave_surface(state: State, which: int | str) -> _SlaveSurface:
         whole_area = nodal_areas(surface.points, whole, scene.axisymmetric).ravel()
         facing[place] = contact.nominal_area[mine] / np.bincount(whole.ravel(), whole_area)[place]
     facing = np.maximum(filled_at_corners(whole, facing), 0.0)
+    if scene.axisymmetric:
+        facing = np.clip(filled_on_axis(whole, facing, on_axis), 0.0, 1.0)
     facets, beyond = surface.facets[:, : surface.corners], 0.0 if by_mortar else 0.5
     return _SlaveSurface(places, facets, pressure, spread, facing, beyond)
 

@@ -83,8 +83,9 @@ def test_pressure_is_transmitted_exactly_by_nodes(kind: Kind, inner: float) -> N
     state = solved(stacked(kind, "node", (4, 4), inner=inner, friction=0.3))
     assert worst_patch_error(state) < 1e-9
     np.testing.assert_allclose(state.contact.pressure, PRESSURE, rtol=1e-9)
-    total = PRESSURE * np.pi * (9 - inner**2)
-    assert state.resultants().contacts[0].force[1] == pytest.approx(total, rel=1e-9)
+    area = np.pi * (9 - inner**2)
+    assert state.resultants().contacts[0].force[1] == pytest.approx(PRESSURE * area, rel=1e-9)
+    assert contact_area(state) == pytest.approx(area, rel=1e-9)
 
 
 @pytest.mark.parametrize("tied", [False, True])
