@@ -365,8 +365,8 @@ def _draw_slip(axes: Axes, trace: ContactTrace, longest: float) -> None:
     """Draw slip by arrows, at a subset of the points if these are many."""
     low, high = trace.window(None)
     places = trace.places[trace.points]
-    seen = np.flatnonzero((trace.status == Status.SLIP) & (places > low) & (places < high))
-    seen = seen[np.argsort(places[seen])][:: -(-len(seen) // MOST_ARROWS)]
+    seen = np.flatnonzero((trace.status == Status.SLIP) & (places >= low) & (places <= high))
+    seen = seen[np.argsort(places[seen])][:: max(-(-len(seen) // MOST_ARROWS), 1)]
     lengths = ARROW * trace.slip[seen] / longest
     look = {"angles": "uv", "scale_units": "width", "scale": 1, "width": 0.0022, "minlength": 0.0}
     heights = trace.traction[trace.points[seen]]

@@ -27,6 +27,7 @@ from fenics_contact import (
     LoadStep,
     RigidPlane,
     RigidSurface,
+    Roller,
     Scene,
     State,
     Status,
@@ -36,7 +37,7 @@ from fenics_contact import (
 )
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import disc, rectangle
-from fenics_contact.materials import NeoHooke, PlaneStrain
+from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
 from fenics_contact.pictures import (
     Picture,
     Units,
@@ -210,6 +211,22 @@ def test_contact_pictures_show_pressure_and_with_friction_its_traction(tmp_path:
         assert contains(image, colour)
     assert contains(image, "#e3e6e8"), "between the slip bounds"
     assert not contains(smooth, "#e3e6e8", 0.01)
+
+
+def test_slip_at_both_ends_of_a_surface_alone_is_drawn(tmp_path: Path) -> None:
+    """A hub on a shaft slips at its edges, where the diagram ends."""
+    steel = IsotropicElasticity(2.1e5, 0.3)
+    meshes = {"shaft": rectangle((0, 0), (10, 60), (3, 13)), "hub": rectangle((10, 20), (25, 40), (4, 7))}
+    pair = ContactPair(Surface("hub", "x0"), Surface("shaft", "x1"), Coulomb(0.2), interference=0.02)
+    scene = Scene(
+        {name: Body(mesh, steel, axisymmetric=True) for name, mesh in meshes.items()},
+        [Roller("shaft", "y0")],
+        contacts=[pair],
+    )
+    state = solve_scene(scene, MPI.COMM_WORLD)
+    places = scene.points[state.contact.points.slave][:, 1]
+    assert set(places[state.contact.status == Status.SLIP].round(9)) == {20.0, 40.0}
+    assert contains(pixels(plot_contact_pressure(state, tmp_path / "hub.png", width=SMALL)), "#d55e00")
 
 
 def test_plane_subdomains_have_colours_of_their_own(tmp_path: Path) -> None:
