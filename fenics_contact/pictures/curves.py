@@ -128,13 +128,14 @@ class ContactTrace:
     """Contact quantities along the slave surface of a pair in the plane.
 
     Attributes:
-        axis: Label of the positions: "x", "−y", or "along the surface".
+        axis: Label of the positions: "x", "−y", of bodies of revolution "r" and "z", or "along the surface".
         places: Positions of all nodes of the surface, ascending, (n,), [length].
         pressure: On all nodes, zero where there is no contact point, (n,), [force / length²].
         traction: Tangential traction on the slave in the direction of increasing positions, (n,).
         bound: Friction bound of the traction, (n,).
         slip: Slip of the contact points on the master in the last load step, in the direction of increasing
             positions, [length].
+        revolved: Whether forces are those of a full revolution, elsewhere per thickness.
     """
 
     name: str
@@ -150,6 +151,7 @@ class ContactTrace:
     force: float
     shear: float
     rubs: bool
+    revolved: bool
 
     def broken(self, values: np.ndarray) -> np.ndarray:
         """Insert a gap into nodal values where the surface is interrupted."""
@@ -182,6 +184,8 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
         lengths = np.diff([*starts, len(order)])
         order, starts = order[::-1], np.concatenate([[0], np.cumsum(lengths[::-1])[:-1]])
     axis, places = _unrolled(mesh.points[order], starts)
+    if state.scene.axisymmetric:
+        axis = axis.replace("x", "r").replace("y", "z")
     numbers = state.torn.decomposition.tearing.global_nodes(slave.body, order)
     chosen = contact.on_pair(pair)
     sorting = np.argsort(numbers)
@@ -194,7 +198,7 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
         f"{slave.body}, {slave.name}", axis, places, starts[1:] - 1, values[0], values[1], values[2],
         points, contact.status[chosen], slip,
         float(contact.normal_force[chosen].sum()), float(shear.sum()),
-        state.scene.contacts[pair].has_friction,
+        state.scene.contacts[pair].has_friction, state.scene.axisymmetric,
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
+from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.pairs import pair_number
 from fenics_contact._surfaces.facets import filled_at_corners
 from fenics_contact.errors import InvalidInputError
@@ -320,9 +321,11 @@ def draw_traction(
     """
     (clim, reach), rubs = window, trace.rubs
     facts = f"largest pressure {written(float(trace.pressure.max()))} {units.stress}, "
-    facts += f"normal force {written(trace.force)} {units.force}/{units.length}"
+    unit = f"{units.force} per revolution" if trace.revolved else f"{units.force}/{units.length}"
+    facts += f"normal force {written(trace.force)} {unit}"
     if rubs:
-        facts += f", tangential force {written(trace.shear)} {units.force}/{units.length}"
+        shear = trace.shear if abs(trace.shear) > ROUNDING * trace.force else 0.0
+        facts += f", tangential force {written(shear)} {unit}"
     top = float(trace.pressure.max()) or 1.0
     height = round((0.62 if rubs else 0.4) * width)
     with sheet(paper, (width, height), headline(title, facts)) as figure:
