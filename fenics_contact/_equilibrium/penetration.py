@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from fenics_contact._base.display import counted
-from fenics_contact._pairing.points import NodeNumbers
+from fenics_contact._equilibrium.passes import Passes, Solve
 from fenics_contact.errors import ConvergenceError, together
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.torn import TornSystem
-from fenics_contact.qp.solution import DualSolution, SolverStep
 from fenics_contact.results.contact import ContactResult
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State
 
 _LOG = logging.getLogger(__name__)
-
-#: Solves a system from the state before, if there is one.
-Solve = Callable[[TornSystem, LinearState | None], LinearState]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +52,8 @@ class Front:
             for number, pair in enumerate(scene.contacts):
                 if pair.fluid is None:
                     continue
-                body, first = (
-                    scene.bodies[pair.slave.body].mesh,
-                    NodeNumbers.of(scene).first_of(pair.slave.body),
-                )
+                body = scene.bodies[pair.slave.body].mesh
+                first = torn.decomposition.tearing.first_of(pair.slave.body)
                 mine = np.flatnonzero(points.pair == number)
                 nodes = points.slave[mine] - first
                 named = pair.fluid.enters if isinstance(pair.fluid.enters, str) else pair.slave.name
@@ -101,31 +94,21 @@ def penetrated(solve: Solve, torn: TornSystem, known: State | None, before: Stat
     wet = np.zeros(torn.points.count, dtype=bool)
     if before is not None and before.contact.wet is not None and len(before.contact.wet) == len(wet):
         wet = before.contact.wet
-    state = known if isinstance(known, LinearState) else None
-    history: list[SolverStep] = []
+    passes = Passes(solve, known)
     earlier: list[bytes] = []
-    products = 0
     while wet.tobytes() not in earlier:
         earlier.append(wet.tobytes())
-        state = solve(front.at(torn, wet), state)
-        solution = state.solution
-        assert isinstance(solution, DualSolution)
-        words = f"fluid pass {len(earlier)}: {counted(int(wet.sum()), 'point')} wet"
+        state = passes.run(front.at(torn, wet))
+        words = f"fluid pass {passes.count}: {counted(int(wet.sum()), 'point')} wet"
         safe_log(_LOG.info, "%s", words)
-        steps = [
-            replace(step, products=step.products + products, outer=len(earlier) - 1)
-            for step in solution.history
-        ]
-        steps[-1] = replace(steps[-1], note=f"{steps[-1].note}; {words}")
-        history, products = [*history, *steps], products + solution.products
+        passes.remark(words)
         following = front.reached(state.contact)
         if np.array_equal(following, wet):
-            found = replace(solution, history=tuple(history), iterations=len(history), products=products)
-            return replace(state, solution=found)
+            return passes.answer(state)
         wet = following
     raise ConvergenceError(
-        f"the front of a fluid must come to rest, but after {counted(len(earlier), 'pass', 'passes')} it "
+        f"the front of a fluid must come to rest, but after {counted(passes.count, 'pass', 'passes')} it "
         f"returns to {counted(int(wet.sum()), 'wet point')} where it was before: apply pressure and load in "
         "smaller load steps, refine the contact, or give the fluid a critical pressure",
-        history,
+        passes.history,
     )

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from fenics_contact._base.display import counted
+from fenics_contact._equilibrium.passes import Passes, Solve
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti.torn import TornSystem
-from fenics_contact.qp.solution import DualSolution, SolverStep
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State
-
-#: Solves a system from the state before, if there is one.
-Solve = Callable[[TornSystem, LinearState | None], LinearState]
 
 
 def coefficients(torn: TornSystem, slip: np.ndarray) -> np.ndarray:
@@ -61,33 +57,25 @@ def consistent(
     """
     slip = np.zeros((torn.points.count, torn.dim - 1)) if before is None else before.contact.total_slip
     mu, part, last = coefficients(torn, slip), 1.0, np.inf
-    state = known if isinstance(known, LinearState) else None
-    history: list[SolverStep] = []
-    products = passes = 0
-    while passes < max_passes and part >= least:
-        state, passes = solve(with_coefficients(torn, mu), state), passes + 1
-        solution, contact = state.solution, state.contact
-        assert isinstance(solution, DualSolution)
+    passes = Passes(solve, known)
+    while passes.count < max_passes and part >= least:
+        state = passes.run(with_coefficients(torn, mu))
+        contact = state.contact
         target = coefficients(torn, contact.total_slip)
         pressed = contact.normal_force[torn.frictional]
         size = float((np.maximum(mu, target) * pressed).max(initial=0.0))
         change = float((np.abs(target - mu) * pressed).max(initial=0.0)) / (size or 1.0)
-        steps = [
-            replace(each, products=each.products + products, outer=passes - 1) for each in solution.history
-        ]
-        words = f"slip pass {passes}: slip bounds changed by {change:.1e}"
-        steps[-1] = replace(steps[-1], note=f"{steps[-1].note}; {words}")
-        history, products = [*history, *steps], products + solution.products
+        passes.remark(f"slip pass {passes.count}: slip bounds changed by {change:.1e}")
         if change <= tolerance:
-            found = replace(solution, history=tuple(history), iterations=len(history), products=products)
-            return replace(state, solution=found)
+            return passes.answer(state)
         if change > progress * last:
             part *= 0.5
         mu, last = (1.0 - part) * mu + part * target, change
     raise ConvergenceError(
-        f"friction coefficients must agree with the slips, but after {counted(passes, 'pass', 'passes')} "
+        "friction coefficients must agree with the slips, but after "
+        f"{counted(passes.count, 'pass', 'passes')} "
         f"slip bounds still change by {last:.1e} of the largest: friction that falls with the slip faster "
         "than bodies are stiff has several states or none, as in stick-slip; take smaller load steps, drive "
         "the bodies by displacements, or let the coefficient fall over a longer slip",
-        history,
+        passes.history,
     )

@@ -1,0 +1,62 @@
+"""Solutions that are repeated until what they depend on agrees with them, with the history of all passes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.qp.solution import DualSolution, SolverStep
+from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.state import State
+
+#: Solves a system from the state before, if there is one.
+Solve = Callable[[TornSystem, LinearState | None], LinearState]
+
+
+class Passes:
+    """Passes so far, each of which starts from the last.
+
+    Attributes:
+        count: How many there were.
+        history: The solver's steps in all of them, with the products up to each.
+    """
+
+    def __init__(self, solve: Solve, known: State | None) -> None:
+        """Start from a known state, if it is one of linear materials."""
+        self._solve, self._products = solve, 0
+        self._state = known if isinstance(known, LinearState) else None
+        self.count = 0
+        self.history: list[SolverStep] = []
+
+    def run(self, torn: TornSystem) -> LinearState:
+        """Return the state of a system. Collective."""
+        self._state = state = self._solve(torn, self._state)
+        solution = _solution(state)
+        self.history += [
+            replace(step, products=step.products + self._products, outer=self.count)
+            for step in solution.history
+        ]
+        self._products += solution.products
+        self.count += 1
+        return state
+
+    def remark(self, words: str) -> None:
+        """Add words to the note of the last step."""
+        self.history[-1] = replace(self.history[-1], note=f"{self.history[-1].note}; {words}")
+
+    def answer(self, state: LinearState) -> LinearState:
+        """Return a state with the steps and the products of all passes."""
+        found = replace(
+            _solution(state),
+            history=tuple(self.history),
+            iterations=len(self.history),
+            products=self._products,
+        )
+        return replace(state, solution=found)
+
+
+def _solution(state: LinearState) -> DualSolution:
+    """Return what the dual solver found: systems that are repeated have contacts."""
+    assert isinstance(state.solution, DualSolution)
+    return state.solution
