@@ -6,7 +6,7 @@ import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,6 +24,8 @@ from fenics_contact.qp.cones import Strengths
 
 if TYPE_CHECKING:
     from fenics_contact.qp.compliance import Closures
+
+Law = TypeVar("Law")
 
 #: Weights of nodes below this fraction of all are rounding, which must not keep a supported point free.
 HELD = 1e-6
@@ -380,22 +382,22 @@ def _strengths(
             limit[mine] = pair.limit_at(places[mine]) * points.area[mine]
     if comm.size > 1 and any(map(callable, limits)):
         require_alike(comm, described(limit, "shear limits given as functions of position"))
-    known = tuple(curve for curve in curves if curve is not None)
-    number_of = np.cumsum([curve is not None for curve in curves]) - 1
-    curve = np.where([each is not None for each in curves], number_of, -1)[points.pair]
-    return Strengths(coefficient, limit, points.area, curve, known)
+    return Strengths(coefficient, limit, points.area, *_numbered(curves, points.pair))
+
+
+def _numbered(given: Sequence[Law | None], pair: np.ndarray) -> tuple[np.ndarray, tuple[Law, ...]]:
+    """Return the number of each point's law among those that pairs are given, −1 without, and these laws."""
+    has = np.array([law is not None for law in given], dtype=bool)
+    return np.where(has, np.cumsum(has) - 1, -1)[pair], tuple(law for law in given if law is not None)
 
 
 def closures_of(scene: Scene, points: ContactPoints) -> Closures | None:
     """Return the closures of all contact points under force; None where all contact is exact."""
-    laws = [pair.closure for pair in scene.contacts]
-    known = tuple(law for law in laws if law is not None)
+    curve, known = _numbered([pair.closure for pair in scene.contacts], points.pair)
     if not known:
         return None
     from fenics_contact.qp.compliance import Closures  # of no use in exact contact
 
-    number_of = np.cumsum([law is not None for law in laws]) - 1
-    curve = np.where([law is not None for law in laws], number_of, -1)[points.pair]
     return Closures(points.area, curve, np.ones(points.count), known)
 
 

@@ -193,7 +193,7 @@ class ContactPair:
             _check_length(f"ContactPair.{name}", getattr(self, name))
         if self.closure is not None:
             check_closing(self.closure)
-        _forget_other_reason(self)
+        forget_other_reason(self)
 
     @property
     def within_body(self) -> bool:
@@ -208,7 +208,7 @@ class ContactPair:
     @property
     def place(self) -> str:
         """Its surfaces: "upper z0 on lower z1", "block z0 on rigid plane"."""
-        return _place(self.slave, self.master)
+        return place_of(self.slave, self.master)
 
     @property
     def given_gap(self) -> str:
@@ -332,7 +332,7 @@ class Tie:
                 f"body {self.slave.body!r} cannot be tied to itself: a tie joins two bodies; mesh its parts "
                 "together, or as two bodies"
             )
-        _forget_other_reason(self)
+        forget_other_reason(self)
 
     @property
     def geometry(self) -> Geometry:
@@ -342,7 +342,7 @@ class Tie:
     @property
     def place(self) -> str:
         """Its surfaces: "upper z0 on lower z1"."""
-        return _place(self.slave, self.master)
+        return place_of(self.slave, self.master)
 
 
 def _check_stiffness(name: str, given: float | None) -> None:
@@ -353,7 +353,7 @@ def _check_stiffness(name: str, given: float | None) -> None:
         )
 
 
-def _forget_other_reason(pair: ContactPair | Tie) -> None:
+def forget_other_reason(pair: Any) -> None:
     """Drop the reason for a choice in whose place another discretisation was given."""
     if not pair.reason.startswith(f"{pair.discretisation}, "):
         object.__setattr__(pair, "reason", "")
@@ -388,7 +388,8 @@ def _in_words(value: float | OfPosition | str) -> str:
     return value if isinstance(value, str) else f"{value:g}"
 
 
-def _place(slave: Surface, master: Surface | RigidObstacle) -> str:
+def place_of(slave: Surface, master: Surface | RigidObstacle) -> str:
+    """Return the surfaces of a pair in words."""
     if isinstance(master, Surface):
         return f"{slave.in_words} on {master.in_words}"
     name = master.name if isinstance(master, RigidTool) else name_in_words(type(master).__name__)

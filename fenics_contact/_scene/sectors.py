@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.local_axes import HeldDirections
-from fenics_contact._scene.pairs import AnyDiscretisation, Surface, Tie
+from fenics_contact._scene.pairs import AnyDiscretisation, Surface, Tie, forget_other_reason, place_of
 from fenics_contact._surfaces.facets import surface_moments
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
@@ -76,8 +76,7 @@ class CyclicSymmetry:
                 f"CyclicSymmetry needs both sides of a sector, got {self.place}: name the other side as "
                 "master"
             )
-        if not self.reason.startswith(f"{self.discretisation}, "):
-            object.__setattr__(self, "reason", "")
+        forget_other_reason(self)
 
     @property
     def sliding(self) -> bool:
@@ -92,7 +91,7 @@ class CyclicSymmetry:
     @property
     def place(self) -> str:
         """Its surfaces: "rotor end on rotor start"."""
-        return f"{self.slave.body} {self.slave.name} on {self.master.body} {self.master.name}"
+        return place_of(self.slave, self.master)
 
     def matrix(self, angle: float) -> np.ndarray:
         """Return the rotation about the axis by an angle, shape (dim, dim)."""

@@ -78,9 +78,9 @@ def write_contact_table(state: State, path: str | Path, *, pair: int | str | Non
 def _contact_columns(state: State, displacement: np.ndarray) -> dict[str, np.ndarray]:
     """Return the columns of a contact table; `displacement`: of the nodes of all bodies, (n_nodes, dim)."""
     scene, contact, points = state.scene, state.contact, state.contact.points
-    sizes = [body.mesh.n_nodes for body in scene.bodies.values()]
-    first = dict(zip(scene.bodies, np.cumsum([0, *sizes]), strict=False))
-    offset = np.array([first[pair.slave.body] for pair in scene.contacts], dtype=int)[points.pair]
+    numbers = state.torn.decomposition.tearing
+    first = [numbers.first_of(pair.slave.body) for pair in scene.contacts]
+    offset = np.array(first, dtype=int)[points.pair]
     places, in_space = state.contact_places, points.tangents
     vectors = {
         "": places,
