@@ -15,6 +15,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.pairs import AnyDiscretisation, ContactPair, Friction, Surface
 from fenics_contact._scene.supports import Roller, ToolMotion
+from fenics_contact._scene.surface_laws import ClosureLaw, check_closing
 from fenics_contact._surfaces.true_surface import Geometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import safe_log
@@ -50,6 +51,8 @@ class AutomaticContact(Sequence[ContactPair]):
         geometry: As in `ContactPair`.
         self_contact: Bodies of materials for large deformations that may meet themselves, by nodes. Each gets
             a surface "boundary", all of its facets, that is slave and master at once.
+        closure: The law of closure of all pairs, see `ContactPair`. Fluid that enters needs an inlet on the
+            slave, so pairs with a fluid are named.
 
     Raises:
         InvalidInputError: If the distance is not positive; when the scene is made, if it finds no pair, or
@@ -74,14 +77,17 @@ class AutomaticContact(Sequence[ContactPair]):
     discretisation: AnyDiscretisation = "best"
     geometry: Geometry = "best"
     self_contact: tuple[str, ...] = ()
+    closure: ClosureLaw | None = None
 
     def __post_init__(self) -> None:
-        """Raise unless the distance is positive and finite."""
+        """Raise unless the distance is positive and finite, and the closure rises with the pressure."""
         if self.distance is not None and not 0.0 < self.distance < np.inf:
             raise InvalidInputError(
                 f"AutomaticContact.distance must be positive and finite, got {self.distance!r}: give the "
                 "largest gap that may close, or None"
             )
+        if self.closure is not None:
+            check_closing(self.closure)
 
     def __len__(self) -> int:
         """Return zero: a scene replaces it by the pairs that it finds."""
@@ -112,7 +118,7 @@ class AutomaticContact(Sequence[ContactPair]):
         with_surfaces = replace(scene, bodies=bodies, contacts=())
         pairs = tuple(self._pair(with_surfaces, *names) for names in near)
         for whole in (Surface(name, "boundary") for name in self.self_contact):
-            pairs += (ContactPair(whole, whole, self.friction, geometry=self.geometry),)
+            pairs += (ContactPair(whole, whole, self.friction, geometry=self.geometry, closure=self.closure),)
         words = "%d contact pairs are found within a distance of %.4g: %s"
         safe_log(_LOG.info, words, len(pairs), distance, "; ".join(pair.place for pair in pairs))
         return bodies, pairs
@@ -138,7 +144,7 @@ class AutomaticContact(Sequence[ContactPair]):
         from fenics_contact._scene.pair_geometry import master_share
 
         sides = Surface(one, f"near {other}"), Surface(other, f"near {one}")
-        pair = ContactPair(*sides, self.friction, self.discretisation, self.geometry)
+        pair = ContactPair(*sides, self.friction, self.discretisation, self.geometry, closure=self.closure)
         sizes = [_size(scene.bodies[side.body].mesh, side.name) for side in sides]
         held = [bool(scene.fixed(side.body)[np.unique(scene.facets(side))].all()) for side in sides]
         alike = max(sizes) <= 1.1 * min(sizes)

@@ -261,6 +261,7 @@ class AutomaticPart(Part):
     """Contact wherever boundaries of different bodies face each other, or those of a body that folds."""
 
     friction: AnyFriction | None
+    closure: AnyClosure | None
 
 
 @keys_of(Tie, without={"reason"})

@@ -16,6 +16,7 @@ from fenics_contact import (
     BodyMesh,
     ContactPair,
     Coulomb,
+    LinearClosure,
     RigidPlane,
     Scene,
     Support,
@@ -64,6 +65,24 @@ def test_the_surfaces_that_face_each_other_are_found_and_solved() -> None:
         forces.append(state.contact.normal_force)
     assert forces[0].sum() > 100.0
     assert forces[0] == pytest.approx(forces[1], rel=1e-6)
+
+
+def test_all_pairs_have_the_law_of_closure() -> None:
+    law = LinearClosure(1e5)
+    contact = solve_scene(scene((4, 4, 2), automatic=AutomaticContact(closure=law)), MPI.COMM_SELF).contact
+    pressed = contact.pressure > 1.0
+    assert pressed.any()
+    np.testing.assert_allclose(contact.gap[pressed], -law.closure(contact.pressure[pressed]), rtol=1e-3)
+    rubber = {"seal": Body(LOW, NeoHooke(10.0, 0.3))}
+    (folded,) = Scene(rubber, contacts=AutomaticContact(self_contact=("seal",), closure=law)).contacts
+    assert folded.closure == law
+
+    class Falling(LinearClosure):
+        def closure(self, pressure: np.ndarray) -> np.ndarray:
+            return -pressure
+
+    with pytest.raises(InvalidInputError, match="closure of Falling must be zero without pressure"):
+        AutomaticContact(closure=Falling(1.0))
 
 
 def test_the_finer_side_is_the_slave_then_the_softer_one() -> None:

@@ -451,7 +451,10 @@ def test_two_supports_cannot_have_one_name() -> None:
 
 # Scene files whose contact pairs the scene finds.
 PAIR = re.compile(r"\[\[contacts\]\].*?\n\n", re.DOTALL)
-FOUND = '[automatic_contact]\nfriction = { law = "coulomb", coefficient = 0.2 }\n\n'
+FOUND = (
+    '[automatic_contact]\nfriction = { law = "coulomb", coefficient = 0.2 }\n'
+    'closure = { law = "linear", stiffness = 1e5 }\n\n'
+)
 
 
 def read(text: str, folder: Path) -> SceneFile:
@@ -465,6 +468,7 @@ def test_pairs_are_found_in_place_of_those_of_the_file(tmp_path: Path) -> None:
     (pair,) = file.scene.contacts
     assert pair.place == "upper near lower on lower near upper"
     assert pair.friction == Coulomb(0.2)
+    assert pair.closure == surface_laws.LinearClosure(1e5)
     assert file.partitions.keys() == {"lower", "upper"}
 
 
