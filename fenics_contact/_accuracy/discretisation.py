@@ -187,7 +187,7 @@ def energy_on_subdomain(
     The result has shape (n_cells,), in the order of the subdomain's mesh, [force · length].
     """
     space = subdomain.mesh.space
-    mesh, dim = space.mesh, subdomain.mesh.dim
+    mesh, dim = space.mesh, subdomain.mesh.components
     _dolfinx.update_coordinates(mesh, subdomain.points[np.argsort(subdomain.mesh.nodes)])
     fields = []
     for values in (displacement, *(gradient[:, :, k] for k in range(dim))):

@@ -290,8 +290,8 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
     comm, tearing, at = decomposition.comm, decomposition.tearing, evaluation.at
     numbering, rows = evaluation.torn.numbering, np.arange(evaluation.torn.numbering.total)
     here, block = decomposition.held
-    copies = np.zeros((len(tearing.copy_subdomain), tearing.dim))
-    copies[here] = at.displacement.reshape(-1, tearing.dim)[block]
+    copies = np.zeros((len(tearing.copy_subdomain), tearing.components))
+    copies[here] = at.displacement.reshape(-1, tearing.components)[block]
     stored: dict[str, np.ndarray] = {
         "displacement": np.asarray(comm.allreduce(copies)),
         "multiplier": numbering.gather(at.multiplier, rows),
@@ -320,13 +320,13 @@ def stored_configuration(
     """Return the configuration of a stored state, with its contact points, and its load. Collective."""
     tearing = decomposition.tearing
     count, given = len(tearing.copy_subdomain), stored["displacement"].shape
-    if given != (count, tearing.dim):
+    if given != (count, tearing.components):
         raise InvalidInputError(
             f"a stored state needs displacements of {count} nodes of its subdomains, got shape {given}: give "
             "the scene and the partition of that state"
         )
     here, block = decomposition.held
-    by_block = np.zeros((len(here), tearing.dim))
+    by_block = np.zeros((len(here), tearing.components))
     by_block[block] = stored["displacement"][here]
     displacement = by_block.ravel()
     history = tuple(

@@ -60,7 +60,7 @@ def carried_over(old: DualSystem, solution: DualSolution, new: DualSystem) -> np
     start[gluing_new] = solution.multiplier[gluing_old]
     normal = before.numbering.gather(solution.multiplier, before.normal_rows)
     tau = before.numbering.gather(solution.multiplier, before.tangential_rows.ravel()).reshape(
-        -1, before.dim - 1
+        -1, before.components - 1
     )
     match = _matches(before.points, after.points)
     matched = match >= 0
@@ -68,7 +68,7 @@ def carried_over(old: DualSystem, solution: DualSolution, new: DualSystem) -> np
     values[matched] = normal[match[matched]]
     _put(new, start, after.normal_rows, values)
     if len(after.frictional):
-        friction = np.zeros((before.points.count, before.dim))
+        friction = np.zeros((before.points.count, before.components))
         friction[before.frictional] = np.einsum("na,nad->nd", tau, before.points.tangents[before.frictional])
         in_space = np.where(matched[:, None], friction[match], 0.0)[after.frictional]
         turned = np.einsum("nad,nd->na", after.points.tangents[after.frictional], in_space)

@@ -55,7 +55,7 @@ def consistent(
     Raises:
         ConvergenceError: If they do not agree; carries the history of all passes.
     """
-    slip = np.zeros((torn.points.count, torn.dim - 1)) if before is None else before.contact.total_slip
+    slip = np.zeros((torn.points.count, torn.components - 1)) if before is None else before.contact.total_slip
     mu, part, last = coefficients(torn, slip), 1.0, np.inf
     passes = Passes(solve, known)
     while passes.count < max_passes and part >= least:

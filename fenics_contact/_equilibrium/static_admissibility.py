@@ -142,10 +142,10 @@ def _along_sections(torn: TornSystem) -> tuple[sp.csr_matrix, np.ndarray]:
         if not preload.is_free:
             continue
         mine = np.flatnonzero(ties.pair == len(scene.ties) + number)
-        row = place[mine][:, None] * torn.dim + np.arange(torn.dim)
+        row = place[mine][:, None] * torn.components + np.arange(torn.components)
         size = np.sqrt(len(mine))
         entries = (ties.normal[mine].ravel() / size, (row.ravel(), np.zeros(row.size, dtype=np.int64)))
-        count = torn.dim * int(bonded.sum()) + int((~bonded).sum())
+        count = torn.components * int(bonded.sum()) + int((~bonded).sum())
         columns.append(sp.csr_matrix(entries, shape=(count, 1)))
         forces.append(-(preload.force or 0.0) / size)
     return sp.hstack(columns, format="csr"), np.array(forces)
@@ -334,7 +334,7 @@ class _Balance:
         for _ in range(50):  # most settle within five times
             if (digits := _digits(left.motion).tolist()) == before:
                 break
-            velocity = (slip.T @ left.motion).reshape(len(torn.frictional), torn.dim - 1)
+            velocity = (slip.T @ left.motion).reshape(len(torn.frictional), torn.components - 1)
             before, left = digits, self.left(part, np.linalg.norm(velocity, axis=1)) or left
         return left
 
@@ -378,7 +378,7 @@ class _Motion:
             more = "raise the friction coefficient" if len(torn.frictional) else "give its contact friction"
             return f"Support it, {touch}, or {more}"
         own = np.abs(bodies[body].arms(torn.points)).any(axis=(1, 2)) & (self.pressed > MARGIN)
-        if not _digits(self.bodies[body])[torn.dim :].any() or not own.any():
+        if not _digits(self.bodies[body])[torn.components :].any() or not own.any():
             return f"Support it, or {touch}"
         places = " and ".join(torn.scene.contacts[pair].place for pair in np.unique(torn.points.pair[own]))
         axis = bodies[body].axis(self.bodies[body])
@@ -398,7 +398,7 @@ def _admissible(
     # Surfaces that supports hold apart cannot be pressed together, whatever the supports could carry.
     pressed = ~torn.relations[1].held(torn.decomposition.fixed)[torn.frictional]
     coefficient = part * pressed * torn.friction_coefficient
-    n_normal, discs, width = torn.points.count, len(torn.frictional), torn.dim
+    n_normal, discs, width = torn.points.count, len(torn.frictional), torn.components
     size = reactions + n_normal + (width - 1) * discs
     coulomb = torn.tresca_bound == 0.0
     # Rows −(Ψ, τ) of each disc, with Ψ = μ λ_N or a given bound.
@@ -513,12 +513,13 @@ def _of_any(torn: TornSystem, pair: ContactPair, names: list[str]) -> sp.csc_mat
     slave = torn.scene.bodies[pair.slave.body]
     at = slave.mesh.points[fixing_nodes(slave.mesh.points)]
     size = slave.rigid_modes(at).shape[2]
-    result = np.zeros((len(names), size, at.size))
+    length = len(at) * slave.components
+    result = np.zeros((len(names), size, length))
     for side, sign in ((pair.slave, 1.0), (pair.master, -1.0)):
         if isinstance(side, Surface):
             modes = torn.scene.bodies[side.body].rigid_modes(at)
-            result[names.index(side.body)] += sign * modes.reshape(at.size, size).T
-    return sp.csc_matrix(result.reshape(-1, at.size))
+            result[names.index(side.body)] += sign * modes.reshape(length, size).T
+    return sp.csc_matrix(result.reshape(-1, length))
 
 
 def _separate(motions: np.ndarray, names: list[str]) -> tuple[UnheldMotion, ...]:

@@ -106,7 +106,7 @@ class ContactWarnings:
     def _warn_of_large_rotations(self, state: State) -> None:
         """Warn of bodies of small strain that turn so far that they are strained by it. Collective."""
         comm = state.torn.decomposition.comm
-        moved = state.torn_displacement.reshape(-1, state.torn.dim)
+        moved = state.torn_displacement.reshape(-1, state.torn.components)
         longest = float(comm.allreduce(np.linalg.norm(moved, axis=1).max(initial=0.0), op=MPI.MAX))
         for name, body in state.scene.deforming.items():
             if body.deforms_much or name in self._given or longest * self._bound(name, body.mesh) <= FAR:
@@ -132,7 +132,7 @@ class ContactWarnings:
         Only bodies whose bounding boxes come near each other are gathered; ranks share their facets.
         """
         scene, comm = state.scene, state.torn.decomposition.comm
-        moved = state.torn_displacement.reshape(-1, scene.dim)
+        moved = state.torn_displacement.reshape(-1, scene.components)
         reach = max(comm.allgather(float(np.linalg.norm(moved, axis=1).max(initial=0.0))))
         near = [both for both in bodies_near(scene, reach) if both not in self._given]
         names = sorted({name for both in near for name in both})

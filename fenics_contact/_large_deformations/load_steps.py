@@ -405,7 +405,7 @@ class _Way:
                 "hold them better"
             )
             raise self._ends(now, words) from failure
-        way = (found.evaluation.at.displacement - now.at.displacement).reshape(-1, now.torn.dim)
+        way = (found.evaluation.at.displacement - now.at.displacement).reshape(-1, now.torn.components)
         far = global_max(now.torn.numbering.comm, np.linalg.norm(way, axis=1).max(initial=0.0))
         snap = Snap(fraction, float(far), motion.dissipated, motion.stages)
         safe_log(_LOG.info, "%s", snap)

@@ -157,7 +157,7 @@ def unsymmetric_at(
     decomposition: Decomposition, stiffness: sp.csr_matrix, nodes: np.ndarray
 ) -> UnevenStiffness:
     """Return the unsymmetric part of a torn stiffness on the free dofs of some nodes. Collective."""
-    tearing, dim = decomposition.tearing, decomposition.tearing.dim
+    tearing, dim = decomposition.tearing, decomposition.tearing.components
     here, block = decomposition.held
     node = np.empty(len(here), dtype=np.int64)
     node[block] = tearing.copy_node[here]
@@ -254,7 +254,7 @@ def stiffened(
     """Add blocks on single nodes, shared by their copies, to the tangents of this rank's subdomains."""
     if len(geometric.block_node) == 0:
         return tangents
-    decomposition, dim = torn.decomposition, torn.dim
+    decomposition, dim = torn.decomposition, torn.components
     entry, copy, place = decomposition.copies_here(geometric.block_node)
     block = geometric.blocks[entry] * decomposition.tearing.copy_share[copy, None, None]
     dofs = dim * place[:, None] + np.arange(dim)
@@ -330,7 +330,9 @@ class ContactConfiguration:
             along = np.einsum("nad,npd->nap", points.tangents, points.tilted)
             across |= np.max(along**2, axis=2) > 0.5
         held = np.zeros_like(across)
-        held[torn.frictional] = torn.relations[2].held(torn.decomposition.fixed).reshape(-1, torn.dim - 1)
+        held[torn.frictional] = (
+            torn.relations[2].held(torn.decomposition.fixed).reshape(-1, torn.components - 1)
+        )
         return np.asarray(across & held)
 
     def turning(self, multiplier: Vector, pressure: UnevenStiffness | None) -> TurningForces | None:
@@ -346,7 +348,7 @@ class ContactConfiguration:
             UnevenStiffness(each.left, each.right, slave[each.point])
             for each in (points.friction_stiffness(friction), means.stiffness)
         ]
-        width, frictional = self.torn.dim - 1, self.torn.frictional
+        width, frictional = self.torn.components - 1, self.torn.frictional
         rubbed = (width * frictional[:, None] + np.arange(width)).ravel()
         # In the order of the rows of contact, of which those of gaps measure −n·[u].
         slips = scaled_rows(means.slip, 1.0 - self._across.ravel())
@@ -381,7 +383,7 @@ class ContactConfiguration:
         That of points without friction is zero.
         """
         torn = self.torn
-        count, width = torn.points.count, torn.dim - 1
+        count, width = torn.points.count, torn.components - 1
         rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])
         gathered = torn.numbering.gather(values, rows)
         tangential = np.zeros((count, width))
@@ -411,7 +413,7 @@ class ContactConfiguration:
         fixed, axes = decomposition.fixed, decomposition.axes
         for columns, owner in turning.columns:
             entries = (columns if axes is None else free_matrix(fixed, axes) @ columns).T.tocoo()
-            node, component = np.divmod(entries.col, self.torn.dim)
+            node, component = np.divmod(entries.col, self.torn.components)
             free = ~fixed[node, component] if axes is None else np.full(len(node), True)
             further.append(
                 on_copies(

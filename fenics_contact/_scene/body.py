@@ -74,6 +74,16 @@ class Body:
         return _dolfinx.revolved(self.mesh.cell_type) if self.axisymmetric else self.mesh.cell_type
 
     @property
+    def components(self) -> int:
+        """Number of components of its displacement."""
+        return self.mesh.dim
+
+    @property
+    def motions(self) -> int:
+        """Number of its rigid motions."""
+        return 1 if self.axisymmetric else 3 * (self.mesh.dim - 1)
+
+    @property
     def on_axis(self) -> np.ndarray:
         """Which nodes of a body of revolution lie on its axis, shape (n_nodes,); none of others."""
         if not self.axisymmetric:

@@ -319,6 +319,11 @@ class SceneParts:
         return int(next(iter(self.bodies.values())).mesh.points.shape[1])
 
     @property
+    def components(self) -> int:
+        """Number of components of displacements."""
+        return next(iter(self.bodies.values())).components
+
+    @property
     def axisymmetric(self) -> bool:
         """Whether its bodies are bodies of revolution."""
         return next(iter(self.bodies.values())).axisymmetric
@@ -352,7 +357,7 @@ class SceneParts:
     ) -> tuple[np.ndarray, LocalAxes | None]:
         """Return what `prescribed` returns, and along which axes; None: all along the coordinates'."""
         chosen = self.supports if supports is None else supports
-        values = np.full(self.bodies[body].mesh.points.shape, np.nan)
+        values = np.full((self.bodies[body].mesh.n_nodes, self.components), np.nan)
         for support in chosen:
             if support.body == body and not isinstance(support, Roller | ToolMotion):
                 nodes, given = self.given(support)

@@ -266,14 +266,14 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
     names = {effect.name for effect in effects}
     counts = [_node_counts(body.mesh, partitions[name]) for name, body in scene.bodies.items()]
     nodes, shared = (np.concatenate(column) for column in zip(*counts, strict=True))
-    subdomains, unknowns = len(nodes), scene.dim * int(nodes.sum())
+    subdomains, unknowns = len(nodes), scene.components * int(nodes.sum())
     solver = choose_solver(scene, subdomains, sensitivity=sensitivity)
     direct = solver is SolverKind.DIRECT
     loose = sum(int(s.free.sum()) for s in scene.supports if isinstance(s, RigidSurface))
     loose += sum(preload.is_free for preload in scene.preloads)
-    each = 1 if scene.axisymmetric else scene.dim * (scene.dim + 1) // 2
+    each = next(iter(scene.bodies.values())).motions
     motions = 0 if direct else subdomains * each + loose
-    sizes = zip(scene.dim * nodes, scene.dim * shared, strict=True)
+    sizes = zip(scene.components * nodes, scene.components * shared, strict=True)
     factors = sum(expected_bytes(int(size), int(interface)) for size, interface in sizes)
     return Plan(
         effects=effects,
@@ -334,14 +334,14 @@ def _multipliers(scene: SceneParts, unknowns: int) -> dict[str, int]:
     fixed = sum(int(np.count_nonzero(scene.fixed(name))) for name in scene.body_names)
     slaves = [_bearing_nodes(scene, pair.slave) for pair in scene.contacts]
     rubbing = [count for pair, count in zip(scene.contacts, slaves, strict=True) if pair.has_friction]
-    tied = [(1 if tie.sliding else scene.dim) * _slave_nodes(scene, tie.slave) for tie in scene.ties]
+    tied = [(1 if tie.sliding else scene.components) * _slave_nodes(scene, tie.slave) for tie in scene.ties]
     return {
-        "gluing": unknowns - scene.dim * nodes,
+        "gluing": unknowns - scene.components * nodes,
         "prescribed": fixed,
         "tied": sum(tied),
-        "drawn": sum(scene.dim * each.count(scene.bodies[each.body].mesh) for each in scene.preloads),
+        "drawn": sum(scene.components * each.count(scene.bodies[each.body].mesh) for each in scene.preloads),
         "normal": sum(slaves),
-        "tangential": (scene.dim - 1) * sum(rubbing),
+        "tangential": (scene.components - 1) * sum(rubbing),
     }
 
 

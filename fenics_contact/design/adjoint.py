@@ -420,7 +420,7 @@ def slips_by_area(torn: TornSystem, multiplier: np.ndarray, weight: np.ndarray) 
     """
     result = np.zeros(torn.points.count)
     if torn.elastic_slip is not None:
-        rows, width = torn.tangential_rows.ravel(), torn.dim - 1
+        rows, width = torn.tangential_rows.ravel(), torn.components - 1
         tau, by_slip = (torn.numbering.gather(x, rows).reshape(-1, width) for x in (multiplier, weight))
         area = torn.points.area[torn.frictional]
         result[torn.frictional] = -torn.elastic_slip / area * np.einsum("na,na->n", tau, by_slip)

@@ -92,7 +92,7 @@ def bounds_by_place(torn: TornSystem, normal_force: np.ndarray, by_bound: np.nda
     point's slip bound, shape (n_friction,).
     """
     points = torn.points
-    result, by_all = np.zeros((points.count, torn.dim)), np.zeros(points.count)
+    result, by_all = np.zeros((points.count, torn.components)), np.zeros(points.count)
     by_all[torn.frictional] = by_bound
     limited = np.zeros(points.count, dtype=bool)
     if torn.strengths is not None:
@@ -200,7 +200,7 @@ def mortar_by_shape(
     own[known] = np.hstack(list(motions.at(nodes[known])))
     coupled = CouplingDerivatives(by.area, left, right, by.normal, by.gap, own)
     by_slave, by_master = mortar_points_pulled_back(met, coupled, comm)
-    result = np.zeros((tearing.n_nodes, torn.dim))
+    result = np.zeros((tearing.n_nodes, torn.components))
     result[nodes] += by_slave
     result[opposite] += by_master
     return result
@@ -278,7 +278,7 @@ def contact_by_shape(
     slip bounds and areas, by which the derivatives are given. Collective.
     """
     tearing, points = torn.decomposition.tearing, torn.points
-    result = np.zeros((tearing.n_nodes, torn.dim))
+    result = np.zeros((tearing.n_nodes, torn.components))
     if points.count == 0:
         return result
     rows = _row_fields(torn, fields)
@@ -326,7 +326,11 @@ def _by_mortar(torn: TornSystem, index: int, rows: RowFields, by_area: np.ndarra
     # Nodes that have no point of this pair only give their areas to others.
     slave, areas = points.of_surface(index, by_area)
     own = np.isin(slave, points.slave[mine])
-    pulled, normal, gap = np.zeros((2, len(slave), torn.dim)), np.zeros((len(slave), torn.dim)), 0.0 * areas
+    pulled, normal, gap = (
+        np.zeros((2, len(slave), torn.components)),
+        np.zeros((len(slave), torn.components)),
+        0.0 * areas,
+    )
     pulled[:, own], normal[own], gap[own] = _pulled_master(points, rows, mine), by.normal + turned, by.gap
     given = MortarDerivatives(pulled, normal, gap, areas)
     return mortar_by_shape(torn, torn.scene.contacts[index], slave, rows, given)
@@ -340,7 +344,7 @@ def _by_obstacle(torn: TornSystem, obstacle: RigidObstacle, rows: RowFields, min
         body = torn.scene.bodies[obstacle.name]
         assert isinstance(body, ToolBody)
         nodes = torn.decomposition.tearing.global_nodes(obstacle.name, np.arange(body.mesh.n_nodes))
-        moved = np.broadcast_to(rows.at(nodes)[:, None], (2, len(mine), len(nodes), torn.dim))
+        moved = np.broadcast_to(rows.at(nodes)[:, None], (2, len(mine), len(nodes), torn.components))
         carried = _by_point(torn.points, rows, mine, moved).weight @ body.weight_slopes
     with together(torn.decomposition.comm):
         bending = evaluate_shape(obstacle, "curvatures", torn.scene.points[torn.points.slave[mine]])
@@ -379,7 +383,7 @@ def _add_projection(
 
 def _row_fields(torn: TornSystem, fields: PairedFields) -> RowFields:
     """Gather multipliers and displacements at all points. Collective."""
-    points, width = torn.points, torn.dim - 1
+    points, width = torn.points, torn.components - 1
     normal = np.stack([torn.numbering.gather(x, torn.normal_rows) for x in fields.multipliers])
     friction = np.zeros((2, points.count, width))
     for k, x in enumerate(fields.multipliers):
@@ -421,7 +425,7 @@ def ties_by_shape(torn: TornSystem, fields: PairedFields) -> np.ndarray:
     Rows of bonded surfaces lie along the axes and change by the weights of the master alone, those of sliding
     ones by its normals, too.
     """
-    result = np.zeros((torn.decomposition.tearing.n_nodes, torn.dim))
+    result = np.zeros((torn.decomposition.tearing.n_nodes, torn.components))
     if torn.ties.count == 0:
         return result
     masters = [tie.master for tie in torn.scene.ties]
@@ -438,7 +442,7 @@ def ties_by_shape(torn: TornSystem, fields: PairedFields) -> np.ndarray:
 def _forces(torn: TornSystem, multipliers: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     """Return the multipliers of the rows times their directions, summed at each point, (2, n, dim)."""
     rows = torn.relations[0]
-    result = np.zeros((2, torn.ties.count, torn.dim))
+    result = np.zeros((2, torn.ties.count, torn.components))
     for force, multiplier in zip(result, multipliers, strict=True):
         values = torn.numbering.gather(multiplier, torn.n_gluing + np.arange(rows.count))
         np.add.at(force, rows.which, values[:, None] * rows.directions)
@@ -473,6 +477,6 @@ def _by_normal(
 ) -> np.ndarray:
     """Return the derivative by the normals, shape (n, dim): rows of sliding ties lie along −n."""
     if not tie.sliding:
-        return np.zeros((len(mine), torn.dim))
+        return np.zeros((len(mine), torn.components))
     along = -np.einsum("knd,nd->kn", force, torn.ties.normal[mine])
     return np.einsum("kn,knd->nd", along, motions.relative[:, mine])

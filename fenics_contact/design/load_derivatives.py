@@ -35,7 +35,7 @@ def field_by_places(
 
     `moving`: marks of the nodes of all bodies that move, or None for all.
     """
-    mesh, dim, mesh_of_body = subdomain.mesh, torn.dim, torn.scene.bodies[subdomain.mesh.body].mesh
+    mesh, dim, mesh_of_body = subdomain.mesh, torn.components, torn.scene.bodies[subdomain.mesh.body].mesh
     nodes = np.sort(mesh.nodes)
     chosen = np.ones(len(nodes), dtype=bool)
     if moving is not None:
@@ -97,7 +97,7 @@ class _Spread:
 def resultant_by_shape(torn: TornSystem, load: TotalForce, w: np.ndarray) -> np.ndarray:
     """Return ∂/∂X of the work of a resultant along w, on the first rank, zero elsewhere. Collective."""
     mesh, tearing = torn.scene.bodies[load.body].mesh, torn.decomposition.tearing
-    result = np.zeros((tearing.n_nodes, torn.dim))
+    result = np.zeros((tearing.n_nodes, torn.components))
     nodes, facets = np.unique(mesh.surfaces[load.surface], return_inverse=True)
     facets = facets.reshape(mesh.surfaces[load.surface].shape)
     numbers = tearing.global_nodes(load.body, nodes)

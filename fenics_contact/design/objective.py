@@ -56,7 +56,7 @@ class Partials:
         zeros = {
             "by_displacement": np.zeros(len(state.torn_displacement)),
             "by_multiplier": np.zeros(len(torn.numbering.owned)),
-            "by_shape": np.zeros((torn.decomposition.tearing.n_nodes, torn.dim)),
+            "by_shape": np.zeros((torn.decomposition.tearing.n_nodes, torn.components)),
         }
         return cls(float(value), **{**zeros, **known})
 

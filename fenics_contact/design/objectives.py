@@ -65,7 +65,7 @@ class ContactForces(Weighable):
 
     def _differentiated(self, state: State) -> tuple[float, np.ndarray, np.ndarray]:
         """Return the checked result of the user's function."""
-        count, width = state.torn.points.count, state.torn.dim - 1
+        count, width = state.torn.points.count, state.torn.components - 1
         value, normal, tangential = self._asked(state)
         if normal.shape != (count,) or tangential.shape != (count, width):
             raise InvalidInputError(

@@ -136,7 +136,7 @@ def deformed_contact_by_shape(
     """
     torn, contact = state.torn, state.equilibrium.evaluation.contact
     points = contact.points
-    result = np.zeros((torn.decomposition.tearing.n_nodes, torn.dim))
+    result = np.zeros((torn.decomposition.tearing.n_nodes, torn.components))
     if points is None or points.points.count == 0:
         return result
     (normal, friction), (by_gap, by_slip) = (contact.at_points(each) for each in fields.multipliers)
@@ -159,7 +159,7 @@ def deformed_contact_by_shape(
 def _on_surfaces(torn: TornSystem, points: SlidingPoints, field: np.ndarray) -> np.ndarray:
     """Return a torn field at the nodes of contact surfaces, zero at others, by dof. Collective."""
     nodes = points.moving_nodes
-    values = np.zeros((torn.decomposition.tearing.n_nodes, torn.dim))
+    values = np.zeros((torn.decomposition.tearing.n_nodes, torn.components))
     values[nodes] = nodal_mean_at(torn.decomposition, field, nodes)
     return values.ravel()
 

@@ -22,9 +22,9 @@ def nodal_mean(decomposition: Decomposition, displacement: np.ndarray) -> np.nda
     here, columns = decomposition.held
     nodes, place = np.unique(tearing.copy_node[here], return_inverse=True)
     share = sp.csr_matrix((tearing.copy_share[here], (place.ravel(), columns)))
-    mean = share @ displacement.reshape(-1, tearing.dim)
+    mean = share @ displacement.reshape(-1, tearing.components)
     sharing = Sharing(decomposition.comm, nodes, np.flatnonzero(tearing.on_several_ranks[nodes]))
-    result = np.full((tearing.n_nodes, tearing.dim), np.nan)
+    result = np.full((tearing.n_nodes, tearing.components), np.nan)
     result[nodes] = sharing.add_up(mean)
     return result
 
@@ -39,8 +39,8 @@ def nodal_mean_at(decomposition: Decomposition, field: np.ndarray, nodes: np.nda
     """
     tearing = decomposition.tearing
     place, copy, block = decomposition.copies_here(nodes)
-    total = np.zeros((len(nodes), tearing.dim))
-    np.add.at(total, place, tearing.copy_share[copy, None] * field.reshape(-1, tearing.dim)[block])
+    total = np.zeros((len(nodes), tearing.components))
+    np.add.at(total, place, tearing.copy_share[copy, None] * field.reshape(-1, tearing.components)[block])
     return np.asarray(decomposition.comm.allreduce(total))
 
 
@@ -54,7 +54,7 @@ def nodal_mean_transposed(decomposition: Decomposition, nodes: np.ndarray, value
     """
     tearing = decomposition.tearing
     place, copy, block = decomposition.copies_here(nodes)
-    result = np.zeros((decomposition.torn_size // tearing.dim, tearing.dim))
+    result = np.zeros((decomposition.torn_size // tearing.components, tearing.components))
     result[block] = tearing.copy_share[copy, None] * values[place]
     return result.ravel()
 
@@ -68,6 +68,6 @@ def nodal_sum(decomposition: Decomposition, force: np.ndarray) -> np.ndarray:
     """
     tearing = decomposition.tearing
     here, block = decomposition.held
-    total = np.zeros((tearing.n_nodes, tearing.dim))
-    np.add.at(total, tearing.copy_node[here], force.reshape(-1, tearing.dim)[block])
+    total = np.zeros((tearing.n_nodes, tearing.components))
+    np.add.at(total, tearing.copy_node[here], force.reshape(-1, tearing.components)[block])
     return np.asarray(decomposition.comm.allreduce(total))

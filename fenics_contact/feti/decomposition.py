@@ -37,6 +37,7 @@ class Tearing(NodeNumbers):
     a pair (node, subdomain); copies are sorted by node, then by subdomain.
 
     Attributes:
+        components: Displacement components of a node, the dofs of a copy.
         subdomain_offset: First subdomain of each body and the total, shape (n_bodies + 1,).
         subdomain_rank: Owner of each subdomain, shape (n_subdomains,).
         first_copy: First copy of each node and the total, shape (n_nodes + 1,).
@@ -44,7 +45,7 @@ class Tearing(NodeNumbers):
         copy_stiffness: Typical stiffness at each copy, the largest being one, shape (n_copies,).
     """
 
-    dim: int
+    components: int
     subdomain_offset: np.ndarray
     subdomain_rank: np.ndarray
     first_copy: np.ndarray
@@ -111,11 +112,11 @@ def tear(
         sums.append(np.bincount(where.ravel(), weights) / np.bincount(where.ravel()))
     key, stiff = np.concatenate(keys), np.concatenate(sums)
     multiplicity = np.bincount(key // total, minlength=int(node_offset[-1]))
-    costs = _costs(key % total, multiplicity[key // total] > 1, total, scene.dim)
+    costs = _costs(key % total, multiplicity[key // total] > 1, total, scene.components)
     return Tearing(
         names,
         node_offset,
-        scene.dim,
+        scene.components,
         subdomain_offset,
         _deal_out(np.split(costs, subdomain_offset[1:-1]), ranks),
         np.concatenate([[0], np.cumsum(multiplicity)]),
@@ -124,10 +125,10 @@ def tear(
     )
 
 
-def _costs(copy_subdomain: np.ndarray, shared: np.ndarray, count: int, dim: int) -> np.ndarray:
+def _costs(copy_subdomain: np.ndarray, shared: np.ndarray, count: int, components: int) -> np.ndarray:
     """Return the estimated cost of each subdomain, shape (n_subdomains,), [s]."""
-    size = dim * np.bincount(copy_subdomain, minlength=count)
-    interface = dim * np.bincount(copy_subdomain[shared], minlength=count)
+    size = components * np.bincount(copy_subdomain, minlength=count)
+    interface = components * np.bincount(copy_subdomain[shared], minlength=count)
     return np.array([expected_seconds(int(n), int(b)) for n, b in zip(size, interface, strict=True)])
 
 
@@ -206,7 +207,7 @@ def prescribed_along(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalA
     Returns the value of each prescribed component, NaN where it is free, shape (n_nodes, dim), [length], and
     along which axes; None: all along the coordinates'.
     """
-    prescribed = np.full((tearing.n_nodes, scene.dim), np.nan)
+    prescribed = np.full((tearing.n_nodes, scene.components), np.nan)
     for support in scene.supports:
         if isinstance(support, Roller | ToolMotion):
             continue
@@ -312,7 +313,7 @@ def gluing_rows(tearing: Tearing, fixed: np.ndarray, axes: LocalAxes | None = No
     within = np.arange(len(dof)) - start[dof]
     is_fixed = fixed.ravel()[dof]
     # A gluing row belongs to the rank of the node's first copy, a prescribing row to that of its own copy.
-    anchor = tearing.first_copy[dof // tearing.dim] + np.where(is_fixed, within, 0)
+    anchor = tearing.first_copy[dof // tearing.components] + np.where(is_fixed, within, 0)
     owner = tearing.subdomain_rank[tearing.copy_subdomain[anchor]]
     return GluingRows(Rows(row, copy, component, entry, np.zeros(len(dof)), owner), dof, fixed, axes)
 
@@ -339,7 +340,7 @@ def _prescribed_entries(tearing: Tearing, fixed: np.ndarray, start: np.ndarray) 
     node, component = np.nonzero(fixed)
     copies = tearing.multiplicity[node]
     within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
-    row = np.repeat(start[tearing.dim * node + component], copies) + within
+    row = np.repeat(start[tearing.components * node + component], copies) + within
     copy = np.repeat(tearing.first_copy[node], copies) + within
     return row, copy, np.repeat(component, copies), np.ones(len(row))
 
@@ -351,7 +352,7 @@ def _glued_entries(
     copy_of = tearing.first_copy[node][:, None] + np.arange(copies)
     matrix = weighted_helmert(tearing.copy_stiffness[copy_of])
     k, j = np.nonzero(np.tri(copies - 1, copies, 1))
-    row = start[tearing.dim * node + component][:, None] + k
+    row = start[tearing.components * node + component][:, None] + k
     return row.ravel(), copy_of[:, j].ravel(), np.repeat(component, len(k)), matrix[:, k, j].ravel()
 
 
@@ -384,17 +385,17 @@ class Decomposition:
     @property
     def torn_size(self) -> int:
         """Length of this rank's torn vectors."""
-        return self.tearing.dim * int(self.block_offset[-1])
+        return self.tearing.components * int(self.block_offset[-1])
 
     @property
     def torn_unknowns(self) -> int:
         """Number of displacement unknowns of all subdomains of all ranks."""
-        return self.tearing.dim * len(self.tearing.copy_subdomain)
+        return self.tearing.components * len(self.tearing.copy_subdomain)
 
     @cached_property
     def parts(self) -> tuple[slice, ...]:
         """Where each of this rank's subdomains lies in its torn vectors."""
-        ends = self.tearing.dim * self.block_offset
+        ends = self.tearing.components * self.block_offset
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
     @cached_property
@@ -416,7 +417,7 @@ class Decomposition:
         here, block = self.held
         stiffness = np.empty(len(here))
         stiffness[block] = self.tearing.copy_stiffness[here]
-        return np.repeat(stiffness, self.tearing.dim)
+        return np.repeat(stiffness, self.tearing.components)
 
     @property
     def fixed(self) -> np.ndarray:

@@ -432,9 +432,9 @@ class DualSystem:
         if self.unheld.shape[1] == 0:
             return displacement
         tearing, here = self.torn.decomposition.tearing, self.torn.decomposition.copy_block
-        weight = np.empty(len(displacement) // tearing.dim)
+        weight = np.empty(len(displacement) // tearing.components)
         weight[here[here >= 0]] = 1.0 / tearing.multiplicity[tearing.copy_node[here >= 0]]
-        weighted = self.unheld.T @ sp.diags(np.repeat(weight, tearing.dim))
+        weighted = self.unheld.T @ sp.diags(np.repeat(weight, tearing.components))
         sums = np.column_stack([(weighted @ self.unheld).toarray(), weighted @ displacement])
         sums = self.torn.numbering.comm.allreduce(sums)
         return displacement - self.unheld @ np.linalg.solve(sums[:, :-1], sums[:, -1])
@@ -546,7 +546,7 @@ class DualSystem:
         here, block = decomposition.held
         of_block = np.empty(len(here))
         of_block[block] = 1.0 / decomposition.tearing.copy_stiffness[here]
-        return of_block[self.inverse.interface // self.torn.dim]
+        return of_block[self.inverse.interface // self.torn.components]
 
     def _scaling(self, coarse: CoarseSpace) -> Scaling | None:
         """Return factors √(b·b / b·D⁻¹b) of the rows b of B, None where stiffness is uniform. Collective."""

@@ -172,14 +172,17 @@ def regularised(stiffness: sp.csr_matrix, kernel: np.ndarray, points: np.ndarray
         stable computation of a generalized inverse of the stiffness matrix of a floating structure.
         Int. J. Numer. Meth. Engng 88 (2011) 493-509.
     """
-    dofs = fixing_dofs(points)
+    dofs = fixing_dofs(points, components=stiffness.shape[0] // len(points))
     return held_by(stiffness, dofs, motions_at(dofs, kernel), float(stiffness.diagonal().max()))
 
 
-def fixing_dofs(points: np.ndarray, count: int = FIXING_NODES) -> np.ndarray:
-    """Return the dofs of well-spread nodes, ascending, shape (n_dofs,); see `fixing_nodes`."""
-    nodes, dim = np.sort(fixing_nodes(points, count)), points.shape[1]
-    return np.asarray((dim * nodes[:, None] + np.arange(dim)).ravel())
+def fixing_dofs(points: np.ndarray, count: int = FIXING_NODES, components: int | None = None) -> np.ndarray:
+    """Return the dofs of well-spread nodes, ascending, shape (n_dofs,); see `fixing_nodes`.
+
+    `components`: dofs of a node; by default as many as it has coordinates.
+    """
+    nodes, width = np.sort(fixing_nodes(points, count)), components or points.shape[1]
+    return np.asarray((width * nodes[:, None] + np.arange(width)).ravel())
 
 
 def motions_at(dofs: np.ndarray, kernel: np.ndarray) -> np.ndarray:

@@ -23,7 +23,7 @@ def foundation_stiffness(
     Returns shape (n_nodes · dim, n_nodes · dim), with dofs node by node of the body.
     """
     mesh = body.mesh
-    size = mesh.n_nodes * mesh.dim
+    size = mesh.n_nodes * body.components
     total = sp.csr_matrix((size, size))
     for foundation in foundations:
         facets = mesh.surfaces[foundation.surface]
@@ -38,7 +38,7 @@ def foundation_stiffness(
 
 def _of_facets(foundation: ElasticFoundation, body: Body, facets: np.ndarray) -> sp.csr_matrix:
     mesh, stiffness = body.mesh, np.asarray(foundation.stiffness)
-    dim, width = mesh.dim, facets.shape[1]
+    dim, width = body.components, facets.shape[1]
     blocks = np.zeros((len(facets), width, dim, width, dim))
     for at in gauss_points(mesh.points, facets, body.axisymmetric):
         if stiffness.ndim:

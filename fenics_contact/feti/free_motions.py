@@ -80,7 +80,7 @@ NO_MOTIONS = FreeMotions(sp.csr_matrix((0, 0)), np.zeros(0))
 
 def free_motions(scene: Scene, tearing: Tearing) -> FreeMotions:
     """Return the free motions of all rigid surfaces on the nodes of their bodies."""
-    columns, loads, size = [], [], tearing.n_nodes * scene.dim
+    columns, loads, size = [], [], tearing.n_nodes * scene.components
     for number, surface in enumerate(scene.supports):
         if not isinstance(surface, RigidSurface) or not surface.free.any():
             continue
@@ -95,7 +95,7 @@ def free_motions(scene: Scene, tearing: Tearing) -> FreeMotions:
         _require_room(surface, along, ~np.isnan(prescribed[own]), mesh.points[own])
         basis, scale = np.linalg.qr(modes.reshape(-1, modes.shape[2]))
         node, component = np.indices(modes.shape[:2]).reshape(2, -1)
-        row = tearing.global_nodes(surface.body, own)[node] * scene.dim + component
+        row = tearing.global_nodes(surface.body, own)[node] * scene.components + component
         place = np.broadcast_to(np.arange(basis.shape[1]), basis.shape)
         entries = (basis.ravel(), (np.repeat(row, basis.shape[1]), place.ravel()))
         columns.append(sp.csr_matrix(entries, shape=(size, basis.shape[1])))
@@ -103,7 +103,7 @@ def free_motions(scene: Scene, tearing: Tearing) -> FreeMotions:
     if not columns:
         return FreeMotions(sp.csr_matrix((size, 0)), np.zeros(0))
     joined = sp.hstack(columns, format="csr")
-    _require_flexible_slaves(scene, tearing, _moving(joined, (tearing.n_nodes, scene.dim)))
+    _require_flexible_slaves(scene, tearing, _moving(joined, (tearing.n_nodes, scene.components)))
     return FreeMotions(joined, np.concatenate(loads))
 
 

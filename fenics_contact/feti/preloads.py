@@ -63,11 +63,11 @@ def section_points(
         nothing = np.zeros(count)
         points = ContactPoints(
             np.full(count, len(scene.ties) + number), behind, master, normals, tangent_frames(normals),
-            nothing, nothing, np.full(count, -1), np.zeros((count, scene.dim - 1)), reference_axes(normals),
-            np.zeros((count, scene.dim), dtype=bool), nothing, np.ones(count, dtype=bool),
+            nothing, nothing, np.full(count, -1), np.zeros((count, scene.components - 1)),
+            reference_axes(normals), np.zeros(normals.shape, dtype=bool), nothing, np.ones(count, dtype=bool),
         )  # fmt: skip
         found.append(points)
-    return join_points(found, scene.dim, numbers.n_nodes)
+    return join_points(found, scene.components, numbers.n_nodes)
 
 
 def shortening_columns(scene: Scene, tied: Relations) -> sp.csr_matrix:
@@ -139,4 +139,3 @@ def once_at_sections(
     area = points.area + np.bincount(left, points.area[dropped], points.count)
     rest = np.setdiff1d(np.arange(points.count), dropped)
     return replace(points, area=area, taken=taken).part(rest)
-

@@ -51,7 +51,7 @@ def _values(scene: Scene) -> dict[str, str]:
             descriptions.update(described(values, f"scene.supports[{number}] at some nodes"))
     for number, load in enumerate(scene.loads):
         if callable(load.value) and not isinstance(load.value, Ufl):
-            points, shape = _nodes(scene, load), () if is_scalar(load) else (scene.dim,)
+            points, shape = _nodes(scene, load), () if is_scalar(load) else (scene.components,)
             values = evaluate(f"{type(load).__name__} on body {load.body!r}", load.value, points, shape)
             descriptions.update(described(values, f"scene.loads[{number}] at some nodes"))
     return descriptions

@@ -65,7 +65,7 @@ def interface_dofs(
     With the interface fixed the inside must have no rigid motion, or K_ii would be singular.
 
     `touched`: marks of the dofs, shape (n,); `kernel`: columns that span the kernel of K, shape (n, n_modes);
-    `points`: coordinates by block of dim dofs, shape (n / dim, dim); `rank_tolerance`: singular values of the
+    `points`: coordinates by block of dofs, shape (n_blocks, dim); `rank_tolerance`: singular values of the
     kernel's trace on an interface below this count as zero: the modes have length one.
     """
     modes, _ = np.linalg.qr(kernel)
@@ -73,7 +73,7 @@ def interface_dofs(
     # A body on an elastic bed may have no contact at all, but the interface must not be empty.
     if not touched.any() or np.count_nonzero(trace > rank_tolerance) < kernel.shape[1]:
         touched = touched.copy()
-        touched.reshape(points.shape)[fixing_nodes(points)] = True
+        touched.reshape(len(points), -1)[fixing_nodes(points)] = True
     return np.flatnonzero(touched)
 
 
@@ -82,7 +82,7 @@ def interface_dofs(
 class SubdomainMesh:
     """The part of a subdomain that does not depend on the geometry: mesh, numbering, tagged facets.
 
-    Blocks of dofs, one dof per direction, are numbered as dolfinx numbers them.
+    Blocks of dofs, one dof per component, are numbered as dolfinx numbers them.
 
     Attributes:
         cells: Cells of the body's mesh, in this mesh's order.
@@ -99,14 +99,14 @@ class SubdomainMesh:
     facets: dict[str, tuple[np.ndarray, np.ndarray]]
 
     @property
-    def dim(self) -> int:
-        """Dimension of space, the length of a block."""
-        return int(self.space.mesh.geometry.dim)
+    def components(self) -> int:
+        """Displacement components of a node, the length of a block."""
+        return int(self.space.dofmap.index_map_bs)
 
     @property
     def size(self) -> int:
         """Number of dofs."""
-        return self.dim * len(self.nodes)
+        return self.components * len(self.nodes)
 
     def facets_of(self, body: Body, surface: str) -> tuple[np.ndarray, np.ndarray]:
         """Return the part of a surface of the body that lies on this mesh: cells, local facets."""
@@ -272,7 +272,7 @@ def foundation_of(mesh: SubdomainMesh, body: Body, foundations: Sequence[Elastic
     beds = [each for each in foundations if each.body == mesh.body]
     if not beds:
         return sp.csr_matrix((mesh.size, mesh.size))
-    dofs = (mesh.dim * mesh.nodes[:, None] + np.arange(mesh.dim)).ravel()
+    dofs = (mesh.components * mesh.nodes[:, None] + np.arange(mesh.components)).ravel()
     return foundation_stiffness(beds, body, mesh.cells)[dofs][:, dofs].tocsr()
 
 

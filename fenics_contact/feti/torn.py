@@ -87,7 +87,7 @@ def meeting_points(
     """Search for contact and tied points, only where the scene has pairs. Collective."""
     tearing, fixed, comm = decomposition.tearing, decomposition.fixed, decomposition.comm
     axes = decomposition.axes
-    points = ties = join_points([], scene.dim, tearing.n_nodes)
+    points = ties = join_points([], scene.components, tearing.n_nodes)
     if scene.contacts:
         points = find_contact_points(scene, fixed, comm, axes=axes, told=told)
         if not overlap:
@@ -111,7 +111,7 @@ def meeting_points(
         with together(comm):
             points = once_at_sections(points, scene, tearing)
             sections = section_points(scene, ties, tearing, fixed, axes)
-        ties = join_points([ties, sections], scene.dim, tearing.n_nodes)
+        ties = join_points([ties, sections], scene.components, tearing.n_nodes)
     return points, ties
 
 
@@ -368,9 +368,9 @@ class TornSystem:
         return replace(self, points=points, right=self.right + change[self.numbering.owned])
 
     @property
-    def dim(self) -> int:
+    def components(self) -> int:
         """Displacement components of a node."""
-        return self.decomposition.tearing.dim
+        return self.decomposition.tearing.components
 
     @property
     def n_gluing(self) -> int:
@@ -385,7 +385,7 @@ class TornSystem:
     @property
     def tangential_rows(self) -> np.ndarray:
         """Row numbers of every frictional point's tangential multipliers, shape (n_friction, dim - 1)."""
-        start, width = self.n_equality + self.points.count, self.dim - 1
+        start, width = self.n_equality + self.points.count, self.components - 1
         return start + np.arange(width * len(self.frictional)).reshape(-1, width)
 
     @cached_property
@@ -503,7 +503,7 @@ def build_torn_system(
         drawn = shortening_columns(scene, system.relations[0])
         tied = drawn @ given_shortenings(scene)
     right = np.concatenate([right, tied, gap, slip]) - supported
-    slid = np.zeros((len(system.frictionless), system.dim - 1))
+    slid = np.zeros((len(system.frictionless), system.components - 1))
     if free.count:
         with together(comm):
             free.require_felt(system.relations, decomposition.fixed)
@@ -557,7 +557,7 @@ def meeting_at(
     supported[equality] = torn.supported[torn.numbering.owned < torn.n_equality]
     normal = (owned >= torn.n_equality) & (owned < torn.n_equality + points.count)
     right[normal] = points.gap[owned[normal] - torn.n_equality]
-    slid = np.zeros((len(system.frictionless), system.dim - 1))
+    slid = np.zeros((len(system.frictionless), system.components - 1))
     there = np.flatnonzero(torn.numbering.owned < torn.n_equality)
     entries = np.ones(len(there)), (np.flatnonzero(equality), there)
     rows = sp.csr_matrix(entries, shape=(len(owned), len(torn.numbering.owned)))
@@ -590,7 +590,7 @@ def _with_rows(
         coefficient[frictional], tresca[frictional],
         None if strengths is None else strengths.part(frictional), closures_of(scene, points),
         None if elastic is None else elastic[frictional], numbering, relations, B,
-        np.zeros(0), np.zeros(0), np.zeros((0, scene.dim - 1)), NO_MOTIONS,
+        np.zeros(0), np.zeros(0), np.zeros((0, scene.components - 1)), NO_MOTIONS,
     )  # fmt: skip
 
 
@@ -607,7 +607,7 @@ def _own_part(
     """Number the multipliers and select the entries of B that act on this rank's subdomains. Collective."""
     block = decomposition.copy_block[rows.copy]
     here = block >= 0
-    row, column = rows.row[here], decomposition.tearing.dim * block[here] + rows.component[here]
+    row, column = rows.row[here], decomposition.tearing.components * block[here] + rows.component[here]
     touched, comm = np.unique(row), decomposition.comm
     # The communication pattern is reused as long as no rank's share of the rows changes.
     stays = known is not None and known.serves(rows.owner, touched)

@@ -51,7 +51,7 @@ def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray
     gathered = [torn.numbering.gather(x, rows) for x in (values.multiplier, values.residual, values.step)]
     count, frictional = torn.points.count, torn.frictional
     normal, gap, normal_step = (x[:count] for x in gathered)
-    tau, minus_slip, tangential_step = (x[count:].reshape(-1, torn.dim - 1) for x in gathered)
+    tau, minus_slip, tangential_step = (x[count:].reshape(-1, torn.components - 1) for x in gathered)
     trial_normal = normal - normal_step * gap
     trial_tangential = tau - tangential_step * minus_slip
     bound = torn.slip_bound(normal[frictional])
@@ -79,7 +79,7 @@ def contact_result(torn: TornSystem, values: RowValues, displacement: np.ndarray
         spread(bound),
         gap,
         spread(slip, torn.sliding(displacement) - torn.slid),
-        spread(origin.reshape(-1, torn.dim - 1), torn.slid),
+        spread(origin.reshape(-1, torn.components - 1), torn.slid),
         status,
         torn.points.area,
         torn.points.area,

@@ -445,7 +445,7 @@ def _at_sites(
 
     `moved`: displacements of all nodes and gradients at the sites.
     """
-    body, dim = torn.scene.bodies[name], torn.dim
+    body, dim = torn.scene.bodies[name], torn.components
     displacement, gradients = moved
     temperature = temperature_of(torn.scene.loads, name)
     means = CellStress(mesh, body, torn.decomposition.comm, temperature)

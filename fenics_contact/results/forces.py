@@ -89,7 +89,7 @@ def _contact_forces(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:
     rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])
     normal, friction = np.split(torn.numbering.gather(multiplier, rows), [points.count])
     force = normal[:, None] * points.normal
-    tangential = friction.reshape(-1, torn.dim - 1)
+    tangential = friction.reshape(-1, torn.components - 1)
     force[frictional] -= np.einsum("na,nad->nd", tangential, points.tangents[frictional])
     return force
 
@@ -100,7 +100,7 @@ def _tie_forces(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:
     of_ties = torn.numbering.gather(multiplier, np.arange(torn.n_gluing, torn.n_equality))
     # A row that supports determine is not in B.
     acting = np.where(rows.held(torn.decomposition.fixed), 0.0, of_ties)
-    force = np.zeros((torn.ties.count, torn.dim))
+    force = np.zeros((torn.ties.count, torn.components))
     np.add.at(force, rows.which, -acting[:, None] * rows.directions)
     return force
 
@@ -115,14 +115,13 @@ def by_node(points: ContactPoints, force: np.ndarray, chosen: np.ndarray) -> np.
 
 def _resisted(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:
     """Return K u of the subdomains whose material resists a rigid motion, zero on others, (torn_size,)."""
-    motions = 1 if torn.scene.axisymmetric else 3 * (torn.dim - 1)
     found = []
     for part, where in zip(torn.subdomains, torn.decomposition.parts, strict=True):
         body = torn.scene.bodies[part.mesh.body]
         kernel, force = part.kernel.shape[1], np.zeros(part.mesh.size)
         if part.foundations:
             kernel = common_kernel(part.material.materials, part.points, body.axisymmetric).shape[-1]
-        if kernel < motions:
+        if kernel < body.motions:
             u = displacement[where]
             force = part.stiffness @ u - foundation_of(part.mesh, body, part.foundations) @ u
         found.append(force)
@@ -443,7 +442,7 @@ def support_shares(scene: Scene, numbers: NodeNumbers) -> list[SupportShare]:
     held = [(number, each) for number, each in enumerate(scene.supports) if isinstance(each, Roller)]
     rolled = {number: _rolled(scene, roller, numbers) for number, roller in held}
     nodes = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(n for n, _ in rolled.values())]))
-    squares = np.zeros((len(scene.supports), len(nodes), scene.dim, scene.dim))
+    squares = np.zeros((len(scene.supports), len(nodes), scene.components, scene.components))
     for number, support in enumerate(scene.supports):
         mesh = scene.bodies[support.body].mesh
         own = np.zeros(count)
@@ -454,13 +453,13 @@ def support_shares(scene: Scene, numbers: NodeNumbers) -> list[SupportShare]:
             along = rolled[number][1]
             np.add.at(squares[number], place, along[:, :, None] * along[:, None, :])
             squares[number] *= own[nodes, None, None]
-            areas.append(np.zeros((count, scene.dim)))
+            areas.append(np.zeros((count, scene.components)))
             continue
-        given = support.value if isinstance(support, Support) else (0.0,) * scene.dim
+        given = support.value if isinstance(support, Support) else (0.0,) * scene.components
         components = [component is not None for component in given]
         areas.append(own[:, None] * components)
-        squares[number] = areas[-1][nodes][:, :, None] * np.eye(scene.dim)
-    total = sum(areas, np.zeros((count, scene.dim)))
+        squares[number] = areas[-1][nodes][:, :, None] * np.eye(scene.components)
+    total = sum(areas, np.zeros((count, scene.components)))
     parts = [area / np.where(total > 0.0, total, 1.0) for area in areas]
     inverse = np.linalg.pinv(squares.sum(axis=0), rcond=1e-10, hermitian=True)
     return [SupportShare(part, nodes, own @ inverse) for part, own in zip(parts, squares, strict=True)]
@@ -566,7 +565,7 @@ def force_balance(
     if about is None:
         carriers = [isinstance(body, ToolBody) for body in torn.scene.bodies.values()]
         of_tool = np.repeat(carriers, np.diff(torn.decomposition.tearing.node_offset))
-    point = _middle(forces.places[~of_tool]) if about is None else point_of(about, torn.dim)
+    point = _middle(forces.places[~of_tool]) if about is None else point_of(about, torn.scene.dim)
     parts, turned = _parts(torn, forces), torn.scene.axisymmetric
     acting = {name: force * [0.0, 1.0] for name, force in parts.items()} if turned else parts
     resultants = {

@@ -56,7 +56,7 @@ def recovered(scene: Scene, field: Field, parts: int = 1) -> tuple[Sites, np.nda
 
 def norm(torn: TornSystem, displacement: np.ndarray) -> float:
     """√(uᵀK u)."""
-    parts = np.split(displacement, torn.dim * torn.decomposition.block_offset[1:-1])
+    parts = np.split(displacement, torn.components * torn.decomposition.block_offset[1:-1])
     return float(np.sqrt(sum(u @ (s.stiffness @ u) for s, u in zip(torn.subdomains, parts, strict=True))))
 
 

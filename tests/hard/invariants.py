@@ -33,7 +33,7 @@ class Whole:
         one = {name: np.zeros(body.mesh.n_cells, dtype=np.int64) for name, body in scene.bodies.items()}
         decomposition = decompose(scene, one, MPI.COMM_SELF)
         self.torn: TornSystem = build_torn_system(scene, decomposition, overlap=True)
-        tearing, dim = decomposition.tearing, self.torn.dim
+        tearing, dim = decomposition.tearing, self.torn.components
         size = dim * tearing.n_nodes
         self.K = sp.csr_matrix((size, size))
         force = np.zeros(size)

@@ -95,7 +95,7 @@ def whole(body: Body, loads: tuple[Load, ...] = (), forms: FormLibrary | None = 
 
 def by_node(subdomain: Subdomain) -> np.ndarray:
     """Its stiffness matrix, ordered by node."""
-    dim = subdomain.mesh.dim
+    dim = subdomain.mesh.components
     order = np.argsort(subdomain.mesh.nodes)
     dofs = (dim * order[:, None] + np.arange(dim)).ravel()
     return np.asarray(subdomain.stiffness.toarray()[np.ix_(dofs, dofs)])
@@ -103,4 +103,4 @@ def by_node(subdomain: Subdomain) -> np.ndarray:
 
 def load_by_node(subdomain: Subdomain) -> np.ndarray:
     """Its load, ordered by node, shape (n, dim)."""
-    return np.asarray(subdomain.load.reshape(-1, subdomain.mesh.dim)[np.argsort(subdomain.mesh.nodes)])
+    return np.asarray(subdomain.load.reshape(-1, subdomain.mesh.components)[np.argsort(subdomain.mesh.nodes)])

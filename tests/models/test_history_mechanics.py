@@ -394,7 +394,7 @@ class Equilibrium:
 
 def dofs_at(patch: Patch, nodes: np.ndarray, component: int) -> np.ndarray:
     """Dofs of one component at nodes of the body."""
-    return patch.mesh.dim * np.flatnonzero(np.isin(patch.mesh.nodes, nodes)) + component
+    return patch.mesh.components * np.flatnonzero(np.isin(patch.mesh.nodes, nodes)) + component
 
 
 def equilibrium(

@@ -61,15 +61,15 @@ def test_force_is_the_gradient_of_the_energy_and_stiffness_that_of_the_force(pat
 
 
 def test_a_rotation_has_neither_force_nor_energy(patch: Patch) -> None:
-    turned = patch.at(patch.deformed(rotation(patch.mesh.dim)))
-    stretched = patch.at(patch.deformed(1.3 * np.eye(patch.mesh.dim)))
+    turned = patch.at(patch.deformed(rotation(patch.mesh.components)))
+    stretched = patch.at(patch.deformed(1.3 * np.eye(patch.mesh.components)))
     assert np.abs(turned.force).max() < 1e-13 * np.abs(stretched.force).max()
     assert abs(turned.energy) < 1e-13 * stretched.energy
     assert turned.least_jacobian == pytest.approx(1.0, abs=1e-13)
 
 
 def test_forces_turn_with_a_deformed_body(patch: Patch) -> None:
-    dim = patch.mesh.dim
+    dim = patch.mesh.components
     u, Q = smooth_field(patch.points, 0.2), rotation(dim, 1.1)
     straight, turned = patch.at(u), patch.at((patch.points + u) @ Q.T - patch.points)
     assert turned.energy == pytest.approx(straight.energy, rel=1e-12)
@@ -86,7 +86,7 @@ def test_the_undeformed_body_is_linearly_elastic(patch: Patch) -> None:
 
 
 def test_small_strains_of_a_neo_hookean_body_are_those_of_hooke(patch: Patch) -> None:
-    hooke = (PlaneStrain if patch.mesh.dim == 2 else IsotropicElasticity)(10.0, 0.3)
+    hooke = (PlaneStrain if patch.mesh.components == 2 else IsotropicElasticity)(10.0, 0.3)
     found, expected = patch.linear_stiffness(), whole(Body(patch.body.mesh, hooke)).stiffness
     assert np.abs(found - expected).max() < 1e-13 * np.abs(found).max()
 

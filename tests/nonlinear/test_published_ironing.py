@@ -212,8 +212,8 @@ class Monolithic:
     @property
     def displacement(self) -> np.ndarray:
         (mesh,) = self._decomposition.meshes
-        by_node = np.empty((len(mesh.nodes), mesh.dim))
-        by_node[mesh.nodes] = self._u.reshape(-1, mesh.dim)
+        by_node = np.empty((len(mesh.nodes), mesh.components))
+        by_node[mesh.nodes] = self._u.reshape(-1, mesh.components)
         return by_node
 
     def advance(self, scene: Scene, tolerance: float = 1e-11) -> None:
