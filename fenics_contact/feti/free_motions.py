@@ -55,12 +55,13 @@ class FreeMotions:
     def require_felt(self, relations: Sequence[Relations], fixed: np.ndarray) -> None:
         """Reject rows of ties and contacts in which nothing but rigid surfaces moves.
 
+        Rows across a plane of symmetry, or around the axis of revolution, may be held: nothing moves there.
+
         `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
         """
-        moving = _moving(self.columns, fixed.shape)
         for relation in relations:
-            held = relation.which[relation.held(fixed)]
-            touched = int(np.count_nonzero(abs(relation.points.jump[held]) @ moving))
+            moved = self.of_rows(np.zeros(0, dtype=np.int64), [relation])
+            touched = int(np.count_nonzero(moved[relation.held(fixed)].getnnz(axis=1)))
             if touched:
                 raise InvalidInputError(
                     f"contact needs bodies that deform, but in {touched} of its rows supports hold the slave "

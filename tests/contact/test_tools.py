@@ -19,8 +19,10 @@ from fenics_contact import (
     MovingObstacle,
     RigidSphere,
     RigidTool,
+    Roller,
     Scene,
     State,
+    Status,
     Support,
     Surface,
     ToolMotion,
@@ -189,6 +191,31 @@ def test_a_tool_of_revolution_moves_along_the_axis() -> None:
         InvalidInputError, match=r"point of tool 'off' must lie on the axis .* got \(1.0, 2.0\)"
     ):
         under(ToolMotion("off"), RigidTool("off", ball.shape, (1.0, 2.0)))
+
+
+def test_planes_of_symmetry_and_the_axis_hold_slip_across_them_under_forces() -> None:
+    """A ball rubs on a quarter of a block, straight and turned by 30°, and on a body of revolution."""
+    body = block((0, 0, -1), (1, 1, 0), (5, 5, 3))
+    turn = np.array([[np.sqrt(0.75), -0.5, 0.0], [0.5, np.sqrt(0.75), 0.0], [0.0, 0.0, 1.0]])
+    driven = ToolMotion("left", DOWN, STRAIGHT, (0, 0, -3.0))
+    ball, found = RigidTool("left", RigidSphere((0, 0, 2.0), 2.0), at=(0, 0, 2.0)), []
+    for mesh in (body, body.moved(body.points @ turn.T)):
+        pair = ContactPair(Surface("block", "z1"), ball, Coulomb(0.3))
+        sides = [Roller("block", side) for side in ("x0", "y0")]
+        state = solved(Scene({"block": Body(mesh, SOFT)}, [BASE, *sides, driven], contacts=[pair]))
+        np.testing.assert_allclose(state.tools()["left"].force[2], 3.0, rtol=1e-9)
+        found.append(state)
+    np.testing.assert_allclose(found[0].contact.normal_force, found[1].contact.normal_force, rtol=1e-6)
+    assert found[0].contact.count(Status.SLIP) > 0
+    disc = Body(rectangle((0, -1), (1, 0), (9, 7)), SOFT, axisymmetric=True)
+    ball = RigidTool("ball", RigidSphere((0, 2), 2.0), at=(0, 2))
+    pair = ContactPair(Surface("disc", "y1"), ball, Coulomb(0.3))
+    held = Support("disc", "y0")
+    pushed = solved(Scene({"disc": disc}, [held, ToolMotion("ball", force=(0, -30.0))], contacts=[pair]))
+    way = pushed.tools()["ball"].displacement
+    moved = solved(Scene({"disc": disc}, [held, ToolMotion("ball", tuple(way), 0.0)], contacts=[pair]))
+    np.testing.assert_allclose(pushed.contact.force, moved.contact.force, rtol=1e-5, atol=1e-7)
+    assert pushed.contact.count(Status.STICK) > 0
 
 
 def test_what_nothing_holds_is_named() -> None:
