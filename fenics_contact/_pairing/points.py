@@ -523,6 +523,8 @@ def shared_once(points: ContactPoints, scene: Scene, *, told: bool) -> ContactPo
         words = "the contact of %s leaves out %s, where force and friction are those of %s at the same places"
         _tell(words, (scene.contacts, points, lost), (scene.contacts, points, kept))
     area, taken = areas_taken(points, (kept, lost), scene)
+    if points.taken is not None:
+        taken = taken.maximum(points.taken)  # not their sum: entries are numbers of nodes
     points = replace(points, area=points.area + area, taken=taken)
     return points.part(np.setdiff1d(np.arange(points.count), lost))
 

@@ -135,7 +135,7 @@ def once_at_sections(
     entries = points.slave[dropped] + 1, (left, points.pair[dropped])
     taken = sp.csr_matrix(entries, shape=(points.count, len(scene.contacts)))
     if points.taken is not None:
-        taken = points.taken + taken
+        taken = points.taken.maximum(taken)
     area = points.area + np.bincount(left, points.area[dropped], points.count)
     rest = np.setdiff1d(np.arange(points.count), dropped)
     return replace(points, area=area, taken=taken).part(rest)

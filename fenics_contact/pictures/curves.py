@@ -192,8 +192,9 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
     points = sorting[np.searchsorted(numbers, contact.points.slave[chosen], sorter=sorting)]
     shear, slip = -sign * contact.friction_force[chosen, 0], sign * contact.slip[chosen, 0]
     values = np.zeros((3, len(order)))
-    area = contact.area[chosen]
-    values[:, points] = np.stack([contact.normal_force[chosen], shear, contact.slip_bound[chosen]]) / area
+    forces = np.stack([contact.normal_force, -sign * contact.friction_force[:, 0], contact.slip_bound])
+    every, given = contact.points.of_surface(pair, (forces / contact.area).T)
+    values[:, sorting[np.searchsorted(numbers, every, sorter=sorting)]] = given.T
     return ContactTrace(
         f"{slave.body}, {slave.name}", axis, places, starts[1:] - 1, values[0], values[1], values[2],
         points, contact.status[chosen], slip,

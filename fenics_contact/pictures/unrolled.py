@@ -236,7 +236,9 @@ def _patch(state: State, pair: int, reach: float | None, unrolling: Unrolling | 
     chosen = chosen[seen]
     points = first[np.searchsorted(numbers, contact.points.slave[chosen])]
     pressure = np.zeros(mesh.n_nodes)
-    pressure[node[points]] = contact.pressure[chosen]
+    every, given = contact.points.of_surface(pair, contact.pressure)
+    shown = np.isin(every, numbers)
+    pressure[nodes[np.searchsorted(numbers, every[shown])]] = given[shown]
     pressure = np.maximum(filled_at_corners(mesh.surfaces[slave.name], pressure)[node], 0.0)
     slip = contact.slip_in_space[chosen]
     return ContactPatch(
@@ -244,23 +246,21 @@ def _patch(state: State, pair: int, reach: float | None, unrolling: Unrolling | 
         points, contact.status[chosen],
         view.project(slip) if unrolling is None else unrolling.turn(slip, mesh.points[node[points]]),
         force, state.scene.contacts[pair].has_friction, hidden,
-        _frame(places, points, pressure[points], contact.points.area[chosen], reach),
+        _frame(places[first], pressure[first], contact.points.area[chosen], reach),
     )  # fmt: skip
 
 
-def _frame(
-    places: np.ndarray, points: np.ndarray, pressure: np.ndarray, area: np.ndarray, reach: float | None
-) -> Frame:
-    """Return a square around the closed points with a margin of two facets.
+def _frame(places: np.ndarray, pressure: np.ndarray, area: np.ndarray, reach: float | None) -> Frame:
+    """Return a square around the nodes under pressure with a margin of two facets.
 
     Unless its size is given, it is limited to slightly more than the surface.
     """
-    closed = pressure > 0 if np.any(pressure > 0) else np.ones(len(points), dtype=bool)
-    low, high = places[points[closed]].min(axis=0), places[points[closed]].max(axis=0)
+    closed = pressure > 0 if np.any(pressure > 0) else np.ones(len(places), dtype=bool)
+    low, high = places[closed].min(axis=0), places[closed].max(axis=0)
     middle = (low + high) / 2
     if reach is not None:
         return Frame(middle - reach, middle + reach)
-    half = float(np.max(high - low)) / 2 + 2.5 * float(np.sqrt(area[closed].mean()))
+    half = float(np.max(high - low)) / 2 + 2.5 * float(np.sqrt(area.mean()))
     border = 0.1 * min(half, float(np.ptp(places, axis=0).min()))
     low, high = places.min(axis=0) - border, places.max(axis=0) + border
     return Frame(np.maximum(middle - half, low), np.minimum(middle + half, high))

@@ -146,15 +146,16 @@ def _slave_surface(state: State, which: int | str) -> _SlaveSurface:
     """Return the slave surface of a pair. Collective."""
     scene, contact = state.scene, state.contact
     pair = pair_number(scene.contacts, which)
-    mine = contact.on_pair(pair)
     points, slave = contact.points, scene.contacts[pair].slave
     surface = surface_of(scene, slave, "faceted")
     nodes = state.torn.decomposition.tearing.global_nodes(slave.body, surface.nodes)
-    place = np.searchsorted(nodes, points.slave[mine])
+    # A point may have the areas of several nodes, as those on both sides of a sector.
+    own, point = points.of_surface(pair, np.arange(points.count))
+    place = np.searchsorted(nodes, own)
     # Nodes without a contact point are open without a gap: neighbouring contact reaches up to them.
     pressure, spread = np.zeros(len(nodes)), np.zeros(len(nodes))
-    pressure[place] = contact.pressure[mine] * (contact.status[mine] > 0)
-    spread[place] = _modulus(state, pair) * np.maximum(contact.gap[mine], 0.0)
+    pressure[place] = (contact.pressure * (contact.status > 0))[point]
+    spread[place] = _modulus(state, pair) * np.maximum(contact.gap[point], 0.0)
     whole = np.searchsorted(surface.nodes, scene.bodies[slave.body].mesh.surfaces[slave.name])
     pressure, spread = filled_at_corners(whole, pressure), np.maximum(filled_at_corners(whole, spread), 0.0)
     on_axis = scene.bodies[slave.body].on_axis[surface.nodes]
@@ -168,8 +169,9 @@ def _slave_surface(state: State, which: int | str) -> _SlaveSurface:
     facing = held.astype(float)
     facing[place] = 1.0
     if by_mortar:
-        whole_area = nodal_areas(surface.points, whole, scene.axisymmetric).ravel()
-        facing[place] = contact.nominal_area[mine] / np.bincount(whole.ravel(), whole_area)[place]
+        areas = nodal_areas(surface.points, whole, scene.axisymmetric).ravel()
+        whole_area = np.bincount(point, np.bincount(whole.ravel(), areas)[place], points.count)
+        facing[place] = np.minimum(contact.nominal_area[point] / whole_area[point], 1.0)
     facing = np.maximum(filled_at_corners(whole, facing), 0.0)
     if scene.axisymmetric:
         facing = np.clip(filled_on_axis(whole, facing, on_axis), 0.0, 1.0)

@@ -291,7 +291,8 @@ def contact_fields(
     slave and ``contact_slip``, (n_nodes, 3), [force] and [length]; where a body of the scene deforms much
     ``contact_nominal_pressure``, too. At the corners of quadratic triangles pressures and slip are
     interpolated, see `filled_at_corners`, and pressures at the ends of quadratic edges on an axis of
-    revolution. A node that belongs to several pairs has their sum, and the status of the last.
+    revolution. A node that belongs to several pairs has their sum, and the status of the last; one whose
+    force is that of a point elsewhere, as on one of both sides of a sector, has the pressure there.
     """
     start, end = numbers.node_offset[numbers.body_names.index(body) :][:2]
     count = int(end - start)
@@ -302,6 +303,10 @@ def contact_fields(
         total = np.zeros((count, *values.shape[1:]))
         for pair in np.unique(contact.points.pair[mine]):
             field, own = np.zeros_like(total), mine[contact.points.pair[mine] == pair]
+            if filled and field.ndim == 1:
+                every, given = contact.points.of_surface(pair, values)
+                alone = ~np.isin(every, contact.points.slave)
+                field[every[alone] - start] = given[alone]
             field[nodes[own]] = values[own]
             facets = scene.bodies[body].mesh.surfaces[scene.contacts[pair].slave.name]
             field = filled_at_corners(facets, field) if filled else field

@@ -28,6 +28,7 @@ from fenics_contact import (
     SurfaceDesign,
     ThermalStrain,
     Traction,
+    contact_area,
     solve_scene,
 )
 from fenics_contact._scene.pairs import Discretisation
@@ -36,6 +37,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import NeoHooke
 from fenics_contact.mesh import bisection_partition
+from fenics_contact.pictures.unrolled import contact_patches
 from fenics_contact.results.deformed_state import AnyState
 from tests.contact.press_fits import BORE, NU, RIM, ring
 from tests.contact.sector_cases import (
@@ -94,6 +96,30 @@ def test_nodes_on_the_axis_belong_to_both_sides() -> None:
     u = part.gather_displacement("upper")[on_axis]
     np.testing.assert_allclose(u[:, :2], 0.0, atol=1e-20)
     assert np.abs(u[:, 2]).min() > 1e-4
+
+
+@pytest.mark.parametrize("discretisation", ["node", "mortar"])
+def test_pressure_reaches_the_side_whose_points_are_on_the_other(discretisation: Discretisation) -> None:
+    """Areas, fields and pictures, also where there is another pair, which stays open."""
+    lid, shown = RigidPlane((0.0, 0.0, 0.6), (0.0, 0.0, -1.0)), []
+    for whole in (False, True):
+        scene = column(whole=whole)
+        pairs = [
+            replace(scene.contacts[0], discretisation=discretisation),
+            ContactPair(Surface("upper", "z1"), lid, Coulomb(0.3)),
+        ]
+        state = solved(replace(scene, contacts=pairs), 1)
+        assert contact_area(state) == pytest.approx(4.0 if whole else 1.0, rel=1e-9)
+        assert contact_area(state, 1) == 0.0
+        points = scene.bodies["upper"].mesh.points
+        field = state.gather_fields("upper").points["contact_pressure"]
+        below = (points[:, 2] == 0.0) & (points[:, :2] >= 0.0).all(axis=1)
+        order = np.lexsort(points[below].T)
+        shown.append(field[below][order])
+        patch = contact_patches([state], 0, None)[0]
+        assert np.count_nonzero(patch.pressure > 0) == (25 if whole else 9)
+    assert shown[0].min() > 0
+    np.testing.assert_allclose(shown[0], shown[1], rtol=1e-6)
 
 
 def test_sides_may_belong_to_two_bodies() -> None:
