@@ -61,8 +61,9 @@ class Residuals:
         """
         force = min(self.force_scale, other.force_scale) or max(self.force_scale, other.force_scale)
         gluing = min(self.gluing_scale, other.gluing_scale) or max(self.gluing_scale, other.gluing_scale)
-        natural = _ratio(self.natural * self.force_scale, force)
-        return max(natural, _ratio(self.gluing * self.gluing_scale, gluing), self.coarse)
+        # Infinite where it was divided by zero, in any scale: nothing was displaced yet.
+        natural = _ratio(self.natural * (self.force_scale or 1.0), force)
+        return max(natural, _ratio(self.gluing * (self.gluing_scale or 1.0), gluing), self.coarse)
 
     def is_worse_than(self, other: Residuals) -> bool:
         """Return whether these are worse, in their own scales and in the smaller ones of both."""

@@ -178,6 +178,15 @@ def test_a_huge_wrong_force_is_worse_than_one_that_is_nearly_right():
     assert shorten(with_bounds(problem), huge, small).point is small
 
 
+def test_a_jump_before_anything_is_displaced_is_worse_than_any_other():
+    """Of a bolt that is drawn by a force: its first shortening opens rows, and nothing else has moved."""
+    start = Residuals(np.inf, np.inf, 0.0, 0.0, force_scale=0.0, gluing_scale=0.0)
+    later = Residuals(0.5, 0.1, 0.0, 0.0, force_scale=2.0, gluing_scale=3.0)
+    assert later.is_worse_than(start) is False
+    assert start.is_worse_than(later)
+    assert start.worst_in_scales_with(start) == np.inf
+
+
 def test_a_step_may_be_worse_than_the_last_iterate_if_it_is_better_than_the_one_before():
     problem = random_problem(3)
     solution = solve(problem.dual, problem.slip_bound, FaceNewton(tolerance=1e-10))
