@@ -265,7 +265,8 @@ def plot_field(
     colours = SIGNED_MAP if entry["colours"] == "signed" else STRESS_MAP
     norm = Normalize(*(given or (ends if is_status else entry["range"])))
     head = headline(title, f"{facts}; displacement × {scale:g}")
-    coloured = ColouredField(values, colours, norm, words, head, float(scale), None, named, width)
+    axes = axes_of(state.scene) if state else ("x", "y")
+    coloured = ColouredField(values, colours, norm, words, head, float(scale), None, named, width, axes)
     return draw_field_on_bodies(
         drawn,
         coloured,

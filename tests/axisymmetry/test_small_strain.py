@@ -43,6 +43,8 @@ from fenics_contact.materials import (
 )
 from fenics_contact.mesh import bisection_partition, quadratic
 from fenics_contact.output import read_result
+from fenics_contact.pictures import states
+from fenics_contact.pictures.drawing import ColouredField
 from fenics_contact.results.fields import tensors, von_mises_of
 from tests.axisymmetry.revolved import (
     BORE,
@@ -491,3 +493,18 @@ def test_sections_are_turned_into_bodies_with_their_fields(kind: Kind) -> None:
     np.testing.assert_allclose(mises, np.tile(flat.point_data["nodal_von_mises"], 19), rtol=1e-9)
     with pytest.raises(InvalidInputError, match="above 0 and up to 360"):
         state.to_pyvista(revolved=400.0)
+
+
+def test_fields_of_bodies_of_revolution_are_drawn_over_r_and_z(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[ColouredField] = []
+    monkeypatch.setattr(states, "draw_field_on_bodies", lambda bodies, field, *_, **__: drawn.append(field))
+    state = solved(
+        Scene(
+            {"disc": Body(section((1, 0), (3, 2), (3, 2), "quadrilateral"), STEEL, axisymmetric=True)},
+            [Support("disc", "y0", (None, 0.0))],
+            [Pressure("disc", "x0", PRESSURE)],
+        )
+    )
+    states.plot_field(state, "stress_zz")
+    states.plot_field(state, {"disc": state.gather_von_mises("disc")})
+    assert [field.axes for field in drawn] == [("r", "z"), ("r", "z")]
