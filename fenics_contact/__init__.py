@@ -3,7 +3,7 @@
 What a script needs is here; nothing is loaded before it is used:
 
 Scenes: Scene, Body, BodyMesh, Surface, Support, Roller, RigidSurface, ContactPair, Tie, CyclicSymmetry,
-    AutomaticContact, LoadStep, Preload, Section, ElasticFoundation, box_partition
+    AutomaticContact, LoadStep, Preload, Section, ElasticFoundation, Spring, box_partition
 
 Laws of surfaces: Coulomb, Tresca, FrictionTable, FrictionCurve, SlipTable, LinearClosure, ExponentialClosure,
     ClosureTable, ClosureLaw, FluidPressure
@@ -97,6 +97,7 @@ if TYPE_CHECKING:
     from fenics_contact._scene.scene import LoadStep as LoadStep
     from fenics_contact._scene.scene import Scene as Scene
     from fenics_contact._scene.sectors import CyclicSymmetry as CyclicSymmetry
+    from fenics_contact._scene.springs import Spring as Spring
     from fenics_contact._scene.supports import RigidSurface as RigidSurface
     from fenics_contact._scene.supports import Roller as Roller
     from fenics_contact._scene.supports import Support as Support

@@ -278,6 +278,9 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
         rows[f"rigid surface {number}"] = str(motion).replace("[length]", units.length)
     for name, each in state.preloads().items() if state.scene.preloads else ():
         rows[f"preload {name}"] = f"{each.force:.6g} {force}, shorter by {each.shortening:.6g} {units.length}"
+    for name, spring in state.springs().items() if state.scene.springs else ():
+        size, longer = np.linalg.norm(spring.force), np.linalg.norm(spring.elongation)
+        rows[f"spring {name}"] = f"{size:.6g} {force}, ends moved by {longer:.6g} {units.length}"
     if state.unheld:
         rows["held by nothing"] = " and ".join(map(str, state.unheld)) + ": stays where it is"
     if state.known_errors is not None:

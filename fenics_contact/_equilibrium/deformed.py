@@ -266,7 +266,7 @@ def _energies(evaluation: ResidualState, rubbed: float) -> Energies:
     dead = evaluation.softening is None
     work = evaluation.torn.load_work(evaluation.at.displacement) if dead else np.nan
     surface = 0.0
-    if evaluation.torn.compliance is not None:
+    if evaluation.torn.compliance is not None or evaluation.torn.give is not None:
         given_way, kept = softened(evaluation.torn, evaluation.at.multiplier)
         surface = float(evaluation.torn.numbering.comm.allreduce(given_way - kept))
     return Energies(strain, work, rubbed + evaluation.rubbing, surface=surface)

@@ -280,9 +280,9 @@ def default_solver(kind: SolverKind) -> DualSolver:
 
 
 def _loads_of(scene: Scene) -> tuple[list[Any], ...]:
-    """Return the loads of a scene, the rigid surfaces, at whose points loads act, and the preloads."""
+    """Return the loads of a scene, the rigid surfaces, at whose points loads act, preloads and springs."""
     rigid = [each for each in scene.supports if isinstance(each, RigidSurface)]
-    return list(scene.loads), rigid, list(scene.preloads)
+    return list(scene.loads), rigid, list(scene.preloads), list(scene.springs)
 
 
 def _lengths_after(before: State | None, scene: Scene) -> np.ndarray:

@@ -135,8 +135,9 @@ def _along_sections(torn: TornSystem) -> tuple[sp.csr_matrix, np.ndarray]:
     Returns shape (n_tie_forces, n_free), orthonormal, and coefficients of these, (n_free,).
     """
     scene, ties = torn.scene, torn.ties
-    bonded = ~are_sliding(scene.ties, ties.pair)
+    bonded = ~are_sliding(scene.ties, ties.pair[: ties.count - len(scene.springs)])
     place = np.cumsum(bonded) - 1
+    sprung = 0 if torn.springs is None else torn.springs.count
     columns, forces = [], []
     for number, preload in enumerate(scene.preloads):
         if not preload.is_free:
@@ -145,7 +146,7 @@ def _along_sections(torn: TornSystem) -> tuple[sp.csr_matrix, np.ndarray]:
         row = place[mine][:, None] * torn.components + np.arange(torn.components)
         size = np.sqrt(len(mine))
         entries = (ties.normal[mine].ravel() / size, (row.ravel(), np.zeros(row.size, dtype=np.int64)))
-        count = torn.components * int(bonded.sum()) + int((~bonded).sum())
+        count = torn.components * int(bonded.sum()) + int((~bonded).sum()) + sprung
         columns.append(sp.csr_matrix(entries, shape=(count, 1)))
         forces.append(-(preload.force or 0.0) / size)
     return sp.hstack(columns, format="csr"), np.array(forces)
@@ -192,12 +193,16 @@ class RigidBody:
         return sp.csr_matrix(np.hstack([normal, slip.reshape(len(normal), -1)]))
 
     def tie_wrenches(self, torn: TornSystem) -> sp.csr_matrix:
-        """Wrenches of unit forces at tied points, shape (n_modes, n)."""
-        arms = self.arms(torn.ties)
-        sliding = are_sliding(torn.scene.ties, torn.ties.pair)
+        """Wrenches of unit forces at tied points, and of springs at the end, shape (n_modes, n)."""
+        count = torn.ties.count - len(torn.scene.springs)
+        arms, sprung = np.split(self.arms(torn.ties), [count])
+        sliding = are_sliding(torn.scene.ties, torn.ties.pair[:count])
         bonded = arms[~sliding].reshape(-1, arms.shape[2]).T
-        gliding = np.einsum("nd,ndm->mn", torn.ties.normal[sliding], arms[sliding])
-        return sp.csr_matrix(np.hstack([bonded, gliding]))
+        gliding = np.einsum("nd,ndm->mn", torn.ties.normal[:count][sliding], arms[sliding])
+        every = [bonded, gliding]
+        if torn.springs is not None:
+            every.append(np.einsum("rd,rdm->mr", torn.springs.directions, sprung[torn.springs.spring]))
+        return sp.csr_matrix(np.hstack(every))
 
     def load_wrench(self, torn: TornSystem) -> np.ndarray:
         """Wrench of the loads on this rank's part of the body, shape (n_modes,)."""

@@ -396,6 +396,8 @@ class Equations:
         unbalanced = beyond(external - internal - bound, ROUNDED * self.stiffness * self._cell)
         least = global_min(comm, min((r.least_jacobian for r in responses), default=1.0))
         open_ = contact.constraint_residual(at.displacement)
+        if torn.give is not None:
+            open_ = open_ + torn.give * at.multiplier
         step, feasible = at.natural_step(caution), torn.law.feasible(at.multiplier)
         trial, compliance = at.multiplier - step * open_, torn.compliance
         mapped = feasible.project(trial) if compliance is None else compliance.resolve(feasible, trial, step)

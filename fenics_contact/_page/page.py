@@ -209,6 +209,7 @@ def sections(record: Record, units: Units) -> str:
         "Contact": _contact(record, units),
         "Load steps": _steps(record, units),
         "Rigid surfaces": _rows(_motions(record, units)),
+        "Springs": _rows(_springs(record, units)),
         "Forces and moments": _forces(record, units),
         "Errors and residuals": _rows(_accuracy(record)),
         "Computed with": _rows(_origin(record)),
@@ -369,6 +370,16 @@ def _motions(record: Record, units: Units) -> dict[str, str]:
         )
         name = f"{place} {_side(entry)}, point {about}"
         facts |= {name: f"displacement {move} {units.length}; rotation {turn} rad"}
+    return facts
+
+
+def _springs(record: Record, units: Units) -> dict[str, str]:
+    """Return force and elongation of springs between surfaces."""
+    facts: dict[str, str] = {}
+    for entry in (record.get("forces") or {}).get("springs") or ():
+        tension, longer = (", ".join(map(number, entry[name])) for name in ("tension", "elongation"))
+        force, _ = _force_units(record, units)
+        facts[entry["name"]] = f"tension {tension} {force}; elongation {longer} {units.length}"
     return facts
 
 

@@ -28,6 +28,7 @@ from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.rollers import direction_of, flat_normal, held_directions, widest_angle
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
+from fenics_contact._scene.springs import Spring
 from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support, ToolMotion
 from fenics_contact._scene.tools import ToolBody, bodies_with_tools, with_motions
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
@@ -55,6 +56,7 @@ class SceneParts:
     ties: Sequence[AnyTie] = field(default=())
     preloads: Sequence[Preload] = field(default=())
     foundations: Sequence[ElasticFoundation] = field(default=())
+    springs: Sequence[Spring] = field(default=())
 
     def __post_init__(self) -> None:
         """Reject names that do not exist, and loads and supports that do not suit their bodies."""
@@ -74,6 +76,10 @@ class SceneParts:
         for foundation in self.foundations:
             self._require(foundation.body, foundation.surface, "ElasticFoundation")
             foundation.require_space(self.dim)
+        for spring in self.springs:
+            for name, end in spring.surfaces.items():
+                self._require(end.body, end.name, f"Spring.{name}")
+            spring.require_suits(self)
         object.__setattr__(self, "supports", tuple(map(self._in_space, self.supports)))
         for part in (*self.supports, *self.loads):
             if not isinstance(part, RigidSurface | Roller | ToolMotion):

@@ -38,6 +38,7 @@ class EffectName(StrEnum):
     ROLLER = "roller"
     RIGID_SURFACE = "rigid surface"
     FOUNDATION = "elastic foundation"
+    SPRING = "spring"
     RIGID_TOOL = "rigid tool"
     BODY_FORCE = "body force"
     SURFACE_LOAD = "surface load"
@@ -92,6 +93,7 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
         (names.ROLLER, rolling, "surface slides", "surfaces slide"),
         (names.RIGID_SURFACE, rigid, "surface stays rigid", "surfaces stay rigid"),
         (names.FOUNDATION, len(scene.foundations), "surface rests on springs", "surfaces rest on springs"),
+        (names.SPRING, len(scene.springs), "spring acts between surfaces", "springs act between surfaces"),
         (names.RIGID_TOOL, tools, "tool moves as one piece", "tools move as one piece each"),
         (names.BODY_FORCE, volume, "load on a volume", "loads on volumes"),
         (names.SURFACE_LOAD, len(loads) - volume - thermal, "load on a surface", "loads on surfaces"),
@@ -315,7 +317,7 @@ def choose_solver(scene: SceneParts, subdomains: int, *, sensitivity: bool = Fal
         return SolverKind.FACE_NEWTON
     # A body that its supports alone do not hold has a singular stiffness; ties need multipliers.
     loose = any(isinstance(support, RigidSurface) and support.free.any() for support in scene.supports)
-    loose = loose or bool(scene.preloads or scene.ties)
+    loose = loose or bool(scene.preloads or scene.ties or scene.springs)
     if subdomains == 1 and not (sensitivity or loose) and held_by_supports(scene, scene.body_names[0]):
         return SolverKind.DIRECT
     return SolverKind.PROJECTED_CG
@@ -340,6 +342,7 @@ def _multipliers(scene: SceneParts, unknowns: int) -> dict[str, int]:
         "prescribed": fixed,
         "tied": sum(tied),
         "drawn": sum(scene.components * each.count(scene.bodies[each.body].mesh) for each in scene.preloads),
+        "sprung": sum(len(each.rows(scene)[1]) for each in scene.springs),
         "normal": sum(slaves),
         "tangential": (scene.components - 1) * sum(rubbing),
     }

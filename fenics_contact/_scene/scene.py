@@ -40,6 +40,7 @@ class Scene(SceneParts):
         preloads: Sections through bodies that are drawn together. The scene cuts the meshes of these bodies,
             whose nodes are there twice; cells and surfaces keep numbers and names.
         foundations: Surfaces that rest on springs to the ground, the same in all load steps.
+        springs: Springs between surfaces, the same in all load steps.
 
     Raises:
         InvalidInputError: If a part names a body or a surface that is not there, does not suit the body's
@@ -108,6 +109,7 @@ class Scene(SceneParts):
             ],
             "ties": [tie.place for tie in self.ties],
             **({"foundations": [each.place for each in self.foundations]} if self.foundations else {}),
+            **({"springs": [spring.place for spring in self.springs]} if self.springs else {}),
             **({"preloads": [preload.place for preload in self.preloads]} if self.preloads else {}),
         }
 

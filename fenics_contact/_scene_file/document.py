@@ -26,6 +26,7 @@ from fenics_contact._scene_file.model import (
     FoundationPart,
     PreloadAim,
     PreloadPart,
+    SpringPart,
 )
 from fenics_contact._scene_file.part import Part
 from fenics_contact._scene_file.source import Mistake, Source, as_toml, branches, written
@@ -424,6 +425,7 @@ class Document(Part):
     ties: list[AnyTiePart] = Field([], description="pairs that stay together")
     preloads: list[PreloadPart] = Field([], description="bolts drawn together at a section")
     foundations: list[FoundationPart] = Field([], description="surfaces on springs to the ground")
+    springs: list[SpringPart] = Field([], description="springs between surfaces")
     steps: list[StepPart] = Field([], description="load steps; without them all acts at once")
     solver: SolverPart = Field(SolverPart(), description="how it is solved")
     output: OutputPart = Field(OutputPart(), description="what is written, and where")

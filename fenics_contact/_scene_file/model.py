@@ -20,6 +20,7 @@ from fenics_contact._scene.obstacles import MovingObstacle, RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie
 from fenics_contact._scene.preloads import Preload, Section
 from fenics_contact._scene.sectors import CyclicSymmetry
+from fenics_contact._scene.springs import Spring
 from fenics_contact._scene.supports import RigidSurface, Roller, Support, ToolMotion
 from fenics_contact._scene_file.part import Part, keys_of, table_of
 from fenics_contact._scene_file.values import (
@@ -435,6 +436,29 @@ class FoundationPart(Part):
     stiffness: Vector | PositiveFloat = Field(
         description="[force / length³]: a number along the normal of the surface, or one for each axis"
     )
+
+
+@keys_of(Spring, without=("second", "name"))
+class SpringPart(Part):
+    """A spring between two surfaces, or a surface and a fixed point."""
+
+    first: SurfaceOfBody
+    second: SurfaceOfBody | None = Field(None, description="the other surface")
+    point: Vector | None = Field(None, description="a fixed point in place of a second surface, [length]")
+    stiffness: Vector | PositiveFloat = Field(
+        description="[force / length]: a number along the line between the ends, or one for each axis"
+    )
+    name: str | None = Field(None, description="how results call it, both ends by default")
+
+    def made(self, **other: Any) -> Spring:
+        """Build the spring, with the second end that its keys give."""
+        if (self.second is None) == (self.point is None):
+            raise InvalidInputError(
+                f"a spring needs a second surface or a fixed point, got second={self.second!r} and "
+                f"point={self.point!r}: give one of them"
+            )
+        second: Any = self.point if self.second is None else self.second.made()
+        return super().made(second=second, name=self.name or "")
 
 
 @keys_of(Preload, without=("section", "name"))

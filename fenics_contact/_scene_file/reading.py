@@ -124,7 +124,7 @@ class Builder:
         document, dim = self._document, next(iter(bodies.values())).mesh.dim
         empty = Scene(bodies)
         built: dict[str, list[Any]] = {}
-        for key in ("contacts", "supports", "loads", "ties", "preloads", "foundations"):
+        for key in ("contacts", "supports", "loads", "ties", "preloads", "foundations", "springs"):
             built[key] = []
             for number, part in enumerate(getattr(document, key)):
                 with self._at(key, number):

@@ -234,9 +234,11 @@ def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign)
     body = scene.bodies[name]
     cut, planes = mirrored(scene, name), planes_of(scene)
     held = cut[:, : scene.dim].copy()
-    for support in (*scene.supports, *scene.foundations):
-        if support.body == name:
-            facets = body.mesh.surfaces[support.surface]
+    ends = [end for spring in scene.springs for end in spring.surfaces.values()]
+    places = [(each.body, each.surface) for each in (*scene.supports, *scene.foundations)]
+    for own, surface in (*places, *((end.body, end.name) for end in ends)):
+        if own == name:
+            facets = body.mesh.surfaces[surface]
             held[facets[~cut[facets].all(axis=1).any(axis=1)]] = True
     for section in body.mesh.cuts.values():
         held[section.pairs] = True

@@ -24,6 +24,8 @@ class Relations:
         resting: Marks of friction rows along which supports prescribe no slip, shape (n_rows,); None for
             other rows.
         axes: Axes of nodes along which supports prescribe components; None: the coordinates' everywhere.
+        sprung: Number of the last rows, which are those of springs: their forces act also where supports
+            determine them.
     """
 
     points: ContactPoints
@@ -31,6 +33,7 @@ class Relations:
     directions: np.ndarray
     resting: np.ndarray | None = None
     axes: LocalAxes | None = None
+    sprung: int = 0
 
     @property
     def count(self) -> int:
@@ -63,7 +66,7 @@ class Relations:
         left = free.part(self.directions, self.which)
         mine = np.einsum("rd,rd->r", left, left)
         if self.resting is None:
-            return np.asarray(mine <= HELD**2)
+            return np.asarray((mine <= HELD**2) & (np.arange(self.count) < self.count - self.sprung))
         normal = free.part(self.points.normal[self.which], self.which)
         other = np.einsum("rd,rd->r", normal, normal)
         across = mine * other - np.einsum("rd,rd->r", left, normal) ** 2

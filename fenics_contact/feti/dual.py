@@ -57,6 +57,7 @@ class DirichletPreconditioner:
         of D⁻¹, shape (n_interface,), the same for all components of a node.
         """
         self._inverse, self._numbering = inverse, numbering
+        self._soft: tuple[np.ndarray, np.ndarray] | None = None
         self._B = scaled_columns(B, compliance)
         self._Bt = self._B.T.tocsr()
         diagonal = numbering.to_owned(np.asarray(B.multiply(self._B).sum(axis=1)).ravel())
@@ -83,8 +84,30 @@ class DirichletPreconditioner:
         """
         return Lifting(self, self._contact.on_face(restriction))
 
+    def soften(self, give: np.ndarray, B: sp.csr_matrix) -> None:
+        """Let rows give way: M becomes s M s, s² = F / (F + C), and 1 / C where nothing moves. Collective.
+
+        F of a row of means is estimated as b·D⁻¹b / ‖b‖: under an even traction on n nodes a body is √n times
+        as stiff as at one.
+
+        `give`: C, owned, zero on rows that do not; `B`: as before.
+        """
+        squares = (np.asarray(B.multiply(other).sum(axis=1)).ravel() for other in (B, self._B))
+        plain, weighted = map(self._numbering.to_owned, squares)
+        soft, share, alone = np.flatnonzero(give > 0.0), np.ones(len(give)), np.zeros(len(give))
+        moves = plain[soft] > 0.0
+        flexibility = weighted[soft] / np.sqrt(np.where(moves, plain[soft], 1.0))
+        share[soft] = np.sqrt(flexibility / (flexibility + give[soft]))
+        alone[soft] = np.where(moves, 0.0, 1.0 / give[soft])
+        self._soft = share, alone
+        self._contact = self._contact.softened(give > 0.0)
+
     def _apply(self, residual: np.ndarray, contact: _ContactBlock) -> np.ndarray:
-        return self._force(self._inverse.stiffen(self._jump(residual, contact)), contact)
+        if self._soft is None:
+            return self._force(self._inverse.stiffen(self._jump(residual, contact)), contact)
+        share, alone = self._soft
+        stiffened = self._inverse.stiffen(self._jump(share * residual, contact))
+        return share * self._force(stiffened, contact) + alone * residual
 
     def _jump(self, residual: np.ndarray, contact: _ContactBlock) -> np.ndarray:
         """Return D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹ r on the interface. Collective."""
@@ -143,9 +166,14 @@ class _ContactBlock:
         n_gluing: int,
         gram: sp.csr_matrix,
         basis: sp.csr_matrix | None = None,
+        soft: np.ndarray | None = None,
     ) -> None:
-        """Take the matrix, or its part on the columns of a basis, shape (n_rows, n_face)."""
+        """Take the matrix, or its part on the columns of a basis, shape (n_rows, n_face).
+
+        `soft`: marks of rows that give way, replicated, shape (n_rows,); None: none do.
+        """
         self._numbering, self._n_gluing, self._gram, self._basis = numbering, n_gluing, gram, basis
+        self._soft = soft
         self._owned = np.flatnonzero(numbering.owned >= n_gluing)
         self._place = numbering.owned[self._owned] - n_gluing
         matrix = gram if basis is None else (basis.T @ gram @ basis).tocsr()
@@ -182,7 +210,11 @@ class _ContactBlock:
         where = np.concatenate([part[1] + start for part, start in zip(parts, starts, strict=False)])
         value = np.concatenate([part[2] for part in parts])
         basis = sp.csr_matrix((value, (row, where)), shape=(self._gram.shape[0], int(starts[-1])))
-        return _ContactBlock(self._numbering, self._n_gluing, self._gram, basis)
+        return _ContactBlock(self._numbering, self._n_gluing, self._gram, basis, self._soft)
+
+    def softened(self, soft: np.ndarray) -> _ContactBlock:
+        """Return the block with marks of rows that give way, owned, and contradict no other. Collective."""
+        return _ContactBlock(self._numbering, self._n_gluing, self._gram, None, self._gathered(soft) > 0.0)
 
     def solve(self, x: np.ndarray) -> np.ndarray:
         """Return the solution on these rows, zero on those that are not on the face. Collective."""
@@ -205,6 +237,9 @@ class _ContactBlock:
         alone = np.ones(self._size, dtype=bool)
         if part is not None and self._basis is not None:
             alone = np.diff(self._basis.tocsc().indptr) == 1
+        if part is not None and self._soft is not None:
+            soft = self._soft if self._transposed is None else self._transposed @ self._soft != 0.0
+            alone &= ~soft
         if part is not None and not alone.all():
             matrix = self._matrix[alone][:, alone].tocsr()
             part = _dependent_part(matrix, _regularised(matrix), right[alone]) if alone.any() else None
@@ -372,6 +407,8 @@ class DualSystem:
             preconditioner = DirichletPreconditioner(
                 self.inverse, self._B_interface, self._compliance(), torn.numbering, torn.n_gluing
             )
+            if torn.give is not None:
+                preconditioner.soften(torn.give, self._B_interface)
             diagonal, supported = self._diagonal()
             scaling = self._scaling(coarse)
         nothing = np.zeros(len(torn.numbering.owned))
@@ -389,11 +426,12 @@ class DualSystem:
         )
 
     def apply(self, multiplier: np.ndarray) -> np.ndarray:
-        """Return F λ = B K⁺ Bᵀ λ for an owned vector. Collective."""
+        """Return F λ = B K⁺ Bᵀ λ for an owned vector, with C λ on rows of springs. Collective."""
         self.products += 1
-        numbering = self.torn.numbering
+        numbering, give = self.torn.numbering, self.torn.give
         force = self._Bt_interface @ numbering.to_local(multiplier)
-        return numbering.to_owned(self._B_interface @ self.inverse.flex(force))
+        product = numbering.to_owned(self._B_interface @ self.inverse.flex(force))
+        return product if give is None else product + give * multiplier
 
     def reach(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """Return abs(B) abs(u), the size of the displacements at each row, owned, [length]. Collective."""

@@ -73,7 +73,7 @@ def section_points(
 def shortening_columns(scene: Scene, tied: Relations) -> sp.csr_matrix:
     """Return what unit shortenings are in the rows of ties, shape (n_tied_rows, n_preloads)."""
     number = tied.points.pair[tied.which] - len(scene.ties)
-    row = np.flatnonzero(number >= 0)
+    row = np.flatnonzero((number >= 0) & (number < len(scene.preloads)))  # springs come after
     normal = tied.points.normal[tied.which[row]]
     value = -np.einsum("rd,rd->r", tied.directions[row], normal)
     shape = (tied.count, len(scene.preloads))

@@ -46,6 +46,7 @@ from fenics_contact.feti.preloads import (
     shortening_columns,
     with_shortenings,
 )
+from fenics_contact.feti.springs import SpringRows, spring_points, with_springs
 from fenics_contact.feti.subdomain import Subdomain, assemble
 from fenics_contact.qp.cones import CoulombLaw, SlipLaw, Strengths, TrescaLaw
 from fenics_contact.qp.layout import ContactLayout
@@ -112,6 +113,10 @@ def meeting_points(
             points = once_at_sections(points, scene, tearing)
             sections = section_points(scene, ties, tearing, fixed, axes)
         ties = join_points([ties, sections], scene.components, tearing.n_nodes)
+    if scene.springs:
+        with together(comm):
+            ends = spring_points(scene, tearing)
+        ties = join_points([ties, ends], scene.components, tearing.n_nodes)
     return points, ties
 
 
@@ -207,6 +212,7 @@ class TornSystem:
         slid: Tangential displacement of the points without friction, which have no such rows, at the origin
             of slip, replicated, shape (n_contact − n_friction, dim − 1), [length].
         fluid: Load and place of fluid between surfaces; None without any.
+        springs: Springs between surfaces, the last rows of ties; None without any.
         free: The free motions of rigid surfaces and unknown shortenings of preloads, which add Q q to c.
     """
 
@@ -230,6 +236,7 @@ class TornSystem:
     slid: np.ndarray
     free: FreeMotions
     fluid: FluidLoad | None = None
+    springs: SpringRows | None = None
 
     def jump(self, displacement: np.ndarray) -> np.ndarray:
         """Return B u for a torn displacement of this rank, owned, [length]. Collective."""
@@ -254,8 +261,8 @@ class TornSystem:
         """
         if self.free.count == 0:
             return np.zeros(0)
-        # Sections lie in the last rows of ties.
-        rows = self.numbering.owned < (self.n_equality if self.scene.preloads else self.n_gluing)
+        # Sections lie in the last rows of ties that do not give way.
+        rows = self.numbering.owned < (self.first_sprung if self.scene.preloads else self.n_gluing)
         columns = self.free.columns[rows]
         sums = np.column_stack([(columns.T @ columns).toarray(), -columns.T @ residual[rows]])
         sums = self.decomposition.comm.allreduce(sums)
@@ -376,6 +383,21 @@ class TornSystem:
     def n_gluing(self) -> int:
         """Number of gluing and Dirichlet rows of all ranks."""
         return self.decomposition.gluing.rows.count
+
+    @property
+    def first_sprung(self) -> int:
+        """Number of the first row of springs."""
+        return self.n_equality - (0 if self.springs is None else self.springs.count)
+
+    @cached_property
+    def give(self) -> np.ndarray | None:
+        """C of rows of springs, zero on others, owned, (n_owned,), [length / force]; None without any."""
+        if self.springs is None:
+            return None
+        result = np.zeros(len(self.numbering.owned))
+        place = self.numbering.owned_index(np.arange(self.first_sprung, self.n_equality))
+        result[place[place >= 0]] = self.springs.compliance[place >= 0]
+        return result
 
     @property
     def normal_rows(self) -> np.ndarray:
@@ -502,6 +524,8 @@ def build_torn_system(
     if scene.preloads:
         drawn = shortening_columns(scene, system.relations[0])
         tied = drawn @ given_shortenings(scene)
+    if system.springs is not None:
+        tied[len(tied) - system.springs.count :] = system.springs.right
     right = np.concatenate([right, tied, gap, slip]) - supported
     slid = np.zeros((len(system.frictionless), system.components - 1))
     if free.count:
@@ -517,7 +541,10 @@ def build_torn_system(
 
 def _meets_alike(scene: Scene, other: Scene) -> bool:
     """Return whether two scenes have the same meshes and the same pairs of surfaces."""
-    pairs = [[*each.contacts, *each.ties, *(p.key for p in each.preloads)] for each in (scene, other)]
+    pairs = [
+        [*each.contacts, *each.ties, *each.springs, *(p.key for p in each.preloads)]
+        for each in (scene, other)
+    ]
     return scene.has_meshes_of(other) and pairs[0] == pairs[1]
 
 
@@ -581,6 +608,9 @@ def _with_rows(
     gluing, tearing, fixed = decomposition.gluing.rows, decomposition.tearing, decomposition.fixed
     axes = decomposition.axes
     tied = tied_relations(ties, scene.ties, fixed, axes)
+    springs = SpringRows.of(scene) if scene.springs else None
+    if springs is not None:
+        tied = with_springs(tied, springs)
     slips = tangential_relations(points, frictional, prescribed, axes)
     relations = (tied, normal_relations(points, axes), slips)
     rows = stack([gluing, *(relation.rows(tearing, fixed) for relation in relations), *further])
@@ -590,7 +620,7 @@ def _with_rows(
         coefficient[frictional], tresca[frictional],
         None if strengths is None else strengths.part(frictional), closures_of(scene, points),
         None if elastic is None else elastic[frictional], numbering, relations, B,
-        np.zeros(0), np.zeros(0), np.zeros((0, scene.components - 1)), NO_MOTIONS,
+        np.zeros(0), np.zeros(0), np.zeros((0, scene.components - 1)), NO_MOTIONS, springs=springs,
     )  # fmt: skip
 
 

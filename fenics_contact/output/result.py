@@ -68,6 +68,7 @@ def described_scene(scene: Scene, subdomains: Mapping[str, int], time: float = 0
         "ties": [_described_pair(tie, time) for tie in scene.ties],
         **({"preloads": readable(scene.preloads)} if scene.preloads else {}),
         **({"foundations": readable(scene.foundations)} if scene.foundations else {}),
+        **({"springs": readable(scene.springs)} if scene.springs else {}),
     }
 
 
@@ -114,6 +115,8 @@ def forces_record(state: State) -> dict[str, Any]:
     drawn: dict[str, Any] = {"preloads": preloads_record(state)} if state.scene.preloads else {}
     if state.scene.foundations:
         drawn["foundations"] = [_on_surface(each) for each in state.foundations()]
+    if state.scene.springs:
+        drawn["springs"] = springs_record(state)
     return {
         "reactions": [_on_surface(each) for each in state.reactions()],
         "contacts": [_on_surface(each) for each in pairs.contacts],
@@ -143,6 +146,20 @@ def preloads_record(state: State) -> list[dict[str, Any]]:
             **_on_surface(each.resultant),
         }
         for name, each in state.preloads().items()
+    ]
+
+
+def springs_record(state: State) -> list[dict[str, Any]]:
+    """Return forces and elongations of springs. Collective."""
+    return [
+        {
+            "name": name,
+            "force": each.force,
+            "directions": each.directions,
+            "tension": each.tension,
+            "elongation": each.elongation,
+        }
+        for name, each in state.springs().items()
     ]
 
 
@@ -275,7 +292,8 @@ None where materials dissipate or are nonlinear |
     | ``forces`` | ``reactions`` of the supports, ``contacts`` and ``ties`` (on the slave): each with body, \
 surface, ``force``, ``moment`` and the point ``about`` which it is; where there are any, ``foundations`` \
 likewise, and of ``preloads`` ``name``, ``axial_force``, ``shortening``, ``shear``, ``bending`` and \
-``torsion``; ``balance`` of all with the loads, its ``imbalance`` and the scales to which that is relative |
+``torsion``, of ``springs`` ``name``, ``force`` on the first end, ``directions``, ``tension`` and \
+``elongation``; ``balance`` of all with the loads, its ``imbalance`` and the scales to which it is relative |
     | ``rigid_motions`` | of each rigid surface body, surface, ``displacement`` and ``rotation`` of the \
 point ``about`` |
     | ``tools`` | of each rigid tool by name ``displacement``, ``rotation``, and ``force`` and ``moment`` of \

@@ -184,6 +184,7 @@ class StepTable:
     | ``loads Fr``, ``loads Fz`` | the same of bodies of revolution, a revolution |
     | ``lid top Fx``, ... | reaction of the supports of the surface "top" of the body "lid" |
     | ``foundation slab bottom Fx``, ... | force of springs to the ground |
+    | ``spring NAME tension``, ``... elongation`` | of springs between surfaces, with the axis if in several |
     | ``lid bottom on pot rim Fx``, ... | force on the slave of a pair or tie |
     | ``lid bottom on pot rim pressure``, ``... area`` | the largest pressure, and the area of contact |
 
@@ -252,12 +253,25 @@ class StepTable:
             found |= {f"foundation {place}": springs[place] for place in springs.places}
         for listed in (pairs.contacts, pairs.ties):
             found |= dict(zip(_names(listed.places), listed, strict=True))
-        columns: dict[str, float] = {}
+        columns = self._springs(state, balance.force_scale) if state.scene.springs else {}
         for name, each in found.items():
             self._about.setdefault(name, each.about)
             parts = (each.force, balance.force_scale), (each.moment, balance.moment_scale)
             numbers = np.concatenate([rounded(part, scale) for part, scale in parts])
             columns |= {f"{name} {head}": float(v) for head, v in zip(each.heads, numbers, strict=True)}
+        return columns
+
+    @staticmethod
+    def _springs(state: State, scale: float) -> dict[str, float]:
+        """Return tension and elongation of springs by their columns. Collective."""
+        columns: dict[str, float] = {}
+        for name, each in state.springs().items():
+            lines = each.directions.tolist()
+            axes = [""] if len(lines) == 1 else [f" {'xyz'[line.index(1.0)]}" for line in lines]
+            tensions = rounded(each.tension, scale)
+            for axis, tension, longer in zip(axes, tensions, each.elongation, strict=True):
+                columns[f"spring {name} tension{axis}"] = float(tension)
+                columns[f"spring {name} elongation{axis}"] = float(longer)
         return columns
 
     def _text(self) -> str:

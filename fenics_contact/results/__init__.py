@@ -9,6 +9,7 @@ from fenics_contact.results.fields import GatheredFields
 from fenics_contact.results.forces import Balance, PairResultants, Resultant, Resultants
 from fenics_contact.results.preloads import Preloads, SectionForces
 from fenics_contact.results.rigid_motions import RigidMotion, UnheldMotion
+from fenics_contact.results.springs import SpringForce, SpringForces
 from fenics_contact.results.state import Energies
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ __all__ = [
     "RigidMotion",
     "SectionForces",
     "SolverErrors",
+    "SpringForce",
+    "SpringForces",
     "StateErrors",
     "UnheldMotion",
 ]

@@ -496,7 +496,7 @@ class Balance:
         gaps: Of contacts and ties between bodies: both sides together have no force, but a moment where
             friction, a tie or a mean over facets transmits forces across a gap between the meshes, or where
             one body has moments about undeformed places and the other about deformed ones.
-        beds: Of elastic foundations, and of materials that resist rigid motions; zero otherwise.
+        beds: Of elastic foundations, springs, and materials that resist rigid motions; zero otherwise.
         force_scale: Largest sum of the sizes of the nodal forces of one of these, [force]; where nothing acts
             a force below which bodies count as free of forces.
         moment_scale: Largest sum of the sizes of nodal forces times their distances from the point,
@@ -589,13 +589,15 @@ def _parts(torn: TornSystem, forces: NodalForces) -> dict[str, np.ndarray]:
     """Return the nodal forces of each part, shape (n_nodes, dim)."""
     between = np.array([isinstance(pair.master, Surface) for pair in torn.scene.contacts], dtype=bool)
     meets_body = between[torn.points.pair]
-    tied = by_node(torn.ties, forces.tie, np.arange(torn.ties.count))
+    springs = torn.ties.count - len(torn.scene.springs)
+    tied = by_node(torn.ties, forces.tie, np.arange(springs))
+    sprung = by_node(torn.ties, forces.tie, np.arange(springs, torn.ties.count))
     return {
         "loads": forces.load,
         "reactions": forces.reaction,
         "obstacles": by_node(torn.points, forces.contact, np.flatnonzero(~meets_body)),
         "gaps": by_node(torn.points, forces.contact, np.flatnonzero(meets_body)) + tied,
-        "beds": sum(forces.foundations, forces.bed),
+        "beds": sum(forces.foundations, forces.bed) + sprung,
     }
 
 

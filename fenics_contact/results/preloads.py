@@ -10,6 +10,7 @@ import numpy as np
 from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.preloads import Preload
+from fenics_contact._scene.springs import Spring
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.preloads import shortening_columns
 from fenics_contact.feti.torn import TornSystem
@@ -98,8 +99,8 @@ class Preloads(Mapping[str, SectionForces]):
         return "\n".join([*aligned(rows, 1), "in [force], [length], [force·length]"])
 
 
-def names_of(preloads: Sequence[Preload]) -> list[str]:
-    """Return the names of preloads, those of the same name numbered."""
+def names_of(preloads: Sequence[Preload | Spring]) -> list[str]:
+    """Return the names of preloads or springs, those of the same name numbered."""
     labels = [preload.label for preload in preloads]
     return [
         label if labels.count(label) == 1 else f"{label} {labels[: k + 1].count(label)}"

@@ -49,6 +49,7 @@ from fenics_contact.results.forces import (
 )
 from fenics_contact.results.preloads import Preloads, section_forces
 from fenics_contact.results.rigid_motions import RigidMotion, UnheldMotion, rigid_motion
+from fenics_contact.results.springs import SpringForces, spring_forces
 from fenics_contact.results.tools import ToolResult, tool_results
 
 if TYPE_CHECKING:
@@ -70,7 +71,8 @@ class Energies:
             have histories of their own (`AutomaticSteps.finer_history`), the sum over these.
         dual: Value of the dual functional, −½ (f − Bᵀλ)ᵀK⁺(f − Bᵀλ) − λᵀc − Φ(λ); None for nonlinear
             materials.
-        surface: Stored by surfaces that give way, λᵀC(λ) − Φ(λ) with the closures C = Φ'; zero without any.
+        surface: Stored by surfaces that give way, λᵀC(λ) − Φ(λ) with the closures C = Φ', and by springs
+            between surfaces, N²/(2k); zero without any.
     """
 
     strain: float
@@ -124,11 +126,12 @@ def compute_energies(
 
 def softened(torn: TornSystem, multiplier: np.ndarray) -> tuple[float, float]:
     """Return λᵀC(λ) and Φ(λ) of this rank's rows, [force · length]; zero where contact is exact."""
-    compliance = torn.compliance
+    compliance, give = torn.compliance, torn.give
+    sprung = 0.0 if give is None else float(multiplier @ (give * multiplier))
     if compliance is None:
-        return 0.0, 0.0
+        return sprung, 0.5 * sprung
     pressing = compliance.given_way(multiplier)
-    return float(multiplier @ pressing), compliance.work(multiplier)
+    return sprung + float(multiplier @ pressing), 0.5 * sprung + compliance.work(multiplier)
 
 
 def pairs_in_words(scene: Scene, contact: ContactResult, force: str = "", stress: str = "") -> list[str]:
@@ -457,6 +460,15 @@ class State(ABC):
         """
         rigid = [support for support in self.scene.supports if isinstance(support, RigidSurface)]
         return tuple(rigid_motion(self.scene, each, self.gather_displacement(each.body)) for each in rigid)
+
+    @collectively("State.springs", comm_of)
+    def springs(self) -> SpringForces:
+        """Return force and elongation of every `Spring` by its name. Collective.
+
+        Example:
+            >>> state.springs()["rod"].tension  # doctest: +SKIP
+        """
+        return spring_forces(self.torn, self._nodal_forces, self.solution.multiplier)
 
     @collectively("State.preloads", comm_of)
     def preloads(self) -> Preloads:

@@ -51,6 +51,7 @@ from fenics_contact import (
     Section,
     ShapeProblem,
     SlipTable,
+    Spring,
     Status,
     Support,
     Surface,
@@ -110,7 +111,15 @@ from fenics_contact.materials import (
 )
 from fenics_contact.mesh.cell_types import CELL_TYPES
 from fenics_contact.qp import FaceNewton
-from fenics_contact.results import BalancedTolerance, Preloads, RigidMotion, SectionForces, UnheldMotion
+from fenics_contact.results import (
+    BalancedTolerance,
+    Preloads,
+    RigidMotion,
+    SectionForces,
+    SpringForce,
+    SpringForces,
+    UnheldMotion,
+)
 from fenics_contact.results.deformed_state import AnyState
 from tests.contact.gallery import partitions
 from tests.nonlinear.scenes import pressed, rounded
@@ -145,6 +154,7 @@ def objects() -> dict[str, Any]:
     search = ForScipy(bowl, np.zeros(60), constraints=limits)
     search.arguments("SLSQP")["fun"](np.zeros(60))
     weights = [BodyForce("block", (0, 0, float(k))) for k in range(50)]
+    sprung = SpringForce(np.eye(3)[2], np.array([0.1]), np.eye(3)[2:])
     drawn = SectionForces(0.1, np.eye(3)[2], state.balance().loads)
     roots = [
         shape.function(TotalPotential()),
@@ -159,8 +169,9 @@ def objects() -> dict[str, Any]:
         Roller("block", "x0"), CyclicSymmetry(Surface("block", "x0"), Surface("block", "y0"), (0.0, 0.0)),
         *shape.geometry.motions, LoadCases({"one": shape}), path, followed,
         Remeshed(shape), Remeshing(np.zeros(60), 1.0, 1.1),
-        ElasticFoundation("block", "z0", 1.0), Preload("block", Section((0, 0, 0.5), (0, 0, 1))),
-        Preloads({"block": drawn}), drawn,
+        ElasticFoundation("block", "z0", 1.0), Spring(Surface("block", "z1"), (0, 0, 9), 1.0),
+        Preload("block", Section((0, 0, 0.5), (0, 0, 1))),
+        Preloads({"block": drawn}), drawn, SpringForces({"rod": sprung}), sprung,
         RigidMotion(Surface("block", "z1"), np.zeros(3), np.ones(3), np.arange(3.0)),
         limits, BundleTrust(),
         minimize(bowl, np.ones(60), constraints=NonlinearConstraint(bowl, 90.0, name="size")),

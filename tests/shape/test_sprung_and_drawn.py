@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import ContactProblem, Coulomb, ElasticFoundation, Preload, Section, ShapeProblem
+from fenics_contact import (
+    ContactProblem,
+    Coulomb,
+    ElasticFoundation,
+    Preload,
+    Section,
+    ShapeProblem,
+    Spring,
+    Surface,
+)
 from fenics_contact.design import PressureNorm
 from fenics_contact.errors import InvalidInputError
 from tests.shape.blocks import block_on_floor, designs_of
@@ -19,6 +28,8 @@ SPRUNG = [ElasticFoundation("block", "z1", (3.0, 2.0, 9.0))]
 CASES: dict[str, dict[str, Any]] = {
     "springs": {"foundations": SPRUNG},
     "a length": {"preloads": [Preload("block", LEVEL, shortening=0.02)]},
+    "a spring": {"springs": [Spring(Surface("block", "z1"), (1.3, 0.6, 3.0), (3.0, 2.0, 9.0))]},
+    "a line": {"springs": [Spring(Surface("block", "z1"), (1.0, 0.5, 3.0), 9.0, tension=-0.5)]},
     "a force": {"foundations": SPRUNG, "preloads": [Preload("block", LEVEL, force=-0.4)]},
 }
 

@@ -1,0 +1,185 @@
+"""Springs between the mean displacements of two surfaces, or of a surface and the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from fenics_contact._base.checks import GivenVector, checked, floats
+from fenics_contact._base.sparse import ROUNDING
+from fenics_contact._scene.body import Body
+from fenics_contact._scene.pairs import Surface
+from fenics_contact._surfaces.facets import gauss_points, surface_moments
+from fenics_contact.errors import InvalidInputError
+
+
+class Around(Protocol):
+    """What a spring needs to know of its scene."""
+
+    @property
+    def bodies(self) -> Mapping[str, Body]:
+        """Bodies by name."""
+
+    @property
+    def dim(self) -> int:
+        """Displacement components of a node."""
+
+    @property
+    def axisymmetric(self) -> bool:
+        """Whether its bodies are bodies of revolution."""
+
+    @property
+    def deforms_much(self) -> bool:
+        """Whether one of its bodies does."""
+
+
+@dataclass(frozen=True)
+@checked()
+class Spring:
+    """A spring between two surfaces, or between a surface and a fixed point.
+
+    It acts on the mean displacements ū = ∫ u dA / ∫ dA of its ends, with forces spread over them as an even
+    traction, and resists no rotation of an end about its centroid. A number k acts along the unit vector n
+    from the centroid of the first end to that of the second one, with the tension N = N₀ + k n·(ū₂ − ū₁). A
+    vector acts along each axis, with the forces k_d (ū₂ − ū₁)_d on the first end. Both count displacements
+    from the undeformed bodies, and axes and n stay as they are. Surfaces may belong to one body, and one may
+    be that of a `RigidTool`, whose name for it is "tool". Bodies may be held by springs alone.
+
+    Attributes:
+        first: A named surface.
+        second: Another one, or the coordinates of a fixed point.
+        stiffness: k > 0, [force / length] (in the plane: per unit of thickness; on bodies of revolution: per
+            revolution): a number along the line between the ends, or one of at least zero along each axis.
+            With a plane of symmetry through the spring that of the part which is modelled.
+        tension: N₀ of a spring along its line, before anything moves, negative in compression, [force].
+        name: Name in results; by default both ends.
+
+    Raises:
+        InvalidInputError: If a stiffness is negative, all are zero, numbers are not finite, both ends are
+            the same, or there is a tension without a line. When the scene is made: if the ends of a spring
+            along its line have the same centroid, or bodies deform much, in which the line would turn; if
+            numbers do not suit the space of the bodies, or bodies of revolution, which have springs along
+            their axis alone.
+
+    Example:
+        >>> rod = Spring(Surface("lid", "rim"), Surface("pot", "rim"), 2e4, tension=500.0)  # N/mm, N
+        >>> bushing = Spring(Surface("arm", "eye"), Surface("frame", "pin"), (900.0, 900.0, 150.0))
+        >>> mount = Spring(Surface("engine", "foot"), (0, 0, -80), 400.0)
+    """
+
+    first: Surface
+    second: Surface | GivenVector
+    stiffness: float | GivenVector
+    tension: float = 0.0
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        """Reject what holds nothing, or pushes away."""
+        numbers = np.asarray(self.stiffness, dtype=np.float64)
+        if not np.isfinite(numbers).all() or (numbers < 0).any() or not numbers.any():
+            raise InvalidInputError(
+                f"Spring.stiffness of {self.label!r} must be positive, or numbers of at least zero along the "
+                f"axes, got {self.stiffness!r}: give the force that a unit of displacement causes"
+            )
+        if not np.isfinite(self.tension) or (self.tension and numbers.ndim):
+            raise InvalidInputError(
+                f"Spring.tension of {self.label!r} must be a finite number, zero with a stiffness for each "
+                f"axis, got {self.tension!r}: give a stiffness along the line between the ends"
+            )
+        if self.first == self.second:
+            raise InvalidInputError(
+                f"a Spring must have two different ends, got {self.first.in_words!r} twice: give another "
+                "surface, or the coordinates of a fixed point"
+            )
+        object.__setattr__(self, "stiffness", floats(numbers) if numbers.ndim else float(numbers))
+        if not isinstance(self.second, Surface):
+            object.__setattr__(self, "second", floats(np.asarray(self.second, dtype=np.float64)))
+
+    @property
+    def label(self) -> str:
+        """Its name, by default both ends."""
+        if self.name:
+            return self.name
+        other = self.second
+        return f"{self.first.in_words} to {other.in_words if isinstance(other, Surface) else 'ground'}"
+
+    @property
+    def place(self) -> str:
+        """Where it is and how stiff, in words."""
+        along = "along each axis" if isinstance(self.stiffness, tuple) else "along its line"
+        drawn = f", tension {self.tension:g}" if self.tension else ""
+        return f"{self.label}, {self.stiffness} {along}{drawn}"
+
+    @property
+    def surfaces(self) -> dict[str, Surface]:
+        """Its surfaces by the names of the fields."""
+        ends = {"first": self.first, "second": self.second}
+        return {name: end for name, end in ends.items() if isinstance(end, Surface)}
+
+    def centres(self, scene: Around) -> np.ndarray:
+        """Return the centroids of both ends, shape (2, dim), [length]."""
+        return np.array([_centre(scene, end) for end in (self.first, self.second)])
+
+    def rows(self, scene: Around) -> tuple[np.ndarray, np.ndarray]:
+        """Return the directions in which it acts, unit vectors, (n, dim), and its stiffness in each, (n,)."""
+        if isinstance(self.stiffness, tuple):
+            numbers = np.array(self.stiffness)
+            return np.eye(scene.dim)[numbers > 0.0], numbers[numbers > 0.0]
+        line = np.diff(self.centres(scene), axis=0)
+        line /= np.linalg.norm(line)
+        line[np.abs(line) <= ROUNDING] = 0.0
+        return line, np.array([self.stiffness])
+
+    def require_suits(self, scene: Around) -> None:
+        """Reject numbers of another space, springs without a line, and motions that bodies do not have."""
+        dim, revolved = scene.dim, scene.axisymmetric
+        for name in ("stiffness", "second"):
+            given = getattr(self, name)
+            if isinstance(given, tuple) and (len(given) != dim or not np.isfinite(given).all()):
+                raise InvalidInputError(
+                    f"Spring.{name} of {self.label!r} must have {dim} finite numbers, got {given!r}: give "
+                    "one for each axis"
+                )
+        if isinstance(self.stiffness, tuple):
+            across = revolved and self.stiffness[0] > 0.0
+        else:
+            line = np.diff(self.centres(scene), axis=0)[0]
+            size = max(float(np.abs(body.mesh.points).max()) for body in scene.bodies.values())
+            if np.linalg.norm(line) <= ROUNDING * size:
+                raise InvalidInputError(
+                    f"a Spring along its line needs ends with different centroids, but both of "
+                    f"{self.label!r} are in the same place: give a stiffness for each axis"
+                )
+            across = revolved and abs(line[0]) > ROUNDING * size
+            if scene.deforms_much:
+                raise InvalidInputError(
+                    f"the Spring {self.label!r} along its line needs small displacements, but some body "
+                    "deforms much and would turn the line: give a stiffness for each axis"
+                )
+        if across:
+            raise InvalidInputError(
+                f"a Spring on bodies of revolution must act along the axis, got {self.place}: give "
+                "stiffness=(0, k), and fixed points on the axis, r = 0"
+            )
+
+
+def mean_weights(scene: Around, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes of a surface in its body, shape (n,), and their weights in its mean, (n,), sum one."""
+    mesh = scene.bodies[surface.body].mesh
+    facets = mesh.surfaces[surface.name]
+    weights = np.zeros(facets.shape)
+    for at in gauss_points(mesh.points, facets, scene.axisymmetric):
+        weights += at.areas[:, None] * at.values
+    nodes, place = np.unique(facets, return_inverse=True)
+    sums = np.bincount(place.ravel(), weights.ravel())
+    return nodes, sums / sums.sum()
+
+
+def _centre(scene: Around, end: Surface | GivenVector) -> np.ndarray:
+    if not isinstance(end, Surface):
+        return np.asarray(end, dtype=np.float64)
+    mesh = scene.bodies[end.body].mesh
+    return surface_moments(mesh.points, mesh.surfaces[end.name], scene.axisymmetric).centroid

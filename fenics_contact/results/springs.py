@@ -1,0 +1,94 @@
+"""Forces and elongations of the springs between surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact._base.display import displayed
+from fenics_contact._base.sparse import ROUNDING
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.results.forces import NodalForces, aligned
+from fenics_contact.results.preloads import names_of
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class SpringForce:
+    """A spring in a state.
+
+    Attributes:
+        force: On the first end, shape (dim,), [force]; on the second end it is the opposite.
+        elongation: ū₂ − ū₁ of the mean displacements along each direction in which the spring acts, shape
+            (n,), [length]: one along its line, positive in extension, or one for each axis with a stiffness.
+        directions: These directions, unit vectors, shape (n, dim).
+    """
+
+    force: np.ndarray
+    elongation: np.ndarray
+    directions: np.ndarray
+
+    @property
+    def tension(self) -> np.ndarray:
+        """Force along each direction, positive in tension, shape (n,), [force]."""
+        return np.asarray(self.directions @ self.force)
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class SpringForces(Mapping[str, SpringForce]):
+    """All springs of a scene by their names, in its order; those of the same name are numbered."""
+
+    entries: Mapping[str, SpringForce]
+
+    def __len__(self) -> int:
+        """Return the number of springs."""
+        return len(self.entries)
+
+    def __getitem__(self, name: str) -> SpringForce:
+        """Return that of a name."""
+        if name not in self.entries:
+            raise InvalidInputError(
+                f"springs of the scene are {', '.join(map(repr, self.entries)) or 'none'}, got {name!r}: "
+                "use one of these names"
+            )
+        return self.entries[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Return the names."""
+        return iter(self.entries)
+
+    def __str__(self) -> str:
+        """Return a table with one line for each direction of each spring."""
+        if not self.entries:
+            return "none"
+        size = max(float(np.abs(each.force).max()) for each in self.values())
+        rows: list[tuple[str, ...]] = [("", "along", "tension", "elongation")]
+        for name, each in self.items():
+            for way, tension, longer in zip(each.directions, each.tension, each.elongation, strict=True):
+                along = f"({', '.join(f'{x:.3g}' for x in way)})"
+                rows.append(
+                    (name, along, f"{tension if abs(tension) > ROUNDING * size else 0:.5g}", f"{longer:.5g}")
+                )
+        return "\n".join([*aligned(rows, 2), "in [force], [length]"])
+
+
+def spring_forces(torn: TornSystem, forces: NodalForces, multiplier: np.ndarray) -> SpringForces:
+    """Return what the springs exert. Collective.
+
+    `multiplier`: λ, owned.
+    """
+    springs, rows = torn.scene.springs, torn.springs
+    if rows is None:
+        return SpringForces({})
+    tension = torn.numbering.gather(multiplier, np.arange(torn.first_sprung, torn.n_equality))
+    elongation = rows.compliance * (tension - rows.tension)
+    on_first = -forces.tie[torn.ties.count - len(springs) :]
+    found = {}
+    for number, name in enumerate(names_of(springs)):
+        mine = rows.spring == number
+        found[name] = SpringForce(on_first[number], elongation[mine], rows.directions[mine])
+    return SpringForces(found)
