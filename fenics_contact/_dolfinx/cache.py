@@ -23,9 +23,6 @@ _LOG = logging.getLogger(__name__)
 #: was a program that uses dolfinx alone.
 PATIENCE = 60.0
 
-#: Modules of forms that this process has loaded: ffcx lists the whole folder each time it loads one.
-_LOADED: dict[tuple[str, ...], Any] = {}
-
 
 @contextmanager
 def compiled_once() -> Iterator[None]:
@@ -36,14 +33,8 @@ def compiled_once() -> Iterator[None]:
 
     def locked_lookup(module_name: str, object_names: Any, cache_dir: Any, timeout: Any) -> Any:
         held.close()
-        key = (str(cache_dir), module_name, *object_names)
-        if key not in _LOADED:
-            held.enter_context(_alone(Path(cache_dir) / module_name))
-            found = lookup(module_name, object_names, cache_dir, timeout)
-            if found[0] is None:  # the caller compiles it
-                return found
-            _LOADED[key] = found
-        return _LOADED[key]
+        held.enter_context(_alone(Path(cache_dir) / module_name))
+        return lookup(module_name, object_names, cache_dir, timeout)
 
     with ExitStack() as held:  # until the library is written, which the lookup leaves to its caller
         jit.get_cached_module = locked_lookup

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import ufl
@@ -19,15 +20,28 @@ Facets = Mapping[int, tuple[np.ndarray, np.ndarray]]
 Cells = Mapping[int, np.ndarray]
 
 
+#: What this process has compiled, by the signature of the form as it was written: what dolfinx made of it,
+#: the expanded form and the symbols of the form. To expand and find it again takes as long as a small body.
+_COMPILED: dict[str, tuple[Any, ufl.Form, tuple[Any, ...]]] = {}
+
+
 class CompiledForm:
     """A UFL form on a template, compiled once, bound to many meshes."""
 
     def __init__(self, comm: MPI.Comm, form: ufl.Form) -> None:
-        """Compile ``form``. Collective on ``comm``: one rank compiles, the others read its cache."""
-        self.form = _expanded(form)
-        with Task("compile forms"), side_effects_undone(), compiled_once():
-            build = dolfinx.jit.ffcx_jit if old() else dolfinx.fem.compile_form
-            self._compiled = build(comm, self.form, {}, {})
+        """Compile ``form``, unless all ranks have compiled one that differs from it in its symbols alone.
+
+        Collective on ``comm``: one rank compiles, the others read its cache.
+        """
+        signature, symbols = form.signature(), (*form.coefficients(), *form.constants())
+        if not comm.allreduce(signature in _COMPILED, op=MPI.LAND):
+            expanded = _expanded(form)
+            with Task("compile forms"), side_effects_undone(), compiled_once():
+                build = dolfinx.jit.ffcx_jit if old() else dolfinx.fem.compile_form
+                _COMPILED[signature] = build(comm, expanded, {}, {}), expanded, symbols
+        self._compiled, self.form, its_symbols = _COMPILED[signature]
+        #: Symbols of ``form`` by those of the compiled one.
+        self._mine = dict(zip(its_symbols, symbols, strict=True))
 
     def bind(
         self,
@@ -56,8 +70,8 @@ class CompiledForm:
             if parts
         }
         # A symbol that UFL has simplified away must not be passed.
-        functions = {symbol: coefficients[symbol] for symbol in self.form.coefficients()}
-        numbers = {symbol: constants[symbol] for symbol in self.form.constants()}
+        functions = {symbol: coefficients[self._mine[symbol]] for symbol in self.form.coefficients()}
+        numbers = {symbol: constants[self._mine[symbol]] for symbol in self.form.constants()}
         return dolfinx.fem.create_form(self._compiled, list(spaces), mesh, domains, functions, numbers)
 
     def _bind_old(
@@ -70,7 +84,7 @@ class CompiledForm:
         cells: Cells,
     ) -> dolfinx.fem.Form:
         compiled, module, code = self._compiled
-        mine = self.form.coefficients()
+        mine = [self._mine[symbol] for symbol in self.form.coefficients()]
         order = [compiled.original_coefficient_position[i] for i in range(compiled.num_coefficients)]
         kinds = cpp.fem.IntegralType
         domains = dict.fromkeys((kinds.cell, kinds.exterior_facet, kinds.interior_facet, kinds.vertex))
@@ -83,7 +97,7 @@ class CompiledForm:
             compiled,
             [space._cpp_object for space in spaces],
             [coefficients[mine[i]]._cpp_object for i in order],
-            [constants[constant]._cpp_object for constant in self.form.constants()],
+            [constants[self._mine[symbol]]._cpp_object for symbol in self.form.constants()],
             domains,
             mesh._mesh,
             module.ffi,

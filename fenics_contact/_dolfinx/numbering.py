@@ -2,20 +2,36 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import ufl
 
+from fenics_contact._base.libraries import MPI
 from fenics_contact._dolfinx.cache import compiled_once
 from fenics_contact._dolfinx.cells import NODE_ORDER, cell_type_named, facet_vertices
 from fenics_contact._dolfinx.loading import cpp, dolfinx, old, side_effects_undone, version
 from fenics_contact._dolfinx.templates import cellwise_element, scalar_element, vector_element
 
+#: Elements that this process has compiled, each with its dofmap and the library that holds both: dolfinx 0.5
+#: looks them up in the folder of compiled forms for every space, of which each subdomain has several.
+_ELEMENTS: dict[ufl.finiteelement.AbstractFiniteElement, tuple[cpp.fem.FiniteElement, int, Any]] = {}
+
 
 def _space(
     mesh: dolfinx.mesh.Mesh, element: ufl.finiteelement.AbstractFiniteElement
 ) -> dolfinx.fem.FunctionSpace:
-    with side_effects_undone(), compiled_once():  # the element is compiled
-        return dolfinx.fem.FunctionSpace(mesh, element) if old() else dolfinx.fem.functionspace(mesh, element)
+    if not old():
+        with side_effects_undone():
+            return dolfinx.fem.functionspace(mesh, element)
+    if not mesh.comm.allreduce(element in _ELEMENTS, op=MPI.LAND):
+        with side_effects_undone(), compiled_once():
+            (compiled, dofmap), library, _ = dolfinx.jit.ffcx_jit(mesh.comm, element)
+        places = (int(library.ffi.cast("uintptr_t", library.ffi.addressof(of))) for of in (compiled, dofmap))
+        _ELEMENTS[element] = (cpp.fem.FiniteElement(next(places)), next(places), library)
+    made, dofmap, _ = _ELEMENTS[element]
+    dofs = cpp.fem.create_dofmap(mesh.comm, dofmap, mesh.topology, made)
+    return dolfinx.fem.FunctionSpace(mesh, element, cpp.fem.FunctionSpace(mesh._mesh, made, dofs))
 
 
 def geometry_degree(mesh: dolfinx.mesh.Mesh) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import count
 
 import ufl
@@ -14,6 +14,7 @@ from fenics_contact._dolfinx.loading import old
 _NUMBERS = count(10**9)
 
 
+@cache
 def _element(cell_type: str, shape: tuple[int, ...]) -> ufl.finiteelement.AbstractFiniteElement:
     if not old():
         import basix.ufl
@@ -35,6 +36,7 @@ def scalar_element(cell_type: str) -> ufl.finiteelement.AbstractFiniteElement:
     return _element(cell_type, ())
 
 
+@cache
 def cellwise_element(cell_type: str, shape: tuple[int, ...] = ()) -> ufl.finiteelement.AbstractFiniteElement:
     """Return the element of scalars, vectors or tensors that are constant on each cell."""
     if not old():

@@ -39,9 +39,30 @@ def test_a_form_bound_to_several_meshes_is_compiled_once(cell: str, monkeypatch:
     monkeypatch.setattr("dolfinx.jit.ffcx_jit", refuse)
     with pytest.raises(AssertionError, match="compiled again"):
         _dolfinx.CompiledForm(MPI.COMM_SELF, 2 * factor * dx)
+    other = constants(cell, 1)[0]
+    like_it = _dolfinx.CompiledForm(MPI.COMM_SELF, other * dx)
     for scale, (_, mesh, volume) in enumerate(boxes(cell), start=1):
-        bound = form.bind(mesh, [], {}, {factor: _dolfinx.fem.Constant(mesh, np.float64(scale))})
-        assert _dolfinx.assemble_scalar(bound) == pytest.approx(scale * volume, rel=1e-13)
+        for symbol, compiled in ((factor, form), (other, like_it)):
+            bound = compiled.bind(mesh, [], {}, {symbol: _dolfinx.fem.Constant(mesh, np.float64(scale))})
+            assert _dolfinx.assemble_scalar(bound) == pytest.approx(scale * volume, rel=1e-13)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_symbols_of_a_form_like_a_compiled_one_reach_their_own_places(cell: str) -> None:
+    space = _dolfinx.displacement_space(cell)
+    dx = ufl.dx(domain=_dolfinx.template(cell), metadata={"quadrature_degree": 2})
+    along = ufl.TestFunction(space)
+    _, mesh, volume = boxes(cell)[1]
+    one, two = _dolfinx.coefficient(mesh, "one"), _dolfinx.coefficient(mesh, "two")
+    one.x.array[:], two.x.array[:] = 3.0, 5.0
+    for number in (5, 0):  # the second is found, and its symbols have other numbers
+        u, v = (ufl.Coefficient(space, count=number + k) for k in range(2))
+        a, b = constants(cell, 2)
+        energy = (7 * u[0] + a * v[0] * v[0] + b * b * v[1] * v[0]) * dx  # u drops out of the derivative
+        form = _dolfinx.CompiledForm(MPI.COMM_SELF, ufl.derivative(energy, v, along))
+        values = {a: _dolfinx.fem.Constant(mesh, 2.0), b: _dolfinx.fem.Constant(mesh, 10.0)}
+        force = _dolfinx.assemble_vector(form.bind(mesh, [two.function_space], {u: one, v: two}, values))
+        assert force.sum() == pytest.approx((2 * 2 * 5 + 2 * 100 * 5) * volume, rel=1e-13)
 
 
 @pytest.mark.parametrize("cell", CELLS)
