@@ -62,13 +62,17 @@ def exempted_leftovers() -> None:
 
 @pytest.fixture(autouse=True)
 def collected_garbage() -> Iterator[None]:
-    """Destroy what a test leaves behind at one moment on all ranks: PETSc's destructors are collective."""
+    """Destroy what a test leaves behind at one moment on all ranks: PETSc's destructors are collective.
+
+    What fixtures and caches of its module keep is exempted: the next collections need not look at it.
+    """
     yield
     gc.collect()
     if communicators_are_few():
         forget_cached_states()
         gc.unfreeze()
         gc.collect()
+    gc.freeze()
 
 
 def communicators_are_few(few: int = 1800) -> bool:
