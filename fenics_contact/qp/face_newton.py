@@ -68,8 +68,8 @@ class SlidingError(InfeasibleError):
         """Store the motion; ``words`` say which bodies move."""
         super().__init__(
             f"every body must be held by supports, contact or friction, but {words}, and friction carries "
-            f"only {100 * share:.3g} % of the load against it: support what slides, press it, lower the load "
-            "or raise the friction coefficient"
+            f"only {100 * round(share, 9):.3g} % of the load against it: support what slides, press it, "
+            "lower the load or raise the friction coefficient"
         )
         self.share, self.motion = share, motion
 
