@@ -38,6 +38,8 @@ def _cut(mesh: BodyMesh, preload: Preload) -> BodyMesh:
     if isinstance(section, Section):
         before, behind = section.sides(mesh, body)
         where = section.reach(mesh)
+        if section.radius is not None:
+            where += f", its {counted(len(before) + len(behind), 'cell')} within {section.radius:g} matter"
     else:
         before, behind = (cells_of_region(mesh, body, name) for name in section)
         where = "the two regions have no common face"

@@ -207,7 +207,7 @@ class RigidSurface:
         idle = (self.load != 0.0) & ~self.free
         if idle.any():
             raise InvalidInputError(
-                f"a load on surface {self.surface!r} of body {self.body!r} must act on free components, got "
+                f"a load on {self._whose} must act on free components, got "
                 f"force {self.force!r} and moment {self.moment!r} beside displacement {self.displacement!r} "
                 f"and rotation {self.rotation!r}: leave the component free (None), or the load away"
             )
@@ -236,13 +236,20 @@ class RigidSurface:
         if not fits or (len(known) < count and not may_be_free):
             needed = "one finite number" if count == 1 else f"{count} finite numbers"
             needed += ", or None for those that are free" if may_be_free and count > 1 else ""
+            kind = "ToolMotion" if self.surface == TOOL else "RigidSurface"
             raise InvalidInputError(
-                f"RigidSurface.{name} of surface {self.surface!r} of body {self.body!r} must be {needed}, "
-                f"as {self.at!r} is a point in {'the plane' if self.dim == 2 else 'space'}, got {given!r}: "
+                f"{kind}.{name} of {self._whose} must be {needed}, as {self.at!r} "
+                f"is a point in {'the plane' if self.dim == 2 else 'space'}, got {given!r}: "
                 "give them, or nothing"
             )
         numbers = tuple(None if entry is None else float(entry) for entry in entries)
         return numbers[0] if count == 1 else numbers
+
+    @property
+    def _whose(self) -> str:
+        """The surface and its body, or the tool that it moves, in words."""
+        tool = self.surface == TOOL
+        return f"tool {self.body!r}" if tool else f"surface {self.surface!r} of body {self.body!r}"
 
     @property
     def dim(self) -> int:

@@ -272,6 +272,10 @@ def _clipped(bodies: Bodies, clip: Clip, *, plane: bool) -> dict[str, pv.Unstruc
     """Return what a plane leaves of bodies, its normal pointing to what is cut away."""
     if plane:
         raise InvalidInputError("clip is for bodies in space, these are plane: leave it out")
+    if len(clip) != 2 or np.ndim(clip[0]) != 1:
+        raise InvalidInputError(
+            f"clip must be a point and a normal, got {clip!r}: give ((0, 2, 0), (0, -1, 0)) to cut at y = 2"
+        )
     point, towards = clip
     normal = unit_vector("the normal of clip", towards, 3)
     if len(point) != 3 or not np.isfinite(point).all():

@@ -311,6 +311,11 @@ def _own_field(
                 f"{cells[name]} cells, or a row of Gauss points for each cell, got shape {own.shape}: "
                 "compute them on the mesh of the body"
             )
+        if not np.isfinite(own).any():
+            raise InvalidInputError(
+                f"values of your own on {name!r} must be finite somewhere, got {own.size} that are not: "
+                "leave this body out"
+            )
         extremes += [float(np.nanmin(own)), float(np.nanmax(own))]
         means = own.mean(axis=1) if own.ndim == 2 else own
         values[name] = means if nodal else np.repeat(means, body.n_cells // cells[name])

@@ -9,6 +9,7 @@ import numpy as np
 
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.tools import ToolBody
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.forces import NodalForces, on_tool
 from fenics_contact.results.rigid_motions import RigidMotion
@@ -35,11 +36,20 @@ class ToolResult:
     moment: np.ndarray | float
 
 
-def tool_results(
-    torn: TornSystem, forces: NodalForces, motions: Iterable[RigidMotion]
-) -> dict[str, ToolResult]:
+class ToolResults(dict[str, ToolResult]):
+    """The tools of a scene by name."""
+
+    def __missing__(self, name: str) -> ToolResult:
+        """Reject a name that no tool has."""
+        raise InvalidInputError(
+            f"tools of the scene are {', '.join(map(repr, self)) or 'none'}, got {name!r}: use one of these "
+            "names"
+        )
+
+
+def tool_results(torn: TornSystem, forces: NodalForces, motions: Iterable[RigidMotion]) -> ToolResults:
     """Return the tools of a scene by name."""
-    scene, found = torn.scene, {}
+    scene, found = torn.scene, ToolResults()
     for motion in motions:
         name = motion.surface.body
         if isinstance(scene.bodies[name], ToolBody):

@@ -195,6 +195,7 @@ def test_contact_across_a_section_has_the_pressure_of_the_whole_surface():
     [
         (Preload("bar", Section((0, 0, 9), (0, 0, 1))), "through nothing: the body reaches from -9 to -5"),
         (Preload("bar", Section((0, 0, 2), (0, 0, 1), radius=0.6)), "ends inside the body, at 3 nodes"),
+        (Preload("bar", Section((0, 0, 2), (0, 0, 1), radius=0.1)), "its 0 cells within 0.1 matter"),
         (Preload("bar", Section((0, 0, 2), (0, 0, 1), region="shank")), "names region 'shank'"),
         (Preload("bar", ("low", "high")), "names region 'low'"),
         (Preload("bar", Section((0, 0), (0, 1))), "must have 3 coordinates"),

@@ -59,6 +59,8 @@ def test_a_tool_that_moves_as_prescribed_is_the_obstacle_at_its_place() -> None:
     np.testing.assert_allclose(driven.contact.force, still.contact.force, atol=3e-3 * size)
     tool = driven.tools()["left"]
     np.testing.assert_allclose(tool.displacement, way, atol=1e-15)
+    with pytest.raises(InvalidInputError, match="tools of the scene are 'left', got 'right'"):
+        driven.tools()["right"]
     np.testing.assert_allclose(tool.force, -driven.contact.force.sum(axis=0), rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(driven.reactions()["left tool"].force, -tool.force, atol=1e-9 * size)
     assert driven.balance().imbalance < 1e-10
@@ -303,7 +305,9 @@ def test_effects_and_plan_name_tools() -> None:
         (lambda: pressed(ToolMotion("left", stiffness=(0, 1))), "have 3 stiffnesses"),
         (lambda: pressed(ToolMotion("left", stiffness=(0, 0, -1.0))), "zero or positive, got"),
         (lambda: pressed(ToolMotion("left", (0, 0, 0), stiffness=(0, 0, 1.0))), "must act on free"),
-        (lambda: pressed(ToolMotion("left", (0, 0, 0), force=(0, 0, 1.0))), "of body 'left' must"),
+        (lambda: pressed(ToolMotion("left", (0, 0, 0), force=(0, 0, 1.0))), "on tool 'left' must act on"),
+        (lambda: pressed(ToolMotion("left", (0, 0))), "ToolMotion.displacement of tool 'left' must be 3"),
+        (lambda: pressed(ToolMotion("left", moment=3.0)), "ToolMotion.moment of tool 'left' must be 3"),
     ],
 )  # fmt: skip
 def test_tools_that_cannot_be_are_refused(scene: object, message: str) -> None:

@@ -142,6 +142,8 @@ def test_values_of_nodes_cells_and_gauss_points_are_drawn(cell: str) -> None:
     assert len(np.unique(cells.reshape(-1, cells.shape[2]), axis=0)) > 20
     with pytest.raises(InvalidInputError, match=r"'bar' must be one for each of its .* got shape \(3,\)"):
         plot_field(state, {"bar": np.zeros(3)})
+    with pytest.raises(InvalidInputError, match="'bar' must be finite somewhere, got "):
+        plot_field(state, {"bar": np.full(state.scene.bodies["bar"].mesh.n_nodes, np.nan)})
 
 
 def test_bodies_are_chosen_undeformed_and_cut() -> None:
@@ -159,6 +161,7 @@ def test_bodies_are_chosen_undeformed_and_cut() -> None:
     assert cut.shape != rest.shape or np.abs(cut - rest).max() > 0.1
     for wrong, words in (
         ({"bodies": ["lid"]}, r"bodies must be some of \['lower', 'upper'\], got \['lid'\]"),
+        ({"clip": (0, 0, 1)}, "clip must be a point and a normal"),
         ({"clip": (middle, (0, 0, 0))}, "the normal of clip must be 3 finite numbers, not all zero"),
         ({"clip": ((0, 0), (0, 0, 1))}, "the point of clip must be three finite numbers"),
         ({"clip": ((0, 0, 99), (0, 0, -1))}, "clip must leave something of the bodies"),
