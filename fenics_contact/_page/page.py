@@ -35,12 +35,13 @@ from fenics_contact.pictures.canvas import (
     STRESS_MAP,
     Units,
 )
-from fenics_contact.pictures.drawing import outline
+from fenics_contact.pictures.drawing import outline, tool_at
 from fenics_contact.pictures.section import field_entries, is_plane, linear_cells
 from fenics_contact.pictures.states import chosen_scale
 from fenics_contact.results.state import State
 from fenics_contact.shapes.combined import placed, simplified
-from fenics_contact.shapes.simple import Cylinder, Plane, Sphere, SurfaceShape
+from fenics_contact.shapes.rounded import Box, Cone
+from fenics_contact.shapes.simple import Cylinder, Plane, Sphere, SurfaceShape, Torus
 
 if TYPE_CHECKING:
     import pyvista
@@ -151,6 +152,10 @@ def _samples(colours: Colormap, count: int = 33) -> list[list[float | str]]:
 
 #: What describes a shape in a record, the larger sets first.
 _SHAPES: tuple[tuple[tuple[str, ...], type], ...] = (
+    (("tip", "axis", "half_angle", "radius"), Cone),
+    (("centre", "axis", "ring_radius", "tube_radius"), Torus),
+    (("centre", "size", "radius", "rotation"), Box),
+    (("centre", "size", "radius"), Box),
     (("point", "axis", "radius"), Cylinder),
     (("centre", "radius"), Sphere),
     (("point", "normal"), Plane),
@@ -174,17 +179,26 @@ def obstacle_entries(record: Mapping[str, Any], points: np.ndarray) -> list[dict
             "type": (each.get("obstacle") or each)["type"],
             "lines": [
                 np.pad(line, ((0, 0), (0, 3 - dim))).tolist()
-                for line in _obstacle_lines(each, points[:, :dim])
+                for line in _obstacle_lines(each, points[:, :dim], record.get("tools") or {})
             ],
         }
         for each in different
     ]
 
 
-def _obstacle_lines(entry: Mapping[str, Any], points: np.ndarray) -> list[np.ndarray]:
-    shape = _shape(entry.get("obstacle") or entry)
+def _obstacle_lines(
+    entry: Mapping[str, Any], points: np.ndarray, tools: Mapping[str, Any]
+) -> list[np.ndarray]:
+    """Return the lines of an obstacle where it is.
+
+    `tools`: motions of rigid tools by name.
+    """
+    shape = _shape(entry.get("obstacle") or entry.get("shape") or entry)
     if shape is None:
         return []
+    tool = tools.get(entry.get("name", "")) if "at" in entry else None
+    if tool is not None:
+        shape = tool_at(shape, np.asarray(entry["at"]), tool["rotation"], np.asarray(tool["displacement"]))
     if "translation" in entry:
         shape = simplified(placed(shape, np.asarray(entry["rotation"]), entry["translation"]))
     return outline(shape, points)

@@ -117,6 +117,8 @@ def forces_record(state: State) -> dict[str, Any]:
         drawn["foundations"] = [_on_surface(each) for each in state.foundations()]
     if state.scene.springs:
         drawn["springs"] = springs_record(state)
+    if any(pair.has_friction for pair in state.scene.contacts):
+        drawn["friction"] = [_on_surface(each) for each in pairs.friction]
     return {
         "reactions": [_on_surface(each) for each in state.reactions()],
         "contacts": [_on_surface(each) for each in pairs.contacts],
@@ -171,6 +173,7 @@ def listed_forces(forces: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any
     words = {"reactions": "reaction", "contacts": "contact", "ties": "tie"}
     single = [(f"{words[kind]} {k}", entry) for kind in words for k, entry in enumerate(forces[kind])]
     single += [(f"section of {each['name']}", each) for each in forces.get("preloads", ())]
+    single += [(f"friction {k}", each) for k, each in enumerate(forces.get("friction", ()))]
     single += [(f"foundation {k}", each) for k, each in enumerate(forces.get("foundations", ()))]
     balance = forces["balance"]
     sums = {name: entry for name, entry in balance.items() if isinstance(entry, Mapping)}
@@ -291,7 +294,8 @@ None where materials dissipate or are nonlinear |
     | ``unheld`` | rigid motions that nothing resists and nothing loads, in words; `State.unheld` |
     | ``forces`` | ``reactions`` of the supports, ``contacts`` and ``ties`` (on the slave): each with body, \
 surface, ``force``, ``moment`` and the point ``about`` which it is; where there are any, ``foundations`` \
-likewise, and of ``preloads`` ``name``, ``axial_force``, ``shortening``, ``shear``, ``bending`` and \
+and the part of ``friction`` in each of the contacts likewise, and of ``preloads`` ``name``, \
+``axial_force``, ``shortening``, ``shear``, ``bending`` and \
 ``torsion``, of ``springs`` ``name``, ``force`` on the first end, ``directions``, ``tension`` and \
 ``elongation``; ``balance`` of all with the loads, its ``imbalance`` and the scales to which it is relative |
     | ``rigid_motions`` | of each rigid surface body, surface, ``displacement`` and ``rotation`` of the \

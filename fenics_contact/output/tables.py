@@ -17,6 +17,7 @@ from fenics_contact.errors import collectively, together
 from fenics_contact.output.files import write_text
 from fenics_contact.results.area import contact_area
 from fenics_contact.results.contact import Status
+from fenics_contact.results.forces import Balance, Resultant
 from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
@@ -184,6 +185,8 @@ class StepTable:
     | ``loads Fr``, ``loads Fz`` | the same of bodies of revolution, a revolution |
     | ``lid top Fx``, ... | reaction of the supports of the surface "top" of the body "lid" |
     | ``foundation slab bottom Fx``, ... | force of springs to the ground |
+    | ``tool NAME ux``, ..., ``tool NAME turn x``, ... | displacement and rotation of each rigid tool |
+    | ``tool NAME Fx``, ..., ``tool NAME Mx``, ... | force of contact on it, and moment about its point |
     | ``spring NAME tension``, ``... elongation`` | of springs between surfaces, with the axis if in several |
     | ``lid bottom on pot rim Fx``, ... | force on the slave of a pair or tie |
     | ``lid bottom on pot rim pressure``, ``... area`` | the largest pressure, and the area of contact |
@@ -254,11 +257,10 @@ class StepTable:
         for listed in (pairs.contacts, pairs.ties):
             found |= dict(zip(_names(listed.places), listed, strict=True))
         columns = self._springs(state, balance.force_scale) if state.scene.springs else {}
+        columns |= _tools(state, balance)
         for name, each in found.items():
             self._about.setdefault(name, each.about)
-            parts = (each.force, balance.force_scale), (each.moment, balance.moment_scale)
-            numbers = np.concatenate([rounded(part, scale) for part, scale in parts])
-            columns |= {f"{name} {head}": float(v) for head, v in zip(each.heads, numbers, strict=True)}
+            columns |= _of_resultant(name, each, balance)
         return columns
 
     @staticmethod
@@ -284,6 +286,27 @@ class StepTable:
             f"moments about: {'; '.join(about)}",
         ]
         return csv_text(remarks, names, ([row.get(name) for name in names] for row in self._rows))
+
+
+def _of_resultant(name: str, each: Resultant, balance: Balance) -> dict[str, float]:
+    """Return force and moment by their columns, rounding of those of all bodies as zero."""
+    parts = (each.force, balance.force_scale), (each.moment, balance.moment_scale)
+    numbers = np.concatenate([rounded(part, scale) for part, scale in parts])
+    return {f"{name} {head}": float(v) for head, v in zip(each.heads, numbers, strict=True)}
+
+
+def _tools(state: State, balance: Balance) -> dict[str, float]:
+    """Return motion, force and moment of rigid tools by their columns. Collective."""
+    columns: dict[str, float] = {}
+    for name, tool in state.tools().items():
+        acting = Resultant(tool.force, tool.moment, tool.displacement)
+        axes = "rz" if acting.axisymmetric else "xyz"[: len(tool.force)]
+        turns = np.atleast_1d(tool.rotation)[: np.size(tool.moment)]
+        around = "xyz"[3 - len(turns) :]
+        columns |= {f"tool {name} u{axis}": float(x) for axis, x in zip(axes, tool.displacement, strict=True)}
+        columns |= {f"tool {name} turn {axis}": float(x) for axis, x in zip(around, turns, strict=True)}
+        columns |= _of_resultant(f"tool {name}", acting, balance)
+    return columns
 
 
 def rounded(values: Any, scale: float) -> np.ndarray:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
 
 import numpy as np
 import pyvista as pv
+from contourpy import contour_generator
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
@@ -56,6 +57,7 @@ from fenics_contact.pictures.section import (
 from fenics_contact.pictures.unrolled import label_axes
 from fenics_contact.results.state import State
 from fenics_contact.shapes.combined import placed, simplified
+from fenics_contact.shapes.rounded import Box
 from fenics_contact.shapes.simple import Cylinder, Plane, Sphere, SurfaceShape
 
 if TYPE_CHECKING:
@@ -87,10 +89,17 @@ def _where_it_is(obstacle: RigidObstacle, state: State) -> SurfaceShape:
         return obstacle.at(state.time)
     if not isinstance(obstacle, RigidTool):
         return obstacle
-    motion, about = state.tools()[obstacle.name], np.array(obstacle.at)
-    angle = np.pad(np.atleast_1d(motion.rotation), (3 - np.size(motion.rotation), 0))
+    motion = state.tools()[obstacle.name]
+    return tool_at(obstacle.shape, np.array(obstacle.at), motion.rotation, motion.displacement)
+
+
+def tool_at(
+    shape: SurfaceShape, about: np.ndarray, rotation: np.ndarray | float, displacement: np.ndarray
+) -> SurfaceShape:
+    """Return the shape of a tool that has moved with its point, (dim,), and turned about it, in radians."""
+    angle = np.pad(np.atleast_1d(rotation), (3 - np.size(rotation), 0))
     turn = Rotation.from_rotvec(angle).as_matrix()[: len(about), : len(about)]
-    return placed(obstacle.shape, turn, floats(about - turn @ about + motion.displacement))
+    return placed(shape, turn, floats(about - turn @ about + displacement))
 
 
 def shade_obstacles(axes: Axes, obstacles: list[SurfaceShape], frame: Frame) -> None:
@@ -105,10 +114,11 @@ def shade_obstacles(axes: Axes, obstacles: list[SurfaceShape], frame: Frame) -> 
 
 
 def outline(shape: SurfaceShape, points: np.ndarray) -> list[np.ndarray]:
-    """Return lines that show an obstacle near bodies, (n, dim) each; none for shapes other than these.
+    """Return lines that show an obstacle near bodies, (n, dim) each.
 
     Of a plane the edge of the part under the bodies, of a sphere three circles, of a cylinder a circle at
-    each end of the part near the bodies and four lines between them.
+    each end of the part near the bodies and four lines between them, of a box the edges of its faces, of
+    other shapes in space sections near the bodies.
 
     `points`: all nodes of the bodies, (n, dim).
     """
@@ -121,8 +131,10 @@ def outline(shape: SurfaceShape, points: np.ndarray) -> list[np.ndarray]:
             for k, first in enumerate(axes)
             for second in axes[:k]
         ]
+    if isinstance(shape, Box) and shape.dim == 3:
+        return _faces(shape)
     if not isinstance(shape, Cylinder):
-        return []
+        return _net(shape, points) if points.shape[1] == 3 else []
     axis = np.asarray(shape.axis)
     along = (points - np.asarray(shape.point)) @ axis
     ends = [np.asarray(shape.point) + reach * axis for reach in (along.min(), along.max())]
@@ -130,6 +142,44 @@ def outline(shape: SurfaceShape, points: np.ndarray) -> list[np.ndarray]:
     sides = [sign * shape.radius * each for each in across for sign in (1.0, -1.0)]
     circles = [_circle(end, across, shape.radius) for end in ends]
     return circles + [np.stack([end + side for end in ends]) for side in sides]
+
+
+def _faces(box: Box) -> list[np.ndarray]:
+    """Return the closed edges of the flat faces of a box in space, (5, 3) each."""
+    half = 0.5 * np.asarray(box.size)
+    loop = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
+    faces = []
+    for axis in range(3):
+        others = [other for other in range(3) if other != axis]
+        for side in (-1.0, 1.0):
+            own = np.full((len(loop), 3), side * half[axis])
+            own[:, others] = loop * (half[others] - box.radius)
+            faces.append(np.asarray(box.centre) + own @ box.directions.T)
+    return faces
+
+
+def _net(shape: SurfaceShape, points: np.ndarray, planes: int = 5, samples: int = 64) -> list[np.ndarray]:
+    """Return where planes across each axis cut a shape in space near bodies, (n, 3) each.
+
+    `planes`: number across each axis, evenly over the box around the bodies and a fourth of its size around
+    them; `samples`: of the distance along each side of a plane.
+    """
+    room = 0.25 * float(np.ptp(points, axis=0).max())
+    low, high = points.min(axis=0) - room, points.max(axis=0) + room
+    lines = []
+    for axis in range(3):
+        across, up = (other for other in range(3) if other != axis)
+        sides = [np.linspace(low[other], high[other], samples) for other in (across, up)]
+        places = np.empty((planes, samples, samples, 3))
+        places[..., across], places[..., up] = np.meshgrid(*sides)
+        places[..., axis] = np.linspace(low[axis], high[axis], planes)[:, None, None]
+        distance = shape.distance(places.reshape(-1, 3)).reshape(places.shape[:-1])
+        for own, at in zip(distance, places[:, 0, 0, axis], strict=True):
+            for flat in contour_generator(sides[0], sides[1], own).lines(0.0):
+                line = np.full((len(flat), 3), at)
+                line[:, [across, up]] = flat
+                lines.append(line)
+    return lines
 
 
 def obstacle_layers(

@@ -161,7 +161,7 @@ def plot_stress(
     Below, two sections through the centre of the strongest contact, in true deformation: with magnified
     displacement bodies would overlap in contact. Plane bodies are shown in their plane, with a detail of the
     contact if it is small. Rigid obstacles are shaded in the plane; in space planes are shown as sheets,
-    spheres and cylinders by their outlines, others not at all.
+    spheres, cylinders and boxes by their outlines, others by sections near the bodies.
 
     Args:
         state: The state.

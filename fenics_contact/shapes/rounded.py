@@ -190,7 +190,7 @@ class Box:
 
     def normals(self, points: np.ndarray) -> np.ndarray:
         """Return the gradient of the distance."""
-        return self._slopes(points)[0] @ self._turn.T
+        return self._slopes(points)[0] @ self.directions.T
 
     def curvatures(self, points: np.ndarray) -> np.ndarray:
         """Return those of its round edges and corners, zero at its faces."""
@@ -200,11 +200,11 @@ class Box:
             np.where((length > 0)[:, None, None], flat, 0.0)
             / np.where(length > 0, length, 1.0)[:, None, None]
         )
-        return np.asarray(self._turn @ own @ self._turn.T)
+        return np.asarray(self.directions @ own @ self.directions.T)
 
     @cached_property
-    def _turn(self) -> np.ndarray:
-        """Directions of its axes as columns, (dim, dim)."""
+    def directions(self) -> np.ndarray:
+        """Directions of its axes as columns, shape (dim, dim)."""
         angle = np.zeros(3)
         if self.rotation is not None:
             angle[3 - np.size(self.rotation) :] = self.rotation
@@ -212,7 +212,7 @@ class Box:
 
     def _over(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return how far points are beyond the sides of the box less its radius, and their own sides."""
-        arm = (points - np.asarray(self.centre)) @ self._turn
+        arm = (points - np.asarray(self.centre)) @ self.directions
         return np.abs(arm) - (0.5 * np.asarray(self.size) - self.radius), np.where(arm < 0, -1.0, 1.0)
 
     def _slopes(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

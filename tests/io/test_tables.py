@@ -15,26 +15,31 @@ from fenics_contact import (
     Body,
     ContactPair,
     ContactProblem,
+    Coulomb,
     ElasticFoundation,
     FluidPressure,
     LinearClosure,
     LoadSequence,
     LoadStep,
     RigidPlane,
+    RigidSphere,
+    RigidTool,
     Scene,
     Status,
     Support,
     Surface,
     Tie,
+    ToolMotion,
     TotalForce,
     Traction,
     contact_area,
     solve_scene,
+    write_result,
 )
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, J2Plasticity, NeoHooke, PlaneStrain
-from fenics_contact.output import StepTable, write_contact_table
+from fenics_contact.output import StepTable, read_result, write_contact_table
 from tests.contact.fluid_case import FLUID, seal
 from tests.io.states import touching_blocks
 
@@ -192,6 +197,38 @@ def test_springs_and_surfaces_that_give_way_have_columns(tmp_path: Path) -> None
     assert springs + floor == pytest.approx(1.0, rel=1e-6)
     assert row["surface_energy"] == pytest.approx(state.energies.surface, rel=1e-9)
     assert row["surface_energy"] > 1e-3
+
+
+def test_tools_have_columns_of_motion_force_and_moment_also_of_revolution(tmp_path: Path) -> None:
+    plane = Body(rectangle((0, 0), (3, 1), (6, 2)), PlaneStrain(100.0, 0.3))
+    tool = RigidTool("die", RigidSphere((1.2, 3.0), 2.0), (1.2, 3.0))
+    pair = ContactPair(Surface("slab", "y1"), tool, Coulomb(0.3))
+    pressed = [Support("slab", "y0"), ToolMotion("die", (0.1, None), 0.01, force=(0.0, -2.0))]
+    state = solve_scene(Scene({"slab": plane}, pressed, [], [pair]), COMM, tolerance=1e-10)
+    _, (row,) = read(StepTable(tmp_path / "steps.csv", COMM).add(state))
+    die = state.tools()["die"]
+    columns = [name.removeprefix("tool die ") for name in row if name.startswith("tool")]
+    assert columns == ["ux", "uy", "turn z", "Fx", "Fy", "M"]
+    numbers = [row[f"tool die {name}"] for name in columns]
+    assert numbers == pytest.approx([0.1, die.displacement[1], 0.01, die.force[0], 2.0, die.moment], rel=1e-9)
+    assert abs(die.force[0]) > 0.1
+    write_result(state, tmp_path)
+    found = read_result(tmp_path)["forces"]
+    rubbed = state.resultants().friction[0]
+    assert found["friction"][0]["force"] == pytest.approx(rubbed.force)
+    assert found["friction"][0]["surface"] == "y1"
+    assert abs(rubbed.force[0]) > 0.1
+    disc = Body(rectangle((0, 0), (3, 1), (6, 2)), IsotropicElasticity(100.0, 0.3), axisymmetric=True)
+    ball = RigidTool("die", RigidSphere((0.0, 3.0), 2.0), (0.0, 3.0))
+    pressed = [Support("slab", "y0"), ToolMotion("die", (0.0, None), 0.0, force=(0.0, -2.0))]
+    scene = Scene({"slab": disc}, pressed, [], [ContactPair(Surface("slab", "y1"), ball)])
+    state = solve_scene(scene, COMM, tolerance=1e-10)
+    _, (row,) = read(StepTable(tmp_path / "steps.csv", COMM).add(state))
+    columns = [name for name in row if name.startswith("tool die")]
+    assert columns == [f"tool die {each}" for each in ("ur", "uz", "Fr", "Fz")]
+    assert row["tool die Fz"] == pytest.approx(2.0, rel=1e-8)
+    write_result(state, tmp_path)
+    assert "friction" not in read_result(tmp_path)["forces"]
 
 
 def test_points_that_fluid_has_reached_are_marked(tmp_path: Path) -> None:

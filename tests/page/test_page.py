@@ -15,15 +15,17 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scipy.spatial.transform import Rotation
 
 from fenics_contact import State, Status, result_page, write_result, write_vtu
 from fenics_contact import _cli as cli
-from fenics_contact._page.page import Page, rounded, sections, status_words
+from fenics_contact._page.page import Page, obstacle_entries, rounded, sections, status_words
 from fenics_contact.errors import InvalidInputError, MissingRequirementError
 from fenics_contact.output import ResultSeries
-from fenics_contact.output.result import result_record
+from fenics_contact.output.result import readable, result_record
 from fenics_contact.pictures import Units
 from fenics_contact.pictures.section import rounded_up
+from fenics_contact.shapes import Box, Cone, SurfaceShape, Torus
 from tests.viz.moving_states import block_among_movers, pressed_by_a_lid
 from tests.viz.plane_states import plane_block
 from tests.viz.states import pulled, touching_blocks
@@ -270,6 +272,27 @@ def test_obstacles_that_move_are_lines_where_they_are() -> None:
         assert np.abs(before.distance(points)).max() > 0.02, "it has moved"
     (lid,) = content(result_page(pressed_by_a_lid()).html)[0]["obstacles"]
     assert np.asarray(lid["lines"][0])[:, 1:] == pytest.approx(np.tile([0.9, 0.0], (2, 1)))
+
+
+def test_tools_are_lines_where_they_have_moved_to() -> None:
+    shapes: dict[str, SurfaceShape] = {
+        "box": Box((1.0, 1.0, 1.6), (1.0, 0.6, 1.0), radius=0.2, rotation=(0.0, 0.0, 0.4)),
+        "square": Box((1.0, 1.0, 1.5), (1.0, 0.6, 1.0)),
+        "cone": Cone((1.0, 1.0, 1.1), (0.0, 0.0, 1.0), 1.0, radius=0.3),
+        "ring": Torus((1.0, 1.0, 1.4), (0.0, 0.0, 1.0), 0.6, 0.3),
+    }
+    at, turn = (1.0, 1.0, 2.0), np.array([0.0, 0.3, 0.1])
+    master = {"type": "RigidTool", "name": "t", "at": list(at)}
+    moved = {"t": {"displacement": [0.1, 0.0, -0.2], "rotation": turn.tolist()}}
+    points = np.array([[0.0, 0.0, 0.0], [2.0, 2.0, 1.0]])
+    for shape in shapes.values():
+        pair = {"master": {**master, "shape": readable(shape)}}
+        ((entry),) = obstacle_entries({"scene": {"contacts": [pair]}, "tools": moved}, points)
+        lines = np.concatenate([np.asarray(line) for line in entry["lines"]])
+        matrix = Rotation.from_rotvec(turn).as_matrix()
+        before = (lines - np.array(at) - np.array([0.1, 0.0, -0.2])) @ matrix + np.array(at)
+        np.testing.assert_allclose(shape.distance(before), 0.0, atol=0.02)
+        assert np.abs(shape.distance(lines)).max() > 0.05, "it has moved"
 
 
 def test_residuals_and_objectives_are_there_to_draw(tmp_path: Path) -> None:

@@ -66,7 +66,7 @@ from fenics_contact.pictures.designs import _outlines as profiles
 from fenics_contact.pictures.drawing import obstacle_layers, obstacles_of, outline, shade_obstacles
 from fenics_contact.pictures.section import refined, strongest_contact
 from fenics_contact.pictures.unrolled import contact_patches, label_axes
-from fenics_contact.shapes import Plane, Sphere
+from fenics_contact.shapes import Box, Cone, Plane, SignedDistance, Sphere, SurfaceShape, Torus, Triangulation
 from tests.contact.gallery import partitions
 from tests.viz.moving_states import block_among_movers, pressed_by_a_lid
 from tests.viz.plane_states import caged_block, hung_block, pin_in_ring, plane_block
@@ -467,13 +467,14 @@ def test_obstacles_in_space_are_drawn_where_they_are() -> None:
         "RigidPlane", "RigidSphere", "RigidCylinder", "DistanceObstacle", "RigidPlane"
     ]  # fmt: skip
     # The floor as sheet and edge; ball and bar by circles and lines; of the front wall, which would hide all
-    # as it lies between the viewer and the block, the edge.
+    # as it lies between the viewer and the block, the edge. The distance by ten sections.
     assert view.towards[1] < 0
-    assert len(layers) == 2 + 3 + 6 + 1
+    assert len(layers) == 2 + 3 + 6 + 10 + 1
     assert corners.shape == (10, 3)
-    shown = [0] * 2 + [1] * 3 + [2] * 6 + [4]
+    shown = [0] * 2 + [1] * 3 + [2] * 6 + [3] * 10 + [4]
     for number, layer in zip(shown, layers, strict=True):
-        np.testing.assert_allclose(obstacles[number].distance(np.asarray(layer.mesh.points)), 0.0, atol=1e-6)
+        away = obstacles[number].distance(np.asarray(layer.mesh.points))
+        np.testing.assert_allclose(away, 0.0, atol=0.01 if number == 3 else 1e-6)
 
 
 def test_outlines_in_the_plane_are_an_edge_and_a_circle() -> None:
@@ -482,6 +483,36 @@ def test_outlines_in_the_plane_are_an_edge_and_a_circle() -> None:
     (edge,), (circle,) = outline(Plane((0.0, 0.0), (0.0, 1.0)), points), outline(disc, points)
     np.testing.assert_allclose(np.sort(edge[:, 0]), [-0.12, 2.12])
     np.testing.assert_allclose(disc.distance(circle), 0.0, atol=1e-12)
+
+
+TIPS = np.array([[0.2, 0.2, 0.8], [1.8, 0.2, 0.8], [0.2, 1.8, 0.8], [1.0, 1.0, 2.0]])
+SOLIDS: dict[str, SurfaceShape] = {
+    "cone": Cone((1.1, 0.9, 1.2), (0.1, 0.0, 1.0), 1.0, radius=0.2),
+    "torus": Torus((1.0, 1.0, 1.3), (0.0, 0.0, 1.0), 0.6, 0.3),
+    "triangles": Triangulation(TIPS, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])),
+    "ring of my own": SignedDistance(lambda x: np.hypot(x[:, 0] - 1.0, x[:, 2] - 1.5) - 0.7),
+}
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_obstacles_of_any_shape_are_sections_near_the_bodies(name: str) -> None:
+    points, shape = np.array([[0.0, 0.0, 0.0], [2.0, 2.0, 1.0]]), SOLIDS[name]
+    lines = np.concatenate(outline(shape, points))
+    away = np.abs(shape.distance(lines))
+    assert np.quantile(away, 0.9) < 0.01
+    assert away.max() < 0.07, "at sharp edges, that of two samples"
+    assert lines.min() >= -0.5 - 1e-12
+    assert lines.max() <= 2.5 + 1e-12
+    assert np.ptp(lines, axis=0).min() > 0.2, "in all directions"
+
+
+def test_boxes_are_drawn_by_the_edges_of_their_faces() -> None:
+    box = Box((1.0, 2.0, 3.0), (2.0, 3.0, 4.0), radius=0.5, rotation=(0.1, 0.2, 0.3))
+    loops = outline(box, np.zeros((1, 3)))
+    assert len(loops) == 6
+    np.testing.assert_allclose(box.distance(np.concatenate(loops)), 0.0, atol=1e-12)
+    assert sum(np.linalg.norm(np.diff(loop, axis=0), axis=1).sum() for loop in loops) == pytest.approx(48.0)
+    assert outline(Box((0.0, 0.0), (1.0, 1.0)), np.zeros((1, 2))) == []
 
 
 def test_obstacles_that_move_are_drawn_where_they_are_in_each_state() -> None:
