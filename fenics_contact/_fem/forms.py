@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from fenics_contact._fem.loads import as_tractions
 from fenics_contact._fem.model_checks import check_model, unit_cell_stiffness
 from fenics_contact._fem.templates import (
     Constants,
+    Template,
     Templates,
     Written,
     scalar_constants,
@@ -175,16 +177,10 @@ class FormLibrary:
         return self._typical_modulus[material, cell_type]
 
     def _check(self, material: Material, cell_type: str) -> None:
-        if (material, cell_type) in self._typical_modulus:
-            return
-        parts = Composition((material,))
-
-        def bind(space: _dolfinx.fem.FunctionSpace) -> _dolfinx.fem.Form:
-            return self.stiffness(parts, cell_type, space)
-
-        check_model(material, cell_type, bind)
-        stiffness = unit_cell_stiffness(cell_type, bind)
-        self._typical_modulus[material, cell_type] = float(np.diag(stiffness).mean())
+        if (material, cell_type) not in self._typical_modulus:
+            template = self._templates["stiffness", (material,), cell_type]
+            model = _Model(material, cell_type, template.signature, template)
+            self._typical_modulus[material, cell_type] = _checked_modulus(model)
 
     def _prepare_stiffness(self, materials: tuple[Material, ...], cell_type: str) -> None:
         def write() -> Written:
@@ -206,6 +202,27 @@ class FormLibrary:
             return form, (*symbol.constants, *constants), symbol.coefficients
 
         self._templates.get(load_key(load, materials, cell_type), load_name(load, cell_type), write)
+
+
+@dataclass(frozen=True)
+class _Model:
+    """A material on cells of one type, by what its form is made of."""
+
+    material: Material
+    cell_type: str
+    signature: str
+    template: Template = field(compare=False)
+
+
+@lru_cache(maxsize=128)  # scenes of one process mostly have the same materials
+def _checked_modulus(model: _Model) -> float:
+    """Check a model, and return the mean diagonal entry of the stiffness of a cell of edge length one."""
+
+    def bind(space: _dolfinx.fem.FunctionSpace) -> _dolfinx.fem.Form:
+        return model.template.bind([space, space], model.material.parameters)
+
+    check_model(model.material, model.cell_type, bind)
+    return float(np.diag(unit_cell_stiffness(model.cell_type, bind)).mean())
 
 
 def cell_stiffness(scene: Scene, forms: FormLibrary) -> dict[str, np.ndarray]:

@@ -48,6 +48,11 @@ class Template:
         self._written = form
         self._constants, self._coefficients = tuple(constants), tuple(coefficients)
 
+    @property
+    def signature(self) -> str:
+        """What forms have in common that differ in their symbols alone."""
+        return str(self._written.signature())
+
     def mentions(self, kind: type) -> bool:
         """Return whether the form contains a UFL symbol of a given type."""
         return bool(extract_type(self._written, kind))

@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from fenics_contact import Body, Scene, check_history_material, check_hyperelastic
 from fenics_contact._fem.forms import FormLibrary
-from fenics_contact._fem.model_checks import check_kernel
+from fenics_contact._fem.model_checks import check_kernel, check_model
 from fenics_contact.errors import InvalidInputError, UserCodeError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
@@ -187,6 +187,24 @@ def test_an_infinite_stiffness_is_refused() -> None:
         InvalidInputError, match=r"NaN or infinity in the stiffness of IsotropicElasticity: check"
     ):
         prepare(IsotropicElasticity(1e308, 0.49), "hexahedron")
+
+
+def test_a_process_checks_a_material_once_and_an_odd_one_every_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    checked = list[Material]()
+
+    def noted(material: Material, *others: Any) -> None:
+        checked.append(material)
+        check_model(material, *others)
+
+    monkeypatch.setattr("fenics_contact._fem.forms.check_model", noted)
+    one, other, odd = IsotropicElasticity(123.0, 0.27), IsotropicElasticity(321.0, 0.27), Model(shear=-0.2)
+    first = [prepare(each, "hexahedron").typical_modulus(each, "hexahedron") for each in (one, other, one)]
+    assert checked == [one, other]
+    assert first == pytest.approx([first[0], first[0] * 321 / 123, first[0]], rel=1e-12)
+    for _ in range(2):
+        with pytest.raises(InvalidInputError, match="the energy of a material must not be negative"):
+            prepare(odd, "hexahedron")
+    assert checked == [one, other, odd, odd]
 
 
 @pytest.mark.parametrize("cell", ["quadrilateral", "hexahedron"])
