@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
-from fenics_contact import Body, ContactPair, Coulomb, RigidPlane, Scene, Support, Surface, Traction
+from fenics_contact import Body, BodyMesh, ContactPair, Coulomb, RigidPlane, Scene, Support, Surface, Traction
 from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
@@ -17,6 +18,14 @@ CELLS = 6
 
 
 FRICTION = Coulomb(0.4)
+
+
+@cache
+def blocks() -> tuple[BodyMesh, BodyMesh]:
+    """Return the lower and the crowned upper block."""
+    counts = (CELLS,) * 3
+    upper = block((0.05, 0.05, 1), (0.95, 0.95, 1.9), counts)
+    return block((0, 0, 0), (1, 1, 1), counts), crowned(upper, 0.005)
 
 
 def elastic(young: float) -> IsotropicElasticity:
@@ -41,9 +50,7 @@ class Blocks:
 
     def scene(self, contrast: float) -> Scene:
         law = {name: elastic(1.0 if name == self.soft else contrast) for name in ("lower", "upper")}
-        counts = (CELLS,) * 3
-        lower, upper = block((0, 0, 0), (1, 1, 1), counts), block((0.05, 0.05, 1), (0.95, 0.95, 1.9), counts)
-        bodies = {"lower": Body(lower, law["lower"]), "upper": Body(crowned(upper, 0.005), law["upper"])}
+        bodies = {name: Body(mesh, law[name]) for name, mesh in zip(law, blocks(), strict=True)}
         faces = Surface("upper", "z0"), Surface("lower", "z1")
         pair = ContactPair(*faces[:: 1 if self.slave == "upper" else -1], self.friction, self.discretisation)  # type: ignore[call-arg]
         supports = [Support("lower", "z0")]
@@ -70,7 +77,7 @@ class Regions:
     friction: Coulomb | None
 
     def scene(self, contrast: float) -> Scene:
-        mesh = block((0, 0, 0), (1, 1, 1), (CELLS,) * 3)
+        mesh, _ = blocks()
         middle = mesh.points[mesh.cells].mean(axis=1)[:, self.axis]
         first = middle < 0.5 + self.inside / CELLS
         mesh = replace(mesh, regions={"a": np.flatnonzero(first), "b": np.flatnonzero(~first)})
