@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,7 +14,7 @@ from fenics_contact import ContactPair, RigidPlane, Scene, State, Status, Surfac
 from tests.contact.checks import assert_solved
 from tests.contact.contrast import FRICTION, Blocks, Regions
 
-CONTRASTS = (1.0, 10.0, 100.0, 1000.0)
+CONTRASTS = (1.0, 30.0, 1000.0)
 
 
 BLOCKS = [
@@ -36,7 +37,9 @@ def solved(case: Case, contrast: float) -> State:
 
 
 def products(case: Case) -> list[int]:
-    return [solved(case, contrast).counts["f_products"] for contrast in CONTRASTS]
+    even = replace(case, soft="lower" if isinstance(case, Blocks) else "a")  # nothing is soft at contrast 1
+    states = [solved(even, 1.0), *(solved(case, contrast) for contrast in CONTRASTS[1:])]
+    return [state.counts["f_products"] for state in states]
 
 
 @pytest.mark.parametrize("case", BLOCKS, ids=str)
@@ -44,7 +47,7 @@ def test_work_does_not_grow_with_the_contrast_of_two_bodies(
     case: Blocks, record_property: Callable[[str, object], None]
 ) -> None:
     work = products(case)
-    record_property("F-products for contrasts 1, 10, 100, 1000", work)
+    record_property("F-products for contrasts 1, 30, 1000", work)
     assert 5 < work[0] < 40
     assert max(work) <= 2.5 * work[0]
 
@@ -54,7 +57,7 @@ def test_work_hardly_grows_with_the_contrast_of_two_regions(
     case: Regions, record_property: Callable[[str, object], None]
 ) -> None:
     work = products(case)
-    record_property("F-products for contrasts 1, 10, 100, 1000", work)
+    record_property("F-products for contrasts 1, 30, 1000", work)
     assert 5 < work[0] < 40
     # Subdomains half soft, half stiff side by side on a floor: the first active sets are far off.
     hard = case.inside and case.axis == 0 and case.friction is not None
@@ -93,8 +96,8 @@ def test_a_stiff_body_acts_on_a_soft_one_as_a_rigid_one() -> None:
         rigid, MPI.COMM_SELF, partitions={"upper": box_partition(upper.mesh, (2, 2, 2))}, tolerance=1e-6
     )
     u = expected.gather_displacement("upper")
-    states = [solved(case, contrast) for contrast in CONTRASTS]
+    states = [solved(case, contrast) for contrast in (1.0, 100.0, 1000.0)]
     errors = [np.abs(state.gather_displacement("upper") - u).max() / np.abs(u).max() for state in states]
     assert errors[0] > 0.2
-    assert errors[3] < 0.002
-    assert errors[2] / errors[3] == pytest.approx(10.0, rel=0.2)
+    assert errors[2] < 0.002
+    assert errors[1] / errors[2] == pytest.approx(10.0, rel=0.2)
