@@ -70,9 +70,10 @@ REFLECTIONS = np.array(
 
 def check_cell_type(cell: str, dim: int = 3) -> None:
     """Reject a cell type that the structured meshes do not support."""
-    known = tuple(name for name, kind in CELL_TYPES.items() if kind.dim == dim)
+    known = ("hexahedron", "tetrahedron") if dim == 3 else ("quadrilateral", "triangle")
     if not isinstance(cell, str) or cell not in known:
-        raise InvalidInputError(f"cell must be one of {known}, got {brief(cell)}: choose one of them")
+        curved = ", fenics_contact.mesh.quadratic makes quadratic cells of them" if cell in CELL_TYPES else ""
+        raise InvalidInputError(f"cell must be one of {known}, got {brief(cell)}: choose one of them{curved}")
 
 
 def structured_cells(counts: tuple[int, ...], closed: bool = False) -> tuple[np.ndarray, np.ndarray]:

@@ -181,6 +181,7 @@ def test_lines_may_be_spaced_as_one_likes() -> None:
         (((0, 0), (0, 1), (1, 1)), r"upper must exceed lower in x and y, got lower \[0, 0\]"),
         (((0, 0), (1, 1), (1, 1, 1)), r"counts must be two integers, got \(1, 1, 1\)"),
         (((0, 0), (1, 1), (1, 0)), r"counts\[1\] must be an integer of at least 1, got 0"),
+        (((0, 0), (1, 1), (1, 1), "quadrilateral9"), "quadratic makes quadratic cells of them"),
         (((0, 0), (1, 1), (1, 1), "tetrahedron"), r"cell must be one of .*triangle.*, got 'tetrahedron'"),
     ],
 )
