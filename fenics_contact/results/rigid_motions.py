@@ -101,15 +101,18 @@ class RigidMotion:
 
     def __str__(self) -> str:
         """Return it in words; rounding of other components is zero."""
-        words = []
-        for values in map(np.atleast_1d, (self.displacement, self.rotation, self.about)):
-            known = np.where(np.abs(values) > MOTION_ROUNDING * np.abs(values).max(), values, 0.0)
-            words.append(f"({', '.join(f'{number:.5g}' for number in known)})")
-        moved, turned, about = words
+        moved, turned, about = map(in_words, (self.displacement, self.rotation, self.about))
         return (
             f"{self.surface.body} {self.surface.name}: displacement {moved} [length] of {about}, "
             f"rotation {turned} rad"
         )
+
+
+def in_words(values: np.ndarray | float) -> str:
+    """Return components in brackets, zero where they are the rounding of others."""
+    given = np.atleast_1d(values)
+    known = np.where(np.abs(given) > MOTION_ROUNDING * np.abs(given).max(initial=0.0), given, 0.0)
+    return f"({', '.join(f'{number:.5g}' for number in known)})"
 
 
 def rigid_motion(scene: Scene, support: RigidSurface, displacement: np.ndarray) -> RigidMotion:
@@ -126,5 +129,6 @@ def rigid_motion(scene: Scene, support: RigidSurface, displacement: np.ndarray) 
     modes = support.modes(mesh.points[nodes]).reshape(-1, len(support.motion))
     size = np.linalg.norm(modes, axis=0)
     motion = np.linalg.lstsq(modes / size, displacement[nodes].ravel(), rcond=None)[0] / size
+    motion = np.where(support.free, motion, support.prescribed)
     moved, turned = np.split(motion, [scene.dim])
     return RigidMotion(where, np.array(support.at), moved, float(turned[0]) if scene.dim == 2 else turned)

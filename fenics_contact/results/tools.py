@@ -12,7 +12,7 @@ from fenics_contact._scene.tools import ToolBody
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.forces import NodalForces, on_tool
-from fenics_contact.results.rigid_motions import RigidMotion
+from fenics_contact.results.rigid_motions import RigidMotion, in_words
 
 
 @displayed
@@ -35,6 +35,17 @@ class ToolResult:
     force: np.ndarray
     moment: np.ndarray | float
 
+    def __str__(self) -> str:
+        """Return it in one line."""
+        moved, turned, force, moment = map(
+            in_words, (self.displacement, self.rotation, self.force, self.moment)
+        )
+        turning = f" and moment {moment} [force·length]" if np.size(self.moment) else ""
+        return (
+            f"displacement {moved} [length], rotation {turned} rad; contact exerts force {force} [force]"
+            f"{turning} on it"
+        )
+
 
 class ToolResults(dict[str, ToolResult]):
     """The tools of a scene by name."""
@@ -45,6 +56,10 @@ class ToolResults(dict[str, ToolResult]):
             f"tools of the scene are {', '.join(map(repr, self)) or 'none'}, got {name!r}: use one of these "
             "names"
         )
+
+    def __str__(self) -> str:
+        """Return one line for each tool."""
+        return "\n".join(f"{name}: {tool}" for name, tool in self.items()) or "none"
 
 
 def tool_results(torn: TornSystem, forces: NodalForces, motions: Iterable[RigidMotion]) -> ToolResults:

@@ -58,7 +58,11 @@ def test_a_tool_that_moves_as_prescribed_is_the_obstacle_at_its_place() -> None:
     size = np.abs(still.contact.force).max()
     np.testing.assert_allclose(driven.contact.force, still.contact.force, atol=3e-3 * size)
     tool = driven.tools()["left"]
-    np.testing.assert_allclose(tool.displacement, way, atol=1e-15)
+    np.testing.assert_array_equal(tool.displacement, way)
+    np.testing.assert_array_equal(tool.rotation, STRAIGHT)
+    words = str(driven.tools())
+    assert words.startswith("left: displacement (0, 0, -0.05) [length], rotation (0, 0, 0) rad;")
+    assert words.endswith("[force·length] on it")
     with pytest.raises(InvalidInputError, match="tools of the scene are 'left', got 'right'"):
         driven.tools()["right"]
     np.testing.assert_allclose(tool.force, -driven.contact.force.sum(axis=0), rtol=1e-12, atol=1e-12)
