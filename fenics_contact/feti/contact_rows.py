@@ -73,6 +73,14 @@ class Relations:
         tilted = (across <= parallel**2 * mine * other) & (mine < other)
         return np.asarray((mine <= HELD**2) | (self.resting & tilted))
 
+    def along_normals(self, fixed: np.ndarray) -> np.ndarray:
+        """Return free parts of directions along those of the normals, relative to these, shape (n_rows,)."""
+        free = FreeSpaces.of(self.points, fixed, self.axes)
+        left = free.part(self.directions, self.which)
+        normal = free.part(self.points.normal[self.which], self.which)
+        size = np.einsum("rd,rd->r", normal, normal)
+        return np.einsum("rd,rd->r", left, normal) / np.where(size > HELD**2, size, np.inf)
+
     def freedom(self, fixed: np.ndarray) -> np.ndarray:
         """Return the length of the free part of each direction, from 0 to 1, shape (n_rows,)."""
         free = FreeSpaces.of(self.points, fixed, self.axes)

@@ -52,22 +52,39 @@ class FreeMotions:
             parts.append(sp.csr_matrix(np.array(moved).reshape(self.count, relation.count).T))
         return sp.vstack(parts, format="csr")
 
-    def require_felt(self, relations: Sequence[Relations], fixed: np.ndarray) -> None:
-        """Reject rows of ties and contacts in which nothing but rigid surfaces moves.
 
-        Rows across a plane of symmetry, or around the axis of revolution, may be held: nothing moves there.
+def without_held(
+    columns: sp.csr_matrix, relations: Sequence[Relations], fixed: np.ndarray, rounding: float = 1e-6
+) -> sp.csr_matrix:
+    """Return Q without friction rows that are left to normal ones, shape (n_rows, n).
 
-        `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
-        """
-        for relation in relations:
-            moved = self.of_rows(np.zeros(0, dtype=np.int64), [relation])
-            touched = int(np.count_nonzero(moved[relation.held(fixed)].getnnz(axis=1)))
-            if touched:
-                raise InvalidInputError(
-                    f"contact needs bodies that deform, but in {touched} of its rows supports hold the slave "
-                    "and the master is a rigid surface with free components: prescribe these, or leave the "
-                    "slave free"
-                )
+    Rows across a plane of symmetry, or around the axis of revolution, are held: nothing moves there. At the
+    tip of a cone on the axis both sides move along it: slip alone is what the normal row has already.
+
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `rounding`: of rows that
+    cancel, relative to the largest.
+
+    Raises:
+        InvalidInputError: If in rows of ties and contacts nothing but rigid surfaces moves.
+    """
+    counts = [relation.count for relation in relations]
+    starts = columns.shape[0] - np.cumsum(counts[::-1])[::-1]
+    felt, least = np.ones(columns.shape[0]), rounding * abs(columns).max()
+    for relation, start in zip(relations, starts, strict=True):
+        held = np.flatnonzero(relation.held(fixed))
+        moved = columns[start + held]
+        if relation.resting is not None:  # the normal rows are those of −n
+            share = sp.diags(relation.along_normals(fixed)[held])
+            moved = moved + share @ columns[starts[1] + relation.which[held]]
+        touched = int(np.count_nonzero(abs(moved).max(axis=1).toarray() > least)) if len(held) else 0
+        if touched:
+            raise InvalidInputError(
+                f"contact needs bodies that deform, but in {touched} of its rows supports hold the slave "
+                "and the master is a rigid surface with free components: prescribe these, or leave the "
+                "slave free"
+            )
+        felt[start + held] = 0.0
+    return (sp.diags(felt) @ columns).tocsr()
 
 
 def _moving(columns: sp.csr_matrix, shape: tuple[int, ...]) -> np.ndarray:

@@ -38,7 +38,7 @@ from fenics_contact.feti.decomposition import (
     prescribed_along,
     stack,
 )
-from fenics_contact.feti.free_motions import NO_MOTIONS, FreeMotions, free_motions
+from fenics_contact.feti.free_motions import NO_MOTIONS, FreeMotions, free_motions, without_held
 from fenics_contact.feti.preloads import (
     given_shortenings,
     once_at_sections,
@@ -529,9 +529,10 @@ def build_torn_system(
     right = np.concatenate([right, tied, gap, slip]) - supported
     slid = np.zeros((len(system.frictionless), system.components - 1))
     if free.count:
+        columns = free.of_rows(decomposition.gluing.dof, system.relations)
         with together(comm):
-            free.require_felt(system.relations, decomposition.fixed)
-        free = replace(free, columns=free.of_rows(decomposition.gluing.dof, system.relations)[owned])
+            columns = without_held(columns, system.relations, decomposition.fixed)
+        free = replace(free, columns=columns[owned])
     else:
         free = replace(free, columns=sp.csr_matrix((len(owned), 0)))
     if scene.preloads:

@@ -17,6 +17,7 @@ from fenics_contact import (
     Coulomb,
     LoadStep,
     MovingObstacle,
+    RigidPlane,
     RigidSphere,
     RigidTool,
     Roller,
@@ -33,6 +34,7 @@ from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, J2Plasticity, NeoHooke, PlaneStrain
 from fenics_contact.mesh import quadratic
+from fenics_contact.shapes import Cone
 from fenics_contact.study.scenes.nested_box import mirrored, nested_box
 from tests.contact.checks import assert_solved
 from tests.contact.tooling import BASE, DOWN, LEFT, PLATE, RIGHT, SOFT, STRAIGHT, TOLERANCE, pressed, sprung
@@ -222,6 +224,32 @@ def test_planes_of_symmetry_and_the_axis_hold_slip_across_them_under_forces() ->
     moved = solved(Scene({"disc": disc}, [held, ToolMotion("ball", tuple(way), 0.0)], contacts=[pair]))
     np.testing.assert_allclose(pushed.contact.force, moved.contact.force, rtol=1e-5, atol=1e-7)
     assert pushed.contact.count(Status.STICK) > 0
+
+
+def test_a_cone_of_revolution_under_a_force_is_the_one_in_space() -> None:
+    """On the axis, at its tip, slip would open the contact; in space a node lies beside it."""
+    slope, found = np.radians(75), []
+    flat = RigidPlane((0, 0), (np.cos(slope), -np.sin(slope)))
+    disc = Body(rectangle((0, -1), (2, 0), (13, 5)), SOFT, axisymmetric=True)
+    wedge = block((0.01, 0, -1), (2, np.radians(10), 0), (13, 1, 5))
+    r, angle, z = wedge.points.T
+    wedge = wedge.moved(np.column_stack([r * np.cos(angle), r * np.sin(angle), z]))
+    cone = RigidTool("cone", Cone((0, 0, 0), (0, 0, 1), slope), at=(0, 0, 0))
+    rollers = [Support("wedge", "z0"), Roller("wedge", "y0"), Roller("wedge", "y1")]
+    for scene in (
+        Scene(
+            {"disc": disc},
+            [Support("disc", "y0"), ToolMotion("cone", force=(0, -50.0))],
+            contacts=[ContactPair(Surface("disc", "y1"), RigidTool("cone", flat, (0, 0)), Coulomb(0.2))],
+        ),
+        Scene(
+            {"wedge": Body(wedge, SOFT)},
+            [*rollers, ToolMotion("cone", DOWN, STRAIGHT, (0, 0, -50.0 / 36))],
+            contacts=[ContactPair(Surface("wedge", "z1"), cone, Coulomb(0.2))],
+        ),
+    ):
+        found.append(solved(scene).tools()["cone"].displacement[-1])
+    assert found[0] == pytest.approx(found[1], rel=0.02)
 
 
 def test_what_nothing_holds_is_named() -> None:
