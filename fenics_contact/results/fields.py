@@ -456,10 +456,11 @@ def _at_sites(
     means = CellStress(mesh, body, torn.decomposition.comm, temperature)
     number = cells_of_body(mesh, body.mesh.cells)
     places = body.mesh.points - (0.0 if body.axisymmetric else body.mesh.points.mean(axis=0))
-    # A rotation has no stress: the gradients (i, j) and (j, i) have the same.
+    # A rotation has no stress: the gradients (i, j) and (j, i) have the same. Of bodies of revolution u_z = r
+    # is shear alone, u_r = z has a hoop strain.
     pairs = [(i, j) for i in range(dim) for j in range(i, dim)]
     units = np.zeros((1 + len(pairs), dim, dim))
-    units[np.arange(1, len(units)), [i for i, _ in pairs], [j for _, j in pairs]] = 1.0
+    units[np.arange(1, len(units)), [j for _, j in pairs], [i for i, _ in pairs]] = 1.0
     fields = [places @ unit.T for unit in units]
     sizes = [gradients[:, i, j] + (gradients[:, j, i] if i != j else 0.0) for i, j in pairs]
     if body.axisymmetric:

@@ -34,6 +34,7 @@ from fenics_contact import _cli as cli
 from fenics_contact._surfaces.facets import bearing_areas, nodal_areas
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block, rectangle
+from fenics_contact.gallery.blocks import SIDES
 from fenics_contact.materials import (
     Elasticity,
     EnergyModel,
@@ -493,6 +494,21 @@ def test_sections_are_turned_into_bodies_with_their_fields(kind: Kind) -> None:
     np.testing.assert_allclose(mises, np.tile(flat.point_data["nodal_von_mises"], 19), rtol=1e-9)
     with pytest.raises(InvalidInputError, match="above 0 and up to 360"):
         state.to_pyvista(revolved=400.0)
+
+
+@pytest.mark.parametrize("kind", ["triangle", "quadrilateral", "quadrilateral9"])
+def test_shear_along_the_axis_has_no_hoop_stress_at_nodes(kind: Kind) -> None:
+    """A tube whose outside moves along the axis: u_z = c ln r, τ = μ c / r, far from z = 0."""
+
+    def along(points: np.ndarray) -> np.ndarray:
+        return 0.01 * np.log(points[:, 0])
+
+    tube = Body(section((2, 5), (3, 6), (8, 5), kind), STEEL, axisymmetric=True)
+    state = solved(Scene({"tube": tube}, [Support("tube", side, (0.0, along)) for side in SIDES[:4]]))
+    (stress,) = state.gather_nodal_stress("tube")
+    shear = 0.01 * 2.1e5 / 2.6 / tube.mesh.points[:, 0]
+    np.testing.assert_allclose(stress[:, 0, 1], shear, rtol=0.03)
+    assert np.abs(np.diagonal(stress, axis1=1, axis2=2)).max() < 0.02 * shear.max()
 
 
 def test_fields_of_bodies_of_revolution_are_drawn_over_r_and_z(monkeypatch: pytest.MonkeyPatch) -> None:
