@@ -297,7 +297,7 @@ def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
         raise InvalidInputError(
             f"the file must be an XDMF file, got the name {base.name!r}: let it end in '.xdmf'"
         )
-    files = file_of_each(state.displacement, base.parent, base.stem, ".xdmf")
+    files = file_of_each(state.scene.deforming, base.parent, base.stem, ".xdmf")
     for name, target in files.items():
         _write_xdmf(state.torn.decomposition.comm, target, state.displacement[name], state.von_mises[name])
     return files

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,11 +30,13 @@ from fenics_contact import (
     ToolMotion,
     solve_scene,
     solve_steps,
+    write_vtu,
 )
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, J2Plasticity, NeoHooke, PlaneStrain
 from fenics_contact.mesh import quadratic
+from fenics_contact.output import write_xdmf
 from fenics_contact.shapes import Cone
 from fenics_contact.study.scenes.nested_box import mirrored, nested_box
 from tests.contact.checks import assert_solved
@@ -199,6 +202,14 @@ def test_a_tool_of_revolution_moves_along_the_axis() -> None:
         InvalidInputError, match=r"point of tool 'off' must lie on the axis .* got \(1.0, 2.0\)"
     ):
         under(ToolMotion("off"), RigidTool("off", ball.shape, (1.0, 2.0)))
+
+
+def test_files_have_the_bodies_and_not_what_carries_tools(tmp_path: Path) -> None:
+    state = solved(pressed(ToolMotion("left", (0.0, 0.0, -0.05), STRAIGHT), friction=0.0))
+    assert list(write_xdmf(state, tmp_path / "pressed.xdmf")) == ["block"]
+    write_vtu(state, tmp_path, "pressed")
+    assert sorted(path.suffix for path in tmp_path.iterdir()) == [".h5", ".vtm", ".vtu", ".xdmf"]
+    assert list(state.to_pyvista().keys()) == ["block"]
 
 
 def test_planes_of_symmetry_and_the_axis_hold_slip_across_them_under_forces() -> None:
