@@ -8,7 +8,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from dataclasses import field as attribute
 from html import escape
 from importlib import resources
@@ -20,6 +20,7 @@ from matplotlib.colors import Colormap, to_hex
 
 from fenics_contact._base.display import force_units, name_in_words
 from fenics_contact._base.requirements import require_extra
+from fenics_contact._page.obstacles import obstacle_entries
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.mesh.faces import boundary_faces
 from fenics_contact.output.files import json_text, write_text
@@ -35,13 +36,10 @@ from fenics_contact.pictures.canvas import (
     STRESS_MAP,
     Units,
 )
-from fenics_contact.pictures.drawing import outline, tool_at
-from fenics_contact.pictures.section import field_entries, is_plane, linear_cells
+from fenics_contact.pictures.section import cells_of, field_entries, is_plane, linear, linear_cells
 from fenics_contact.pictures.states import chosen_scale
+from fenics_contact.results.revolved import check_turned, turned_around
 from fenics_contact.results.state import State
-from fenics_contact.shapes.combined import placed, simplified
-from fenics_contact.shapes.rounded import Box, Cone
-from fenics_contact.shapes.simple import Cylinder, Plane, Sphere, SurfaceShape, Torus
 
 if TYPE_CHECKING:
     import pyvista
@@ -148,69 +146,6 @@ def colour_scales() -> dict[str, list[list[float | str]] | list[str] | str]:
 
 def _samples(colours: Colormap, count: int = 33) -> list[list[float | str]]:
     return [[float(place), to_hex(colours(float(place)))] for place in np.linspace(0.0, 1.0, count)]
-
-
-#: What describes a shape in a record, the larger sets first.
-_SHAPES: tuple[tuple[tuple[str, ...], type], ...] = (
-    (("tip", "axis", "half_angle", "radius"), Cone),
-    (("centre", "axis", "ring_radius", "tube_radius"), Torus),
-    (("centre", "size", "radius", "rotation"), Box),
-    (("centre", "size", "radius"), Box),
-    (("point", "axis", "radius"), Cylinder),
-    (("centre", "radius"), Sphere),
-    (("point", "normal"), Plane),
-)
-
-
-def obstacle_entries(record: Mapping[str, Any], points: np.ndarray) -> list[dict[str, Any]]:
-    """Return type and lines of each different rigid obstacle; no lines if it is of another shape.
-
-    `points`: all nodes of the bodies, (n, 3).
-    """
-    scene = record.get("scene") or {}
-    dim = int(scene.get("dimension") or 3)
-    different: list[Mapping[str, Any]] = []
-    for pair in scene.get("contacts") or ():
-        master = pair.get("master") or {}
-        if "type" in master and master not in different:
-            different.append(master)
-    return [
-        {
-            "type": (each.get("obstacle") or each)["type"],
-            "lines": [
-                np.pad(line, ((0, 0), (0, 3 - dim))).tolist()
-                for line in _obstacle_lines(each, points[:, :dim], record.get("tools") or {})
-            ],
-        }
-        for each in different
-    ]
-
-
-def _obstacle_lines(
-    entry: Mapping[str, Any], points: np.ndarray, tools: Mapping[str, Any]
-) -> list[np.ndarray]:
-    """Return the lines of an obstacle where it is.
-
-    `tools`: motions of rigid tools by name.
-    """
-    shape = _shape(entry.get("obstacle") or entry.get("shape") or entry)
-    if shape is None:
-        return []
-    tool = tools.get(entry.get("name", "")) if "at" in entry else None
-    if tool is not None:
-        shape = tool_at(shape, np.asarray(entry["at"]), tool["rotation"], np.asarray(tool["displacement"]))
-    if "translation" in entry:
-        shape = simplified(placed(shape, np.asarray(entry["rotation"]), entry["translation"]))
-    return outline(shape, points)
-
-
-def _shape(entry: Mapping[str, Any]) -> SurfaceShape | None:
-    """Return the shape that an entry of a record describes, None if it is of none that is drawn."""
-    for names, kind in _SHAPES:
-        if all(isinstance(entry.get(name), list | float | int) for name in names):
-            shape: SurfaceShape = kind(**{name: entry[name] for name in names})
-            return shape
-    return None
 
 
 Record = Mapping[str, Any]
@@ -474,6 +409,19 @@ class Source:
         """The names of units that the result's scene file gives, mm, N and MPa if there are none."""
         return Units(**((self.record.get("more") or {}).get("unit_names") or {}))
 
+    def turned(self, angle: float) -> Source:
+        """Return it with sections turned around the axis into hexahedra or tetrahedra, which pages cut."""
+
+        def solid(name: str, section: pyvista.UnstructuredGrid) -> pyvista.UnstructuredGrid:
+            body = turned_around(linear(name, section), angle, step=7.5)
+            return body if cells_of(body).shape[1] == 8 else body.triangulate()
+
+        check_turned(angle, bool((self.record.get("scene") or {}).get("axisymmetric")))
+        steps: list[tuple[str, Mapping[str, pyvista.UnstructuredGrid]]] = []
+        for label, grids in self.steps:
+            steps.append((label, {name: solid(name, grid) for name, grid in grids.items()}))
+        return replace(self, steps=steps)
+
 
 def source_of_states(states: Mapping[str, State]) -> Source:
     """Return the fields of states by name and the record of the last one. Collective."""
@@ -554,6 +502,7 @@ def result_page(
     field: str = "",
     title: str = "",
     units: Units | None = None,
+    revolved: float = 0.0,
 ) -> Page:
     """Make a web page of a result: bodies to turn, to cut and to colour, curves and tables. Collective.
 
@@ -572,12 +521,15 @@ def result_page(
         field: Name of the field that is shown first, such as "contact_pressure"; the others are in its menu.
         title: Title of the page; that of the result unless given.
         units: Names of the units; those of the result unless given.
+        revolved: Angle in degrees by which the sections of bodies of revolution are turned around their axis,
+            then that of z, such as 270, with vectors and stresses in space; 0 shows the sections.
 
     Returns:
         The page, which Jupyter shows as the value of a cell.
 
     Raises:
-        InvalidInputError: If there is no such result, or it has no fields, or not the one to show first.
+        InvalidInputError: If there is no such result, or it has no fields, or not the one to show first, or
+            other bodies are to be turned.
         MissingRequirementError: If plotly or pyvista is missing.
         OutputError: If the file cannot be written.
 
@@ -592,6 +544,8 @@ def result_page(
     if isinstance(result, State):
         result = {"": result}
     source = source_of_states(result) if isinstance(result, Mapping) else source_of_files(Path(result))
+    if revolved:
+        source = source.turned(revolved)
     page = None
     with nullcontext() if source.comm is None else together(source.comm):
         if source.comm is None or source.comm.rank == 0:
@@ -635,10 +589,13 @@ def _data(source: Source, title: str, units: Units, arrays: Arrays) -> dict[str,
     if not everything:
         raise InvalidInputError("a page needs at least one body, the files have none: write the result again")
     points = np.concatenate([np.asarray(grid.points) for grid in everything])
-    obstacles = obstacle_entries(source.record, points)
+    scene = source.record.get("scene") or {}
+    plane = all(map(is_plane, everything))
+    turned = bool(scene.get("axisymmetric")) and not plane
+    obstacles = obstacle_entries(source.record, points, turned=turned)
     data = {
         "title": title,
-        "plane": all(map(is_plane, everything)),
+        "plane": plane,
         "length": units.length,
         "bodies": bodies,
         "fields": field_entries([grids for _, grids in source.steps], units),
@@ -653,7 +610,7 @@ def _data(source: Source, title: str, units: Units, arrays: Arrays) -> dict[str,
         ],
         "scale": 1.0 if obstacles else max(chosen_scale(grids) for _, grids in source.steps),
         "obstacles": obstacles,
-        "status": status_words((source.record.get("scene") or {}).get("contacts") or ()),
+        "status": status_words(scene.get("contacts") or ()),
         "colours": colour_scales(),
         "history": _history(source.record),
     }

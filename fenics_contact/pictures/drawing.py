@@ -55,10 +55,11 @@ from fenics_contact.pictures.section import (
     sections_of,
 )
 from fenics_contact.pictures.unrolled import label_axes
+from fenics_contact.results.revolved import turned_around
 from fenics_contact.results.state import State
 from fenics_contact.shapes.combined import placed, simplified
 from fenics_contact.shapes.rounded import Box
-from fenics_contact.shapes.simple import Cylinder, Plane, Sphere, SurfaceShape
+from fenics_contact.shapes.simple import Cylinder, Plane, Revolved, Sphere, SurfaceShape
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -100,6 +101,30 @@ def tool_at(
     angle = np.pad(np.atleast_1d(rotation), (3 - np.size(rotation), 0))
     turn = Rotation.from_rotvec(angle).as_matrix()[: len(about), : len(about)]
     return placed(shape, turn, floats(about - turn @ about + displacement))
+
+
+def turned_shape(shape: SurfaceShape) -> SurfaceShape:
+    """Return the shape in space of one over (r, z), turned around the axis of z."""
+    match shape:
+        case Plane((_, z), (across, along)) if across == 0.0:
+            return Plane((0.0, 0.0, z), (0.0, 0.0, along))
+        case Sphere((r, z), radius, hollow) if r == 0.0:
+            return Sphere((0.0, 0.0, z), radius, hollow)
+    return Revolved(shape, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def turned_field(
+    bodies: Bodies, values: Mapping[str, np.ndarray], angle: float
+) -> tuple[dict[str, pv.UnstructuredGrid], dict[str, np.ndarray]]:
+    """Return sections turned around their axis, by an angle in degrees, with their values in every copy."""
+    solids = {name: turned_around(body, angle) for name, body in bodies.items()}
+    tiled = {}
+    for name, own in values.items():
+        body, solid = bodies[name], solids[name]
+        nodal = len(own) == body.n_points
+        copies = solid.n_points // body.n_points if nodal else solid.n_cells // body.n_cells
+        tiled[name] = np.tile(own, copies)
+    return solids, tiled
 
 
 def shade_obstacles(axes: Axes, obstacles: list[SurfaceShape], frame: Frame) -> None:

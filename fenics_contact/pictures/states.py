@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -37,7 +38,14 @@ from fenics_contact.pictures.canvas import (
     written,
 )
 from fenics_contact.pictures.curves import contact_trace
-from fenics_contact.pictures.drawing import Clip, ColouredField, draw_field_on_bodies, obstacles_of
+from fenics_contact.pictures.drawing import (
+    Clip,
+    ColouredField,
+    draw_field_on_bodies,
+    obstacles_of,
+    turned_field,
+    turned_shape,
+)
 from fenics_contact.pictures.section import (
     Bodies,
     Spot,
@@ -66,7 +74,9 @@ from fenics_contact.pictures.unrolled import (
 from fenics_contact.results.fields import in_space
 from fenics_contact.results.linear_state import as_linear
 from fenics_contact.results.multi_block import body_grid
+from fenics_contact.results.revolved import check_turned
 from fenics_contact.results.state import State, comm_of
+from fenics_contact.shapes.simple import SurfaceShape
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -152,6 +162,7 @@ def plot_stress(
     sections: bool = True,
     reach: float | None = None,
     smooth: bool = True,
+    revolved: float = 0.0,
     title: str = "",
     units: Units | None = None,
     width: int = 1600,
@@ -172,9 +183,12 @@ def plot_stress(
         sections: Whether to draw the sections, if a contact carries force.
         reach: How far sections reach up and down from the contact's middle, [length]; chosen unless given.
         smooth: Whether to show nodal means instead of cell values.
+        revolved: Angle in degrees by which bodies of revolution are turned around their axis, such as 270, in
+            space and without details of the contact; 0 shows the section.
 
     Raises:
-        InvalidInputError: If an option or the name of the file cannot be used.
+        InvalidInputError: If an option or the name of the file cannot be used, or other bodies are to be
+            turned.
 
     Example:
         >>> plot_stress(state, "output/stress.png", clim=(0, 400), scale=50)  # doctest: +SKIP
@@ -185,6 +199,8 @@ def plot_stress(
         checked_scale(scale)
     checked_reach(reach)
     given = None if clim is None else checked_range(clim)
+    if revolved:
+        check_turned(revolved, state.scene.axisymmetric)
     bodies, obstacles = drawn_bodies(state), obstacles_of(state)
     # With magnified displacement bodies would penetrate rigid obstacles.
     factor = float(scale) if scale is not None else 1.0 if obstacles else chosen_scale(bodies)
@@ -198,7 +214,9 @@ def plot_stress(
     label = f"von Mises stress ({named.stress})"
     axes = axes_of(state.scene)
     coloured = ColouredField(values, STRESS_MAP, norm, label, words, factor, reach, named, width, axes)
-    spot = contact_spot(state, bodies) if sections else None
+    spot = contact_spot(state, bodies) if sections and not revolved else None
+    if revolved:
+        bodies, coloured, obstacles = _turned(bodies, coloured, obstacles, revolved)
     return draw_field_on_bodies(
         bodies, coloured, target, obstacles=obstacles, spot=spot, comm=state.torn.decomposition.comm
     )
@@ -213,6 +231,7 @@ def plot_field(
     scale: float = 1.0,
     clim: tuple[float, float] | None = None,
     clip: Clip | None = None,
+    revolved: float = 0.0,
     label: str = "",
     title: str = "",
     units: Units | None = None,
@@ -233,11 +252,13 @@ def plot_field(
         clim: Range of the colours; chosen unless given.
         clip: A point and a normal, of bodies in space: what lies on the side to which the normal points,
             before deformation, is cut away.
+        revolved: Angle in degrees by which bodies of revolution of a state are turned around their axis, such
+            as 270; 0 shows the section. Components stay those of the section.
         label: Words for a field of your own, with its unit.
 
     Raises:
-        InvalidInputError: If there is no such field or body, values do not fit, the cut leaves nothing, or an
-            option or the name of the file cannot be used.
+        InvalidInputError: If there is no such field or body, values do not fit, the cut leaves nothing, other
+            bodies are to be turned, or an option or the name of the file cannot be used.
 
     Example:
         >>> plot_field(state, "displacement_z", "lift.png", bodies=["lid"])  # doctest: +SKIP
@@ -248,6 +269,8 @@ def plot_field(
     checked_scale(scale)
     given = None if clim is None else checked_range(clim)
     state = result if isinstance(result, State) else None
+    if revolved:
+        check_turned(revolved, state is not None and state.scene.axisymmetric)
     every: Bodies = drawn_bodies(result) if isinstance(result, State) else result
     known = [name for name in every if isinstance(field, str) or name in field]
     chosen = _chosen_bodies(every, known if bodies is None else bodies)
@@ -258,6 +281,8 @@ def plot_field(
         meshes = state.scene.bodies if state else {}
         cells = {k: meshes[k].mesh.n_cells if state else body.n_cells for k, body in chosen.items()}
         values, entry = _own_field(drawn, cells, field, label)
+    if revolved and ", " in entry["label"]:  # x, y, z in space are others than r, z and the way around
+        entry = {**entry, "label": f"{entry['label']} of the section"}
     is_status = entry["colours"] == "status"
     ends = (-1.0, 2.0) if is_status else entry["extremes"][0] or (0.0, 0.0)
     words = f"{entry['label']} ({entry['unit']})" if entry["unit"] else entry["label"]
@@ -267,14 +292,25 @@ def plot_field(
     head = headline(title, f"{facts}; displacement × {scale:g}")
     axes = axes_of(state.scene) if state else ("x", "y")
     coloured = ColouredField(values, colours, norm, words, head, float(scale), None, named, width, axes)
+    obstacles = obstacles_of(state) if state else []
+    if revolved:
+        drawn, coloured, obstacles = _turned(drawn, coloured, obstacles, revolved)
     return draw_field_on_bodies(
         drawn,
         coloured,
         target,
-        obstacles=obstacles_of(state) if state else [],
+        obstacles=obstacles,
         clip=clip,
         comm=comm_of(state) if state else None,
     )
+
+
+def _turned(
+    bodies: Bodies, field: ColouredField, obstacles: list[SurfaceShape], angle: float
+) -> tuple[dict[str, pv.UnstructuredGrid], ColouredField, list[SurfaceShape]]:
+    """Return what is to be drawn turned around the axis, by an angle in degrees."""
+    solids, values = turned_field(bodies, field.values, angle)
+    return solids, replace(field, values=values), [turned_shape(shape) for shape in obstacles]
 
 
 def _chosen_bodies(bodies: Bodies, names: Sequence[str]) -> dict[str, pv.UnstructuredGrid]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 import json
 import re
 import sys
@@ -19,30 +17,18 @@ from scipy.spatial.transform import Rotation
 
 from fenics_contact import State, Status, result_page, write_result, write_vtu
 from fenics_contact import _cli as cli
-from fenics_contact._page.page import Page, obstacle_entries, rounded, sections, status_words
+from fenics_contact._page.obstacles import obstacle_entries
+from fenics_contact._page.page import Page, rounded, sections, status_words
 from fenics_contact.errors import InvalidInputError, MissingRequirementError
 from fenics_contact.output import ResultSeries
 from fenics_contact.output.result import readable, result_record
 from fenics_contact.pictures import Units
 from fenics_contact.pictures.section import rounded_up
 from fenics_contact.shapes import Box, Cone, SurfaceShape, Torus
+from tests.page.contents import content
 from tests.viz.moving_states import block_among_movers, pressed_by_a_lid
 from tests.viz.plane_states import plane_block
 from tests.viz.states import pulled, touching_blocks
-
-
-def content(page: str | None) -> tuple[dict[str, Any], list[np.ndarray]]:
-    """Read what the script of a page reads: its data and its arrays."""
-    assert page is not None
-    (data,) = re.findall(r'<script id="data" type="application/json">(.*?)</script>', page, re.DOTALL)
-    (packed,) = re.findall(r'<script id="arrays"[^>]*>(.*?)</script>', page, re.DOTALL)
-    whole, known = gzip.decompress(base64.b64decode(packed)), json.loads(data)
-    arrays = [
-        np.frombuffer(whole, dtype=f"<{entry['type']}", count=entry["length"], offset=entry["start"])
-        for entry in known["arrays"]
-    ]
-    columns = [entry["columns"] for entry in known["arrays"]]
-    return known, [part.reshape(-1, count) for part, count in zip(arrays, columns, strict=True)]
 
 
 def text_of(page: str | None) -> str:
