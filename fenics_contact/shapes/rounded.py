@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
 from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.shapes.simple import Revolved, outer, require_place
+from fenics_contact.shapes.simple import AboutAxis, Revolved, outer, require_place
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class _Wedge:
 @displayed
 @dataclass(frozen=True)
 @checked()
-class Cone:
+class Cone(AboutAxis):
     """An endless cone that opens along its axis, with a round tip.
 
     Attributes:
@@ -96,23 +96,6 @@ class Cone:
                 f"{self.half_angle!r}: it is measured from the axis, in radians"
             )
         _require_not_negative(self, self.radius)
-
-    @property
-    def dim(self) -> int:
-        """Dimension of the space that it lies in, 3."""
-        return 3
-
-    def distance(self, points: np.ndarray) -> np.ndarray:
-        """Return the distance from the flank or, below it, from the tip."""
-        return self._revolved.distance(points)
-
-    def normals(self, points: np.ndarray) -> np.ndarray:
-        """Return the gradient of the distance."""
-        return self._revolved.normals(points)
-
-    def curvatures(self, points: np.ndarray) -> np.ndarray:
-        """Return those of the tip, and around the axis those of the flank."""
-        return self._revolved.curvatures(points)
 
     @cached_property
     def _revolved(self) -> Revolved:

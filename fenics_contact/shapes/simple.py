@@ -520,9 +520,34 @@ class SignedDistance:
         return 0.5 * (columns + np.swapaxes(columns, 1, 2))
 
 
+class AboutAxis:
+    """Distance, normals and curvatures of a shape in space that is the revolution of a profile."""
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space that it lies in, 3."""
+        return 3
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """Return the signed distance, negative inside the body."""
+        return self._revolved.distance(points)
+
+    def normals(self, points: np.ndarray) -> np.ndarray:
+        """Return the gradient of the distance."""
+        return self._revolved.normals(points)
+
+    def curvatures(self, points: np.ndarray) -> np.ndarray:
+        """Return those of the profile, and around the axis those of its circles."""
+        return self._revolved.curvatures(points)
+
+    @property
+    def _revolved(self) -> Revolved:
+        raise NotImplementedError
+
+
 @dataclass(frozen=True)
 @checked()
-class Torus:
+class Torus(AboutAxis):
     """A ring of round wire; or everything outside it.
 
     Attributes:
@@ -550,23 +575,6 @@ class Torus:
                 f"{self.tube_radius!r}, got {self.ring_radius!r}: it is measured from the axis to the middle "
                 "of the wire; for a wire without a hole use Sphere or Revolved"
             )
-
-    @property
-    def dim(self) -> int:
-        """Dimension of the space that it lies in, 3."""
-        return 3
-
-    def distance(self, points: np.ndarray) -> np.ndarray:
-        """Return the distance from the circle less the tube's radius, with the opposite sign if hollow."""
-        return self._revolved.distance(points)
-
-    def normals(self, points: np.ndarray) -> np.ndarray:
-        """Return ± the direction from the circle."""
-        return self._revolved.normals(points)
-
-    def curvatures(self, points: np.ndarray) -> np.ndarray:
-        """Return those of the tube, and around the axis those of the ring."""
-        return self._revolved.curvatures(points)
 
     @cached_property
     def _revolved(self) -> Revolved:
