@@ -57,7 +57,7 @@ class DirichletPreconditioner:
         of D⁻¹, shape (n_interface,), the same for all components of a node.
         """
         self._inverse, self._numbering = inverse, numbering
-        self._soft: tuple[np.ndarray, np.ndarray] | None = None
+        self._sprung: np.ndarray | None = None
         self._B = scaled_columns(B, compliance)
         self._Bt = self._B.T.tocsr()
         diagonal = numbering.to_owned(np.asarray(B.multiply(self._B).sum(axis=1)).ravel())
@@ -84,30 +84,18 @@ class DirichletPreconditioner:
         """
         return Lifting(self, self._contact.on_face(restriction))
 
-    def soften(self, give: np.ndarray, B: sp.csr_matrix) -> None:
-        """Let rows give way: M becomes s M s, s² = F / (F + C), and 1 / C where nothing moves. Collective.
+    def soften(self, give: np.ndarray) -> None:
+        """Add 1 / C on rows that give way, which move nothing or depend on each other. Collective.
 
-        F of a row of means is estimated as b·D⁻¹b / ‖b‖: under an even traction on n nodes a body is √n times
-        as stiff as at one.
-
-        `give`: C, owned, zero on rows that do not; `B`: as before.
+        `give`: C, owned, zero on rows that do not give way.
         """
-        squares = (np.asarray(B.multiply(other).sum(axis=1)).ravel() for other in (B, self._B))
-        plain, weighted = map(self._numbering.to_owned, squares)
-        soft, share, alone = np.flatnonzero(give > 0.0), np.ones(len(give)), np.zeros(len(give))
-        moves = plain[soft] > 0.0
-        flexibility = weighted[soft] / np.sqrt(np.where(moves, plain[soft], 1.0))
-        share[soft] = np.sqrt(flexibility / (flexibility + give[soft]))
-        alone[soft] = np.where(moves, 0.0, 1.0 / give[soft])
-        self._soft = share, alone
-        self._contact = self._contact.softened(give > 0.0)
+        soft = give > 0.0
+        self._sprung = np.divide(1.0, give, where=soft, out=np.zeros(len(give)))
+        self._contact = self._contact.softened(soft)
 
     def _apply(self, residual: np.ndarray, contact: _ContactBlock) -> np.ndarray:
-        if self._soft is None:
-            return self._force(self._inverse.stiffen(self._jump(residual, contact)), contact)
-        share, alone = self._soft
-        stiffened = self._inverse.stiffen(self._jump(share * residual, contact))
-        return share * self._force(stiffened, contact) + alone * residual
+        result = self._force(self._inverse.stiffen(self._jump(residual, contact)), contact)
+        return result if self._sprung is None else result + self._sprung * residual
 
     def _jump(self, residual: np.ndarray, contact: _ContactBlock) -> np.ndarray:
         """Return D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹ r on the interface. Collective."""
@@ -408,7 +396,7 @@ class DualSystem:
                 self.inverse, self._B_interface, self._compliance(), torn.numbering, torn.n_gluing
             )
             if torn.give is not None:
-                preconditioner.soften(torn.give, self._B_interface)
+                preconditioner.soften(torn.give)
             diagonal, supported = self._diagonal()
             scaling = self._scaling(coarse)
         nothing = np.zeros(len(torn.numbering.owned))
