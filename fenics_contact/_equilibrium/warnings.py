@@ -13,7 +13,6 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.display import counted
 from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
-from fenics_contact._pairing.search import find_contact_points
 from fenics_contact._scene.pair_geometry import Outline, bodies_near, outline_of, unpaired
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import TILT, surface_of
@@ -393,13 +392,11 @@ def _open_means(state: State, number: int, moved: float, most: float = 0.5) -> l
     presses = contact.normal_force[contact.on_pair(number)].any()
     if presses or not pair.by_mortar or not isinstance(pair.master, Surface) or pair.given_gap:
         return []
-    torn = state.torn
-    single = Scene(scene.bodies, scene.supports, contacts=(replace(pair, discretisation="node"),))
-    points = find_contact_points(
-        single, torn.decomposition.fixed, torn.numbering.comm, axes=torn.decomposition.axes, told=True
-    )
-    moves = np.concatenate([state.gather_displacement(name) for name in scene.bodies])
-    gap = points.gap + np.einsum("nd,nd->n", points.normal, points.jump @ moves)
+    slave, master = (surface_of(scene, side, pair.geometry) for side in (pair.slave, pair.master))
+    hit = project(slave.points, slave.normals, master)
+    own = state.gather_displacement(pair.slave.body)[slave.nodes[hit.point]]
+    other = state.gather_displacement(pair.master.body)[master.nodes]
+    gap = hit.gap + np.einsum("nd,nd->n", hit.normal, own - node_weights(master, hit) @ other)
     deep = -float(gap.min(initial=0.0))
     if deep <= most * moved:
         return []

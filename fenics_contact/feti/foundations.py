@@ -58,13 +58,13 @@ def separated(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Separate motions, (n, k), by whether a stiffness resists them.
 
-    `rounding`: energy of a motion, relative to the largest, that is none.
+    `rounding`: energy of a motion that is none, relative to the largest of any displacement of its size.
 
     Returns orthonormal coefficients of those that it does, (k, r), and of the others, (k, k − r).
     """
     basis, scale = np.linalg.qr(modes)
     values, vectors = np.linalg.eigh(basis.T @ (stiffness @ basis))
-    held = values > rounding * values.max(initial=0.0)
+    held = values > rounding * abs(stiffness).sum(axis=1).max()
     free = np.linalg.qr(np.linalg.solve(scale, vectors[:, ~held]))[0]
     # What is resisted is all that is across the others.
     return np.linalg.svd(np.eye(len(values)) - free @ free.T)[0][:, : held.sum()], free

@@ -76,10 +76,16 @@ class Residuals:
         """These without the forces out of balance."""
         return replace(self, coarse=0.0)
 
-    def beside(self, reach: float) -> Residuals:
-        """Return the residuals with the gluing residual relative to smaller displacements."""
+    def beside(self, reach: float, nothing: float = 1e-10, rounding: float = 1e-11) -> Residuals:
+        """Return the residuals with the gluing residual relative to smaller displacements.
+
+        Where displacements are at most `nothing` of those that cancel, jumps of `rounding` of these are none:
+        supports take up all load, and both are the last digits of K⁺.
+        """
         if not 0.0 < reach < self.gluing_scale:
             return self
+        if reach <= nothing * self.gluing_scale and self.gluing <= rounding:
+            return replace(self, gluing=0.0)
         return replace(self, gluing=self.gluing * self.gluing_scale / reach, gluing_scale=reach)
 
     def within(self, tolerance: float) -> bool:
@@ -367,9 +373,12 @@ def answer_at(problem: DualProblem, multiplier: Vector, product: Vector, alpha: 
     iterate = iterate_at(problem, multiplier, product, alpha)
     if problem.reach is None:
         return iterate
+    reach = problem.reach(multiplier, alpha)
+    # Jumps in the last digits of displacements are none.
+    jumps = np.where(np.abs(iterate.residual) > LAST_PLACES * reach, iterate.residual, 0.0)
+    residuals = measure(problem, multiplier, product, jumps)
     # Over all rows: those of supports may not move at all.
-    reach = problem.norm(problem.reach(multiplier, alpha))
-    return replace(iterate, residuals=iterate.residuals.beside(reach))
+    return replace(iterate, residuals=residuals.beside(problem.norm(reach)))
 
 
 def apply_unless_zero(problem: DualProblem, operator: Operator, x: Vector) -> Vector:

@@ -250,6 +250,7 @@ def _solve_scaled(
         if solution.residuals.within(solver.tolerance):
             return replace(solution, products=products, iterations=len(history), history=history)
         tolerance *= 0.3 * solver.tolerance / solution.residuals.worst
+        tolerance = min(tolerance, 0.3 * begin.residuals.worst or tolerance)  # else nothing is left to do
     raise ConvergenceError(
         f"a solution needs residuals below {solver.tolerance:.1e}, got {solution.residuals} after "
         f"{attempts} attempts with ever stricter scaled ones: loosen the tolerance",

@@ -23,6 +23,7 @@ from fenics_contact import (
     write_result,
 )
 from fenics_contact.errors import InfeasibleError, InvalidInputError
+from fenics_contact.feti.foundations import foundation_stiffness, separated
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStress
 from fenics_contact.mesh import quadratic
@@ -212,3 +213,14 @@ def test_scene_files_and_results_have_foundations(tmp_path) -> None:
     result = read_result(tmp_path)
     assert result["forces"]["foundations"][0]["force"] == pytest.approx([0.0, 0.0, 2.0], abs=1e-8)
     assert result["scene"]["foundations"][0]["stiffness"] == [1.0, 1.0, 5.0]
+
+
+def test_radial_springs_hold_no_ring_along_its_axis() -> None:
+    """Normals of quadratic edges have an axial component in the last digit."""
+    mesh = quadratic(rectangle((0.6, 0.3), (1.2, 1.1), (4, 3), "triangle"))
+    ring = Body(mesh, STEEL, axisymmetric=True)
+    springs = foundation_stiffness([ElasticFoundation("ring", "x1", 0.1)], ring)
+    along = np.tile([0.0, 1.0], mesh.n_nodes)[:, None]
+    held, free = separated(springs, along)
+    assert along.T @ springs @ along > 0.0
+    assert (held.shape[1], free.shape[1]) == (0, 1)

@@ -12,12 +12,20 @@ from fenics_contact import (
     Body,
     BodyForce,
     BodyMesh,
+    ClosureLaw,
+    ClosureTable,
     ContactPair,
+    Coulomb,
+    ElasticFoundation,
+    ExponentialClosure,
+    FrictionTable,
+    LinearClosure,
     LoadStep,
     Pressure,
     RigidCylinder,
     RigidPlane,
     RigidSphere,
+    Roller,
     Scene,
     Support,
     ThermalStrain,
@@ -41,18 +49,26 @@ MODULI = ("young_modulus", "young_moduli", "shear_modulus", "shear_moduli")
 def in_units(scene: Scene, length: float, force: float) -> Scene:
     """Return the scene in other units: a length of 1 becomes ``length``, a force of 1 becomes ``force``.
 
-    In the plane forces are per unit of thickness, which is one in the old units and in the new ones.
+    In the plane forces are per unit of thickness, which is one in the old units and in the new ones; those of
+    bodies of revolution are per revolution.
     """
-    area = length ** (scene.dim - 1)
+    dim = 3 if scene.axisymmetric else scene.dim
+    area = length ** (dim - 1)
     bodies = {name: _body_in_units(body, length, force / area) for name, body in scene.bodies.items()}
     contacts = [_pair_in_units(pair, length, force / area) for pair in scene.contacts]
     return replace(
         scene,
         bodies=bodies,
         supports=[_support_in_units(support, length) for support in scene.supports],
-        loads=[_load_in_units(load, length, force, scene.dim) for load in scene.loads],
+        loads=[_load_in_units(load, length, force, dim) for load in scene.loads],
         contacts=contacts,
+        foundations=[_foundation_in_units(part, length, force / area) for part in scene.foundations],
     )
+
+
+def _foundation_in_units(foundation: ElasticFoundation, length: float, stress: float) -> ElasticFoundation:
+    factor = stress * length if foundation.total else stress / length
+    return replace(foundation, stiffness=_of_position(foundation.stiffness, length, factor))
 
 
 def steps_in_units(
@@ -84,7 +100,7 @@ def _body_in_units(body: Body, length: float, stress: float) -> Body:
         material = {region: scaled(part) for region, part in material.items()}
     else:
         material = scaled(material)  # type: ignore[arg-type]
-    return Body(body.mesh.moved(length * body.mesh.points), material)
+    return replace(body, mesh=body.mesh.moved(length * body.mesh.points), material=material)
 
 
 def _of_position(value: Any, length: float, factor: float) -> Any:
@@ -97,7 +113,9 @@ def _of_position(value: Any, length: float, factor: float) -> Any:
     return tuple(factor * np.asarray(value)) if np.ndim(value) else factor * value
 
 
-def _support_in_units(support: Support, length: float) -> Support:
+def _support_in_units(support: Support | Roller, length: float) -> Support | Roller:
+    if isinstance(support, Roller):
+        return replace(support, displacement=_of_position(support.displacement, length, length))
     return replace(support, value=tuple(_of_position(value, length, length) for value in support.value))
 
 
@@ -120,9 +138,33 @@ def _pair_in_units(pair: ContactPair, length: float, stress: float) -> ContactPa
         case RigidCylinder():
             point = _of_position(master.point, length, length)
             master = replace(master, point=point, radius=length * master.radius)
-    if isinstance(friction, Tresca):
-        friction = Tresca(stress * friction.traction)
-    return replace(pair, master=master, friction=friction)
+    match friction:
+        case Tresca(traction=traction):
+            friction = replace(friction, traction=stress * traction)  # type: ignore[operator]
+        case Coulomb(shear_limit=limit) if limit is not None:
+            friction = replace(friction, shear_limit=stress * limit)  # type: ignore[operator]
+    match friction:
+        case Coulomb(friction_coefficient=FrictionTable() as table):
+            pressure = tuple(stress * np.array(table.pressure))
+            friction = replace(friction, friction_coefficient=replace(table, pressure=pressure))
+    if friction is not None and friction.stick_stiffness is not None:
+        friction = replace(friction, stick_stiffness=stress / length * friction.stick_stiffness)
+    return replace(
+        pair, master=master, friction=friction, closure=_closure_in_units(pair.closure, length, stress)
+    )
+
+
+def _closure_in_units(law: ClosureLaw | None, length: float, stress: float) -> ClosureLaw | None:
+    match law:
+        case LinearClosure():
+            return LinearClosure(stress / length * law.stiffness)
+        case ExponentialClosure():
+            return ExponentialClosure(stress * law.pressure, length * law.clearance)
+        case ClosureTable():
+            values = length * np.array(law.closures), stress * np.array(law.pressures)
+            return ClosureTable(*map(tuple, values))
+    assert law is None
+    return None
 
 
 def turned(scene: Scene, turn: np.ndarray) -> Scene:

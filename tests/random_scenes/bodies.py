@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -164,13 +165,20 @@ def material(dice: Dice, dim: int, modulus: float) -> Material:
 
 def body(dice: Dice, mesh: BodyMesh, modulus: float) -> Body:
     """Give a mesh its material, or two of them by halves."""
-    first = material(dice, mesh.dim, modulus)
+    return in_halves(dice, mesh, lambda factor: material(dice, mesh.dim, factor * modulus))
+
+
+def in_halves(
+    dice: Dice, mesh: BodyMesh, choose: Callable[[float], Material], axisymmetric: bool = False
+) -> Body:
+    """Give a mesh one material, or two by halves, the second with a factor on its modulus."""
+    first = choose(1.0)
     if mesh.n_cells < 2 or not dice.chance(0.15):
-        return Body(mesh, first)
+        return Body(mesh, first, axisymmetric)
     centres = mesh.points[mesh.cells].mean(axis=1)
     axis = int(dice.random.integers(mesh.dim))
     order = np.argsort(centres[:, axis], kind="stable")
     cut = 1 + int(dice.random.integers(mesh.n_cells - 1))
     regions = {"first": np.sort(order[:cut]), "second": np.sort(order[cut:])}
-    second = material(dice, mesh.dim, modulus * dice.power(-3.0, 3.0))
-    return Body(replace(mesh, regions=regions), {"first": first, "second": second})
+    second = choose(dice.power(-3.0, 3.0))
+    return Body(replace(mesh, regions=regions), {"first": first, "second": second}, axisymmetric)

@@ -17,10 +17,12 @@ from fenics_contact import (
     Body,
     BodyForce,
     ContactPair,
+    ElasticFoundation,
     Pressure,
     RigidCylinder,
     RigidPlane,
     RigidSphere,
+    Roller,
     Scene,
     Support,
     ThermalStrain,
@@ -29,12 +31,15 @@ from fenics_contact import (
     box_partition,
 )
 from fenics_contact._scene.loads import Load
+from fenics_contact.materials import OrthotropicElasticity, OrthotropicPlaneStress
 from fenics_contact.materials.elastic import can_expand
 from fenics_contact.mesh import bisection_partition
 from tests.hard.transform import in_units
 from tests.random_scenes.arrangements import ARRANGEMENTS, Arrangement
 from tests.random_scenes.bodies import body, with_surface
 from tests.random_scenes.dice import Dice
+from tests.random_scenes.effects import may_be_oblique, with_effects
+from tests.random_scenes.whole import on_axis
 
 #: Weights of tolerances: the default, a number as for derivatives, and a small one.
 TOLERANCES = {None: 6.0, 1e-6: 2.5, 1e-8: 1.5}
@@ -50,6 +55,9 @@ class Sample:
         scene: The scene.
         cut: Subdomain of every cell of every body, None for the default.
         tolerance: None for the default.
+        plain: The same scene before it was turned, whose supports hold components; None if those of the
+            scene do.
+        turn: How it was turned, shape (dim, dim).
     """
 
     seed: int
@@ -57,6 +65,13 @@ class Sample:
     scene: Scene
     cut: Mapping[str, np.ndarray] | None
     tolerance: float | None
+    plain: Scene | None = None
+    turn: np.ndarray | None = None
+
+    @property
+    def unturned(self) -> Sample:
+        """The scene with supports that hold components."""
+        return self if self.plain is None else replace(self, scene=self.plain, plain=None, turn=None)
 
 
 def sample(seed: int) -> Sample:
@@ -74,19 +89,20 @@ def sample(seed: int) -> Sample:
         for name, grown in made.bodies.items()
     }
     scene = Scene(bodies, contacts=made.contacts, ties=made.ties)
-    scene = _supported(dice, scene, made)
-    scene = replace(scene, loads=_loads(dice, scene, made))
-    scene = _placed(dice, scene)
-    cut = _cut(dice, scene)
+    scene = supported(dice, scene, made)
+    scene = replace(scene, loads=loads(dice, scene, made))
+    scene = with_effects(seed, dice, scene, level)
+    scene, plain, turn = _placed(dice, scene, rollers=may_be_oblique(seed))
+    parts = cut(dice, scene)
     tolerance = dice.weighted(TOLERANCES)
     dice.say(f"tolerance {tolerance}")
-    return Sample(seed, ", ".join(dice.words), scene, cut, tolerance)
+    return Sample(seed, ", ".join(dice.words), scene, parts, tolerance, plain, turn)
 
 
 # -------------------------------------------------------------------------------------------------- supports
 
 
-def _supported(dice: Dice, scene: Scene, made: Arrangement) -> Scene:
+def supported(dice: Dice, scene: Scene, made: Arrangement) -> Scene:
     for index, name in enumerate(made.bodies):
         upper = made.floor or index > 0
         kinds = UPPER if upper else LOWER
@@ -143,7 +159,7 @@ def _patch(dice: Dice, scene: Scene, made: Arrangement, name: str) -> Scene:
     facet = int(dice.random.integers(len(mesh.surfaces[side])))
     patch = f"patch{len(scene.supports)}"
     old = scene.bodies[name]
-    body_ = Body(with_surface(mesh, patch, mesh.surfaces[side][facet : facet + 1]), old.material)
+    body_ = replace(old, mesh=with_surface(mesh, patch, mesh.surfaces[side][facet : facet + 1]))
     value = tuple(0.0 if dice.chance(0.6) else None for _ in range(scene.dim))
     if not any(v is not None for v in value):
         value = (0.0,) * scene.dim
@@ -182,6 +198,9 @@ def _held(dice: Dice, scene: Scene, name: str, side: str, value: tuple[float | N
 def _contradicting(scene: Scene, name: str) -> bool:
     mesh = scene.bodies[name].mesh
     low, high = np.full(mesh.points.shape, np.inf), np.full(mesh.points.shape, -np.inf)
+    if scene.axisymmetric:
+        axis = on_axis(mesh.points)
+        low[axis, 0] = high[axis, 0] = 0.0
     for support in scene.supports:
         if support.body == name:
             nodes = np.unique(mesh.surfaces[support.surface])
@@ -208,7 +227,7 @@ UPPER: dict[Support_, float] = {_no_support: 3.5, _pushed: 3.5, _roller: 3.0, _p
 # ----------------------------------------------------------------------------------------------------- loads
 
 
-def _loads(dice: Dice, scene: Scene, made: Arrangement) -> list[Load]:
+def loads(dice: Dice, scene: Scene, made: Arrangement) -> list[Load]:
     loads: list[Load] = []
     for index, name in enumerate(made.bodies):
         share = 0.7 if index == len(made.bodies) - 1 else 0.2
@@ -276,24 +295,54 @@ LOADS: dict[Load_, float] = {_traction: 5.0, _total: 2.0, _pressure: 2.0, _weigh
 # ----------------------------------------------------------------------------------------- places and units
 
 
-def _placed(dice: Dice, scene: Scene) -> Scene:
-    """Turn and shift the scene, and write it in other units."""
+def _placed(dice: Dice, scene: Scene, rollers: bool) -> tuple[Scene, Scene | None, np.ndarray | None]:
+    """Turn and shift the scene, and write it in other units.
+
+    `rollers`: whether supports of single components may be turned by any angle, as rollers.
+
+    Returns the scene, the same one unturned if it has such rollers, and how it was turned.
+    """
     kind = dice.weighted({"as built": 4.0, "turned by quarters": 2.0, "turned": 4.0})
     turn = {
         "as built": lambda: np.eye(scene.dim),
         "turned by quarters": lambda: dice.quarter_turn(scene.dim),
         "turned": lambda: dice.turn(scene.dim),
     }[kind]()
-    if kind == "turned" and any(None in support.value for support in scene.supports):
+    open_ = any(None in support.value for support in scene.supports)
+    along_axes = any(np.ndim(foundation.stiffness) for foundation in scene.foundations)
+    rollers = rollers and open_ and kind == "turned" and not along_axes
+    if kind == "turned" and (along_axes or open_) and not rollers:
         kind, turn = "turned by quarters", dice.quarter_turn(scene.dim)
     far = dice.weighted({0.0: 4.0, 1.0: 4.0, 100.0: 1.5, 1e4: 0.5})
     shift = far * dice.direction(scene.dim)
-    dice.say(f"{kind}, shifted by {far:g}")
-    scene = moved(scene, turn, shift)
+    dice.say(f"{kind}{' on rollers' if rollers else ''}, shifted by {far:g}")
+    placed = [moved(scene, turn, shift)]
+    if rollers:
+        placed.append(moved(_turned_back(scene, turn), np.eye(scene.dim), turn.T @ shift))
     length = dice.power(-6.0, 6.0) if dice.chance(0.5) else 1.0
     force = dice.power(-6.0, 6.0) if dice.chance(0.5) else 1.0
     dice.say(f"units {length:.2g} and {force:.2g}")
-    return in_units(scene, length, force) if (length, force) != (1.0, 1.0) else scene
+    if (length, force) != (1.0, 1.0):
+        placed = [in_units(each, length, force) for each in placed]
+    return (placed[0], placed[1], turn) if rollers else (placed[0], None, None)
+
+
+def _turned_back(scene: Scene, turn: np.ndarray) -> Scene:
+    """Return the scene with axes of materials that are turned the other way: `moved` leaves them in space."""
+
+    def material(given: Any) -> Any:
+        match given:
+            case dict():
+                return {region: material(part) for region, part in given.items()}
+            case OrthotropicElasticity():
+                axes = np.array(given.orientation) @ turn
+                return replace(given, orientation=tuple(map(tuple, axes)))
+            case OrthotropicPlaneStress():
+                return replace(given, angle=given.angle - float(np.arctan2(turn[1, 0], turn[0, 0])))
+        return given
+
+    bodies = {name: Body(part.mesh, material(part.material)) for name, part in scene.bodies.items()}
+    return replace(scene, bodies=bodies)
 
 
 def moved(scene: Scene, turn: np.ndarray, shift: np.ndarray) -> Scene:
@@ -303,27 +352,41 @@ def moved(scene: Scene, turn: np.ndarray, shift: np.ndarray) -> Scene:
         return np.asarray(points @ turn.T + shift)
 
     bodies = {
-        name: Body(part.mesh.moved(place(part.mesh.points)), part.material)
+        name: replace(part, mesh=part.mesh.moved(place(part.mesh.points)))
         for name, part in scene.bodies.items()
     }
     return replace(
         scene,
         bodies=bodies,
-        supports=[_turned_support(support, turn) for support in scene.supports],
+        supports=[turned for support in scene.supports for turned in _turned_supports(support, turn)],
         loads=[_turned_load(load, turn, shift) for load in scene.loads],
         contacts=[_turned_pair(pair, turn, place) for pair in scene.contacts],
+        foundations=[_turned_foundation(foundation, turn) for foundation in scene.foundations],
     )
 
 
-def _turned_support(support: Support, turn: np.ndarray) -> Support:
+def _turned_foundation(foundation: ElasticFoundation, turn: np.ndarray) -> ElasticFoundation:
+    if not np.ndim(foundation.stiffness):
+        return foundation
+    return replace(foundation, stiffness=tuple(np.abs(turn) @ np.array(foundation.stiffness)))
+
+
+def _turned_supports(support: Support, turn: np.ndarray) -> list[Support | Roller]:
+    """Return a support turned; one that leaves components open as rollers, unless axes remain axes."""
     if None not in support.value:
-        return replace(support, value=tuple(turn @ np.array(support.value, dtype=float)))
+        return [replace(support, value=tuple(turn @ np.array(support.value, dtype=float)))]
     axes = np.abs(turn).argmax(axis=1)
+    if not np.allclose(np.abs(turn)[np.arange(len(turn)), axes], 1.0):
+        return [
+            Roller(support.body, support.surface, value, tuple(turn[:, axis]))
+            for axis, value in enumerate(support.value)
+            if value is not None
+        ]
     values = [
         None if support.value[axis] is None else float(turn[row, axis] * support.value[axis])  # type: ignore[operator]
         for row, axis in enumerate(axes)
     ]
-    return replace(support, value=tuple(values))
+    return [replace(support, value=tuple(values))]
 
 
 def _turned_load(load: Any, turn: np.ndarray, shift: np.ndarray) -> Any:
@@ -355,7 +418,7 @@ def _turned_pair(
 # ------------------------------------------------------------------------------------------------ partitions
 
 
-def _cut(dice: Dice, scene: Scene) -> dict[str, np.ndarray] | None:
+def cut(dice: Dice, scene: Scene) -> dict[str, np.ndarray] | None:
     kind = dice.weighted({"default": 3.0, "boxes": 2.5, "bisected": 2.0, "graph": 2.5})
     if kind == "default":
         dice.say("default partition")

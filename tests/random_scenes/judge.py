@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import traceback
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
@@ -14,6 +15,7 @@ from fenics_contact import solve_scene
 from fenics_contact.errors import ConvergenceError, FenicsContactError
 from tests.random_scenes.generator import Sample, sample
 from tests.random_scenes.refusals import unjust
+from tests.random_scenes.revolved import revolved
 from tests.random_scenes.verifier import complaints
 
 
@@ -70,12 +72,17 @@ class Verdict:
         return cls(**{**data, "outcome": Outcome(data["outcome"])})
 
 
-def judge(seed: int) -> Verdict:
+def judge(seed: int, build: Callable[[int], Sample] = sample) -> Verdict:
     """Build a scene, solve it, and verify the answer or the refusal."""
     start = time.perf_counter()
-    made = sample(seed)
+    made = build(seed)
     outcome, detail, products = _ended(made)
     return Verdict(seed, outcome, made.words, detail, round(time.perf_counter() - start, 3), products)
+
+
+def judge_revolved(seed: int) -> Verdict:
+    """The same of bodies of revolution."""
+    return judge(seed, revolved)
 
 
 def _ended(made: Sample) -> tuple[Outcome, str, int]:
@@ -84,7 +91,7 @@ def _ended(made: Sample) -> tuple[Outcome, str, int]:
     except ConvergenceError as error:
         return Outcome.NOT_CONVERGED, str(error), error.history[-1].products if error.history else 0
     except FenicsContactError as error:
-        objection = unjust(error, made)
+        objection = unjust(error, made.unturned)
         reason = f"{type(error).__name__}: {error}"
         return (Outcome.WRONG, f"{objection}; {reason}", 0) if objection else (Outcome.REFUSED, reason, 0)
     except Exception as error:  # whatever comes from inside is what is looked for

@@ -100,7 +100,11 @@ def _pair_misplaced(whole: Whole, points: ContactPoints, pair: ContactPair, own:
     nodes = np.unique(side.facets)
     if len(np.unique(slave)) != len(slave) or not np.isin(slave, nodes).all():
         yield "points are no nodes of the slave, or the same"
-    movable = nodes[whole.free[nodes].any(axis=1)]
+    mesh = whole.scene.bodies[pair.slave.body].mesh
+    area = surface_area(mesh, mesh.surfaces[pair.slave.name], whole.scene.axisymmetric)
+    # Ends of quadratic edges on an axis of revolution have no area.
+    wide = np.abs(area[nodes - whole.offset[pair.slave.body]]) > EXACT * area.max()
+    movable = nodes[whole.free[nodes].any(axis=1) & wide]
     size = np.ptp(whole.points, axis=0).max()
     length = EXACT * size + ROUNDING * np.abs(whole.points).max()
     mortar = pair.discretisation == "mortar" and isinstance(pair.master, Surface)
@@ -129,7 +133,9 @@ def _pair_misplaced(whole: Whole, points: ContactPoints, pair: ContactPair, own:
 
 def _areas(whole: Whole, surface: Surface, slave: np.ndarray, area: np.ndarray) -> Iterator[str]:
     mesh: BodyMesh = whole.scene.bodies[surface.body].mesh
-    own = surface_area(mesh, mesh.surfaces[surface.name])[slave - whole.offset[surface.body]]
+    own = surface_area(mesh, mesh.surfaces[surface.name], whole.scene.axisymmetric)[
+        slave - whole.offset[surface.body]
+    ]
     # On facets that are no parallelograms their equal parts are not the integrals of shape functions.
     if np.abs(area / own - 1.0).max(initial=0.0) > 0.25:
         yield f"areas of points are off by {np.abs(area / own - 1).max():.1e}"

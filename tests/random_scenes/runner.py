@@ -18,14 +18,14 @@ from typing import IO
 
 from fenics_contact import clean_environment
 from tests.random_scenes.deformed_judge import judge_history
-from tests.random_scenes.judge import Outcome, Verdict, judge
+from tests.random_scenes.judge import Outcome, Verdict, judge, judge_revolved
 
 ROOT = Path(__file__).parents[2]
 #: A process that waits and computes nothing hangs, too, if it does so for this many times the limit.
 PATIENCE = 40.0
 Judge = Callable[[int], Verdict]
-#: Scenes of small strain and linear materials, and histories of large deformations.
-JUDGES: dict[str, Judge] = {"linear": judge, "deformed": judge_history}
+#: Scenes of small strain and linear materials, those of revolution, and histories of large deformations.
+JUDGES: dict[str, Judge] = {"linear": judge, "revolved": judge_revolved, "deformed": judge_history}
 #: Begins the lines that a worker writes; libraries may write others.
 MARK = "verdict: "
 

@@ -8,10 +8,26 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import Body, ContactPair, Coulomb, Scene, State, Support, Surface, Traction, solve_scene
+from fenics_contact import (
+    Body,
+    ClosureTable,
+    ContactPair,
+    Coulomb,
+    ElasticFoundation,
+    ExponentialClosure,
+    FrictionTable,
+    LinearClosure,
+    Pressure,
+    Scene,
+    State,
+    Support,
+    Surface,
+    Traction,
+    solve_scene,
+)
 from fenics_contact.errors import InfeasibleError, InvalidInputError
-from fenics_contact.gallery import block, hemisphere
-from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.gallery import block, hemisphere, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from tests.random_scenes import runner
 from tests.random_scenes.generator import Sample, sample
 from tests.random_scenes.judge import Outcome, Verdict
@@ -100,6 +116,42 @@ def test_contact_points_in_the_wrong_place_are_noticed(state: State, part, chang
     assert any(complaint in words for words in found), found
 
 
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"closure": LinearClosure(0.2)}, "complementarity"),
+        ({"closure": ExponentialClosure(0.003, 0.01)}, "penetration"),
+        ({"closure": ClosureTable((0.0, 0.01), (0.0, 0.003))}, "complementarity"),
+        ({"friction": Coulomb(0.5, stick_stiffness=0.1)}, "friction"),
+        ({"friction": Coulomb(FrictionTable((0.0, 0.01), (0.5, 0.3)))}, "cone"),
+        ({"friction": Coulomb(0.5, shear_limit=0.002)}, "cone"),
+    ],
+)
+def test_answers_to_another_law_of_surfaces_are_noticed(state: State, change, complaint: str) -> None:
+    made = stacked()
+    softer = replace(made.scene, contacts=[replace(made.scene.contacts[0], **change)])
+    right = solve_scene(softer, MPI.COMM_SELF, tolerance=made.tolerance)
+    assert not complaints(right, made)
+    wrong = replace(state, torn=replace(state.torn, scene=softer))
+    found = complaints(wrong, made)
+    assert any(complaint in words for words in found), found
+
+
+@pytest.mark.parametrize("axisymmetric", [False, True])
+def test_springs_of_another_stiffness_are_noticed(axisymmetric: bool) -> None:
+    material = STEEL if axisymmetric else PlaneStrain(1.0, 0.3)
+    body = Body(rectangle((0, 0), (2, 1), (4, 3)), material, axisymmetric)
+    springs = ElasticFoundation("body", "y0", 0.1)
+    supports, loads = [Support("body", "x0", (0.0, None))], [Pressure("body", "y1", 0.01)]
+    scene = Scene({"body": body}, supports, loads, foundations=[springs])
+    made = Sample(-1, "on springs", scene, None, 1e-8)
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-8)
+    assert not complaints(state, made)
+    stiffer = replace(scene, foundations=[replace(springs, stiffness=0.11)])
+    found = complaints(replace(state, torn=replace(state.torn, scene=stiffer)), made)
+    assert any("balance" in words for words in found), found
+
+
 def test_gaps_to_the_facets_of_a_round_master_are_noticed() -> None:
     floor = block((-0.5, -0.5, -0.5), (0.5, 0.5, 0.0), (5, 5, 2))
     scene = Scene(
@@ -163,5 +215,7 @@ def test_a_seed_is_one_scene_and_seeds_meet_everything() -> None:
         "but sliding", "rigid ball", "rigid bar", "and a wall", "no load", "pressure", "degrees warmer",
         "of position", "one facet", "guided", "free", "boxes", "graph", "bisected", "default partition",
         "turned by quarters", "shifted by 10000", "orthotropic", "nu=0.4999", "thin", "side by side",
+        "on rollers", "on springs", "linear closure", "exponential closure", "table closure", "elastic slip",
+        "by pressure", "with a shear limit",
     ):  # fmt: skip
         assert part in words, part

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact import BodyForce, BodyMesh, Pressure, Scene, ThermalStrain, TotalForce
+from fenics_contact import Body, BodyForce, BodyMesh, Pressure, Scene, ThermalStrain, TotalForce
 from fenics_contact._scene.loads import Load
 from fenics_contact.materials import (
     IsotropicElasticity,
@@ -23,12 +23,15 @@ from fenics_contact.materials import (
     OrthotropicPlaneStress,
     PlaneStrain,
     PlaneStress,
+    rigid_body_modes,
 )
 from fenics_contact.mesh import CellType
-from fenics_contact.mesh.cell_types import CELL_TYPES, FACET_TYPES
+from fenics_contact.mesh.cell_types import CELL_TYPES, FACET_TYPES, quadrature
 
 #: Components of a strain in the order of its vector, shear strains doubled.
 PAIRS = {2: [(0, 0), (1, 1), (0, 1)], 3: [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]}
+#: Those of a body of revolution among the ones in space: (r, r), (z, z), (r, z) and around the axis.
+REVOLVED = [0, 1, 5, 2]
 
 
 def elasticity(material: Any, dim: int) -> np.ndarray:
@@ -121,23 +124,43 @@ def gauss(cell: CellType) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True)
 class Integrated:
-    """Shape functions (q, k), gradients (q, c, k, d) and weights (q, c) of the cells of a mesh."""
+    """Shape functions (q, k), gradients (q, c, k, d) and weights (q, c) of the cells of a mesh.
+
+    Of bodies of revolution also shape functions over the radius, (q, c, k).
+    """
 
     values: np.ndarray
     gradients: np.ndarray
     weights: np.ndarray
+    hoop: np.ndarray | None = None
+
+    @property
+    def strains(self) -> np.ndarray:
+        """Strains by displacements of nodes, (q, c, strains, k, d)."""
+        rows = strain_rows(self.gradients)
+        if self.hoop is None:
+            return rows
+        around = np.zeros_like(rows[:, :, :1])
+        around[:, :, 0, :, 0] = self.hoop
+        return np.concatenate([rows, around], axis=2)
 
 
-def integrated(mesh: BodyMesh) -> Integrated:
+def integrated(mesh: BodyMesh, axisymmetric: bool = False) -> Integrated:
     """Evaluate everything at the Gauss points of all cells."""
     cell = CELL_TYPES[mesh.cell_type]
-    places, weight = gauss(cell)
+    # No rule integrates 1 / r exactly, and the answer depends on it.
+    rule = quadrature(cell, 2 * cell.order) if axisymmetric and cell.is_simplex else gauss(cell)
+    places, weight = rule
     values, local = shapes(cell, places)
     corners = mesh.points[mesh.cells]
     corners = corners - corners[:, :1]
     jacobian = np.einsum("qka,ckd->qcda", local, corners)
     gradients = np.einsum("qka,qcad->qckd", local, np.linalg.inv(jacobian))
-    return Integrated(values, gradients, weight[:, None] * np.linalg.det(jacobian))
+    weights = weight[:, None] * np.linalg.det(jacobian)
+    if not axisymmetric:
+        return Integrated(values, gradients, weights)
+    radius = np.einsum("qk,ck->qc", values, mesh.points[mesh.cells][:, :, 0])
+    return Integrated(values, gradients, 2 * np.pi * radius * weights, values[:, None] / radius[:, :, None])
 
 
 def strain_rows(gradients: np.ndarray) -> np.ndarray:
@@ -158,6 +181,7 @@ class Whole:
         offset: Number of the first node of each body among all nodes.
         points: Coordinates of all nodes, (n_nodes, dim).
         K: Stiffness, dof dim n + d for component d of node n.
+        springs: The part of it that foundations have.
         load: (n_nodes, dim).
         prescribed: (n_nodes, dim), NaN where free.
         body_of: Number of the body of each node.
@@ -172,16 +196,19 @@ class Whole:
         self.load = np.zeros(self.points.shape)
         parts = []
         for name, part in scene.bodies.items():
-            found = integrated(part.mesh)
-            C = np.array([elasticity(material, self.dim) for material in part.materials])
+            found = integrated(part.mesh, part.axisymmetric)
+            C = np.array([_stiffness_of(material, part) for material in part.materials])
             C = C[part.material_of_cells]
             parts.append(_stiffness(part.mesh, found, C))
             nodes = slice(self.offset[name], self.offset[name] + part.mesh.n_nodes)
             for load in scene.loads:
                 if load.body == name:
                     self.load[nodes] += _nodal(part, found, C, load)
-        self.K = sp.block_diag(parts, format="csr")
+        self.springs = self._springs()
+        self.K = sp.block_diag(parts, format="csr") + self.springs
         self.prescribed = np.full(self.points.shape, np.nan)
+        if scene.axisymmetric:
+            self.prescribed[on_axis(self.points), 0] = 0.0
         for support in scene.supports:
             mesh = scene.bodies[support.body].mesh
             nodes = np.unique(mesh.surfaces[support.surface]) + self.offset[support.body]
@@ -189,6 +216,27 @@ class Whole:
                 if value is not None:
                     assert not callable(value)
                     self.prescribed[nodes, component] = value
+
+    def _springs(self) -> sp.csr_matrix:
+        """Return the stiffness of foundations, of facets as they are."""
+        springs = sp.csr_matrix((self.points.size,) * 2)
+        for foundation in self.scene.foundations:
+            mesh = self.scene.bodies[foundation.body].mesh
+            facets = mesh.surfaces[foundation.surface]
+            values, normal = facet_integrals(mesh, facets, self.scene.axisymmetric)
+            area = np.linalg.norm(normal, axis=2)
+            if np.ndim(foundation.stiffness):
+                tensor = np.einsum("qf,d,de->qfde", area, foundation.stiffness, np.eye(self.dim))
+            else:
+                tensor = np.einsum("qfd,qfe,qf->qfde", normal, normal, foundation.stiffness / area)
+            tensor = tensor / (area.sum() if foundation.total else 1.0)
+            blocks = np.einsum("qk,ql,qfde->fkdle", values, values, tensor)
+            dofs = self.dim * (facets + self.offset[foundation.body])[..., None] + np.arange(self.dim)
+            rows, columns = np.broadcast_arrays(dofs[:, :, :, None, None], dofs[:, None, None, :, :])
+            springs = springs + sp.csr_matrix(
+                (blocks.ravel(), (rows.ravel(), columns.ravel())), shape=springs.shape
+            )
+        return springs
 
     @property
     def free(self) -> np.ndarray:
@@ -200,8 +248,27 @@ class Whole:
         return slice(self.offset[name], self.offset[name] + self.scene.bodies[name].mesh.n_nodes)
 
 
+def on_axis(points: np.ndarray) -> np.ndarray:
+    """Return which points lie on the axis of revolution, (n,)."""
+    return np.asarray(points[..., 0] <= 1e-9 * np.ptp(points.reshape(-1, 2), axis=0).max())
+
+
+def rigid_motions(scene: Scene, name: str) -> np.ndarray:
+    """Return those of a body, about its middle and in its size, (n_nodes * dim, motions)."""
+    points = scene.bodies[name].mesh.points
+    centred = points - points.mean(axis=0)
+    modes = rigid_body_modes(centred / np.abs(centred).max()).reshape(points.size, -1)
+    return modes[:, 1:2] if scene.axisymmetric else modes
+
+
+def _stiffness_of(material: Any, part: Body) -> np.ndarray:
+    if part.axisymmetric:
+        return elasticity(material, 3)[np.ix_(REVOLVED, REVOLVED)]
+    return elasticity(material, part.mesh.dim)
+
+
 def _stiffness(mesh: BodyMesh, found: Integrated, C: np.ndarray) -> sp.csr_matrix:
-    B = strain_rows(found.gradients)
+    B = found.strains
     q, c, s, k, d = B.shape
     B = B.reshape(q, c, s, k * d)
     blocks = np.einsum("qc,qcsi,cst,qctj->cij", found.weights, B, C, B, optimize=True)
@@ -215,16 +282,18 @@ def _nodal(part: Any, found: Integrated, C: np.ndarray, load: Load) -> np.ndarra
     """Return the nodal forces of a load, (n_nodes, dim)."""
     mesh, force = part.mesh, np.zeros(part.mesh.points.shape)
     if isinstance(load, ThermalStrain):
-        strain = np.array([thermal_strain(material, mesh.dim) for material in part.materials])
+        dim = 3 if part.axisymmetric else mesh.dim
+        strain = np.array([thermal_strain(material, dim) for material in part.materials])
+        strain = strain[:, REVOLVED] if part.axisymmetric else strain
         stress = np.einsum("cst,ct->cs", C, strain[part.material_of_cells]) * load.value
-        B = strain_rows(found.gradients)
-        np.add.at(force, mesh.cells, np.einsum("qc,qcskd,cs->ckd", found.weights, B, stress))
+        work = np.einsum("qc,qcskd,cs->ckd", found.weights, found.strains, stress)
+        np.add.at(force, mesh.cells, work)
     elif isinstance(load, BodyForce):
         share = np.einsum("qk,qc->ck", found.values, found.weights)
         np.add.at(force, mesh.cells, share[:, :, None] * np.array(load.value))
     else:
         facets = mesh.surfaces[load.surface]
-        values, normal = facet_integrals(mesh, facets)
+        values, normal = facet_integrals(mesh, facets, part.axisymmetric)
         area = np.linalg.norm(normal, axis=2)
         if isinstance(load, Pressure):
             given = np.einsum("qk,qfd->fkd", values, -load.value * normal)
@@ -238,8 +307,13 @@ def _nodal(part: Any, found: Integrated, C: np.ndarray, load: Load) -> np.ndarra
     return force
 
 
-def facet_integrals(mesh: BodyMesh, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return shape functions (q, k) and weighted outward normals (q, f, d) at the Gauss points of facets."""
+def facet_integrals(
+    mesh: BodyMesh, facets: np.ndarray, axisymmetric: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return shape functions (q, k) and weighted outward normals (q, f, d) at the Gauss points of facets.
+
+    Those of bodies of revolution are of whole turns.
+    """
     kind = FACET_TYPES[facets.shape[1], mesh.dim]
     places, weight = gauss(kind)
     values, local = shapes(kind, places)
@@ -249,12 +323,14 @@ def facet_integrals(mesh: BodyMesh, facets: np.ndarray) -> tuple[np.ndarray, np.
         normal = np.cross(tangents[:, :, 0], tangents[:, :, 1])
     else:
         normal = np.stack([tangents[:, :, 0, 1], -tangents[:, :, 0, 0]], axis=2)
+    if axisymmetric:
+        normal = 2 * np.pi * (values @ corners[:, :, 0].T)[:, :, None] * normal
     return values, weight[:, None, None] * normal
 
 
-def surface_area(mesh: BodyMesh, facets: np.ndarray) -> np.ndarray:
+def surface_area(mesh: BodyMesh, facets: np.ndarray, axisymmetric: bool) -> np.ndarray:
     """Return the force of a unit pressure on each node of a mesh, (n_nodes,)."""
-    values, normal = facet_integrals(mesh, facets)
+    values, normal = facet_integrals(mesh, facets, axisymmetric)
     areas = np.zeros(mesh.n_nodes)
     np.add.at(areas, facets, np.einsum("qk,qf->fk", values, np.linalg.norm(normal, axis=2)))
     return areas
