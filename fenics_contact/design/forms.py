@@ -12,7 +12,7 @@ from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact._base.libraries import MPI
-from fenics_contact._fem.composition import as_in_space, integrate
+from fenics_contact._fem.composition import as_in_space, integrate, material_sets
 from fenics_contact._fem.forms import Temperature, stress_in_space, stress_left
 from fenics_contact._fem.load_forms import Symbol, load_key, load_name, load_work
 from fenics_contact._fem.templates import (
@@ -168,6 +168,14 @@ def _virtual_work(material: Any, u: Expr, w: Expr, constants: Constants) -> Expr
 def _by_shape(form: ufl.Form, cell_type: str) -> ufl.Form:
     velocity = ufl.TestFunction(_dolfinx.displacement_space(cell_type))
     return ufl.derivative(form, ufl.SpatialCoordinate(_dolfinx.template(cell_type)), velocity)
+
+
+def sets_in_use(torn: TornSystem, body: str) -> list[Materials]:
+    """Return the materials of the subdomains of a body, of all ranks: others need no form. Collective."""
+    every = material_sets(torn.scene.bodies[body])
+    mine = {part.material.materials for part in torn.subdomains if part.mesh.body == body}
+    used = torn.decomposition.comm.allgather([materials in mine for materials in every])
+    return [materials for materials, *ranks in zip(every, *used, strict=True) if any(ranks)]
 
 
 def sum_over_subdomains(

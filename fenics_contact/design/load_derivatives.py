@@ -9,13 +9,12 @@ from typing import cast
 import numpy as np
 
 from fenics_contact import _dolfinx
-from fenics_contact._fem.composition import material_sets
 from fenics_contact._fem.load_forms import is_scalar, load_fields, load_parameters
 from fenics_contact._fem.loads import LinearTraction, spread_traction
 from fenics_contact._scene.fields import OfPosition, gradients_of
 from fenics_contact._scene.loads import Load, SurfaceLoad, ThermalStrain, TotalForce
 from fenics_contact._surfaces.facets import GaussPoint, gauss_points, surface_moments
-from fenics_contact.design.forms import ShapeForms, sum_over_subdomains
+from fenics_contact.design.forms import ShapeForms, sets_in_use, sum_over_subdomains
 from fenics_contact.design.surface_derivatives import integral_pulled_back
 from fenics_contact.errors import together
 from fenics_contact.feti.averages import nodal_mean_at
@@ -159,8 +158,8 @@ def strain_work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: 
 
     `u`: torn displacement of this rank, [length].
     """
-    for body in torn.scene.bodies.values():  # all ranks compile, also for bodies without a part on them
-        for materials in material_sets(body):
+    for name, body in torn.scene.bodies.items():  # all ranks compile, also for bodies without a part on them
+        for materials in sets_in_use(torn, name):
             forms.virtual_work_by_shape(materials, body.cell_type)
 
     def on_subdomain(subdomain: Subdomain, functions: Functions) -> np.ndarray:
@@ -178,7 +177,7 @@ def load_work_by_shape(forms: ShapeForms, torn: TornSystem, w: np.ndarray) -> np
     spread: list[Load] = [load for load in loads if not isinstance(load, TotalForce)]
     for load in spread:  # all ranks compile
         body = torn.scene.bodies[load.body]
-        for materials in material_sets(body):
+        for materials in sets_in_use(torn, load.body):
             forms.load_by_shape(load, materials, body.cell_type)
             if callable(load.value):
                 forms.load_by_field(load, materials, body.cell_type)

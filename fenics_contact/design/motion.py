@@ -20,7 +20,6 @@ from fenics_contact import _dolfinx
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._base.libraries import MPI, PETSc, check_not_forked
 from fenics_contact._base.sparse import dispose_with
-from fenics_contact._fem.composition import material_sets
 from fenics_contact._fem.forms import temperature_of
 from fenics_contact._fem.templates import Template, volume_measure
 from fenics_contact._pairing.points import NodeNumbers
@@ -29,7 +28,14 @@ from fenics_contact._scene.parts import mirrored, planes_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import gauss_points, within_planes
 from fenics_contact.design.design import SurfaceDesign, checked_variables
-from fenics_contact.design.forms import Density, Integrand, ShapeForms, subdomain_fields, sum_over_subdomains
+from fenics_contact.design.forms import (
+    Density,
+    Integrand,
+    ShapeForms,
+    sets_in_use,
+    subdomain_fields,
+    sum_over_subdomains,
+)
 from fenics_contact.design.load_derivatives import field_by_places
 from fenics_contact.design.objective import Partials, Weighable, require_linear
 from fenics_contact.errors import InvalidDesignError, InvalidInputError, together
@@ -419,7 +425,7 @@ class BodyIntegral:
         """Compile the integral or a derivative, return a function that binds it to subdomains. Collective."""
         body = self.state.scene.bodies[self.body]
         cell_type, temperature = body.cell_type, temperature_of(self.state.scene.loads, self.body)
-        for materials in material_sets(body):
+        for materials in sets_in_use(self.state.torn, self.body):
             self.forms.functional(self.density, materials, cell_type, by, temperature)
 
         def bind(subdomain: Subdomain, functions: Functions, spaces: Spaces) -> _dolfinx.fem.Form:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -10,20 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import (
-    Body,
-    BodyForce,
-    BodyMesh,
-    ContactPair,
-    Pressure,
-    Scene,
-    Surface,
-    SurfaceDesign,
-    ThermalStrain,
-    TotalForce,
-    Tresca,
-    Ufl,
-)
+from fenics_contact import BodyMesh, SurfaceDesign
 from fenics_contact._pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact._pairing.points import tangent_frames
 from fenics_contact._pairing.search import MortarPoints
@@ -54,12 +42,12 @@ from fenics_contact.gallery import block, half_disc, rectangle, side_of
 from fenics_contact.materials import IsotropicElasticity, OrthotropicElasticity
 from fenics_contact.mesh import quadratic
 from fenics_contact.shapes import Torus
-from tests.contact.gallery import FLOOR, crowned
 from tests.pairing.mortar_surfaces import SOLID, shell
 from tests.shape.aims import aims
 from tests.shape.blocks import problem
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Line, miss_without
+from tests.shape.two_materials import two_materials
 
 CELLS = ("hexahedron", "tetrahedron")
 #: What is known of the master: its facets, the shape they stand for, or its nodes, which suggest one.
@@ -407,30 +395,9 @@ def test_nodes_that_form_no_grid_and_other_variables_are_refused() -> None:
 
 
 # Derivatives of a block of two materials that is heated and drawn by a force that varies in space.
-WOOD = OrthotropicElasticity(
-    (90.0, 60.0, 80.0), (0.2, 0.3, 0.25), (30.0, 35.0, 25.0), thermal_expansion=(1e-3, 2e-3, 0.0)
-)
 JUDGES = objectives("block") | {
     name: aims("block", "z0")[name] for name in ("largest stress", "friction work")
 }
-
-
-def two_materials() -> Scene:
-    mesh = crowned(block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (6, 3, 3)), 0.02)
-    left = mesh.points[mesh.cells].mean(axis=1)[:, 0] < 0.7
-    mesh = replace(mesh, regions={"left": np.flatnonzero(left), "right": np.flatnonzero(~left)})
-    materials = {"left": IsotropicElasticity(120.0, 0.3, 1e-3), "right": WOOD}
-    return Scene(
-        {"block": Body(mesh, materials)},
-        loads=[
-            Pressure("block", "z1", lambda points: 2.0 + 0.2 * points[:, 0]),
-            TotalForce("block", "z1", (0.02, 0.0, -0.1), moment=(0.01, 0.02, 0.05), at=(0.9, 0.6, 1.5)),
-            BodyForce("block", Ufl(lambda x: [0.3 * x[2], 0.1, -0.2 * x[0]])),
-            ThermalStrain("block", 5.0),
-            ThermalStrain("block", Ufl(lambda x: 3.0 * x[2] * x[0])),
-        ],
-        contacts=[ContactPair(Surface("block", "z0"), FLOOR, Tresca(0.6))],
-    )
 
 
 @cache
@@ -445,6 +412,37 @@ def test_the_adjoint_agrees_with_central_differences(objective: str) -> None:
     assert line().is_smooth()
     assert line().steepness(JUDGES[objective]) > 0.02
     assert line().miss(JUDGES[objective]) < 1e-5
+
+
+def test_only_materials_of_subdomains_that_there_are_have_forms() -> None:
+    """The block is cut into a part of both materials and one of wood alone."""
+    here = line()
+    here.point(JUDGES["energy"])
+    parts = {tuple(map(type, part.material.materials)) for part in here.state().torn.subdomains}
+    assert parts == {(IsotropicElasticity, OrthotropicElasticity), (OrthotropicElasticity,)}
+    names = [name[1:-1] for name in here.problem.geometry.forms.compiled if name[0] == "work by shape"]
+    assert sorted(names, key=len) == sorted(parts, key=len)
+
+
+def test_ranks_with_parts_of_other_materials_have_the_forms_of_all(mpirun: Callable[..., str]) -> None:
+    script = """
+        import json, sys
+        import numpy as np
+        from mpi4py import MPI
+        from tests.shape.blocks import problem
+        from tests.shape.objectives import objectives
+        from tests.shape.two_materials import two_materials
+
+        comm, alpha = MPI.COMM_WORLD, np.array(json.loads(sys.argv[1]))
+        point = problem(two_materials(), comm).evaluate_by(objectives("block")["energy"], alpha)
+        parts = comm.allgather([len(part.material.materials) for part in point.state.torn.subdomains])
+        if comm.rank == 0:
+            sys.stdout.write(f"{parts} {point.gradient.tolist()}")
+    """
+    parts, gradient = mpirun(script, 2, json.dumps(line().alpha.tolist())).split("]] ")
+    assert parts == "[[2], [1"
+    expected = line().point(JUDGES["energy"]).gradient
+    np.testing.assert_allclose(json.loads(gradient), expected, atol=1e-6 * np.abs(expected).max())
 
 
 def test_heat_and_the_force_count() -> None:
