@@ -19,7 +19,7 @@ from fenics_contact._accuracy.state_errors import (
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti.dual import DualSystem
-from fenics_contact.qp.solution import DualSolution, SolverStep
+from fenics_contact.qp.solution import DualSolution, SolverStep, continued
 from fenics_contact.qp.solve import DualSolver
 
 #: An estimate is repeated if the solver's error was more than this share of it: jumps between subdomains that
@@ -98,11 +98,7 @@ class Rounds:
         system, products = self._system, self._system.products - self._before
         with self._timer.phase("solve"):
             self.last = solve(system, solver, start)
-        outer = self.history[-1].outer + 1 if self.history else 0
-        self.history += [
-            replace(step, products=step.products + products, outer=step.outer + outer)
-            for step in self.last.history
-        ]
+        self.history = continued(self.history, self.last.history, products)
         with self._timer.phase("state"):
             self.displacement = system.displacement(self.last.multiplier, self.last.alpha)
         with self._timer.phase("errors"):

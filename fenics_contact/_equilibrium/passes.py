@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti.torn import TornSystem
-from fenics_contact.qp.solution import DualSolution, SolverStep
+from fenics_contact.qp.solution import DualSolution, SolverStep, continued
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State
 
@@ -30,13 +31,18 @@ class Passes:
         self.history: list[SolverStep] = []
 
     def run(self, torn: TornSystem) -> LinearState:
-        """Return the state of a system. Collective."""
-        self._state = state = self._solve(torn, self._state)
+        """Return the state of a system. Collective.
+
+        Raises:
+            ConvergenceError: As its solve; carries the history of all passes.
+        """
+        try:
+            self._state = state = self._solve(torn, self._state)
+        except ConvergenceError as failure:
+            steps = continued(self.history, failure.history, self._products)
+            raise ConvergenceError(str(failure), steps) from failure
         solution = _solution(state)
-        self.history += [
-            replace(step, products=step.products + self._products, outer=self.count)
-            for step in solution.history
-        ]
+        self.history = continued(self.history, solution.history, self._products)
         self._products += solution.products
         self.count += 1
         return state

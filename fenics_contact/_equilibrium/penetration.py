@@ -59,7 +59,7 @@ class Front:
                 named = pair.fluid.enters if isinstance(pair.fluid.enters, str) else pair.slave.name
                 shared = np.isin(nodes, body.surfaces[named])
                 inlet[mine] = pair.fluid.inlet(body.points[nodes], shared)
-                pressure[mine], critical[mine] = pair.fluid.pressure, pair.fluid.critical
+                pressure[mine], critical[mine] = pair.fluid.pressure, pair.fluid.opens_at
                 number_of = np.full(body.n_nodes, -1)
                 number_of[nodes] = mine
                 facets = number_of[body.surfaces[pair.slave.name]]

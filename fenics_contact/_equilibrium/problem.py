@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 
@@ -169,21 +169,30 @@ class LinearEquilibria:
         """Compute a state whose fluid is where contact is open, or friction fits its slip. Collective."""
         # The front needs the status of every point, which a balanced state leaves uncertain.
         wanted = tolerance if isinstance(tolerance, float) else solver.tolerance
+        by_slip = any(pair.slip_table is not None for pair in torn.scene.contacts)
+        # Errors of passes must not pass for changes of friction.
+        finer = min(wanted, max(0.1 * wanted, 1e-10)) if by_slip else wanted
 
         def solve(system_of: TornSystem, last: LinearState | None) -> LinearState:
             reused = known_system(last)
             system = DualSystem(system_of, self._timer, previous=reused)
             with self._timer.phase("solve"):
-                solution = solve_dual(system, solver.with_tolerance(wanted), _start_from(last, system))
+                solution = solve_dual(system, solver.with_tolerance(finer), _start_from(last, system))
             return self._state(system, solution, tolerance=wanted)
 
-        if any(pair.slip_table is not None for pair in torn.scene.contacts):
-            from fenics_contact._equilibrium.slip_dependence import consistent
+        def wetted(system_of: TornSystem, last: LinearState | None) -> LinearState:
+            if all(pair.fluid is None for pair in torn.scene.contacts):
+                return solve(system_of, last)
+            from fenics_contact._equilibrium.penetration import penetrated
 
-            return consistent(solve, torn, known, before, wanted)
-        from fenics_contact._equilibrium.penetration import penetrated
+            # From the front of the pass before, in this step.
+            return penetrated(solve, system_of, last, before if last is known else last)
 
-        return penetrated(solve, torn, known, before)
+        if not by_slip:
+            return wetted(torn, cast("LinearState | None", known))
+        from fenics_contact._equilibrium.slip_dependence import consistent
+
+        return consistent(wetted, torn, known, before, wanted)
 
     def restored(self, stored: Stored, scene: Scene, known: State | None) -> LinearState:
         """Build a state from what `stored_state` returned, with at most one product. Collective."""

@@ -39,42 +39,48 @@ def consistent(
     before: State | None,
     tolerance: float,
     *,
-    max_passes: int = 60,
-    progress: float = 0.7,
-    least: float = 0.05,
+    max_passes: int = 100,
 ) -> LinearState:
     """Return the state whose friction coefficients are those of its slips. Collective.
 
-    Every pass is one solution at given coefficients. They are taken over whole, and by a smaller part where
-    slip bounds do not get closer to each other, as where friction falls faster with the slip than bodies are
-    stiff: there may be several states, or none.
+    Every pass is one solution at given coefficients, of whose change the next takes over a part θ: all of it
+    at first, then what the last two changes r ask for, θ ← −θ r₀·(r₁ − r₀) / ‖r₁ − r₀‖². It is less than one
+    where they alternate, as friction that rises steeply makes them, and more where they only get smaller.
+    Where friction falls faster with the slip than bodies are stiff, changes grow in one direction: θ = 1
+    follows them to where it falls no more. There may be several states, or none.
 
-    `tolerance`: largest change of a slip bound relative to the largest; `progress`: factor on that change
-    below which a pass makes progress; `least`: smallest part of new coefficients before giving up.
+    `tolerance`: largest change of a slip bound relative to the largest.
 
     Raises:
         ConvergenceError: If they do not agree; carries the history of all passes.
+
+    References:
+        U. Küttler, W. A. Wall, Fixed-point fluid–structure interaction solvers with dynamic relaxation,
+        Comput. Mech. 43 (2008) 61–72.
     """
     slip = np.zeros((torn.points.count, torn.components - 1)) if before is None else before.contact.total_slip
-    mu, part, last = coefficients(torn, slip), 1.0, np.inf
+    mu, part, last = coefficients(torn, slip), 1.0, np.zeros(0)
     passes = Passes(solve, known)
-    while passes.count < max_passes and part >= least:
+    while passes.count < max_passes:
         state = passes.run(with_coefficients(torn, mu))
         contact = state.contact
         target = coefficients(torn, contact.total_slip)
         pressed = contact.normal_force[torn.frictional]
         size = float((np.maximum(mu, target) * pressed).max(initial=0.0))
-        change = float((np.abs(target - mu) * pressed).max(initial=0.0)) / (size or 1.0)
+        missing = (target - mu) * pressed
+        change = float(np.abs(missing).max(initial=0.0)) / (size or 1.0)
         passes.remark(f"slip pass {passes.count}: slip bounds changed by {change:.1e}")
         if change <= tolerance:
             return passes.answer(state)
-        if change > progress * last:
-            part *= 0.5
-        mu, last = (1.0 - part) * mu + part * target, change
+        if len(last):
+            turn = missing - last
+            part *= -float(last @ turn) / (float(turn @ turn) or 1.0)
+            part = part if part > 0.0 else 1.0
+        mu, last = np.maximum(mu + part * (target - mu), 0.0), missing
     raise ConvergenceError(
         "friction coefficients must agree with the slips, but after "
         f"{counted(passes.count, 'pass', 'passes')} "
-        f"slip bounds still change by {last:.1e} of the largest: friction that falls with the slip faster "
+        f"slip bounds still change by {change:.1e} of the largest: friction that falls with the slip faster "
         "than bodies are stiff has several states or none, as in stick-slip; take smaller load steps, drive "
         "the bodies by displacements, or let the coefficient fall over a longer slip",
         passes.history,

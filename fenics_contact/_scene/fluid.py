@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -26,7 +27,10 @@ class FluidPressure:
         enters: Where it enters: a surface of the slave's body that shares nodes with the slave surface, or a
             function of points of the slave, shape (n, dim), that returns whether they are at the inlet, shape
             (n,).
-        critical: Contact pressure, ≥ 0, up to which a point counts as open, [force / length²].
+        critical: Contact pressure, ≥ 0, up to which a point counts as open, [force / length²]; or
+            ``"pressure"``, that of the fluid, also where load steps change it. Where there is fluid already
+            it is what the contact presses in addition to the fluid: a front that moved on moves back late.
+        name: What load steps call it, see `LoadStep`; all of its inlets have one pressure.
 
     Raises:
         InvalidInputError: If a pressure is negative or not finite.
@@ -38,17 +42,25 @@ class FluidPressure:
 
     pressure: float
     enters: str | OfPosition
-    critical: float = 0.0
+    critical: float | Literal["pressure"] = 0.0
+    name: str = "fluid"
 
     def __post_init__(self) -> None:
         """Reject negative pressures."""
         for name in ("pressure", "critical"):
             given = getattr(self, name)
+            if given == "pressure":
+                continue
             if not (np.isfinite(given) and given >= 0):
                 raise InvalidInputError(
                     f"FluidPressure.{name} must be zero or positive and finite, got {given!r}: suction does "
                     "not enter a contact"
                 )
+
+    @property
+    def opens_at(self) -> float:
+        """The contact pressure up to which a point counts as open, [force / length²]."""
+        return self.pressure if isinstance(self.critical, str) else self.critical
 
     def inlet(self, points: np.ndarray, shared: np.ndarray) -> np.ndarray:
         """Return which slave nodes are at the inlet, shape (n,).

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -425,3 +425,40 @@ def pair_number(contacts: Sequence[ContactPair], which: int | str) -> int:
             f"{which!r}: the scene has {', '.join(repr(pair.place) for pair in contacts) or 'no pair'}"
         )
     return int(which)
+
+
+def pressures_of(pairs: Iterable[ContactPair]) -> dict[str, float]:
+    """Return the pressure of each fluid by its name, [force / length²].
+
+    Raises:
+        InvalidInputError: If a fluid has two.
+    """
+    found: dict[str, float] = {}
+    for fluid in (pair.fluid for pair in pairs):
+        if fluid is not None and found.setdefault(fluid.name, fluid.pressure) != fluid.pressure:
+            raise InvalidInputError(
+                f"the fluid {fluid.name!r} must have one pressure at all of its inlets, got "
+                f"{found[fluid.name]:g} and {fluid.pressure:g}: give different fluids different names"
+            )
+    return found
+
+
+def with_pressures(pairs: Iterable[ContactPair], given: Mapping[str, float]) -> tuple[ContactPair, ...]:
+    """Return the pairs with other pressures of some fluids, by name; others keep theirs.
+
+    Raises:
+        InvalidInputError: If there is no such fluid, or a pressure is negative.
+    """
+    pairs = tuple(pairs)
+    known = pressures_of(pairs)
+    if unknown := given.keys() - known.keys():
+        raise InvalidInputError(
+            "the fluids of a load step must be some of the scene's contact pairs, which have "
+            f"{', '.join(known) or 'none'}, got {min(unknown)!r}: give a pair this fluid, or correct the name"
+        )
+    return tuple(
+        pair
+        if pair.fluid is None or pair.fluid.name not in given
+        else replace(pair, fluid=replace(pair.fluid, pressure=given[pair.fluid.name]))
+        for pair in pairs
+    )

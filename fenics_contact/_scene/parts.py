@@ -24,7 +24,7 @@ from fenics_contact._scene.loads import (
 )
 from fenics_contact._scene.local_axes import HeldDirections, LocalAxes, held_along, same_axes
 from fenics_contact._scene.obstacles import RigidObstacle
-from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface
+from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface, pressures_of
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.rollers import direction_of, flat_normal, held_directions, widest_angle
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
@@ -101,7 +101,7 @@ class SceneParts:
             if isinstance(pair, ContactPair) and pair.fluid is not None:
                 self._require_inlet(pair)
             if isinstance(pair, ContactPair) and pair.slip_table is not None:
-                self._require_slip_alone(pair)
+                self._require_linear_slip(pair)
             if isinstance(pair, ContactPair) and pair.stick_stiffness is not None and self.deforms_much:
                 raise InvalidInputError(
                     f"the stick stiffness of {pair.place} needs small displacements, but some body deforms "
@@ -116,6 +116,7 @@ class SceneParts:
                 self._require_dimension(pair.master)
         _require_different(self.contacts)
         _require_different(self.ties)
+        pressures_of(self.contacts)
 
     @property
     def deforms_much(self) -> bool:
@@ -254,13 +255,12 @@ class SceneParts:
                 "a RigidSphere for a round bar"
             )
 
-    def _require_slip_alone(self, pair: ContactPair) -> None:
-        """Reject friction by slip with nonlinear materials or with fluid in a contact."""
-        nonlinear = any(is_nonlinear(m) for body in self.bodies.values() for m in body.materials)
-        if nonlinear or any(each.fluid is not None for each in self.contacts):
+    def _require_linear_slip(self, pair: ContactPair) -> None:
+        """Reject friction by slip between nonlinear materials."""
+        if any(is_nonlinear(m) for body in self.bodies.values() for m in body.materials):
             raise InvalidInputError(
-                f"the SlipTable of {pair.place} needs linear materials and no fluid in contacts: give the "
-                "coefficient of each load step as a number or a function of the place"
+                f"the SlipTable of {pair.place} needs linear materials in all bodies: give the coefficient "
+                "of each load step as a number or a function of the place"
             )
 
     def _require_inlet(self, pair: ContactPair) -> None:

@@ -12,6 +12,7 @@ from fenics_contact._base.checks import checked
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.automatic import AutomaticContact
 from fenics_contact._scene.loads import Load
+from fenics_contact._scene.pairs import with_pressures
 from fenics_contact._scene.parts import SceneParts, with_discretisation
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.sections import changed_by, require_preloads, with_cuts
@@ -173,6 +174,8 @@ class LoadStep:
             and materials that creep; None: the number of the step, from 1.
         preloads: The bolts that are drawn together in the step, by a force or a length; all others of the
             scene are held at the length that they have at its start. An empty list holds all.
+        fluids: Pressures of fluids at the end of the step by their names, see `FluidPressure`, [force /
+            length²]; others keep theirs. None: all do.
 
     Raises:
         InvalidInputError: If there are functions of time, and no time, or it is not finite.
@@ -188,6 +191,7 @@ class LoadStep:
     supports: Sequence[AnySupport] | SupportsInTime | None = None
     time: float | None = None
     preloads: Sequence[Preload] | None = None
+    fluids: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
         """Raise if loads are functions of time and no finite time is given."""
@@ -206,7 +210,8 @@ class LoadStep:
         """Return the scene at the end of the step.
 
         Raises:
-            InvalidInputError: If a function of time returns no loads or supports.
+            InvalidInputError: If a function of time returns no loads or supports, or the scene has no such
+                preload or fluid.
             UserCodeError: If it raises.
         """
         loads = scene.loads if self.loads is None else self.loads
@@ -214,6 +219,8 @@ class LoadStep:
         end = 0.0 if self.time is None else self.time
         if self.preloads is not None:
             scene = replace(scene, preloads=changed_by(scene, self.preloads))
+        if self.fluids is not None:
+            scene = replace(scene, contacts=with_pressures(scene.contacts, self.fluids))
         return self._with(scene, loads, supports, end)
 
     def at(self, scene: Scene, time: float) -> Scene:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt
+from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from fenics_contact._equilibrium.problem import default_solver
 from fenics_contact._scene.body import Body
@@ -216,6 +216,9 @@ class StepPart(Part):
         description="name of a preload -> its force or shortening, all others are held at their lengths; {} "
         "holds all; not given, all stay as they were",
     )
+    fluids: dict[str, NonNegativeFloat] = Field(
+        {}, description="name of a fluid in contacts -> its pressure at the end, [force/length²]"
+    )
 
     def drawn(self, preloads: Sequence[PreloadPart]) -> tuple[Preload, ...] | None:
         """Return the preloads that the step draws together, None where all stay as they were."""
@@ -233,6 +236,7 @@ def load_steps(
     supports: Sequence[AnySupportPart],
     loads: Sequence[AnyLoad],
     preloads: Sequence[PreloadPart],
+    fluids: Mapping[str, float],
     bodies: Mapping[str, Body],
     at: Callable[..., AbstractContextManager[None]],
 ) -> tuple[LoadStep, ...]:
@@ -241,7 +245,7 @@ def load_steps(
     A support or load that a step does not name keeps its value; a named one changes linearly from the value
     before, initially its own, to the one given. A formula that depends on t is evaluated at the end of each
     load step instead, also in later steps and where it is the initial value; t starts at zero. Preloads have
-    their aims in all of the step's parts.
+    their aims in all of the step's parts; pressures of fluids change linearly.
     """
     with at("steps"):
         _require_few(steps)
@@ -250,6 +254,7 @@ def load_steps(
     own = [(0.0,) * dim if part.size is None else part.size for part in supports]
     held = _Values([part.name for part in supports], own)
     acting = _Values([part.name for part in loads], [part.size for part in loads])
+    wetting = dict(fluids)
     built: list[LoadStep] = []
     begin = 0.0
     for position, step in enumerate(steps):
@@ -263,11 +268,16 @@ def load_steps(
                 acts, holds = (
                     each if in_parts and each.varies else each.at(time, share) for each in (acted, held_up)
                 )
-                built.append(LoadStep(name, acts, holds, time, step.drawn(preloads)))
+                pressures = {
+                    each: wetting[each] + share * (end - wetting[each]) for each, end in step.fluids.items()
+                }
+                drawn = step.drawn(preloads)
+                built.append(LoadStep(name, acts, holds, time, drawn, pressures or None))
             for part in (*acted.at(time, 1.0), *held_up.at(time, 1.0)):
                 check_formulas(part, bodies)
         held.reach(step.supports)
         acting.reach(step.loads)
+        wetting.update(step.fluids)
         begin += duration
     return tuple(built)
 

@@ -23,6 +23,7 @@ from fenics_contact._optimize.progress import Callback
 from fenics_contact._optimize.result import Result
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.fields import read_field
+from fenics_contact._scene.pairs import pressures_of
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.supports import ToolMotion
 from fenics_contact._scene_file.bodies import Shaped
@@ -426,7 +427,8 @@ class SceneFile:
         """All load steps; empty where everything acts at once. Collective on first use."""
         document, bodies = self._complete, self.scene.bodies
         parts = document.supports, document.loads, document.preloads
-        return load_steps(document.steps, *parts, bodies, self._at)
+        fluids = pressures_of(self.scene.contacts)
+        return load_steps(document.steps, *parts, fluids, bodies, self._at)
 
     @cached_property
     def partitions(self) -> dict[str, np.ndarray]:

@@ -43,6 +43,7 @@ def wrong_names(source: Source, document: Document) -> list[Mistake]:
         "the name of a support": _names(document.supports),
         "the name of a load": _names(document.loads),
         "the name of a preload": _names(document.preloads),
+        "the name of a fluid": _names(part.fluid for part in document.contacts if part.fluid),
     }
     used = _references(document)
     wrong = [
@@ -71,7 +72,10 @@ def _references(document: Document) -> Iterator[tuple[Path, str, str]]:
     for name in cuts if isinstance(cuts, Mapping) else ():
         yield ("solver", "subdomains", name), name, "a body"
     for number, step in enumerate(document.steps):
-        changed = {"supports": step.supports, "loads": step.loads, "preloads": step.preloads or ()}
+        changed: dict[str, Iterable[str]] = {
+            "supports": step.supports, "loads": step.loads, "preloads": step.preloads or (),
+            "fluids": step.fluids,
+        }  # fmt: skip
         for key, named in changed.items():
             for name in named:
                 yield ("steps", number, key, name), name, f"the name of a {key[:-1]}"

@@ -541,9 +541,14 @@ def build_torn_system(
 
 
 def _meets_alike(scene: Scene, other: Scene) -> bool:
-    """Return whether two scenes have the same meshes and the same pairs of surfaces."""
+    """Return whether two scenes have the same meshes and pairs of surfaces, whatever fluid is in them."""
     pairs = [
-        [*each.contacts, *each.ties, *each.springs, *(p.key for p in each.preloads)]
+        [
+            *(c if c.fluid is None else replace(c, fluid=None) for c in each.contacts),
+            *each.ties,
+            *each.springs,
+            *(p.key for p in each.preloads),
+        ]
         for each in (scene, other)
     ]
     return scene.has_meshes_of(other) and pairs[0] == pairs[1]

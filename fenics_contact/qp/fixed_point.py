@@ -5,7 +5,6 @@ Coulomb friction as a fixed point of Tresca problems: the slip bound follows the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,7 +14,7 @@ from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp.cones import TrescaLaw
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_sum
-from fenics_contact.qp.solution import DualSolution, SolverStep, Start, measure
+from fenics_contact.qp.solution import DualSolution, SolverStep, Start, continued, measure
 from fenics_contact.qp.solve import DualSolver, find_equilibrium, solve
 
 
@@ -160,13 +159,13 @@ class FixedPoint:
             try:
                 solution = solve(problem, slip_bound, self._inner(sequence.fraction * reached), earlier)
             except ConvergenceError as failure:
-                steps = _continued(history, failure.history, products)
+                steps = continued(history, failure.history, products)
                 raise ConvergenceError(
                     f"the Coulomb fixed point needs residuals below {self.tolerance:.1e}, but its Tresca "
                     f"problem {number} failed: {failure}",
                     steps,
                 ) from failure
-            history = _continued(history, solution.history, products)
+            history = continued(history, solution.history, products)
             products += solution.products
             solution = _under_own_bound(problem, solution)
             reached = solution.natural_residual
@@ -221,13 +220,3 @@ def _under_own_bound(problem: DualProblem, solution: DualSolution) -> DualSoluti
     """Return a Tresca solution with slip bound and residuals of its own normal forces. Collective."""
     residuals = measure(problem, solution.multiplier, solution.product, solution.residual)
     return replace(solution, slip_bound=problem.law.bound(solution.multiplier), residuals=residuals)
-
-
-def _continued(history: Sequence[SolverStep], steps: Sequence[SolverStep], products: int) -> list[SolverStep]:
-    """Append the steps of another Tresca problem, continuing the count of steps and products."""
-    outer = history[-1].outer + 1 if history else 0
-    counted = (
-        replace(step, iteration=number, products=products + step.products, outer=outer)
-        for number, step in enumerate(steps, len(history))
-    )
-    return [*history, *counted]

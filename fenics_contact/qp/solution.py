@@ -208,6 +208,16 @@ class SolverStep:
         )
 
 
+def continued(history: Sequence[SolverStep], steps: Sequence[SolverStep], products: int) -> list[SolverStep]:
+    """Append the steps of a further solve, continuing the counts of steps, of products and of solves."""
+    outer = history[-1].outer + 1 if history else 0
+    counted = (
+        replace(step, iteration=number, products=products + step.products, outer=outer + step.outer)
+        for number, step in enumerate(steps, len(history))
+    )
+    return [*history, *counted]
+
+
 @dataclass(frozen=True)
 class SmalseMemory:
     """Estimates of SMALSE that it can reuse for a neighbouring problem.

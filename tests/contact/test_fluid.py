@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scipy.spatial import cKDTree
 
 from fenics_contact import (
     Body,
@@ -16,13 +17,17 @@ from fenics_contact import (
     Coulomb,
     FluidPressure,
     LinearState,
+    LoadStep,
+    RigidSphere,
     RigidTool,
     ShapeProblem,
+    SlipTable,
     Status,
     Support,
     SurfaceDesign,
     ToolMotion,
     solve_scene,
+    solve_steps,
 )
 from fenics_contact._equilibrium import penetration
 from fenics_contact._equilibrium.steps import stored_state
@@ -31,6 +36,8 @@ from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.materials import NeoHooke
 from tests.contact.fluid_case import FLUID, both_ends, seal
 from tests.contact.law_cases import FLOOR, solved
+
+SPHERE = RigidSphere((2.0, 0.5, -3.0), 3.0)
 
 
 def test_a_seal_in_fluid_is_the_dry_one_in_uniform_pressure() -> None:
@@ -93,6 +100,38 @@ def test_load_steps_go_on_from_the_front_that_there_was() -> None:
     assert again.solution.products < 0.5 * first.solution.products
 
 
+def test_load_steps_change_the_pressure_and_the_front_follows_forth_and_back() -> None:
+    fluid, pressures = FluidPressure(0.0, "x0", critical="pressure"), (1.5, 2.5, 1.0)
+    problem = ContactProblem(seal(fluid, extra=1.0), MPI.COMM_SELF, tolerance=1e-9)
+    steps = [LoadStep(f"{p}", fluids={"fluid": p}) for p in pressures]
+    states = solve_steps(problem, steps)
+    counts = [np.count_nonzero(state.contact.wet) for state in states]
+    assert counts[2] < counts[0] < counts[1]
+    for pressure, state in zip(pressures, states, strict=True):
+        alone = solved(seal(FluidPressure(pressure, "x0", critical=pressure), extra=1.0)).contact
+        np.testing.assert_array_equal(state.contact.wet, alone.wet)
+        np.testing.assert_allclose(state.contact.normal_force, alone.normal_force, atol=1e-8)
+    assert states[0].torn.B is states[2].torn.B, "contact is not searched again"
+
+
+def test_fluid_and_friction_by_slip_agree_with_the_friction_of_each_place() -> None:
+    table = SlipTable((0.0, 0.004), (0.4, 0.2))
+    state = solved(seal(FluidPressure(1.5, "x0"), 1.0, 0.3, friction=Coulomb(table)))
+    contact = state.contact
+    coefficient = table.at(np.linalg.norm(contact.total_slip, axis=1))
+    np.testing.assert_allclose(contact.slip_bound, coefficient * contact.normal_force, atol=1e-8)
+    assert np.ptp(coefficient) > 0.02
+    nodes = cKDTree(state.scene.points[contact.points.slave])
+    by_place = Coulomb(lambda x: coefficient[nodes.query(x)[1]])
+    given = solved(seal(FluidPressure(1.5, "x0"), 1.0, 0.3, friction=by_place)).contact
+    np.testing.assert_array_equal(contact.wet, given.wet)
+    np.testing.assert_allclose(contact.force, given.force, atol=1e-6)
+    assert np.count_nonzero(contact.wet) > 9
+    notes = [step.note for step in state.solution.history if "slip pass" in step.note]
+    assert sum("fluid pass 1: 14 points wet" in note for note in notes) == len(notes) - 1
+    assert [step.iteration for step in state.solution.history] == [*range(state.solution.iterations)]
+
+
 def test_fluid_presses_a_tool_that_a_force_drives() -> None:
     # The tool lies below the seal, whose upper side is held: both fluid and contact balance the force.
     scene, force = seal(FluidPressure(2.0, "x0"), extra=0.0), 12.0
@@ -122,10 +161,13 @@ def test_a_stored_state_keeps_its_fluid() -> None:
 
 ON_RANKS = """
 from mpi4py import MPI
-from fenics_contact import FluidPressure, solve_scene
+from fenics_contact import ContactProblem, Coulomb, FluidPressure, LoadStep, SlipTable, solve_steps
 from tests.contact.fluid_case import seal
 
-state = solve_scene(seal(FluidPressure(2.0, "x0"), extra=0.5), MPI.COMM_WORLD, tolerance=1e-9)
+friction = Coulomb(SlipTable((0.0, 0.004), (0.4, 0.2)))
+scene = seal(FluidPressure(1.0, "x0"), extra=0.5, friction=friction)
+problem = ContactProblem(scene, MPI.COMM_WORLD, tolerance=1e-8)
+state = solve_steps(problem, [LoadStep("low"), LoadStep("high", fluids={"fluid": 2.0})])[-1]
 if MPI.COMM_WORLD.rank == 0:
     print(*state.contact.wet.astype(int), *state.contact.normal_force)
 """
@@ -158,6 +200,16 @@ def test_bad_fluids_are_refused() -> None:
         InvalidInputError, match=r"FluidPressure.pressure must be zero or positive and finite, got -1"
     ):
         FluidPressure(-1.0, "x0")
+    with pytest.raises(InvalidInputError, match=r"FluidPressure.pressure must be zero or positive"):
+        LoadStep("leak", fluids={"fluid": -1.0}).applied_to(seal(FluidPressure(1.0, "x0")))
+    with pytest.raises(InvalidInputError, match=r"contact pairs, which have fluid, got 'oil': give a pair"):
+        LoadStep("leak", fluids={"oil": 1.0}).applied_to(seal(FluidPressure(1.0, "x0")))
+    with pytest.raises(InvalidInputError, match=r"which have none, got 'fluid'"):
+        LoadStep("leak", fluids={"fluid": 1.0}).applied_to(seal(None))
+    two = seal(FluidPressure(1.0, "x0"))
+    other = replace(two.contacts[0], master=SPHERE, fluid=FluidPressure(2.0, "x0"))
+    with pytest.raises(InvalidInputError, match=r"'fluid' must have one pressure .*, got 1 and 2: give"):
+        replace(two, contacts=[*two.contacts, other])
     with pytest.raises(InvalidInputError, match=r"FluidPressure.enters.*'side'"):
         seal(FluidPressure(1.0, "side"))
     with pytest.raises(InvalidInputError, match="got none of its nodes: give a surface of the slave's body"):

@@ -284,6 +284,13 @@ def test_laws_of_surfaces_are_those_of_the_package() -> None:
     fluid = {"pressure": 2, "enters": "x0", "critical": 1}
     (wet,) = file_of(contacts=[{"slave": slave, "master": FLOOR, "fluid": fluid}]).scene.contacts
     assert wet.fluid == FluidPressure(2.0, "x0", 1.0)
+    named = {"pressure": 2, "enters": "x0", "critical": "pressure", "name": "oil"}
+    ramp = {"name": "leak", "count": 4, "fluids": {"oil": 3}}
+    file = file_of(contacts=[{"slave": slave, "master": FLOOR, "fluid": named}], steps=[ramp, ramp])
+    assert [step.fluids["oil"] for step in file.steps] == [2.25, 2.5, 2.75, 3.0, *[3.0] * 4]  # type: ignore[index]
+    water = {**ramp, "fluids": {"water": 3}}
+    with pytest.raises(SceneFileError, match=r"steps\.0\.fluids\.water must be the name of a fluid, .*oil"):
+        _ = file_of(contacts=[{"slave": slave, "master": FLOOR, "fluid": named}], steps=[water])
     falling = {"law": "table", "closures": [0, 0.1, 0.2], "pressures": [0, 3, 2]}
     with pytest.raises(SceneFileError, match=r"contacts\.0: .* must rise with the closures"):
         _ = file_of(contacts=[{"slave": slave, "master": FLOOR, "closure": falling}]).scene
