@@ -245,7 +245,7 @@ def _of_moved(
     contact: ContactResult, now: ContactConfiguration, start: MaterialPoints, before: State | None
 ) -> ContactResult:
     """Return the contact of moved bodies with its areas, the slip of its load step and of all before."""
-    slip, points = now.slip(start), now.points
+    slip, points = now.slip(start) - now.elastic_slip(contact.friction_force), now.points
     assert points is not None
     slipped = np.zeros_like(slip)
     if isinstance(before, DeformedState) and (old := before.equilibrium.evaluation.contact.points):

@@ -298,7 +298,7 @@ class AutomaticSteps:
         at = start if start.contact else start.on(equations.contact.at(first, start.displacement, None))
         assert at.contact is not None
         way = _Way(self, equations, first, target, at.contact, timer)
-        now = Progress(at, first.torn, known, (at, first.torn), at.contact.material_points)
+        now = Progress(at, first.torn, known, (at, first.torn), at.contact.start)
         part, longest = self.first, equations.contact.longest_part(first, target)
         smallest = max(self.smallest, self.smallest_before_snap) if self.snaps else self.smallest
         while now.reached < 1.0:

@@ -293,14 +293,21 @@ class ContactConfiguration:
     start: MaterialPoints | None
     prescribed: np.ndarray
 
-    @property
-    def material_points(self) -> MaterialPoints | None:
-        """The points in material coordinates of the master; None for those of the undeformed bodies."""
-        return None if self.points is None else self.points.material_points()
+    def from_here(self, multiplier: Vector) -> ContactConfiguration:
+        """Return the same points with slip that begins here, without what springs back. Collective."""
+        if self.points is None:
+            return self
+        elastic = None
+        if self.torn.elastic_slip is not None:
+            elastic = self.elastic_slip(self.at_points(multiplier)[1])
+        return replace(self, start=self.points.material_points(elastic))
 
-    def from_here(self) -> ContactConfiguration:
-        """Return the same points with slip that begins here."""
-        return replace(self, start=self.material_points)
+    def elastic_slip(self, friction: np.ndarray) -> np.ndarray:
+        """Return D τ of friction forces, both of shape (n, dim − 1), [length]."""
+        by_force, torn = np.zeros(len(friction)), self.torn
+        if torn.elastic_slip is not None:
+            by_force[torn.frictional] = torn.elastic_slip
+        return np.asarray(by_force[:, None] * friction)
 
     def constraint_residual(self, displacement: Vector) -> Vector:
         """Return c − B u of contact, friction and gluing rows, owned, [length]. Collective.
@@ -342,7 +349,8 @@ class ContactConfiguration:
             return TurningForces.of(None, further) if further else None
         normal, friction = self.at_points(multiplier)
         points, slave, normal = self.points, self.points.points.slave, np.maximum(normal, 0.0)
-        stiffness, apart = points.stiffness(normal), self.torn.closures is not None
+        stiffness, torn = points.stiffness(normal), self.torn
+        apart = torn.closures is not None or torn.elastic_slip is not None
         means = points.mean_tangents(normal, friction, self.start, apart=apart)
         further += [
             UnevenStiffness(each.left, each.right, slave[each.point])

@@ -87,7 +87,7 @@ class NonlinearEquilibrium:
     def configuration(self) -> Configuration:
         """The configuration, with histories up to date: the next load step begins here."""
         found = self.evaluation
-        at = replace(found.at, history=found.history, contact=found.contact.from_here())
+        at = replace(found.at, history=found.history, contact=found.contact.from_here(found.at.multiplier))
         return replace(at, time=self.time, largest=found.residuals.gluing_scale)
 
     def continued(self, origin: Configuration) -> Configuration:

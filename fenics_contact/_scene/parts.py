@@ -102,11 +102,6 @@ class SceneParts:
                 self._require_inlet(pair)
             if isinstance(pair, ContactPair) and pair.slip_table is not None:
                 self._require_linear_slip(pair)
-            if isinstance(pair, ContactPair) and pair.stick_stiffness is not None and self.deforms_much:
-                raise InvalidInputError(
-                    f"the stick stiffness of {pair.place} needs small displacements, but some body deforms "
-                    "much: leave it out, or give all bodies materials for small strains"
-                )
             if isinstance(pair.master, Surface):
                 self._require(pair.master.body, pair.master.name, f"{kind}.master")
                 if isinstance(pair, CyclicSymmetry):

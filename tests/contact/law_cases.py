@@ -27,8 +27,9 @@ from fenics_contact import (
     box_partition,
     solve_scene,
 )
+from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.gallery import block
-from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.materials import IsotropicElasticity, Material
 
 FLOOR = RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 MODULUS, HEIGHT, AREA = 1000.0, 1.0, 2.0
@@ -104,6 +105,21 @@ def tilted_block(closure: ClosureLaw | None, friction: Coulomb | None) -> Scene:
 
     return Scene(
         {"block": Body(mesh, IsotropicElasticity(MODULUS, 0.3))}, [], [Traction("block", "z1", load)], [pair]
+    )
+
+
+def pressed_and_sheared(
+    material: Material, discretisation: Discretisation, size: float, cells: int = 2
+) -> Scene:
+    """A block on a wider one, its top moved down and aside; nothing slips."""
+    bodies = {
+        "low": Body(block((-1.0, -1.0, -1.0), (2.0, 2.0, 0.0), (3, 3, 1)), material),
+        "high": Body(block((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (cells, 1, 1)), material),
+    }
+    surfaces = Surface("high", "z0"), Surface("low", "z1")
+    pair = ContactPair(*surfaces, Coulomb(0.5, stick_stiffness=20.0), discretisation)
+    return Scene(
+        bodies, [Support("low", "z0"), Support("high", "z1", (0.4 * size, 0, -size))], contacts=[pair]
     )
 
 

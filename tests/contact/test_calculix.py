@@ -34,7 +34,7 @@ from fenics_contact import (
     solve_steps,
 )
 from fenics_contact.gallery import block
-from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.materials import IsotropicElasticity, Material, StVenantKirchhoff
 
 STEEL = IsotropicElasticity(210000.0, 0.3)
 SHARE = 0.03 / 0.04
@@ -117,10 +117,11 @@ HYSTERESIS = (
 )  # fmt: skip
 
 
-def test_elastic_slip_and_hysteresis_of_fricloop() -> None:
+@pytest.mark.parametrize("material", [STEEL, StVenantKirchhoff(210000.0, 0.3)])
+def test_elastic_slip_and_hysteresis_of_fricloop(material: Material) -> None:
     bodies = {
-        "lower": Body(block((0, 0, 0), (1, 1, 1), (1, 1, 1)), STEEL),
-        "upper": Body(small_cube(1.0), STEEL),
+        "lower": Body(block((0, 0, 0), (1, 1, 1), (1, 1, 1)), material),
+        "upper": Body(small_cube(1.0), material),
     }
     held = [  # a pressure of 100: faces are flat there, too
         Support("lower", "z0"),

@@ -290,6 +290,7 @@ def test_what_has_no_derivative_is_named() -> None:
     [
         ("disc", ClosureTable((-0.02, 0.03, 0.06), (0.0, 0.1, 0.4)), Coulomb(0.2)),
         ("block", LinearClosure(3.0), Coulomb(0.3, shear_limit=0.04)),
+        ("block", LinearClosure(3.0), Coulomb(0.3, stick_stiffness=2.0)),
     ],
 )
 def test_blocks_whose_surfaces_give_way(master: str, law: ClosureLaw, friction: Coulomb) -> None:

@@ -162,13 +162,12 @@ class SlidingPoints:
         """
         met = abs(self.points.master).tocsr()
         count, dim = self.points.normal.shape
-        row = np.repeat(np.arange(count), np.diff(met.indptr))
+        row, of_rows = _entries_by_row(met)
         size = np.maximum(np.asarray(met.sum(axis=1)), np.finfo(float).tiny)
         now, then = (
             places[met.indices] - (met @ places / size)[row]
             for places in (self.coordinates, other.coordinates)
         )
-        of_rows = sp.csr_matrix((met.data, np.arange(len(row)), met.indptr), shape=(count, len(row)))
         products = (now[:, :, None] * then[:, None, :]).reshape(len(row), dim * dim)
         moment = np.asarray(of_rows @ products).reshape(count, dim, dim)
         normals = self.points.normal[:, :, None] * self.carry(other.points.normal, other)[:, None]
@@ -209,17 +208,40 @@ class SlidingPoints:
         """Return the derivative of the friction forces by the coordinates, see `friction_stiffness`."""
         return friction_stiffness(self.points, self.differential, friction)
 
-    def material_points(self) -> MaterialPoints:
-        """Return where the nodes stand on their masters, for the slip from now on."""
-        points = self.points
+    def material_points(self, elastic: np.ndarray | None = None) -> MaterialPoints:
+        """Return where the nodes stand on their masters, for the slip from now on.
+
+        With an elastic slip, in the points' tangents, shape (n, dim − 1), [length], it is where springs
+        between nodes and masters are at rest: what is carried along and turns with the masters.
+        """
+        points, weights = self.points, self.points.master
         foot = self.coordinates[points.slave] - points.distance[:, None] * points.normal
+        if elastic is not None:
+            way = np.einsum("na,nad->nd", elastic, points.tangents)
+            foot, weights = foot - way, weights - self._moving_by(way)
         foot[np.diff(points.master.indptr) > 0] = 0.0
         for index, placement in enumerate(self.placements):
             if placement is not None:
                 rotation, translation = placement
                 mine = points.pair == index
                 foot[mine] = (foot[mine] - translation) @ rotation
-        return MaterialPoints(self.key, points.pair, points.master, foot)
+        return MaterialPoints(self.key, points.pair, weights, foot)
+
+    def _moving_by(self, way: np.ndarray, flat: float = 1e-6) -> sp.csr_matrix:
+        """Return weights of masters' nodes whose sums are zero, and Σ W_j x_j a way along their surface.
+
+        They change linearly across the nodes around a point. `way`: shape (n, dim); `flat`: thickness of a
+        flat surface.
+        """
+        met = sum((abs(slopes) for slopes in self.differential.slopes), abs(self.points.master)).tocsr()
+        row, of_rows = _entries_by_row(met)
+        centre = met @ self.coordinates / np.maximum(np.asarray(met.sum(axis=1)), np.finfo(float).tiny)
+        arm = self.coordinates[met.indices] - centre[row]
+        (count, dim), products = way.shape, arm[:, :, None] * arm[:, None]
+        moment = np.asarray(of_rows @ products.reshape(len(row), dim * dim)).reshape(count, dim, dim)
+        slope = np.einsum("nde,ne->nd", np.linalg.pinv(moment, rcond=flat, hermitian=True), way)
+        values = met.data * np.einsum("jd,jd->j", arm, slope[row])
+        return sp.csr_matrix((values, met.indices, met.indptr), shape=met.shape)
 
     def stored(self, start: MaterialPoints) -> dict[str, np.ndarray]:
         """Return the arrays from which `SlidingContact.found_again` finds the same points."""
@@ -373,3 +395,10 @@ class SlidingPoints:
             for index, means in enumerate(self.means)
             if means is not None
         ]
+
+
+def _entries_by_row(matrix: sp.csr_matrix) -> tuple[np.ndarray, sp.csr_matrix]:
+    """Return the row of each entry, and the matrix that sums values of entries by row, weighted by them."""
+    row = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+    each = np.arange(len(row))
+    return row, sp.csr_matrix((matrix.data, each, matrix.indptr), shape=(matrix.shape[0], len(row)))
