@@ -136,8 +136,11 @@ def meetings_of(
             mine = [points.pair[lost] == index for index in range(len(meetings))]
             nodes = [(points.slave[lost[own]], points.slave[kept[own]]) for own in mine]
             meetings = tuple(
-                _joined_around(met, *nodes[index], (index, len(meetings)))
-                for index, met in enumerate(meetings)
+                _joined_to(met, *nodes[index], (index, len(meetings))) for index, met in enumerate(meetings)
+            )
+        if scene.preloads:
+            meetings = tuple(
+                _once_at_sections(scene, met, (index, len(meetings))) for index, met in enumerate(meetings)
             )
         return meetings
 
@@ -159,10 +162,27 @@ def _require_inside(scene: Scene) -> None:
                     )
 
 
-def _joined_around(
-    meeting: Meeting, lost: np.ndarray, kept: np.ndarray, number: tuple[int, int]
+def _once_at_sections(
+    scene: Scene, meeting: Meeting, number: tuple[int, int], across: float = 0.1
 ) -> Meeting:
-    """Return a pair without nodes on the slave side of a sector; those on the other side have their areas."""
+    """Return a pair by nodes with one of two candidates on both sides of a section, see `once_at_sections`.
+
+    `across`: largest cosine between normals of contact and section with which they count as across.
+    """
+    pair, numbers = scene.contacts[number[0]], NodeNumbers.of(scene)
+    for preload in scene.preloads:
+        if pair.by_mortar or pair.slave.body != preload.body:
+            continue
+        mesh = scene.bodies[preload.body].mesh
+        behind, before = numbers.global_nodes(preload.body, preload.cut(mesh).pairs).T
+        along = np.abs(meeting.slave.normals[meeting.candidates] @ preload.normal(mesh)) < across
+        both = np.isin(behind, meeting.nodes[along]) & np.isin(before, meeting.nodes[along])
+        meeting = _joined_to(meeting, behind[both], before[both], number)
+    return meeting
+
+
+def _joined_to(meeting: Meeting, lost: np.ndarray, kept: np.ndarray, number: tuple[int, int]) -> Meeting:
+    """Return a pair without some of its nodes, whose areas others have."""
     there = np.flatnonzero(np.isin(meeting.nodes, lost))
     if not len(there):
         return meeting
@@ -172,6 +192,7 @@ def _joined_around(
     np.add.at(area, place, meeting.area[there])
     entries = meeting.nodes[there] + 1, (place, np.full(len(place), number[0]))
     taken = sp.csr_matrix(entries, shape=(len(area), number[1]))
+    taken = taken if meeting.taken is None else meeting.taken.maximum(taken)
     joined = replace(meeting, area=area, taken=taken)
     return joined.part(np.setdiff1d(np.arange(len(area)), there))
 
