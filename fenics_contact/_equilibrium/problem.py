@@ -142,11 +142,16 @@ class LinearEquilibria:
         if tolerance is None and (self._solver is not None or design):
             tolerance = solver.tolerance
         if any(pair.fluid is not None or pair.slip_table is not None for pair in scene.contacts):
-            if design:
+            if design and any(pair.slip_table is not None for pair in scene.contacts):
                 raise InvalidInputError(
-                    "derivatives by the shape are not available with fluid that enters a contact, nor with "
-                    "friction by slip: load the wetted surfaces by Pressure, or give a number or a function "
-                    "of the place"
+                    "derivatives by the shape are not available with friction by slip: give a coefficient as "
+                    "a number, a function of the place or a FrictionTable"
+                )
+            if design and torn.free.count:
+                raise InvalidInputError(
+                    "derivatives by the shape with fluid that enters a contact need rigid tools and surfaces "
+                    "whose whole motion is prescribed, and preloads by a shortening: prescribe the motion, "
+                    "or load the wetted surfaces by Pressure"
                 )
             return self._by_passes(torn, tolerance, solver, known or start, before)
         system = DualSystem(torn, self._timer, previous=reused)

@@ -275,7 +275,8 @@ def contact_by_shape(
     """Return the derivative by the geometry of the contact points, replicated, shape (n_nodes, dim).
 
     It is ∂/∂X of −λᵀ B w + (ζ − j)ᵀ(c − B u), with the objective's derivative j by B u − c, and the shares of
-    slip bounds and areas, by which the derivatives are given. Collective.
+    slip bounds and areas, by which the derivatives are given. Fluid acts as λ_N = p A does, where it is now.
+    Collective.
     """
     tearing, points = torn.decomposition.tearing, torn.points
     result = np.zeros((tearing.n_nodes, torn.components))
@@ -285,6 +286,10 @@ def contact_by_shape(
     by_area = bounds_by_area(torn, rows.normal[0], by_bound) + by_area
     with together(torn.decomposition.comm):
         np.add.at(result, points.slave, bounds_by_place(torn, rows.normal[0], by_bound))
+    if torn.fluid is not None:
+        pressure = torn.fluid.pressure
+        by_area = by_area + pressure * np.einsum("nd,nd->n", points.normal, rows.relative[0])
+        rows = replace(rows, normal=rows.normal + np.stack([pressure * points.area, 0.0 * pressure]))
     for index, pair in enumerate(torn.scene.contacts):
         mine = np.flatnonzero(points.pair == index)
         if pair.by_mortar:

@@ -179,9 +179,7 @@ class MeshMotion:
             tilted = cut[0][:, held.shape[1] :].any(axis=1)
             self._sliding = np.flatnonzero(tilted & ~given & ~held.all(axis=1))
             given[self._sliding] = True
-            self._following = [
-                _Component(space, matrix, given, ~(given | column)) for column in held.T
-            ]
+            self._following = [_Component(space, matrix, given, ~(given | column)) for column in held.T]
         matrix.destroy()
 
     def extend(self, displacement: np.ndarray) -> np.ndarray:

@@ -113,11 +113,19 @@ def _finite(value: float, *derivatives: np.ndarray) -> tuple[Any, ...]:
 
 @dataclass(frozen=True)
 class TotalPotential(Weighable):
-    """J = ½ uᵀK u − fᵀu, less the work of loads at the points of rigid surfaces, [force · length]."""
+    """J = ½ uᵀK u − fᵀu, less the work of loads at the points of rigid surfaces, [force · length].
+
+    Not with fluid in contacts.
+    """
 
     def value(self, state: State, forms: ShapeForms) -> float:
-        """Return the total potential energy; raises as `require_linear` does."""
+        """Return the total potential energy; raises as `require_linear` does, and with fluid."""
         require_linear(state, self)
+        if state.torn.fluid is not None:
+            raise InvalidInputError(
+                "TotalPotential needs a scene without fluid in contacts, whose front has no potential, got "
+                "one: use StrainEnergy, contact forces or stresses"
+            )
         return state.energies.total_potential
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:

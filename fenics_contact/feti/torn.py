@@ -173,10 +173,12 @@ class FluidLoad:
     Attributes:
         load: On this rank's torn dofs, shape (torn_size,), [force].
         wet: Contact points where it is, replicated, shape (n_contact,).
+        pressure: Its pressure at each of them, zero where it is not, shape (n_contact,), [force / length²].
     """
 
     load: np.ndarray
     wet: np.ndarray
+    pressure: np.ndarray
 
 
 @displayed
@@ -474,7 +476,7 @@ class TornSystem:
         if free.count:  # it presses tools that are free to move, too
             on_points = np.asarray(self.numbering.comm.allreduce(free.columns.T @ force))
             free = replace(free, load=free.load + on_points)
-        return replace(self, fluid=FluidLoad(-self.force(force), wet), free=free)
+        return replace(self, fluid=FluidLoad(-self.force(force), wet, pressure), free=free)
 
 
 def build_torn_system(

@@ -31,11 +31,13 @@ from fenics_contact import (
 )
 from fenics_contact._equilibrium import penetration
 from fenics_contact._equilibrium.steps import stored_state
-from fenics_contact.design import TotalPotential
+from fenics_contact.design import StrainEnergy, TotalPotential
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.materials import NeoHooke
 from tests.contact.fluid_case import FLUID, both_ends, seal
 from tests.contact.law_cases import FLOOR, solved
+from tests.shape import moved_blocks
+from tests.shape.quotients import check_adjoint
 
 SPHERE = RigidSphere((2.0, 0.5, -3.0), 3.0)
 
@@ -195,6 +197,16 @@ def test_a_front_that_moves_forth_and_back_is_an_error_with_its_history() -> Non
     assert len(error.value.history) >= 2
 
 
+@pytest.mark.parametrize("name", ["floor, fluid", "blocks, fluid"])
+def test_derivatives_by_the_shape_include_the_fluid(name: str) -> None:
+    way = moved_blocks.line(name)
+    assert way.is_smooth(), "the front stays where it is"
+    contact = way.state().contact
+    assert contact.wet is not None
+    assert 0 < np.count_nonzero(contact.wet) < contact.points.count
+    check_adjoint(way, StrainEnergy())
+
+
 def test_bad_fluids_are_refused() -> None:
     with pytest.raises(
         InvalidInputError, match=r"FluidPressure.pressure must be zero or positive and finite, got -1"
@@ -223,8 +235,24 @@ def test_bad_fluids_are_refused() -> None:
     problem = ShapeProblem(
         ContactProblem(scene, MPI.COMM_SELF), SurfaceDesign("seal", "z0", (3, 2)), TotalPotential()
     )
-    with pytest.raises(InvalidInputError, match="derivatives by the shape are not available with fluid"):
+    with pytest.raises(
+        InvalidInputError, match=r"TotalPotential needs a scene without fluid .* StrainEnergy"
+    ):
         problem.evaluate(np.zeros(problem.size))
+    tool = RigidTool("floor", FLOOR, at=(1.5, 0.5, 0.0))
+    driven = ToolMotion("floor", (0.0, 0.0, None), (0.0, 0.0, 0.0), force=(0.0, 0.0, 12.0))
+    held = [Support("seal", "z1"), driven]
+    pair = replace(scene.contacts[0], master=tool)
+    pushed = ContactProblem(replace(scene, supports=held, loads=[], contacts=[pair]), MPI.COMM_SELF)
+    moved = ShapeProblem(pushed, SurfaceDesign("seal", "z0", (3, 2)), StrainEnergy())
+    with pytest.raises(InvalidInputError, match="with fluid that enters a contact need rigid tools and"):
+        moved.evaluate(np.zeros(moved.size))
+    rubbed = seal(None, friction=Coulomb(SlipTable((0.0, 0.1), (0.3, 0.2))))
+    by_slip = ShapeProblem(
+        ContactProblem(rubbed, MPI.COMM_SELF), SurfaceDesign("seal", "z0", (3, 2)), StrainEnergy()
+    )
+    with pytest.raises(InvalidInputError, match="not available with friction by slip: give a coefficient"):
+        by_slip.evaluate(np.zeros(by_slip.size))
 
 
 def test_the_effects_name_the_fluid() -> None:

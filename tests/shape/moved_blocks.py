@@ -13,11 +13,13 @@ from fenics_contact import (
     ClosureTable,
     Coulomb,
     ExponentialClosure,
+    FluidPressure,
     FrictionTable,
     LinearClosure,
     Scene,
     Tresca,
 )
+from fenics_contact.design import StrainEnergy
 from tests.shape.blocks import block_on_block, block_on_floor, problem
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Line
@@ -28,6 +30,12 @@ PUSH, DRAG = (0.35, 0.1, -2.0), (0.6, 0.12, -2.0)
 def closing(scene: Scene, law: ClosureLaw) -> Scene:
     """Return the scene with surfaces that give way."""
     return replace(scene, contacts=[replace(pair, closure=law) for pair in scene.contacts])
+
+
+def wetted(scene: Scene, pressure: float) -> Scene:
+    """Return the scene with fluid that enters from the left."""
+    fluid = FluidPressure(pressure, "x0")
+    return replace(scene, contacts=[replace(pair, fluid=fluid) for pair in scene.contacts])
 
 
 SCENES: dict[str, Callable[[], Scene]] = {
@@ -53,11 +61,16 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "floor, table": lambda: block_on_floor(
         Coulomb(FrictionTable((0.5, 2.5, 4.0), (0.35, 0.25, 0.22))), load=PUSH
     ),
+    "floor, fluid": lambda: wetted(block_on_floor(Coulomb(0.3), load=PUSH), 0.6),
+    "blocks, fluid": lambda: wetted(block_on_block(Coulomb(0.38), "tetrahedron", load=DRAG), 0.3),
     "weight alone": lambda: block_on_block(Coulomb(0.25), load=(0.0, 0.0, 0.0)),
 }
 
 
 OBJECTIVES = {scene: objectives("block" if scene.startswith("floor") else "upper") for scene in SCENES}
+for name in OBJECTIVES:
+    if name.endswith("fluid"):  # which has no potential
+        OBJECTIVES[name]["energy"] = StrainEnergy()
 
 
 @cache
