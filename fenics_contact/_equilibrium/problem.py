@@ -142,10 +142,10 @@ class LinearEquilibria:
         if tolerance is None and (self._solver is not None or design):
             tolerance = solver.tolerance
         if any(pair.fluid is not None or pair.slip_table is not None for pair in scene.contacts):
-            if design and any(pair.slip_table is not None for pair in scene.contacts):
+            if design and before and any(pair.slip_table is not None for pair in scene.contacts):
                 raise InvalidInputError(
-                    "derivatives by the shape are not available with friction by slip: give a coefficient as "
-                    "a number, a function of the place or a FrictionTable"
+                    "derivatives by the shape with friction by slip need a single load step: give the "
+                    "coefficient as a number, a function of the place or a FrictionTable"
                 )
             if design and torn.free.count:
                 raise InvalidInputError(

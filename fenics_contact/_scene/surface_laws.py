@@ -167,6 +167,15 @@ class SlipTable:
         """
         return np.asarray(np.interp(slip, self.slip, self.coefficient))
 
+    def growth(self, slip: np.ndarray) -> np.ndarray:
+        """Return the derivative of `at`, at a corner of the table that beyond it, shape (n,), [1 / length].
+
+        Args:
+            slip: Lengths of slips, shape (n,), [length].
+        """
+        slopes = np.diff(self.coefficient) / np.diff(self.slip)
+        return np.asarray(np.pad(slopes, 1)[np.searchsorted(self.slip, slip, side="right")])
+
 
 def check_rising(curve: FrictionCurve, decades: int = 12) -> None:
     """Reject a curve that falls, or starts above zero; pressures of ``decades`` above and below one."""

@@ -422,7 +422,7 @@ class ShapeProblem(SingleProblem):
             linearised = linearise_face(state, self.choice)
             start = None if known is None else known.adjoint_multiplier
             accuracy = max(ADJOINT_SHARE * tolerance, ADJOINT_FLOOR)
-            adjoint, error = adjoint_of(state, partials, linearised, accuracy, start)
+            adjoint, error, partials = adjoint_of(state, partials, linearised, accuracy, start)
         with one_thread(self.comm), self._timer.phase("gradient"):
             by_points = by_nodes(state, adjoint, partials, linearised, self.geometry.forms)
             gradient = self.geometry.pull_back(by_points)

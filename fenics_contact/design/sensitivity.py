@@ -175,8 +175,10 @@ def adjoint_of(
     linearised: LinearisedFace,
     tolerance: float,
     start: np.ndarray | None = None,
-) -> tuple[Adjoint, StateError]:
+) -> tuple[Adjoint, StateError, Partials]:
     """Solve the adjoint of a state and weigh its residuals with it. Collective.
+
+    Returns both, and the derivatives of the objective, with those by slips that friction follows.
 
     `start`: multiplier of a neighbouring adjoint, owned, or None; not used for deformed states.
     """
@@ -184,11 +186,18 @@ def adjoint_of(
         adjoint = solve_deformed_adjoint(state, partials, linearised, tolerance=tolerance)
         unbalanced = -adjoint.displacement @ state.equilibrium.evaluation.unbalanced
         shares = np.array([state.torn.numbering.comm.allreduce(float(unbalanced))])
-        return adjoint, state_error(state, partials, linearised, adjoint, shares)
+        return adjoint, state_error(state, partials, linearised, adjoint, shares), partials
     linear = as_linear(state, "the adjoint and its error")
-    adjoint = solve_adjoint(linear, partials, linearised, tolerance=tolerance, start=start)
+    if all(pair.slip_table is None for pair in state.scene.contacts):
+        adjoint = solve_adjoint(linear, partials, linearised, tolerance=tolerance, start=start)
+    else:
+        from fenics_contact.design.slip_friction import solve_following_slip
+
+        adjoint, partials = solve_following_slip(
+            linear, partials, linearised, tolerance=tolerance, start=start
+        )
     shares = adjoint.motions * linear.dual.problem.coarse.residual(linear.solution.multiplier)
-    return adjoint, state_error(state, partials, linearised, adjoint, shares)
+    return adjoint, state_error(state, partials, linearised, adjoint, shares), partials
 
 
 def by_nodes(

@@ -247,12 +247,6 @@ def test_bad_fluids_are_refused() -> None:
     moved = ShapeProblem(pushed, SurfaceDesign("seal", "z0", (3, 2)), StrainEnergy())
     with pytest.raises(InvalidInputError, match="with fluid that enters a contact need rigid tools and"):
         moved.evaluate(np.zeros(moved.size))
-    rubbed = seal(None, friction=Coulomb(SlipTable((0.0, 0.1), (0.3, 0.2))))
-    by_slip = ShapeProblem(
-        ContactProblem(rubbed, MPI.COMM_SELF), SurfaceDesign("seal", "z0", (3, 2)), StrainEnergy()
-    )
-    with pytest.raises(InvalidInputError, match="not available with friction by slip: give a coefficient"):
-        by_slip.evaluate(np.zeros(by_slip.size))
 
 
 def test_the_effects_name_the_fluid() -> None:

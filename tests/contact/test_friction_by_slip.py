@@ -3,6 +3,7 @@ none."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -26,10 +27,14 @@ from fenics_contact import (
 )
 from fenics_contact._equilibrium import slip_dependence
 from fenics_contact._equilibrium.steps import stored_state
+from fenics_contact.design import LoadPath, slip_friction
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity, NeoHooke
 from tests.contact.law_cases import FLOOR, dragged_block, solved
+from tests.shape import moved_blocks
+from tests.shape.blocks import problem
+from tests.shape.quotients import check_adjoint
 
 TABLE = SlipTable(slip=(0.0, 0.1, 0.2), coefficient=(0.4, 0.2, 0.3))
 PRESSURE, AREA = 10.0, 2.0
@@ -105,6 +110,43 @@ def test_coefficients_that_do_not_agree_are_an_error_with_their_history() -> Non
     ) as error:
         slip_dependence.consistent(solve, state.torn, None, None, 1e-6)
     assert "slip pass 3" in error.value.history[-1].note or len(error.value.history) > 3
+
+
+@pytest.mark.parametrize("name", ["floor, friction by slip", "blocks, friction by slip"])
+def test_derivatives_by_the_shape_follow_the_slip(name: str) -> None:
+    check_adjoint(moved_blocks.line(name), moved_blocks.OBJECTIVES[name]["friction forces"])
+
+
+ON_RANKS = """
+import numpy as np
+from mpi4py import MPI
+from fenics_contact import ContactProblem, ShapeProblem
+from tests.shape.blocks import designs_of
+from tests.shape.moved_blocks import OBJECTIVES, SCENES
+
+scene = SCENES["floor, friction by slip"]()
+contact = ContactProblem(scene, MPI.COMM_WORLD, tolerance=1e-9)
+objective = OBJECTIVES["floor, friction by slip"]["friction forces"]
+value, gradient = ShapeProblem(contact, designs_of(scene), objective)(np.zeros(6))
+if MPI.COMM_WORLD.rank == 0:
+    print(value, *gradient)
+"""
+
+
+def test_derivatives_are_the_same_on_two_ranks(mpirun: Callable[..., str]) -> None:
+    one, two = (np.array(mpirun(ON_RANKS, ranks).split(), dtype=float) for ranks in (1, 2))
+    np.testing.assert_allclose(two, one, rtol=1e-5, atol=1e-6 * np.abs(one).max())
+
+
+def test_derivatives_of_several_load_steps_and_of_too_steep_friction_are_refused() -> None:
+    blocks = problem(moved_blocks.SCENES["floor, friction by slip"]())
+    path = LoadPath(blocks, [LoadStep("press"), LoadStep("again")])
+    with pytest.raises(InvalidInputError, match="with friction by slip need a single load step"):
+        path(np.zeros(path.size))
+    with pytest.raises(ConvergenceError, match="of friction by slip needs a relative residual below"):
+        slip_friction._smallest_residual(lambda y: np.roll(y, 1), np.eye(5)[0], 1e-9, 3)
+    turned = slip_friction._smallest_residual(lambda y: np.roll(y, 1), np.eye(5)[0], 1e-9, 5)
+    np.testing.assert_allclose(turned, np.eye(5)[4], atol=1e-12)
 
 
 def test_bad_tables_and_scenes_are_refused() -> None:

@@ -17,6 +17,7 @@ from fenics_contact import (
     FrictionTable,
     LinearClosure,
     Scene,
+    SlipTable,
     Tresca,
 )
 from fenics_contact.design import StrainEnergy
@@ -63,6 +64,12 @@ SCENES: dict[str, Callable[[], Scene]] = {
     ),
     "floor, fluid": lambda: wetted(block_on_floor(Coulomb(0.3), load=PUSH), 0.6),
     "blocks, fluid": lambda: wetted(block_on_block(Coulomb(0.38), "tetrahedron", load=DRAG), 0.3),
+    "floor, friction by slip": lambda: block_on_floor(
+        Coulomb(SlipTable((0.0, 0.004), (0.3, 0.25))), load=PUSH
+    ),
+    "blocks, friction by slip": lambda: block_on_block(
+        Coulomb(SlipTable((0.0, 0.02), (0.3, 0.45))), load=DRAG
+    ),
     "weight alone": lambda: block_on_block(Coulomb(0.25), load=(0.0, 0.0, 0.0)),
 }
 
