@@ -199,6 +199,31 @@ def test_contact_across_a_section_has_the_pressure_of_the_whole_surface(material
     assert state.preloads()["bar"].force == pytest.approx(10.0)
 
 
+@pytest.mark.parametrize("by", ["node", "mortar"])
+def test_a_section_may_cut_the_master_of_a_tie_but_not_its_slave(by):
+    """Tied to a wall along which it slides, a drawn bar has the stress of its force, everywhere alike."""
+    wall = block((1, 0, 0), (2, 1, LENGTH), (1, 2, 8) if by == "node" else (1, 3, 7))
+    bodies = {"bar": Body(bar(), SOFT), "wall": Body(wall, SOFT)}
+    supports = [
+        Support("wall", "x1"),
+        Support("bar", "z0", (None, None, 0.0)),
+        Support("bar", "z1", (None, None, 0.0)),
+        Support("bar", "y0", (None, 0.0, None)),
+        Support("bar", "x0", (0.01, None, None)),
+    ]
+    sides = Surface("wall", "x0"), Surface("bar", "x1")
+    drawn = [Preload("bar", MIDDLE, force=10.0)]
+    scene = Scene(bodies, supports, ties=[Tie(*sides, True, by)], preloads=drawn)
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-10)
+    stress = state.stress["bar"].x.array.reshape(-1, 9)
+    assert stress[:, 0] == pytest.approx(-5.0, abs=1e-7)
+    assert stress[:, 8] == pytest.approx(10.0, abs=1e-7)
+    assert state.preloads()["bar"].shortening == pytest.approx(10.0 * LENGTH / 1000.0, rel=1e-8)
+    turned = Scene(bodies, supports, ties=[Tie(*sides[::-1], True, by)], preloads=drawn)
+    with pytest.raises(InvalidInputError, match="sections of preloads must not cut slaves of ties, which"):
+        solve_scene(turned, MPI.COMM_SELF)
+
+
 @pytest.mark.parametrize(
     ("preload", "message"),
     [
