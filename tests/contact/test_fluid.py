@@ -31,12 +31,13 @@ from fenics_contact import (
 )
 from fenics_contact._equilibrium import penetration
 from fenics_contact._equilibrium.steps import stored_state
-from fenics_contact.design import StrainEnergy, TotalPotential
+from fenics_contact.design import LoadPath, StrainEnergy, TotalPotential
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.materials import NeoHooke
 from tests.contact.fluid_case import FLUID, both_ends, seal
 from tests.contact.law_cases import FLOOR, solved
 from tests.shape import moved_blocks
+from tests.shape.blocks import problem
 from tests.shape.quotients import check_adjoint
 
 SPHERE = RigidSphere((2.0, 0.5, -3.0), 3.0)
@@ -205,6 +206,16 @@ def test_derivatives_by_the_shape_include_the_fluid(name: str) -> None:
     assert contact.wet is not None
     assert 0 < np.count_nonzero(contact.wet) < contact.points.count
     check_adjoint(way, StrainEnergy())
+
+
+def test_derivatives_over_load_steps_follow_the_pressure() -> None:
+    blocks = problem(moved_blocks.SCENES["floor, fluid"]())
+    blocks.objective = StrainEnergy()
+    path = LoadPath(blocks, [LoadStep(f"{p}", fluids={"fluid": p}) for p in (0.2, 0.35)])
+    alpha, way = 0.01 * np.random.default_rng(1).standard_normal((2, path.size))
+    quotient = (path(alpha + 1e-3 * way)[0] - path(alpha - 1e-3 * way)[0]) / 2e-3
+    assert path(alpha)[1] @ way == pytest.approx(quotient, rel=1e-5)
+    assert abs(quotient) > 1e-4
 
 
 def test_bad_fluids_are_refused() -> None:
