@@ -150,7 +150,7 @@ def _write(material: Material, cell_type: str) -> Written:
     materials may resist displacements, too.
     """
     dim = _dolfinx.dimension(cell_type)
-    u, *rows = _dolfinx.field_symbols(cell_type, dim + 1)
+    u, *rows = _dolfinx.field_symbols(cell_type, _dolfinx.components(cell_type) + 1)
     q = ufl.TestFunction(_dolfinx.cellwise_space(cell_type))
     parameters = scalar_constants(cell_type, len(material.parameters))
     difference = ufl.as_tensor([[row[j] for j in range(dim)] for row in rows]) - ufl.grad(u)
@@ -158,7 +158,7 @@ def _write(material: Material, cell_type: str) -> Written:
     if _dolfinx.is_revolved(cell_type):
         from fenics_contact._fem.revolution import strained  # plane and solid bodies go without
 
-        # The hoop strain u_r / r is as accurate as the recovered gradient.
+        # The hoop strain u_r / r and the turn u_θ / r are as accurate as the recovered gradient.
         trial = strained(difference, 0.0)
         density = on_cells(material.stiffness(trial, trial, parameters), cell_type)
         return per_revolution(density * q, cell_type) * measure, parameters, (u, *rows)
@@ -187,12 +187,12 @@ def energy_on_subdomain(
     The result has shape (n_cells,), in the order of the subdomain's mesh, [force · length].
     """
     space = subdomain.mesh.space
-    mesh, dim = space.mesh, subdomain.mesh.components
+    mesh, width = space.mesh, subdomain.mesh.components
     _dolfinx.update_coordinates(mesh, subdomain.points[np.argsort(subdomain.mesh.nodes)])
     fields = []
-    for values in (displacement, *(gradient[:, :, k] for k in range(dim))):
+    for values in (displacement, *(gradient[:, :, k] for k in range(width))):
         fields.append(_dolfinx.fem.Function(space))
-        fields[-1].x.array.reshape(-1, dim)[blocks] = values
+        fields[-1].x.array.reshape(-1, width)[blocks, : values.shape[2]] = values
     of_cells = _dolfinx.scalar_space(mesh, 0)
     energies = _dolfinx.assemble_vector(form.bind([of_cells], material.parameters, fields))
     return np.asarray(energies[_dolfinx.cell_dofs(of_cells).ravel()])

@@ -239,12 +239,12 @@ class Patches:
             yield self._of_this_rank(rows, displacement)
 
     def _of_all_ranks(self, rows: np.ndarray, displacement: np.ndarray) -> Moments:
-        size, dim = self.polynomials.count, self.dim
-        packed = np.zeros((self.sites.count if len(rows) else 0, size * (size + dim)))
+        size, width = self.polynomials.count, displacement.shape[1]
+        packed = np.zeros((self.sites.count if len(rows) else 0, size * (size + width)))
         for part in self._chunks(rows):
             moments = self._of_this_rank(part, displacement)
             packed[part] = np.concatenate([moments.matrix, moments.right], axis=2).reshape(len(part), -1)
-        summed = self.sites.sharing.add_up(packed)[rows].reshape(-1, size, size + dim)
+        summed = self.sites.sharing.add_up(packed)[rows].reshape(-1, size, size + width)
         return Moments(rows, summed[:, :, :size], summed[:, :, size:])
 
     def _of_this_rank(self, rows: np.ndarray, displacement: np.ndarray) -> Moments:
@@ -308,15 +308,15 @@ FIRM = {2: 0.2, 3: 0.02}
 def recovered_gradients(sites: Sites, displacement: np.ndarray, slight: float = 1e-5) -> np.ndarray:
     """Return the recovered displacement gradient at every site. Collective.
 
-    `displacement`: displacement of each site, shape (n_sites, dim), [length]; `slight`: weight of the highest
-    derivatives relative to the moments of a patch, which are of order one: it affects only what the patch
-    leaves undetermined, which rounding would decide otherwise.
+    `displacement`: displacement of each site, shape (n_sites, components), [length]; `slight`: weight of the
+    highest derivatives relative to the moments of a patch, which are of order one: it affects only what the
+    patch leaves undetermined, which rounding would decide otherwise.
 
-    Returns ∂u_k/∂x_j as entry (k, j), shape (n_sites, dim, dim), dimensionless.
+    Returns ∂u_k/∂x_j as entry (k, j), shape (n_sites, components, dim), dimensionless.
     """
     patches = find_patches(sites)
     dim, penalty, highest = patches.dim, _penalty(patches), patches.polynomials.highest
-    coefficients = np.zeros((sites.count, patches.polynomials.count, dim))
+    coefficients = np.zeros((sites.count, patches.polynomials.count, displacement.shape[1]))
     waiting, doubts = [], []
     for moments in patches.moments(displacement):
         inverse = np.linalg.inv(moments.matrix + slight * penalty)
@@ -385,14 +385,15 @@ def _mean_of_neighbours(
     polynomials = patches.polynomials
     of_sites = polynomials.tensors(coefficients[needed][:, polynomials.highest])
     turned = polynomials.turned(of_sites, patches.turn[needed])
-    size = dim ** (polynomials.degree + 1)
+    width = coefficients.shape[2]
+    size = dim**polynomials.degree * width
     values = np.column_stack([np.ones(len(needed)), turned.reshape(len(needed), size)])
     total = np.zeros((sites.count, values.shape[1]))
     total[rows] = links[:, needed] @ values
     total = sites.sharing.add_up(total)[rows]
     heard = total[:, 0] > 0
     mean = total[:, 1:] / np.where(heard, total[:, 0], 1.0)[:, None]
-    return heard, mean.reshape(len(mean), *(dim,) * (polynomials.degree + 1))
+    return heard, mean.reshape(len(mean), *(dim,) * polynomials.degree, width)
 
 
 def _penalty(patches: Patches) -> np.ndarray:

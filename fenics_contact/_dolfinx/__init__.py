@@ -17,9 +17,11 @@ from fenics_contact._dolfinx.assembly import (
 )
 from fenics_contact._dolfinx.cells import (
     CELL_TYPES,
+    components,
     degree,
     dimension,
     facet_vertices,
+    has_torsion,
     is_revolved,
     of_mesh,
     revolved,
@@ -78,6 +80,7 @@ __all__ = [
     "cellwise_space",
     "cellwise_space_on",
     "coefficient",
+    "components",
     "constant_symbol",
     "degree",
     "dimension",
@@ -86,6 +89,7 @@ __all__ = [
     "fem",
     "field_symbols",
     "global_dofs",
+    "has_torsion",
     "input_cells",
     "is_revolved",
     "lagrange_degree",

@@ -1,7 +1,8 @@
 """Cell types: dimension, shape, degree, order of nodes, facets.
 
 Forms of bodies of revolution are written on cells whose type has the word axisymmetric in front: they have
-weights and strains of their own.
+weights and strains of their own. Where such bodies may twist, the word torsion follows: displacements have a
+third component, around the axis.
 """
 
 from __future__ import annotations
@@ -42,11 +43,13 @@ _FACET_VERTICES = {
 
 #: What the types of cells of bodies of revolution begin with.
 _REVOLVED = "axisymmetric "
+#: What follows where such bodies may twist.
+_TWISTING = "torsion "
 
 
-def revolved(cell_type: str) -> str:
-    """Return the type of plane cells as that of a body of revolution."""
-    return _REVOLVED + cell_type
+def revolved(cell_type: str, torsion: bool = False) -> str:
+    """Return the type of plane cells as that of a body of revolution, which may twist."""
+    return _REVOLVED + (_TWISTING if torsion else "") + cell_type
 
 
 def is_revolved(cell_type: str) -> bool:
@@ -54,9 +57,19 @@ def is_revolved(cell_type: str) -> bool:
     return cell_type.startswith(_REVOLVED)
 
 
+def has_torsion(cell_type: str) -> bool:
+    """Return whether cells are those of a body of revolution that may twist."""
+    return cell_type.startswith(_REVOLVED + _TWISTING)
+
+
+def components(cell_type: str) -> int:
+    """Return the number of components of displacements on such cells."""
+    return 3 if has_torsion(cell_type) else dimension(cell_type)
+
+
 def of_mesh(cell_type: str) -> str:
     """Return the type that the cells have in a mesh, which does not know whether a body is revolved."""
-    return cell_type.removeprefix(_REVOLVED)
+    return cell_type.removeprefix(_REVOLVED).removeprefix(_TWISTING)
 
 
 def shape(cell_type: str) -> str:

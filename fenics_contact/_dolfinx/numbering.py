@@ -45,9 +45,12 @@ def cell_type_of_mesh(mesh: dolfinx.mesh.Mesh) -> str:
     return cell_type_named(mesh.topology.cell_name(), geometry_degree(mesh))
 
 
-def coefficient(mesh: dolfinx.mesh.Mesh, name: str) -> dolfinx.fem.Function:
-    """Return a vector field on ``mesh`` with the given name (a C identifier)."""
-    return dolfinx.fem.Function(_space(mesh, vector_element(cell_type_of_mesh(mesh))), name=name)
+def coefficient(mesh: dolfinx.mesh.Mesh, name: str, size: int = 0) -> dolfinx.fem.Function:
+    """Return a vector field on ``mesh`` with the given name (a C identifier).
+
+    `size`: number of components; by default as many as coordinates.
+    """
+    return dolfinx.fem.Function(_space(mesh, vector_element(cell_type_of_mesh(mesh), size)), name=name)
 
 
 def scalar_space(mesh: dolfinx.mesh.Mesh, degree: int) -> dolfinx.fem.FunctionSpace:

@@ -7,7 +7,7 @@ from itertools import count
 
 import ufl
 
-from fenics_contact._dolfinx.cells import degree, dimension
+from fenics_contact._dolfinx.cells import components, degree, dimension
 from fenics_contact._dolfinx.cells import shape as shape_of
 from fenics_contact._dolfinx.loading import old
 
@@ -58,8 +58,8 @@ def template(cell_type: str) -> ufl.Mesh:
 
 @lru_cache(maxsize=16)
 def displacement_space(cell_type: str) -> ufl.FunctionSpace:
-    """Return the template's space of vector fields, of the cells' degree."""
-    return ufl.FunctionSpace(template(cell_type), vector_element(cell_type))
+    """Return the template's space of displacements, of the cells' degree."""
+    return ufl.FunctionSpace(template(cell_type), vector_element(cell_type, components(cell_type)))
 
 
 def field_symbols(cell_type: str, count: int) -> list[ufl.Coefficient]:

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from fenics_contact._base.display import counted
 from fenics_contact._base.libraries import MPI
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
+from fenics_contact._scene.body import Body
 from fenics_contact._scene.pair_geometry import Outline, bodies_near, outline_of, unpaired
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import TILT, surface_of
@@ -108,7 +109,7 @@ class ContactWarnings:
         moved = state.torn_displacement.reshape(-1, state.torn.components)
         longest = float(comm.allreduce(np.linalg.norm(moved, axis=1).max(initial=0.0), op=MPI.MAX))
         for name, body in state.scene.deforming.items():
-            if body.deforms_much or name in self._given or longest * self._bound(name, body.mesh) <= FAR:
+            if body.deforms_much or name in self._given or longest * self._bound(name, body) <= FAR:
                 continue
             angle = rotation_of(body.mesh, state.gather_displacement(name))
             if angle > FAR:
@@ -119,10 +120,13 @@ class ContactWarnings:
                 )
                 self._log(state, name, words)
 
-    def _bound(self, name: str, mesh: BodyMesh) -> float:
+    def _bound(self, name: str, body: Body) -> float:
         """Bound rotations by displacements of length one, [1/length]; computed once for a mesh."""
+        mesh = body.mesh
         if name not in self._rotations or self._rotations[name][0] is not mesh:
-            self._rotations[name] = mesh, _Gradients.of(mesh).largest
+            gradients = _Gradients.of(mesh)
+            by_turn = 1.0 / gradients.radius.min() if body.torsion else 0.0
+            self._rotations[name] = mesh, gradients.largest + by_turn
         return self._rotations[name][1]
 
     def _warn_of_passing_bodies(self, state: State) -> None:
@@ -135,7 +139,7 @@ class ContactWarnings:
         reach = max(comm.allgather(float(np.linalg.norm(moved, axis=1).max(initial=0.0))))
         near = [both for both in bodies_near(scene, reach) if both not in self._given]
         names = sorted({name for both in near for name in both})
-        displacement = {name: state.gather_displacement(name) for name in names}
+        displacement = {name: state.gather_displacement(name)[:, : scene.dim] for name in names}
         share = slice(comm.rank, None, comm.size)
         with together(comm):
             outlines = {name: self._outline(scene, name) for name in names}
@@ -162,19 +166,22 @@ class _Gradients:
         corners: Corners of the cells, shape (n, k).
         inverse: Gradient by the displacement of each corner, shape (n, k, dim), [1 / length].
         size: Volumes up to a factor, shape (n,).
+        radius: First coordinate of the middles, shape (n,), [length].
     """
 
     corners: np.ndarray
     inverse: np.ndarray
     size: np.ndarray
+    radius: np.ndarray
 
     @classmethod
     def of(cls, mesh: BodyMesh) -> _Gradients:
         corners = mesh.linear.cells
         arms = mesh.points[corners]
+        radius = arms[..., 0].mean(axis=1)
         arms = arms - arms.mean(axis=1, keepdims=True)
         metric = np.einsum("nkd,nke->nde", arms, arms)
-        return cls(corners, arms @ np.linalg.inv(metric), np.sqrt(np.linalg.det(metric)))
+        return cls(corners, arms @ np.linalg.inv(metric), np.sqrt(np.linalg.det(metric)), radius)
 
     @property
     def largest(self) -> float:
@@ -187,6 +194,10 @@ class _Gradients:
         `displacement`: of the nodes, shape (n_nodes, dim), [length].
         """
         gradient = np.einsum("nkd,nke->nde", self.inverse, displacement[self.corners])
+        if gradient.shape[1] < gradient.shape[2]:  # with torsion
+            turn = displacement[self.corners].mean(axis=1) / self.radius[:, None]
+            around = np.stack([-turn[:, 2], np.zeros(len(turn)), turn[:, 0]], axis=1)
+            gradient = np.concatenate([gradient, around[:, None]], axis=1)
         square = ((gradient - gradient.transpose(0, 2, 1)) ** 2).sum(axis=(1, 2)) / 8.0
         return float(np.sqrt(np.average(square, weights=self.size)))
 
@@ -208,7 +219,8 @@ def _slid_far(state: State, number: int) -> list[tuple[int, str, str]]:
     mine = contact.on_pair(number)
     if not isinstance(pair.master, Surface):
         return []
-    slid = np.linalg.norm(contact.total_slip[mine], axis=1)
+    # Around an axis of revolution surfaces are alike.
+    slid = np.linalg.norm(contact.total_slip[mine][:, : scene.dim - 1], axis=1)
     mesh = scene.bodies[pair.slave.body].mesh
     places = mesh.points[np.unique(mesh.surfaces[pair.slave.name])]
     farthest, reach = float(slid.max(initial=0.0)), float(np.linalg.norm(np.ptp(places, axis=0)))

@@ -51,7 +51,7 @@ class Symbol:
 
     def __init__(self, load: Load, cell_type: str, number: int = 0) -> None:
         """Write the value of ``load``; ``number`` distinguishes the loads of one form."""
-        dim = _dolfinx.dimension(cell_type)
+        width = _dolfinx.components(cell_type)
         self.constants: Constants = ()
         self.coefficients: tuple[ufl.Coefficient, ...] = ()
         if isinstance(load.value, Ufl):
@@ -61,21 +61,22 @@ class Symbol:
             self.expression = ufl.Coefficient(nodal(cell_type), count=FIRST_COUNT + number)
             self.coefficients = (self.expression,)
         else:
-            self.constants = scalar_constants(cell_type, 1 if is_scalar(load) else dim)
+            self.constants = scalar_constants(cell_type, 1 if is_scalar(load) else width)
             self.expression = self.constants[0] if is_scalar(load) else ufl.as_vector(list(self.constants))
 
 
 def from_ufl(load: Load, value: Ufl, cell_type: str) -> Expr:
     """Return a value given as `Ufl`, written on the template, after a check of its shape."""
-    dim = _dolfinx.dimension(cell_type)
-    shape = () if is_scalar(load) else (dim,)
+    width = _dolfinx.components(cell_type)
+    shape = () if is_scalar(load) else (width,)
     with user_code(f"the function given as Ufl of {type(load).__name__} on body {load.body!r}"):
         result = value.function(ufl.SpatialCoordinate(_dolfinx.template(cell_type)))
         result = ufl.as_vector(list(result)) if isinstance(result, list | tuple) else ufl.as_ufl(result)
     if result.ufl_shape != shape:
+        kind = "a scalar" if is_scalar(load) else f"a vector of {width} components"
         raise InvalidInputError(
             f"the UFL value of {type(load).__name__} on body {load.body!r} must have shape {shape}, got "
-            f"{result.ufl_shape}: return {'a scalar' if is_scalar(load) else f'a vector of {dim} components'}"
+            f"{result.ufl_shape}: return {kind}"
         )
     return result
 
@@ -99,10 +100,9 @@ def load_fields(
         return ()
     space = _dolfinx.scalar_space(space.mesh, 1) if is_scalar(load) else space
     nodes, dofs = _dolfinx.node_dofs(space)
-    dim = points.shape[1]
-    shape = () if is_scalar(load) else (dim,)
+    width = int(space.dofmap.index_map_bs)
+    shape = () if is_scalar(load) else (width,)
     name = f"{type(load).__name__} on body {load.body!r}"
-    width = 1 if is_scalar(load) else dim
     here = np.arange(len(nodes)) if acted is None else np.flatnonzero(acted[nodes])
     field = _dolfinx.fem.Function(space, name="load")
     given = evaluate(name, load.value, points[nodes[here]], shape)
@@ -123,7 +123,8 @@ def load_work(
         return integrate(materials, cell_type, thermal, volume_measure(cell_type, 2))
     work = ufl.dot(value, v) if not isinstance(load, Pressure) else None
     if work is None:
-        work = -value * ufl.dot(ufl.FacetNormal(_dolfinx.template(cell_type)), v)
+        along = ufl.as_vector([v[0], v[1]]) if _dolfinx.has_torsion(cell_type) else v
+        work = -value * ufl.dot(ufl.FacetNormal(_dolfinx.template(cell_type)), along)
     measure = volume_measure(cell_type, 2) if isinstance(load, BodyForce) else surface_measure(cell_type)
     return per_revolution(work, cell_type) * measure, ()
 

@@ -134,6 +134,23 @@ class LinearTraction:
         return np.asarray(self.even + around)
 
 
+@dataclass(frozen=True)
+class TwistingTraction:
+    """A traction on a body of revolution that grows around the axis with the radius, a + b r e_θ.
+
+    Attributes:
+        even: a, shape (3,), [force / length²].
+        turning: b, [force / length³].
+    """
+
+    even: GivenVector
+    turning: float
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Return the traction at points, (n, 2) to (n, 3)."""
+        return np.asarray(self.even + self.turning * points[:, :1] * [0.0, 0.0, 1.0])
+
+
 def as_tractions(scene: Scene) -> tuple[Load, ...]:
     """Return the scene's loads with every resultant spread over the present shape of its surface."""
     return tuple(
@@ -144,11 +161,17 @@ def as_tractions(scene: Scene) -> tuple[Load, ...]:
 def spread_traction(scene: Scene, load: TotalForce) -> Traction:
     """Return the traction a + b × (x − c), c the centroid, that has the resultant of a load.
 
-    With the area A and J b = ∫ (x − c) × (b × (x − c)): a = F / A and J b = M + (p − c) × F.
+    With the area A and J b = ∫ (x − c) × (b × (x − c)): a = F / A and J b = M + (p − c) × F. On bodies of
+    revolution with torsion it is a + b r e_θ with b ∫ r² = M.
     """
     mesh = scene.bodies[load.body].mesh
     surface = surface_moments(mesh.points, mesh.surfaces[load.surface], scene.axisymmetric)
     even = tuple(component / surface.area for component in load.value)
+    if scene.torsion:
+        around = surface.area * surface.centroid[0] ** 2 + surface.second_moment[0, 0]  # ∫ r²
+        twisting = float(np.asarray(load.moment or 0.0) / around)
+        value = TwistingTraction((*even, 0.0), twisting) if twisting else (*even, 0.0)
+        return Traction(load.body, load.surface, value)
     if load.moment is None and load.at is None:
         return Traction(load.body, load.surface, even)
     force = np.array(load.value)

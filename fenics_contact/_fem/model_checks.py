@@ -16,6 +16,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material
 from fenics_contact.materials.hyperelastic import Hyperelasticity
+from fenics_contact.materials.kernels import motions_of_revolution
 from fenics_contact.materials.plastic import HistoryMaterial, MaterialResponse
 from fenics_contact.mesh.cell_types import CELL_TYPES
 
@@ -198,7 +199,7 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
             f"the energy of a material must not be negative, {name} has the eigenvalue {energies[0]:.3g} "
             f"beside {energies[-1]:.3g}: check signs and parameters"
         )
-    R = _checked_kernel(material, points, _dolfinx.is_revolved(cell_type))
+    R = _checked_kernel(material, points, cell_type)
     check_kernel(K, R, f"material {name}")
     claimed, counted = R.shape[1], int((energies < ROUNDING * energies[-1]).sum())
     if counted > claimed:
@@ -230,18 +231,18 @@ def check_kernel(
         )
 
 
-def kernel_of(material: Material, points: np.ndarray, axisymmetric: bool = False) -> np.ndarray:
-    """Return the modes without energy of a material at points, shape (n, dim, n_modes).
+def kernel_of(material: Material, points: np.ndarray, cell_type: str = "") -> np.ndarray:
+    """Return the modes without energy of a material at points, shape (n, components, n_modes).
 
-    A body of revolution has the translation along its axis, unless the material resists that.
+    A body of revolution has the translation along its axis and, where it may twist, the turn about it, unless
+    the material resists them.
     """
-    if axisymmetric:
+    if _dolfinx.is_revolved(cell_type):
         in_space = kernel_of(material, np.pad(points, ((0, 0), (0, 1)))).reshape(3 * len(points), -1)
-        along = np.zeros((*points.shape, 1))
-        along[:, 1] = 1.0
-        moved = np.pad(along, ((0, 0), (0, 1), (0, 0))).ravel()
+        modes = motions_of_revolution(points, _dolfinx.has_torsion(cell_type))
+        moved = np.pad(modes, ((0, 0), (0, 3 - modes.shape[1]), (0, 0))).reshape(len(in_space), -1)
         rest = moved - in_space @ np.linalg.lstsq(in_space, moved, rcond=None)[0]
-        return along if np.abs(rest).max() <= 1e-8 else along[..., :0]
+        return modes[..., np.abs(rest).max(axis=0) <= 1e-8]
     name = type(material).__name__
     with user_code(f"the kernel of material {name}"):
         modes = np.asarray(material.kernel(points), dtype=np.float64)
@@ -254,9 +255,9 @@ def kernel_of(material: Material, points: np.ndarray, axisymmetric: bool = False
     return modes
 
 
-def _checked_kernel(material: Material, points: np.ndarray, axisymmetric: bool) -> np.ndarray:
-    name, R = type(material).__name__, kernel_of(material, points, axisymmetric)
-    R = R.reshape(points.size, R.shape[2])
+def _checked_kernel(material: Material, points: np.ndarray, cell_type: str) -> np.ndarray:
+    name, R = type(material).__name__, kernel_of(material, points, cell_type)
+    R = R.reshape(R.shape[0] * R.shape[1], R.shape[2])
     if np.linalg.matrix_rank(R, tol=1e-8 * max(np.abs(R).max(initial=0.0), 1e-300)) < R.shape[1]:
         raise InvalidInputError(
             f"the modes in the kernel of {name} must be independent, the {R.shape[1]} given are not: leave "
@@ -278,13 +279,14 @@ def stiffness_of_cell(vertices: np.ndarray, cell_type: str, bind: Bind) -> tuple
     `vertices`: coordinates in VTK order, shape (n, dim), [length].
     """
     mesh = _dolfinx.local_mesh(vertices, np.arange(len(vertices))[None], _dolfinx.of_mesh(cell_type))
-    space = _dolfinx.coefficient(mesh, "u").function_space
+    space = _dolfinx.coefficient(mesh, "u", _dolfinx.components(cell_type)).function_space
     nodes, dofs = _dolfinx.node_dofs(space)
     points = np.empty_like(vertices)
     points[dofs] = vertices[nodes]
     indptr, indices, data = _dolfinx.assemble_csr(bind(space))
-    K = np.zeros((vertices.size, vertices.size))
-    K[np.repeat(np.arange(vertices.size), np.diff(indptr)), indices] = data
+    size = len(indptr) - 1
+    K = np.zeros((size, size))
+    K[np.repeat(np.arange(size), np.diff(indptr)), indices] = data
     return K, points
 
 
@@ -323,7 +325,7 @@ def check_hyperelastic(
     prepare_forms(templates, (material,), cell_type)
     name, vertices = type(material).__name__, skewed(_unit_cell(cell_type))
     mesh = _dolfinx.local_mesh(vertices, np.arange(len(vertices))[None], _dolfinx.of_mesh(cell_type))
-    space = _dolfinx.coefficient(mesh, "u").function_space
+    space = _dolfinx.coefficient(mesh, "u", _dolfinx.components(cell_type)).function_space
     nodes, dofs = _dolfinx.node_dofs(space)
     points = np.empty_like(vertices)
     points[dofs] = vertices[nodes]

@@ -3,7 +3,7 @@
 A material is written in terms of a displacement in space and its gradient. Of a body of revolution it gets a
 stand-in with three components, along the radius, the axis and the circumference, which stand for x, y and z.
 What it makes of it is then written in the displacement (u_r, u_z) of the plane: the gradient of the stand-in
-becomes [[u_r,r, u_r,z, 0], [u_z,r, u_z,z, 0], [0, 0, u_r / r]].
+becomes [[u_r,r, u_r,z, −u_θ / r], [u_z,r, u_z,z, 0], [u_θ,r, u_θ,z, u_r / r]], where without torsion u_θ = 0.
 """
 
 from __future__ import annotations
@@ -42,16 +42,20 @@ def stand_in(number: int, value: Expr, gradient: Expr) -> StandIn:
 
 def stand_ins(cell_type: str, fields: tuple[Expr, ...]) -> tuple[StandIn, ...]:
     """Return a stand-in for each of some displacements in the plane."""
-    r = ufl.SpatialCoordinate(_dolfinx.template(cell_type))[0]
+    r, twists = ufl.SpatialCoordinate(_dolfinx.template(cell_type))[0], _dolfinx.has_torsion(cell_type)
     return tuple(
-        stand_in(number, ufl.as_vector([u[0], u[1], 0]), _of_revolution(ufl.grad(u), u[0] / r))
+        stand_in(
+            number,
+            ufl.as_vector([u[0], u[1], u[2] if twists else 0]),
+            _of_revolution(ufl.grad(u), u[0] / r, u[2] / r if twists else 0),
+        )
         for number, u in enumerate(fields)
     )
 
 
 def strained(gradient: Expr, hoop: Expr | float) -> StandIn:
-    """Return a stand-in with a gradient in the plane and a hoop strain, and without displacement."""
-    return stand_in(0, ufl.as_vector([0, 0, 0]), _of_revolution(gradient, hoop))
+    """Return a stand-in with the derivatives by r and z and a hoop strain, and without displacement."""
+    return stand_in(0, ufl.as_vector([0, 0, 0]), _of_revolution(gradient, hoop, 0))
 
 
 def in_plane(density: Expr, cell_type: str) -> Expr:
@@ -59,9 +63,17 @@ def in_plane(density: Expr, cell_type: str) -> Expr:
     return map_integrand_dags(_Replaced(cell_type), expand_derivatives(ufl.as_ufl(density)))
 
 
-def _of_revolution(gradient: Expr, hoop: Expr | float) -> Expr:
-    rows = [[gradient[i, 0], gradient[i, 1], 0] for i in range(2)]
-    return ufl.as_tensor([*rows, [0, 0, hoop]])
+def _of_revolution(gradient: Expr, hoop: Expr | float, turn: Expr | float) -> Expr:
+    """Return the gradient in space; ``turn`` is u_θ / r."""
+    twisted = gradient.ufl_shape[0] == 3
+    around = [gradient[2, 0], gradient[2, 1], hoop] if twisted else [0, 0, hoop]
+    return ufl.as_tensor(
+        [
+            [gradient[0, 0], gradient[0, 1], -turn if twisted else 0],
+            [gradient[1, 0], gradient[1, 1], 0],
+            around,
+        ]
+    )
 
 
 class _Replaced(MultiFunction):  # type: ignore[misc]

@@ -354,8 +354,13 @@ def _points_of_pairs(
                 first = _measured(origin, pair, index, fixed, comm, finer, told=True)
             slave = first.slave - NodeNumbers.of(scene).first_of(pair.slave.body)
             points = with_given_gaps(points, first, pair, mesh.points[slave], comm)
-        parts.append(in_free_frames(points, fixed, axes))
-    return join_points(parts, scene.dim, len(fixed))
+        if scene.torsion:
+            from fenics_contact._pairing.torsion import with_turn
+
+            parts.append(with_turn(points, scene))
+        else:
+            parts.append(in_free_frames(points, fixed, axes))
+    return join_points(parts, scene.components, len(fixed))
 
 
 def _measured(

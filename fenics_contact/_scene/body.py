@@ -14,7 +14,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material
 from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_finite_strain
-from fenics_contact.materials.kernels import rigid_body_modes
+from fenics_contact.materials.kernels import motions_of_revolution, rigid_body_modes
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
@@ -35,6 +35,9 @@ class Body:
             r ≥ 0 as first coordinate and the height z along the axis as second. Its materials are those of
             space, with the axes r, z and around the circumference as x, y and z. Loads, forces, areas and
             energies are those of a full revolution; on the axis the radial displacement is zero.
+        torsion: Whether a body of revolution may also twist: its displacement has a third component u_θ
+            around the axis, alike all around, and its strain ε_rθ = ½ (∂u_θ/∂r − u_θ/r) and ε_zθ = ½ ∂u_θ/∂z.
+            On the axis u_θ is zero. Right-handed turns about the axis are positive.
 
     Example:
         >>> from fenics_contact.gallery import rectangle
@@ -46,15 +49,23 @@ class Body:
     mesh: BodyMesh
     material: Material | Mapping[str, Material]
     axisymmetric: bool = False
+    torsion: bool = False
 
     def __post_init__(self) -> None:
         """Refuse materials of another dimension and regions without exactly one material."""
+        if self.torsion and not self.axisymmetric:
+            raise InvalidInputError(
+                "torsion=True needs a body of revolution, got axisymmetric=False: give axisymmetric=True, "
+                "too, or leave torsion out"
+            )
         if self.axisymmetric:
             _check_half_section(self.mesh)
         if isinstance(self.material, Mapping):
             _check_regions(self.mesh, self.material)
         for material in self.materials:
             _check_material(material, self.mesh.dim, self.axisymmetric)
+            if self.axisymmetric and not self.torsion:
+                _check_symmetric_axes(material)
             _check_mean_dilatation(material, self.mesh)
 
     @property
@@ -71,17 +82,18 @@ class Body:
     @property
     def cell_type(self) -> str:
         """The type of its cells for forms, which are others for bodies of revolution."""
-        return _dolfinx.revolved(self.mesh.cell_type) if self.axisymmetric else self.mesh.cell_type
+        cells = self.mesh.cell_type
+        return _dolfinx.revolved(cells, self.torsion) if self.axisymmetric else cells
 
     @property
     def components(self) -> int:
         """Number of components of its displacement."""
-        return self.mesh.dim
+        return 3 if self.torsion else self.mesh.dim
 
     @property
     def motions(self) -> int:
         """Number of its rigid motions."""
-        return 1 if self.axisymmetric else 3 * (self.mesh.dim - 1)
+        return 1 + self.torsion if self.axisymmetric else 3 * (self.mesh.dim - 1)
 
     @property
     def on_axis(self) -> np.ndarray:
@@ -93,13 +105,13 @@ class Body:
     def rigid_modes(self, at: np.ndarray | None = None) -> np.ndarray:
         """Return its rigid motions at its nodes or elsewhere, see `rigid_body_modes`.
 
-        A body of revolution has the translation along its axis alone, shape (n, 2, 1).
+        A body of revolution has the translation along its axis alone, shape (n, 2, 1), where it may twist
+        also the turn about it, (n, 3, 2).
         """
+        points = self.mesh.points
         if not self.axisymmetric:
-            return rigid_body_modes(self.mesh.points, at)
-        modes = np.zeros((*(self.mesh.points if at is None else at).shape, 1))
-        modes[:, 1] = 1.0
-        return modes
+            return rigid_body_modes(points, at)
+        return motions_of_revolution(points if at is None else at, self.torsion, float(points[:, 0].max()))
 
     @property
     def volume(self) -> float:
@@ -120,7 +132,7 @@ class Body:
     @property
     def in_words(self) -> str:
         """Its cells and materials in a few words."""
-        turned = ", a body of revolution" * self.axisymmetric
+        turned = ", a body of revolution" * self.axisymmetric + " that may twist" * self.torsion
         materials = ", ".join(type(each).__name__ for each in self.materials)
         return f"{self.mesh.cells_in_words} of {materials}{turned}"
 
@@ -178,9 +190,7 @@ def _check_material(material: Material, dim: int, axisymmetric: bool) -> None:
             f"the material of a body of revolution must be one of space, {name} is for {material.dims}: use "
             "IsotropicElasticity, OrthotropicElasticity or others that plane bodies cannot have"
         )
-    if axisymmetric:
-        _check_symmetric_axes(material)
-    elif dim not in material.dims:
+    if not axisymmetric and dim not in material.dims:
         raise InvalidInputError(
             f"the material must be made for the dimension of the mesh, {name} is for {material.dims} and the "
             f"mesh has {dim}: use PlaneStrain or PlaneStress in the plane, IsotropicElasticity or "
@@ -203,7 +213,8 @@ def _check_symmetric_axes(material: Material, rounding: float = 1e-9) -> None:
         if coupling > rounding * np.abs(stiffness).max():
             raise InvalidInputError(
                 f"a body of revolution cannot twist, but the axes of {type(material).__name__} are inclined "
-                "to the circumference, its third axis: let one of them point along it"
+                "to the circumference, its third axis: let one of them point along it, or give the body "
+                "torsion=True"
             )
 
 

@@ -204,12 +204,14 @@ class Spinning:
     Attributes:
         point: A point of the axis, [length].
         axis: Unit vector along it; None in the plane, where it is normal to the plane.
+        components: Number of components of the force; by default as many as points have coordinates.
     """
 
     density: float
     speed: float
     point: GivenVector
     axis: GivenVector | None
+    components: int = 0
 
     def require_axis(self, dim: int, axisymmetric: bool) -> None:
         """Reject an axis in another space than the body, and one that a body of revolution does not have."""
@@ -222,12 +224,13 @@ class Spinning:
             )
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
-        """Return the force per volume at points, both of shape (n, dim)."""
+        """Return the force per volume at points, (n, dim) to (n, components)."""
         arms = points - np.array(self.point)
         if self.axis is not None:
             along = np.array(self.axis)
             arms = arms - (arms @ along)[:, None] * along
-        return np.asarray(self.density * self.speed**2 * arms)
+        more = max(self.components - points.shape[1], 0)
+        return np.pad(self.density * self.speed**2 * arms, ((0, 0), (0, more)))
 
 
 def centrifugal(

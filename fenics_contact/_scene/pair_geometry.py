@@ -49,7 +49,7 @@ def displacement_along(scene: SceneParts, normal: np.ndarray) -> float:
                 sizes.append(abs(support.displacement * float(along @ normal)))
             continue
         assert not isinstance(support, ToolMotion)
-        given = support.motion[: scene.dim] if isinstance(support, RigidSurface) else support.value
+        given = (support.motion if isinstance(support, RigidSurface) else support.value)[: scene.dim]
         value = [0.0 if number is None or callable(number) else number for number in given]
         sizes.append(abs(float(np.array(value) @ normal)))
     return max(sizes)
@@ -65,7 +65,7 @@ def force_along(scene: SceneParts, normal: np.ndarray) -> float | None:
         resultant = _resultant(scene, load)
         if resultant is None:
             return None
-        total[load.body] += resultant
+        total[load.body] += resultant[: scene.dim]
     for support in scene.supports:
         if isinstance(support, RigidSurface) and isinstance(scene.bodies[support.body], ToolBody):
             total[support.body] += support.load[: scene.dim]
@@ -463,6 +463,7 @@ def _moved_by_supports(scene: SceneParts, name: str) -> np.ndarray:
     points = scene.bodies[name].mesh.points
     modes = rigid_body_modes(points)
     prescribed, axes = scene.prescribed_along(name)
+    prescribed = prescribed[:, : scene.dim]
     given = ~np.isnan(prescribed)
     along = modes if axes is None else axes.to_local(modes)
     motion = np.linalg.lstsq(along[given], prescribed[given], rcond=None)[0]

@@ -26,6 +26,7 @@ from fenics_contact._scene.local_axes import HeldDirections, LocalAxes, held_alo
 from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface, pressures_of
 from fenics_contact._scene.preloads import Preload
+from fenics_contact._scene.revolution import hold_axis, require_all_or_none, require_simple_torsion, twisting
 from fenics_contact._scene.rollers import direction_of, flat_normal, held_directions, widest_angle
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._scene.springs import Spring
@@ -75,12 +76,14 @@ class SceneParts:
             self._require(preload.body, None, "Preload")
         for foundation in self.foundations:
             self._require(foundation.body, foundation.surface, "ElasticFoundation")
-            foundation.require_space(self.dim)
+            foundation.require_space(self.components)
         for spring in self.springs:
             for name, end in spring.surfaces.items():
                 self._require(end.body, end.name, f"Spring.{name}")
             spring.require_suits(self)
         object.__setattr__(self, "supports", tuple(map(self._in_space, self.supports)))
+        if self.torsion:
+            object.__setattr__(self, "loads", tuple(map(twisting, self.loads)))
         for part in (*self.supports, *self.loads):
             if not isinstance(part, RigidSurface | Roller | ToolMotion):
                 self._require_components(part)
@@ -112,6 +115,14 @@ class SceneParts:
         _require_different(self.contacts)
         _require_different(self.ties)
         pressures_of(self.contacts)
+        if self.torsion:
+            tools = len(self.deforming) < len(self.bodies)
+            others = {
+                "no rigid tools": tools,
+                "no preloads": bool(self.preloads),
+                "no springs": bool(self.springs),
+            }
+            require_simple_torsion(self.bodies.values(), self.supports, others)
 
     @property
     def deforms_much(self) -> bool:
@@ -134,13 +145,7 @@ class SceneParts:
 
     def _require_one_dimension(self) -> None:
         """Raise if some bodies are plane and others solid, or only some are bodies of revolution."""
-        turned = [name for name, body in self.bodies.items() if body.axisymmetric]
-        if turned and len(turned) < len(self.bodies):
-            others = [name for name in self.bodies if name not in turned]
-            raise InvalidInputError(
-                f"the bodies of a scene must all be bodies of revolution or none, got axisymmetric {turned} "
-                f"and others {others}: give all of them axisymmetric=True"
-            )
+        require_all_or_none(self.bodies, self.deforming)
         plane = [name for name, body in self.bodies.items() if body.mesh.dim == 2]
         solid = [name for name in self.bodies if name not in plane]
         if plane and solid:
@@ -168,13 +173,13 @@ class SceneParts:
         """Return a support with as many components as its body has; reject a point in another space."""
         dim = self.bodies[support.body].mesh.dim
         if isinstance(support, Support):
-            return support.held_in(dim)
+            return support.held_in(self.components)
         if isinstance(support, Roller):
             self._require_direction(support)
             return support
         assert isinstance(support, RigidSurface)
         if self.axisymmetric:
-            support = support.along_axis()
+            support = support.along_axis(self.torsion)
         if support.dim != dim:
             raise InvalidInputError(
                 f"RigidSurface.at on surface {support.surface!r} of body {support.body!r} must have {dim} "
@@ -200,9 +205,14 @@ class SceneParts:
 
     def _require_components(self, part: Load | Support) -> None:
         """Reject a vector whose dimension is not that of its body."""
-        dim = self.bodies[part.body].mesh.dim
+        dim = self.bodies[part.body].components
+        if self.torsion and isinstance(part, TotalForce):
+            dim = 2  # forces around the axis balance each other, their moment is given in their place
         if isinstance(part.value, tuple) and len(part.value) != dim:
             needed = "two entries, for x and y, as the body is plane" if dim == 2 else "three, for x, y and z"
+            needed = "three, for r, z and the way around, as the body may twist" if self.torsion else needed
+            if self.torsion and dim == 2:
+                needed = "two entries, for r and z; a torque is its moment"
             raise InvalidInputError(
                 f"{type(part).__name__}.value of body {part.body!r} must hold {needed}, got {part.value!r}: "
                 f"give {dim} of them"
@@ -218,6 +228,8 @@ class SceneParts:
                 f"a load on a surface needs an area, {where} is a line, the axis of revolution: choose "
                 "another surface"
             )
+        if self.torsion and isinstance(part, TotalForce) and part.at is None:
+            return
         if isinstance(part, TotalForce) and (part.moment is not None or part.at is not None):
             raise InvalidInputError(
                 f"TotalForce on {where} of a body of revolution acts along its axis, and outwards all "
@@ -321,8 +333,13 @@ class SceneParts:
 
     @property
     def components(self) -> int:
-        """Number of components of displacements."""
+        """Number of components of displacements; with torsion there is one more than coordinates."""
         return next(iter(self.bodies.values())).components
+
+    @property
+    def torsion(self) -> bool:
+        """Whether its bodies are bodies of revolution that may twist."""
+        return next(iter(self.bodies.values())).torsion
 
     @property
     def axisymmetric(self) -> bool:
@@ -363,9 +380,7 @@ class SceneParts:
             if support.body == body and not isinstance(support, Roller | ToolMotion):
                 nodes, given = self.given(support)
                 values[nodes] = np.where(np.isnan(given), values[nodes], given)
-        axis = self.bodies[body].on_axis
-        check_axis(body, values[axis, 0])
-        values[axis, 0] = 0.0
+        hold_axis(self.bodies[body], body, values)
         return self.held_by_rollers(body, values, chosen)
 
     def holds_as(self, other: SceneParts, body: str) -> bool:
@@ -486,16 +501,6 @@ class SceneParts:
     def _with_meshes(self, meshes: Mapping[str, BodyMesh]) -> Self:
         changed = {name: replace(self.bodies[name], mesh=mesh) for name, mesh in meshes.items()}
         return replace(self, bodies={**self.bodies, **changed})
-
-
-def check_axis(body: str, prescribed: np.ndarray) -> None:
-    """Reject radial displacements prescribed on the axis of a body of revolution other than zero."""
-    moved = np.abs(np.nan_to_num(prescribed)).max(initial=0.0)
-    if moved > 0.0:
-        raise InvalidInputError(
-            f"the radial displacement is zero on the axis of revolution, supports of body {body!r} prescribe "
-            f"up to {moved:.3g} there: leave it free or zero"
-        )
 
 
 def _require_different(pairs: Sequence[ContactPair | AnyTie]) -> None:
@@ -636,7 +641,7 @@ def mirrored(scene: SceneParts, body: str) -> np.ndarray:
                 marks[mesh.surfaces[support.surface].ravel(), np.argmax(np.abs(planes @ normal))] = True
             continue
         given = [axis for axis, value in enumerate(support.value) if value is not None]
-        if len(given) != 1 or callable(support.value[given[0]]):
+        if len(given) != 1 or callable(support.value[given[0]]) or given[0] >= scene.dim:
             continue
         facets = mesh.surfaces[support.surface]
         areas = vector_areas(mesh.points, facets)

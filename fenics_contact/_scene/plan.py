@@ -33,6 +33,7 @@ class EffectName(StrEnum):
 
     ELASTICITY = "elasticity"
     AXISYMMETRY = "axisymmetry"
+    TORSION = "torsion"
     NONLINEAR_MATERIAL = "nonlinear material"
     PRESCRIBED_DISPLACEMENT = "prescribed displacement"
     ROLLER = "roller"
@@ -88,6 +89,8 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
         (names.ELASTICITY, len(scene.bodies) - tools, "elastic body", "elastic bodies"),
         (names.AXISYMMETRY, turned, "body of revolution, all per revolution",
          "bodies of revolution, all per revolution"),
+        (names.TORSION, sum(body.torsion for body in scene.bodies.values()), "body may twist about its axis",
+         "bodies may twist about their axis"),
         (names.NONLINEAR_MATERIAL, nonlinear, "body deforms much or yields", "bodies do"),
         (names.PRESCRIBED_DISPLACEMENT, held, "support", "supports"),
         (names.ROLLER, rolling, "surface slides", "surfaces slide"),

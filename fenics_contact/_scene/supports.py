@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -27,7 +27,8 @@ class Support:
         body: Name of the body.
         surface: Name of its surface.
         value: Displacement [length] for x, y, z (for x, y on a plane body), by default zero in all directions
-            of the body's space. None leaves a component free; a function receives points, shape (n, dim), and
+            of the body's space. Of bodies of revolution with torsion it is along the radius, the axis and the
+            way around it. None leaves a component free; a function receives points, shape (n, dim), and
             returns the component there, shape (n,).
 
     Raises:
@@ -73,12 +74,12 @@ class Support:
             points: Coordinates of nodes on the surface, shape (n, dim), [length].
 
         Returns:
-            Shape (n, dim), [length].
+            Shape (n, components), [length].
 
         Raises:
             InvalidInputError: If a function does not return one finite number per point.
         """
-        result = np.full(points.shape, np.nan)
+        result = np.full((len(points), len(self.value)), np.nan)
         for component, given in enumerate(self.value):
             if callable(given):
                 name = f"component {component} of the support of surface {self.surface!r}"
@@ -171,8 +172,9 @@ class RigidSurface:
         surface: Name of its surface.
         at: The point p, which need not belong to the body, [length].
         displacement: U, [length]: for each direction a number, or None where it is free; all free by default.
-        rotation: θ about each axis, in the plane one number, positive from x to y, in radians; a number
-            prescribes a component, None leaves it free; all free by default.
+        rotation: θ about each axis, in the plane one number, positive from x to y, of bodies of revolution
+            with torsion about their axis, in radians; a number prescribes a component, None leaves it free;
+            all free by default.
         force: Force at the point along free directions, [force] (in the plane: per unit of thickness).
         moment: Moment about the point around free axes, in the plane one number, [force·length].
 
@@ -212,9 +214,22 @@ class RigidSurface:
                 f"and rotation {self.rotation!r}: leave the component free (None), or the load away"
             )
 
-    def along_axis(self) -> RigidSurface:
-        """Return the rigid surface of a body of revolution, which moves along the axis alone."""
+    def along_axis(self, torsion: bool = False) -> RigidSurface:
+        """Return the rigid surface of a body of revolution, which moves along the axis alone.
+
+        With torsion it also turns about the axis: rotation and moment are those about it.
+        """
         radial, turned = (self.displacement or (None,))[0], self.rotation
+        if torsion and self.dim == 2 and not (radial or self.load[0]):
+            moved = (0.0, self.displacement[1] if self.displacement is not None else None)
+            given = {each.name: getattr(self, each.name) for each in fields(RigidSurface)}
+            return TurningSurface(**{**given, "displacement": moved})
+        if torsion:
+            raise InvalidInputError(
+                f"RigidSurface {self.surface!r} of body {self.body!r}, a body of revolution, can move along "
+                f"the axis and turn about it alone, got displacement {self.displacement!r} and force "
+                f"{self.force!r}: give displacement=(0.0, w) or force=(0.0, F), and a rotation or a moment"
+            )
         if self.dim != 2 or radial or turned or self.load[0] or self.load[2]:
             raise InvalidInputError(
                 f"RigidSurface {self.surface!r} of body {self.body!r}, a body of revolution, can move along "
@@ -313,6 +328,21 @@ class RigidSurface:
         about = Rotation.from_rotvec(angle if self.dim == 3 else (0.0, 0.0, angle[0]))
         arms = points - np.array(self.at)
         return np.asarray(shift + arms @ about.as_matrix()[: self.dim, : self.dim].T - arms)
+
+
+@dataclass(frozen=True)
+class TurningSurface(RigidSurface):
+    """A rigid surface of a body of revolution with torsion, which moves along the axis and turns about it.
+
+    Its rotation and moment are those about the axis; a scene makes it of a `RigidSurface`.
+    """
+
+    def modes(self, points: np.ndarray) -> np.ndarray:
+        """Return the displacement for unit motions along r and z and about the axis, (n, 2) to (n, 3, 3)."""
+        modes = np.zeros((len(points), 3, 3))
+        modes[:, [0, 1], [0, 1]] = 1.0
+        modes[:, 2, 2] = points[:, 0]
+        return modes
 
 
 #: Name of the surface of a tool.

@@ -249,9 +249,10 @@ def load_steps(
     """
     with at("steps"):
         _require_few(steps)
-    dim = next(iter(bodies.values())).mesh.dim
+    first = next(iter(bodies.values()))
+    dim = first.mesh.dim
     in_parts = any(is_nonlinear(each) for body in bodies.values() for each in body.materials)
-    own = [(0.0,) * dim if part.size is None else part.size for part in supports]
+    own = [(0.0,) * first.components if part.size is None else part.size for part in supports]
     held = _Values([part.name for part in supports], own)
     acting = _Values([part.name for part in loads], [part.size for part in loads])
     wetting = dict(fluids)
@@ -382,6 +383,9 @@ class BodyPart(Part):
     )
     axisymmetric: bool = Field(
         False, description="whether a plane mesh is half the section (r, z) of a body of revolution"
+    )
+    torsion: bool = Field(
+        False, description="whether a body of revolution may twist: a third component, around the axis"
     )
 
 

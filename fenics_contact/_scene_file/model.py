@@ -369,13 +369,14 @@ class SupportPart(_Named):
 
     value: Components | None = Field(
         None,
-        description=f'displacement along x, y and z (x, y of a plane body), [length]: a number, "{FREE}", or '
+        description="displacement along x, y and z (x, y of a plane body; r, z and around the axis where "
+        f'bodies may twist), [length]: a number, "{FREE}", or '
         "a formula in x, y, z in quotes, or a field from a file; zero in all directions by default",
     )
 
     def build(self, dim: int, value: tuple[Any, ...] | None = None) -> Support:
         """Return the support."""
-        return self.made(value=value or self.value or (0.0,) * dim)
+        return self.made(value=value or self.value or (0.0, 0.0, 0.0))
 
 
 @keys_of(RigidSurface, without=("displacement", "rotation"))

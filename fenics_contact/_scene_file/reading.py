@@ -100,7 +100,7 @@ class Builder:
                 given: Any = materials[made_of] if isinstance(made_of, str) else None
                 if given is None:
                     given = {region: materials[part] for region, part in made_of.items()}
-                made[name] = Body(chosen[name].mesh, given, body.axisymmetric)
+                made[name] = Body(chosen[name].mesh, given, body.axisymmetric, body.torsion)
         self._check()
         return made, chosen
 

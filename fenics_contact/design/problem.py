@@ -86,7 +86,12 @@ def checked_contact(contact: ContactProblem) -> ContactProblem:
 
 
 def _check_differentiable(scene: Scene) -> None:
-    """Reject what of large deformations has no derivative by the shape."""
+    """Reject what of torsion and of large deformations has no derivative by the shape."""
+    if scene.torsion:
+        raise InvalidInputError(
+            "designs need bodies without torsion, this scene has torsion=True: optimise it with a tool that "
+            "takes plain functions, see fenics_contact.SceneResponse, or leave torsion out"
+        )
     if not scene.is_nonlinear:
         return
     reasons = {

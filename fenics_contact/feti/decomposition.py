@@ -16,7 +16,7 @@ from fenics_contact._base.sparse import LAST_PLACES, dispose_with, expected_seco
 from fenics_contact._fem.forms import FormLibrary, cell_stiffness
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.local_axes import LocalAxes, joined_axes, same_axes
-from fenics_contact._scene.parts import check_axis
+from fenics_contact._scene.revolution import hold_axis
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import Roller, ToolMotion
 from fenics_contact._scene.tools import with_tool_parts
@@ -227,9 +227,8 @@ def prescribed_along(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalA
         prescribed[nodes] = np.where(np.isnan(given), known, given)
     if scene.axisymmetric:
         for name in tearing.body_names:
-            axis = tearing.global_nodes(name, np.flatnonzero(scene.bodies[name].on_axis))
-            check_axis(name, prescribed[axis, 0])
-            prescribed[axis, 0] = 0.0
+            first = tearing.first_of(name)
+            hold_axis(scene.bodies[name], name, prescribed[first : first + scene.bodies[name].mesh.n_nodes])
     parts = []
     for body in scene.rolling_bodies:
         first = tearing.first_of(body)

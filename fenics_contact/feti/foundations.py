@@ -44,7 +44,7 @@ def _of_facets(foundation: ElasticFoundation, body: Body, facets: np.ndarray) ->
         if stiffness.ndim:
             springs = at.areas[:, None, None] * np.diag(stiffness)
         else:
-            normal = at.normals / at.areas[:, None]
+            normal = np.pad(at.normals / at.areas[:, None], ((0, 0), (0, dim - mesh.dim)))
             springs = stiffness * np.einsum("n,nc,nd->ncd", at.areas, normal, normal)
         blocks += np.einsum("a,b,ncd->nacbd", at.values, at.values, springs)
     dofs = (dim * facets[:, :, None] + np.arange(dim)).reshape(len(facets), -1)

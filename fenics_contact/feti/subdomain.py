@@ -179,7 +179,7 @@ def cut_out(number: int, body_name: str, body: Body, cells: np.ndarray) -> Subdo
     used, local = np.unique(mesh.cells[cells], return_inverse=True)
     local = local.reshape(len(cells), -1)
     own = _dolfinx.local_mesh(mesh.points[used], local, mesh.cell_type)
-    space = _dolfinx.coefficient(own, "u").function_space
+    space = _dolfinx.coefficient(own, "u", body.components).function_space
     input_nodes, dofs = _dolfinx.node_dofs(space)
     nodes = np.empty(len(used), dtype=np.int64)
     nodes[dofs] = used[input_nodes]
@@ -293,15 +293,13 @@ def kernel_of_body(body: Body, points: np.ndarray, materials: Sequence[Material]
     """
     if isinstance(body, ToolBody):
         return body.kernel(points)
-    return common_kernel(body.materials if materials is None else materials, points, body.axisymmetric)
+    return common_kernel(body.materials if materials is None else materials, points, body.cell_type)
 
 
-def common_kernel(
-    materials: Sequence[Material], points: np.ndarray, axisymmetric: bool = False
-) -> np.ndarray:
-    """Return the modes without energy of a body of several materials at points, (n, dim, n_modes)."""
+def common_kernel(materials: Sequence[Material], points: np.ndarray, cell_type: str = "") -> np.ndarray:
+    """Return the modes without energy of a body of several materials at points, (n, components, n_modes)."""
     # A motion without energy has none in any of the materials.
-    every = (kernel_of(material, points, axisymmetric) for material in materials)
+    every = (kernel_of(material, points, cell_type) for material in materials)
     return min(every, key=lambda modes: modes.shape[-1])
 
 

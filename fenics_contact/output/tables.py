@@ -85,17 +85,16 @@ def _contact_columns(state: State, displacement: np.ndarray) -> dict[str, np.nda
     places, in_space = state.contact_places, points.tangents
     vectors = {
         "": places,
-        "moved": places + displacement[points.slave],
+        "moved": places + displacement[points.slave, : scene.dim],
         "traction": -np.einsum("na,nad->nd", contact.traction, in_space),
         "slip": contact.slip_in_space,
         "total_slip": np.einsum("na,nad->nd", contact.total_slip, in_space),
         "normal": points.normal,
     }
-    axes = "xyz"[: scene.dim]
     split = {
         name: {
             axis if not name else f"{axis}_moved" if name == "moved" else f"{name}_{axis}": part
-            for axis, part in zip(axes, values.T, strict=True)
+            for axis, part in zip("xyz", values.T, strict=False)
         }
         for name, values in vectors.items()
     }

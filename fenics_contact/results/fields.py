@@ -57,7 +57,7 @@ def displacement_function(mesh: _dolfinx.mesh.Mesh, values: np.ndarray) -> _dolf
 
     `values`: displacement of the body's nodes, valid at least on those of this rank, shape (n_nodes, dim).
     """
-    function = _dolfinx.coefficient(mesh, "displacement")
+    function = _dolfinx.coefficient(mesh, "displacement", values.shape[1])
     nodes, dofs = _dolfinx.node_dofs(function.function_space)
     function.x.array.reshape(-1, values.shape[1])[dofs] = values[nodes]
     function.x.scatter_forward()
@@ -397,6 +397,13 @@ def _gauss_weights(body: Body, cells: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return weights * jacobians(mesh.points, mesh.cells[cells], positions), first
 
 
+def _gauss_heights(body: Body, cells: np.ndarray) -> np.ndarray:
+    """Return the second coordinates of the Gauss points of cells, shape (n_cells, n_gauss)."""
+    mesh, cell = body.mesh, CELL_TYPES[body.mesh.cell_type]
+    positions, _ = quadrature(cell, quadrature_degree(body.cell_type))
+    return np.asarray(mesh.points[mesh.cells[cells], 1] @ shape_values(cell, positions).T)
+
+
 def nodal_stress(
     torn: TornSystem,
     displacement: np.ndarray,
@@ -450,7 +457,7 @@ def _at_sites(
 
     `moved`: displacements of all nodes and gradients at the sites.
     """
-    body, dim = torn.scene.bodies[name], torn.components
+    body, dim, width = torn.scene.bodies[name], torn.scene.dim, torn.components
     displacement, gradients = moved
     temperature = temperature_of(torn.scene.loads, name)
     means = CellStress(mesh, body, torn.decomposition.comm, temperature)
@@ -461,17 +468,28 @@ def _at_sites(
     pairs = [(i, j) for i in range(dim) for j in range(i, dim)]
     units = np.zeros((1 + len(pairs), dim, dim))
     units[np.arange(1, len(units)), [j for _, j in pairs], [i for i, _ in pairs]] = 1.0
-    fields = [places @ unit.T for unit in units]
+    fields = [np.pad(places @ unit.T, ((0, 0), (0, width - dim))) for unit in units]
     sizes = [gradients[:, i, j] + (gradients[:, j, i] if i != j else 0.0) for i, j in pairs]
     if body.axisymmetric:
         # u = (r, 0) has the hoop strain of its radial one; (1, 0) has 1 / r, and no other.
-        fields.append(np.broadcast_to([1.0, 0.0], places.shape))
-        sizes.append(_hoop_strains(torn, sites, displacement, sizes[0]) - sizes[0])
+        fields.append(np.broadcast_to(np.eye(width)[0], (len(places), width)))
+        sizes.append(_by_radius(torn, sites, displacement, sizes[0], 0) - sizes[0])
+    if body.torsion:
+        # u_θ = 1 has the shear −1 / r, and u_θ = z the shear 1 of z and −z / r.
+        fields += [np.eye(width)[2] * np.ones((len(places), 1)), np.eye(width)[2] * places[:, 1:]]
+        turn = _by_radius(torn, sites, displacement, gradients[:, 2, 0], 2)
+        sizes += [gradients[:, 2, 0] - turn, gradients[:, 2, 1]]
     on_cells = [means.components(displacement_function(mesh, field)) for field in fields]
     if body.axisymmetric:
         weights, radii = _gauss_weights(body, number)
-        mean = (weights * radii).sum(axis=1) / weights.sum(axis=1)
-        on_cells[-1] = on_cells[0] + mean[:, None] * (on_cells[-1] - on_cells[0])
+        mean = ((weights * radii).sum(axis=1) / weights.sum(axis=1))[:, None]
+        hoop = 1 + len(pairs)
+        on_cells[hoop] = on_cells[0] + mean * (on_cells[hoop] - on_cells[0])
+    if body.torsion:
+        on_cells[-2] = on_cells[0] - mean * (on_cells[-2] - on_cells[0])
+        heights = _gauss_heights(body, number)
+        along = ((weights * heights).sum(axis=1) / (weights * radii).sum(axis=1))[:, None]
+        on_cells[-1] = on_cells[-1] + along * (on_cells[-2] - on_cells[0])
     around = _around_sites(torn, name, sites, np.hstack(on_cells), number)
     at_rest, *strained = np.split(around, len(fields), axis=1)
     total = at_rest.copy()
@@ -480,11 +498,13 @@ def _at_sites(
     return total
 
 
-def _hoop_strains(torn: TornSystem, sites: Sites, displacement: np.ndarray, radial: np.ndarray) -> np.ndarray:
-    """Return u_r / r at sites; on the axis it is the radial strain there."""
+def _by_radius(
+    torn: TornSystem, sites: Sites, displacement: np.ndarray, radial: np.ndarray, component: int
+) -> np.ndarray:
+    """Return a component of u over r at sites; on the axis it is its derivative by r there."""
     on_axis = np.concatenate([body.on_axis for body in torn.scene.bodies.values()])[sites.node]
     radii = np.where(on_axis, 1.0, sites.points[:, 0])
-    return np.where(on_axis, radial, displacement[sites.node, 0] / radii)
+    return np.where(on_axis, radial, displacement[sites.node, component] / radii)
 
 
 def _around_sites(

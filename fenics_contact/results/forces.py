@@ -16,7 +16,7 @@ from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._scene.pairs import ContactPair, Surface, named
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
-from fenics_contact._scene.supports import RigidSurface, Roller, Support
+from fenics_contact._scene.supports import RigidSurface, Roller, Support, TurningSurface
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import share_areas, surface_moments
 from fenics_contact.errors import InvalidInputError
@@ -120,7 +120,7 @@ def _resisted(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:
         body = torn.scene.bodies[part.mesh.body]
         kernel, force = part.kernel.shape[1], np.zeros(part.mesh.size)
         if part.foundations:
-            kernel = common_kernel(part.material.materials, part.points, body.axisymmetric).shape[-1]
+            kernel = common_kernel(part.material.materials, part.points, body.cell_type).shape[-1]
         if kernel < body.motions:
             u = displacement[where]
             force = part.stiffness @ u - foundation_of(part.mesh, body, part.foundations) @ u
@@ -145,7 +145,7 @@ class Resultant:
         moment: Sum of their moments about ``about``, shape (3,) in space; one number in the plane, positive
             from x to y; [force·length]. Plane bodies have forces and moments a unit of thickness. Bodies of
             revolution have those of a full revolution: the sum of the radial forces, the axial force, and no
-            moment, shape (0,).
+            moment, shape (0,); with torsion the torque about the axis, shape (1,).
         about: The point, shape (dim,), [length].
         surface: The surface on which they act; None for a sum over surfaces.
     """
@@ -171,13 +171,13 @@ class Resultant:
     @property
     def axisymmetric(self) -> bool:
         """Whether it is that of forces all around bodies of revolution."""
-        return np.size(self.moment) == 0
+        return np.ndim(self.moment) == 1 and np.size(self.moment) < 3
 
     @property
     def heads(self) -> tuple[str, ...]:
         """Names of the components of force and moment in tables."""
         if self.axisymmetric:
-            return "Fr", "Fz"
+            return ("Fr", "Fz", "T")[: 2 + np.size(self.moment)]
         return ("Fx", "Fy", "Fz", "Mx", "My", "Mz") if len(self.force) == 3 else ("Fx", "Fy", "M")
 
     def __add__(self, other: Resultant) -> Resultant:
@@ -191,6 +191,8 @@ class Resultant:
     def torque(self, point: GivenVector | np.ndarray, direction: GivenVector) -> float:
         """Return the moment about an axis in space, [force·length].
 
+        Of bodies of revolution with torsion ``moment`` holds the torque about their axis.
+
         Args:
             point: A point on the axis, shape (3,), [length].
             direction: Direction of the axis, of any length, shape (3,); turning as a right-handed screw is
@@ -202,14 +204,16 @@ class Resultant:
         if len(self.force) == 2:
             raise InvalidInputError(
                 "an axis needs bodies in space, these are plane: their only axis is normal to the plane, "
-                "and moment_about(point) is the torque about it"
+                "and moment_about(point) is the torque about it; of bodies of revolution with torsion moment "
+                "is that about their axis"
             )
         return float(np.dot(self.moment_about(point), unit_vector("the direction of an axis", direction, 3)))
 
     def __str__(self) -> str:
         """Return it in words."""
         if self.axisymmetric:
-            return f"radial and axial force {_in_brackets(self.force)} [force] per revolution"
+            torque = "".join(f", torque {value:.5g} [force·length]" for value in np.atleast_1d(self.moment))
+            return f"radial and axial force {_in_brackets(self.force)} [force]{torque} per revolution"
         moment = _in_brackets(_row(self.moment))
         return (
             f"force {_in_brackets(self.force)} [force], moment {moment} [force·length] about "
@@ -294,7 +298,10 @@ def table(
         (*name, *(f"{value:.5g}" for value in row)) for name, row in zip(names, np.hstack(shown), strict=True)
     ]
     revolved, head = resultants[0].axisymmetric, (*[""] * len(names[0]), *resultants[0].heads)
-    units = "F in [force] per revolution" if revolved else "F in [force], M in [force·length]"
+    units = "F in [force], M in [force·length]"
+    if revolved:
+        torque = ", T in [force·length]" * np.size(resultants[0].moment)
+        units = f"F in [force]{torque} per revolution"
     return "\n".join([*aligned([head, *cells], len(names[0])), units])
 
 
@@ -319,8 +326,11 @@ def resultant(
 ) -> Resultant:
     """Return force and moment of forces that act at places, both of shape (n, dim), about a point, (dim,).
 
-    Forces all around an axis have no moment.
+    Forces all around an axis have no moment, with torsion one about the axis.
     """
+    if axisymmetric and forces.shape[1] == 3:
+        torque = np.atleast_1d(places[:, 0] @ forces[:, 2])
+        return Resultant(forces[:, :2].sum(axis=0), torque, about, surface)
     if axisymmetric:
         return Resultant(forces.sum(axis=0), np.zeros(0), about, surface)
     moment = moment_of(forces, places - about)
@@ -404,7 +414,7 @@ def point_load(support: RigidSurface, about: np.ndarray, axisymmetric: bool = Fa
     """Return the load at the point of a rigid surface, about a point."""
     force, moment = np.split(support.load, [support.dim])
     if axisymmetric:
-        return Resultant(force, np.zeros(0), about)
+        return Resultant(force, moment if isinstance(support, TurningSurface) else np.zeros(0), about)
     load = Resultant(force, float(moment[0]) if support.dim == 2 else moment, np.array(support.at))
     return Resultant(force, load.moment_about(about), about)
 
@@ -567,7 +577,8 @@ def force_balance(
         of_tool = np.repeat(carriers, np.diff(torn.decomposition.tearing.node_offset))
     point = _middle(forces.places[~of_tool]) if about is None else point_of(about, torn.scene.dim)
     parts, turned = _parts(torn, forces), torn.scene.axisymmetric
-    acting = {name: force * [0.0, 1.0] for name, force in parts.items()} if turned else parts
+    axial = [0.0, 1.0, 1.0][: torn.components]
+    acting = {name: force * axial for name, force in parts.items()} if turned else parts
     resultants = {
         name: resultant(force, forces.places, point, axisymmetric=turned) for name, force in acting.items()
     }
@@ -576,6 +587,8 @@ def force_balance(
             resultants["loads"] += point_load(support, point, turned)
             resultants["reactions"] -= point_load(support, point, turned)
     arms = forces.places - point
+    if torn.scene.torsion:
+        arms = forces.places[:, :1]  # from the axis
     sizes = [np.linalg.norm(force, axis=1) for force in parts.values()]
     reach = np.linalg.norm(arms, axis=1)
     return Balance(

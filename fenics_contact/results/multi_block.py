@@ -49,7 +49,7 @@ def multi_block(
     blocks = pv.MultiBlock()
     for name, whole in meshes.items():
         fields = gather(name)
-        points = in_space(whole.points + deformed * fields.points["displacement"])
+        points = in_space(whole.points) + deformed * in_space(fields.points["displacement"])
         mesh = whole.linear if linear else whole
         grid = body_grid(mesh, points)
         for key, values in fields.points.items():

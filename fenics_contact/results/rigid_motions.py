@@ -24,8 +24,8 @@ class UnheldMotion:
 
     Attributes:
         bodies: Body name -> coefficients of its `Body.rigid_modes`, translations first, shape (3,) in the
-            plane, (6,) in space, (1,) for bodies of revolution; the largest of all is one. Bodies that stay
-            are left out.
+            plane, (6,) in space, (1,) for bodies of revolution, (2,) with torsion; the largest of all is one.
+            Bodies that stay are left out.
     """
 
     bodies: Mapping[str, np.ndarray]
@@ -71,9 +71,11 @@ def rigid_motions(torn: TornSystem, fields: sp.spmatrix) -> tuple[UnheldMotion, 
 
 
 def motion_in_words(motion: np.ndarray) -> str:
-    """Return coefficients of rigid modes, shape (3,), (6,) or (1,), as translation and rotation."""
-    if len(motion) == 1:
-        return f"translation {motion[0]:.2g} along the axis"
+    """Return coefficients of rigid modes, shape (3,), (6,), (1,) or (2,), as translation and rotation."""
+    if len(motion) < 3:
+        parts = ("translation", "along"), ("rotation", "about")
+        moved = zip(motion, parts, strict=False)
+        return " with ".join(f"{kind} {size:.2g} {way} the axis" for size, (kind, way) in moved if size)
     dim = 2 if len(motion) == 3 else 3
     return " with ".join(
         f"{kind} ({', '.join(f'{component:.2g}' for component in part)})"

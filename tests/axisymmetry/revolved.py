@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -94,6 +95,18 @@ def press_fit(
         Surface("ring", "x0"), Surface("shaft", "x1"), law, discretisation, interference=INTERFERENCE
     )
     return Scene(bodies, supports, contacts=[pair])
+
+
+def twisted_fit(
+    kind: Kind, through: int, discretisation: Literal["node", "mortar"], turn: float, friction: float = 0.2
+) -> Scene:
+    """The same with torsion: the bore is held, the rim turned by an angle."""
+    scene = press_fit(kind, through, discretisation, friction)
+    bodies = {name: replace(body, torsion=True) for name, body in scene.bodies.items()}
+    supports = [Support(name, side, (None, 0.0, None)) for name in bodies for side in ("y0", "y1")]
+    supports.append(Support("shaft", "x0", (None, None, 0.0)))
+    supports.append(Support("ring", "x1", (None, None, lambda x: turn * x[:, 0])))
+    return replace(scene, bodies=bodies, supports=supports)
 
 
 def press_fit_pressure() -> float:

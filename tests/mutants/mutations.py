@@ -21,9 +21,23 @@ MUTATIONS = (
     Mutation(
         "bodies of revolution have no hoop strain",
         "_fem/revolution.py",
-        "u[0] / r)",
-        "0 * u[0] / r)",
+        "u[0] / r, u[2]",
+        "0 * u[0] / r, u[2]",
         ("tests/axisymmetry/test_small_strain.py::test_recovered_stress_of_a_patch_is_exact_on_the_axis",),
+    ),
+    Mutation(
+        "a turn about the axis strains bodies of revolution",
+        "_fem/revolution.py",
+        "-turn if twisted else 0",
+        "0",
+        ("tests/axisymmetry/test_torsion.py::test_stiffness_annihilates_translation_and_turn",),
+    ),
+    Mutation(
+        "nothing rubs around the axis",
+        "_pairing/torsion.py",
+        "np.broadcast_to([0.0, 0.0, 1.0]",
+        "np.broadcast_to([0.0, 0.0, 0.0]",
+        ("tests/axisymmetry/test_torsion.py::test_a_disc_turned_on_a_plate_has_the_torque_of_its_pressure",),
     ),
     Mutation(
         "mortar integrals do not go around the axis",

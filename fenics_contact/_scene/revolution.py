@@ -1,0 +1,80 @@
+"""What holds of bodies of revolution in a scene: their axis, and what goes with torsion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from fenics_contact._scene.body import Body
+from fenics_contact._scene.loads import BodyForce, Load, Spinning
+from fenics_contact._scene.supports import AnySupport, Roller
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials.hyperelastic import is_nonlinear
+
+
+def require_all_or_none(bodies: Mapping[str, Body], deforming: Mapping[str, Body]) -> None:
+    """Raise if only some bodies are bodies of revolution, or only some of these may twist.
+
+    `deforming`: those that carry no motion of a tool.
+    """
+    turned = [name for name, body in bodies.items() if body.axisymmetric]
+    if turned and len(turned) < len(bodies):
+        others = [name for name in bodies if name not in turned]
+        raise InvalidInputError(
+            f"the bodies of a scene must all be bodies of revolution or none, got axisymmetric {turned} "
+            f"and others {others}: give all of them axisymmetric=True"
+        )
+    twisting = [name for name, body in bodies.items() if body.torsion]
+    if twisting and len(twisting) < len(deforming):
+        others = [name for name in deforming if name not in twisting]
+        raise InvalidInputError(
+            f"the bodies of a scene must all be able to twist or none, got torsion for {twisting} and "
+            f"not for {others}: give all of them torsion=True"
+        )
+
+
+def hold_axis(body: Body, name: str, prescribed: np.ndarray) -> None:
+    """Prescribe that a body of revolution moves along its axis there; reject that supports say otherwise.
+
+    `prescribed`: what supports prescribe, NaN where free, shape (n_nodes, components), changed in place.
+    """
+    axis, names = body.on_axis, {0: "radial displacement"}
+    if body.torsion:
+        names[2] = "displacement around"
+    for component, what in names.items():
+        moved = np.abs(np.nan_to_num(prescribed[axis, component])).max(initial=0.0)
+        if moved > 0.0:
+            raise InvalidInputError(
+                f"the {what} is zero on the axis of revolution, supports of body {name!r} prescribe "
+                f"up to {moved:.3g} there: leave it free or zero"
+            )
+        prescribed[axis, component] = 0.0
+
+
+def twisting(load: Load) -> Load:
+    """Return a load of a body that may twist; a centrifugal one has nothing around the axis."""
+    if isinstance(load, BodyForce) and isinstance(load.value, Spinning):
+        return replace(load, value=replace(load.value, components=3))
+    return load
+
+
+def require_simple_torsion(
+    bodies: Iterable[Body], supports: Iterable[AnySupport], others: Mapping[str, bool]
+) -> None:
+    """Reject what bodies of revolution that may twist do not go with.
+
+    `others`: whether a scene has what else it must not have, by words for what is needed.
+    """
+    used = {
+        "linear materials": any(is_nonlinear(m) for body in bodies for m in body.materials),
+        "no rollers": any(isinstance(support, Roller) for support in supports),
+        **others,
+    }
+    for needed, given in used.items():
+        if given:
+            raise InvalidInputError(
+                f"bodies of revolution with torsion=True need {needed}, this scene has others: leave torsion "
+                "out, or take the bodies in space"
+            )
