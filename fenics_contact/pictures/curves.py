@@ -131,11 +131,14 @@ class ContactTrace:
         axis: Label of the positions: "x", "−y", of bodies of revolution "r" and "z", or "along the surface".
         places: Positions of all nodes of the surface, ascending, (n,), [length].
         pressure: On all nodes, zero where there is no contact point, (n,), [force / length²].
-        traction: Tangential traction on the slave in the direction of increasing positions, (n,).
+        traction: Tangential traction on the slave in the direction of increasing positions; with torsion
+            its size, (n,).
         bound: Friction bound of the traction, (n,).
         slip: Slip of the contact points on the master in the last load step, in the direction of increasing
-            positions, [length].
+            positions, with torsion its size, [length].
+        shear: Resultant of the traction, with torsion its torque about the axis.
         revolved: Whether forces are those of a full revolution, elsewhere per thickness.
+        twists: Whether bodies of revolution may twist.
     """
 
     name: str
@@ -152,6 +155,7 @@ class ContactTrace:
     shear: float
     rubs: bool
     revolved: bool
+    twists: bool = False
 
     def broken(self, values: np.ndarray) -> np.ndarray:
         """Insert a gap into nodal values where the surface is interrupted."""
@@ -190,16 +194,21 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
     chosen = contact.on_pair(pair)
     sorting = np.argsort(numbers)
     points = sorting[np.searchsorted(numbers, contact.points.slave[chosen], sorter=sorting)]
-    shear, slip = -sign * contact.friction_force[chosen, 0], sign * contact.slip[chosen, 0]
+    friction, slip = -sign * contact.friction_force[:, 0], sign * contact.slip[chosen, 0]
+    shear = friction[chosen].sum()
+    if state.scene.torsion:
+        friction = np.linalg.norm(contact.friction_force, axis=1)
+        slip = np.linalg.norm(contact.slip[chosen], axis=1)
+        shear = -contact.friction_force[chosen, 1] @ mesh.points[order[points], 0]
     values = np.zeros((3, len(order)))
-    forces = np.stack([contact.normal_force, -sign * contact.friction_force[:, 0], contact.slip_bound])
+    forces = np.stack([contact.normal_force, friction, contact.slip_bound])
     every, given = contact.points.of_surface(pair, (forces / contact.area).T)
     values[:, sorting[np.searchsorted(numbers, every, sorter=sorting)]] = given.T
     return ContactTrace(
         f"{slave.body}, {slave.name}", axis, places, starts[1:] - 1, values[0], values[1], values[2],
         points, contact.status[chosen], slip,
-        float(contact.normal_force[chosen].sum()), float(shear.sum()),
-        state.scene.contacts[pair].has_friction, state.scene.axisymmetric,
+        float(contact.normal_force[chosen].sum()), float(shear),
+        state.scene.contacts[pair].has_friction, state.scene.axisymmetric, state.scene.torsion,
     )  # fmt: skip
 
 

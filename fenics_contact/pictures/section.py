@@ -348,16 +348,17 @@ def strongest_contact(contact: ContactResult, places: np.ndarray) -> Spot:
     `places`: positions of the contact points, (n, dim), [length].
     """
     force, points = contact.normal_force, contact.points
-    pair = int(np.argmax(np.bincount(points.pair, weights=force)))
+    pair, dim = int(np.argmax(np.bincount(points.pair, weights=force))), places.shape[1]
+    symmetric, normals = points.symmetric[:, :dim], points.normal[:, :dim]  # with torsion there is one more
     weight = np.where(points.pair == pair, force, 0.0)
     middle = weight @ places / weight.sum()
-    centre, mirrors = _on_mirrors(middle, places, points.symmetric & (weight > 0)[:, None])
-    normal = np.where(mirrors, 0.0, weight @ points.normal)
+    centre, mirrors = _on_mirrors(middle, places, symmetric & (weight > 0)[:, None])
+    normal = np.where(mirrors, 0.0, weight @ normals)
     # Around a pin the normals cancel: there the point of largest force is used, best one on a mirror, and the
     # axis that is nearest to its normal.
     if np.linalg.norm(normal) < 1e-3 * weight.sum():
-        held = points.symmetric.sum(axis=1)
-        normal = points.normal[int(np.argmax(np.where(held == held[weight > 0].max(), weight, 0.0)))]
+        held = symmetric.sum(axis=1)
+        normal = normals[int(np.argmax(np.where(held == held[weight > 0].max(), weight, 0.0)))]
         normal = np.eye(len(normal))[int(np.argmax(np.round(np.abs(normal), 6)))]
     near = weight > 0
     solid = places.shape[1] == 3

@@ -325,7 +325,10 @@ def draw_traction(
     facts += f"normal force {written(trace.force)} {unit}"
     if rubs:
         shear = trace.shear if abs(trace.shear) > ROUNDING * trace.force else 0.0
-        facts += f", tangential force {written(shear)} {unit}"
+        what = "tangential force"
+        if trace.twists:
+            what, unit = "torque of friction", unit.replace(units.force, f"{units.force} {units.length}", 1)
+        facts += f", {what} {written(shear)} {unit}"
     top = float(trace.pressure.max()) or 1.0
     height = round((0.62 if rubs else 0.4) * width)
     with sheet(paper, (width, height), headline(title, facts)) as figure:
@@ -357,6 +360,11 @@ def _draw_friction(axes: Axes, trace: ContactTrace, units: Units) -> None:
     axes.set_ylabel(f"tangential traction ({units.stress})")
     slips = trace.status == Status.SLIP
     longest = float(np.abs(trace.slip[slips]).max(initial=0.0))
+    if trace.twists:
+        axes.set_ylim(bottom=0.0)
+        slid = f"largest slip {written(longest, 2)} {units.length}"
+        axes.set_title(f"size of the tangential traction, slip bound dashed; {slid}")
+        return
     end = ", no slip"
     if longest > 0:
         _draw_slip(axes, trace, longest)

@@ -50,6 +50,8 @@ from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke, OrthotropicElasticity, material_axes
 from fenics_contact.mesh import bisection_partition, quadratic
 from fenics_contact.output import read_result, write_contact_table
+from fenics_contact.pictures import plot_contact_pressure, plot_stress
+from fenics_contact.pictures.curves import contact_trace
 from fenics_contact.results.linear_state import as_linear
 from tests.axisymmetry.revolved import (
     BORE,
@@ -457,6 +459,17 @@ def test_a_twisted_section_is_turned_around_with_its_displacement() -> None:
     np.testing.assert_allclose(tangential, np.tile(flat[:, 2], 19), atol=1e-12)
     bent = np.asarray(state.to_pyvista(deformed=1.0)["ring"].points)
     np.testing.assert_allclose(bent[:, 2], flat[:, 2], atol=1e-7)
+
+
+def test_pictures_show_the_size_of_the_traction_and_its_torque(tmp_path: Path) -> None:
+    state = solved(twisted_fit("quadrilateral", 3, "node", 2e-3), 1e-8)
+    trace = contact_trace(state, 0)
+    np.testing.assert_allclose(trace.traction, 0.2 * trace.pressure, rtol=1e-6)
+    assert trace.shear == pytest.approx(state.resultants().friction[0].moment[0], rel=1e-6)  # type: ignore[index]
+    assert trace.slip.min() > 0.0
+    for draw in (plot_stress, plot_contact_pressure):
+        draw(state, tmp_path / "drawn.png")
+        assert (tmp_path / "drawn.png").stat().st_size > 0
 
 
 def test_table_of_contact_points_has_three_components(tmp_path: Path) -> None:
