@@ -227,10 +227,13 @@ def forces_table(forces: Mapping[str, Any], units: Mapping[str, str] | None = No
     balance, names = forces["balance"], units or {}
     force, length = names.get("force", "force"), names.get("length", "length")
     moments = np.shape(balance["loads"]["moment"])
-    plane, turned = moments == (), moments == (0,)
+    plane, turned, twists = moments == (), moments in ((0,), (1,)), moments == (1,)
     force, moment = force_units(force, length, plane)
+    kinds = f"forces ({force}) and moments ({moment})"
+    if turned:
+        kinds = f"forces ({force}){f' and torques ({moment})' * twists} per revolution"
     table = Table(
-        title=f"forces ({force}) per revolution" if turned else f"forces ({force}) and moments ({moment})",
+        title=kinds,
         title_justify="left",
         box=None,
     )
@@ -243,7 +246,7 @@ def forces_table(forces: Mapping[str, Any], units: Mapping[str, str] | None = No
     )
     for column in ("", "on"):
         table.add_column(column, overflow="fold")
-    in_space = ("Fr", "Fz") if turned else ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+    in_space = ("Fr", "Fz", "T")[: 2 + twists] if turned else ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
     for column in ("Fx", "Fy", "M") if plane else in_space:
         table.add_column(column, justify="right", no_wrap=True)
     scales = scales_of(forces)

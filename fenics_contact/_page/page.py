@@ -345,7 +345,9 @@ def _forces(record: Record, units: Units) -> str:
     ]
     rows = [row for name, entry in entries for row in _force_rows(name, entry, scales, names)]
     turned = bool((record.get("scene") or {}).get("axisymmetric"))
-    what = "axial forces per revolution" if turned else "forces and moments"
+    twists = bool((record.get("scene") or {}).get("torsion"))
+    around = "axial forces and torques" if twists else "axial forces"
+    what = f"{around} per revolution" if turned else "forces and moments"
     words = f"<p>Imbalance of all {what}: {escape(number(imbalance))}.</p>"
     return _table(("", "", *(("r", "z", "") if turned else "xyz")), rows, words=2) + words
 
@@ -363,6 +365,11 @@ def _force_rows(
         return []
     if not moment:  # all around an axis
         return [(name, f"radial and axial force ({units[0]})", *force, "")]
+    if isinstance(entry["moment"], list) and len(moment) == 1:  # of bodies of revolution that may twist
+        return [
+            (name, f"radial and axial force ({units[0]})", *force, ""),
+            ("about the axis", f"torque ({units[1]})", "", "", *moment),
+        ]
     # In the plane a moment is one number, about the axis across it.
     return [
         (name, f"force ({units[0]})", *force, *[""] * (3 - len(force))),

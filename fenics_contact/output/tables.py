@@ -181,7 +181,7 @@ class StepTable:
     | ``surface_energy`` | where surfaces give way |
     | ``preload NAME`` | force of each preload |
     | ``loads Fx``, ... | force of all loads, and its moment ``loads Mx``, ... |
-    | ``loads Fr``, ``loads Fz`` | the same of bodies of revolution, a revolution |
+    | ``loads Fr``, ``loads Fz`` | the same of bodies of revolution, a revolution; with torsion ``loads T`` |
     | ``lid top Fx``, ... | reaction of the supports of the surface "top" of the body "lid" |
     | ``foundation slab bottom Fx``, ... | force of springs to the ground |
     | ``tool NAME ux``, ..., ``tool NAME turn x``, ... | displacement and rotation of each rigid tool |

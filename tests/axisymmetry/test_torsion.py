@@ -442,11 +442,17 @@ def test_scene_files_and_their_results_know_torsion(tmp_path: Path) -> None:
     ran = CliRunner().invoke(cli.app, ["run", str(tmp_path / "tube.toml"), "--output", out], obj=console)
     assert ran.exit_code == 0, ran.output
     assert "-1e+06" in ran.output
+    assert "forces (N) and torques (N mm) per revolution" in " ".join(ran.output.split())
+    head = next(line for line in ran.output.splitlines() if "Fr" in line)
+    assert head.split()[-3:] == ["Fr", "Fz", "T"]
     record = read_result(tmp_path / "out")
     assert record["scene"]["torsion"] is True
     assert record["forces"]["balance"]["reactions"]["moment"] == pytest.approx([-1e6])
     console = cli.Console(MPI.COMM_SELF)
     assert CliRunner().invoke(cli.app, ["view", out, "--page"], obj=console).exit_code == 0
+    page = (tmp_path / "out" / "page.html").read_text(encoding="utf-8")
+    assert "torque (N mm)" in page
+    assert "axial forces and torques per revolution" in page
 
 
 def test_a_twisted_section_is_turned_around_with_its_displacement() -> None:
