@@ -8,18 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from pydantic import AfterValidator, Discriminator, Field, NonNegativeFloat, PositiveFloat, Tag
+from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
 from scipy.spatial.transform import Rotation
 
 from fenics_contact._base.checks import STEEPEST
 from fenics_contact._scene_file.part import Part, keys_of, table_of
 from fenics_contact._scene_file.values import (
-    MARK,
     Pair,
     PlaceOfFile,
     Read,
     Triple,
     Vector,
+    either,
     is_reference,
     load,
     one_of,
@@ -53,26 +53,20 @@ FACE_CHOICES = (
 )
 
 
-def _either(kind: type, this: Any, other: Any) -> Any:
-    """Read values of a Python type as one annotation, all others as another."""
-    tag = Discriminator(lambda value: f"{MARK}this" if isinstance(value, kind) else f"{MARK}other")
-    return Annotated[Annotated[this, Tag(f"{MARK}this")] | Annotated[other, Tag(f"{MARK}other")], tag]
-
-
 _LABEL = Annotated[
     str | int,
     with_message("the name or number of a group or face, a list of them, or a table that chooses faces"),
 ]
-_ONE: Any = _either(dict, Annotated[Any, one_of("faces", *FACE_CHOICES)], _LABEL)
+_ONE: Any = either(dict, Annotated[Any, one_of("faces", *FACE_CHOICES)], _LABEL)
 _SEVERAL = Annotated[list[Annotated[Any, Read(_ONE)]], Field(min_length=1, strict=False)]
 _LIST = Annotated[
     list[str | int],
     Field(min_length=1, strict=False),
     with_message("a list of groups, or a table: surface = group, or surface = [groups]"),
 ]
-_OF_SURFACES = dict[str, Annotated[Any, Read(_either(list, _SEVERAL, _ONE))]]
+_OF_SURFACES = dict[str, Annotated[Any, Read(either(list, _SEVERAL, _ONE))]]
 #: A list of groups, or surface to group, groups, or tables that choose faces.
-SurfaceGroups: TypeAlias = Annotated[Any, Read(_either(dict, _OF_SURFACES, _LIST))]
+SurfaceGroups: TypeAlias = Annotated[Any, Read(either(dict, _OF_SURFACES, _LIST))]
 
 
 def made_choice(given: Any) -> Any:

@@ -38,6 +38,7 @@ from fenics_contact._scene_file.values import (
     Vector,
     VectorExpression,
     at_time,
+    either,
     field_or,
     one_of,
 )
@@ -314,7 +315,7 @@ class TotalMomentLoad(_Load):
 
     changed: ClassVar[str] = "moment"
     kind: Literal["total_moment"]
-    moment: Vector | float = Field(
+    moment: either(list, Vector, float) = Field(  # type: ignore[valid-type]
         alias="value", description="three numbers, in the plane one, positive from x to y, [force·length]"
     )
 
@@ -434,7 +435,7 @@ class RollerPart(_Named):
 class FoundationPart(Part):
     """A surface that rests on springs to the ground."""
 
-    stiffness: Vector | PositiveFloat = Field(
+    stiffness: either(list, Vector, PositiveFloat) = Field(  # type: ignore[valid-type]
         description="[force / length³]: a number along the normal of the surface, or one for each axis"
     )
 
@@ -446,7 +447,7 @@ class SpringPart(Part):
     first: SurfaceOfBody
     second: SurfaceOfBody | None = Field(None, description="the other surface")
     point: Vector | None = Field(None, description="a fixed point in place of a second surface, [length]")
-    stiffness: Vector | PositiveFloat = Field(
+    stiffness: either(list, Vector, PositiveFloat) = Field(  # type: ignore[valid-type]
         description="[force / length]: a number along the line between the ends, or one for each axis"
     )
     name: str | None = Field(None, description="how results call it, both ends by default")

@@ -31,6 +31,8 @@ def unknown(source: Source, path: Path, given: str, what: str, known: Iterable[s
     names = list(known)
     words = f"{written(path)} must be {what}, one of {listed(names)}, got {as_toml(given)}"
     meant = suggestion(given, names).rstrip()
+    if not names and what.startswith("the name of"):
+        meant = f"give it name = {as_toml(given)} there"
     return source.mistake(path, f"{words}: {meant}" if meant else words)
 
 

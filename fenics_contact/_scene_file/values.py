@@ -328,6 +328,12 @@ LONGEST_NAME = 255
 LONGEST_PATH = 4000
 
 
+def either(kind: type, this: Any, other: Any) -> Any:
+    """Read values of a Python type as one annotation, all others as another."""
+    tag = Discriminator(lambda value: f"{MARK}this" if isinstance(value, kind) else f"{MARK}other")
+    return Annotated[Annotated[this, Tag(f"{MARK}this")] | Annotated[other, Tag(f"{MARK}other")], tag]
+
+
 @dataclass(frozen=True, eq=False)
 class Read:
     """Lets pydantic use another annotation for a key than type checkers."""

@@ -22,6 +22,7 @@ from fenics_contact import (
     solve_scene,
     write_result,
 )
+from fenics_contact._scene_file.source import SceneFileError
 from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.feti.foundations import foundation_stiffness, separated
 from fenics_contact.gallery import block, rectangle
@@ -224,3 +225,18 @@ def test_radial_springs_hold_no_ring_along_its_axis() -> None:
     held, free = separated(springs, along)
     assert along.T @ springs @ along > 0.0
     assert (held.shape[1], free.shape[1]) == (0, 1)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "words"),
+    [
+        (-5.0, r"foundations\.0\.stiffness must be a number greater than 0, got -5.0"),
+        ("soft", r"foundations\.0\.stiffness must be a number, got \"soft\""),
+        ([1.0], r"foundations\.0\.stiffness must be two or three finite numbers in brackets"),
+    ],
+)
+def test_a_wrong_stiffness_in_a_scene_file_is_one_mistake(stiffness: object, words: str) -> None:
+    foundations = [{"body": "b", "surface": "z0", "stiffness": stiffness}]
+    with pytest.raises(SceneFileError, match=words) as caught:
+        read_scene_file({"foundations": foundations}, MPI.COMM_SELF)
+    assert str(caught.value).count("stiffness must be") == 1
