@@ -171,7 +171,7 @@ def _slave_surface(state: State, which: int | str) -> _SlaveSurface:
     if by_mortar:
         areas = nodal_areas(surface.points, whole, scene.axisymmetric).ravel()
         whole_area = np.bincount(point, np.bincount(whole.ravel(), areas)[place], points.count)
-        facing[place] = np.minimum(contact.nominal_area[point] / whole_area[point], 1.0)
+        facing[place] = contact.nominal_area[point] / whole_area[point]
     facing = np.maximum(filled_at_corners(whole, facing), 0.0)
     if scene.axisymmetric:
         facing = np.clip(filled_on_axis(whole, facing, on_axis), 0.0, 1.0)
