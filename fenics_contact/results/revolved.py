@@ -45,11 +45,16 @@ def turned_around(
     angles = np.radians(np.linspace(0.0, angle, count + 1))
     layers = n * np.arange(count)[:, None, None]
     ends = [cells + layers, cells + layers + n]
-    # VTK's wedges have the normal of their first triangle outwards, its hexahedra inwards.
-    ends = ends if kind == "TRIANGLE" else ends[::-1]
-    swept = np.concatenate(ends, axis=2).reshape(-1, 2 * cells.shape[1])
     points = np.concatenate([_turned(grid.points, turn) for turn in angles])
-    solid = pv.UnstructuredGrid({pv.CellType[_SWEPT[kind]]: swept}, points)
+
+    def between(*ends: np.ndarray) -> pyvista.UnstructuredGrid:
+        swept = np.concatenate(ends, axis=2).reshape(-1, 2 * cells.shape[1])
+        return pv.UnstructuredGrid({pv.CellType[_SWEPT[kind]]: swept}, points)
+
+    # The normal of the first face of VTK's hexahedra points inwards, that of its wedges outwards up to 9.3.
+    solid = between(*ends[::-1])
+    if solid.volume < 0.0:
+        solid = between(*ends)
     middles = (angles[1:] + angles[:-1]) / 2
     for name in grid.point_data:
         solid.point_data[name] = np.concatenate([_field(name, grid.point_data[name], t) for t in angles])

@@ -314,7 +314,8 @@ def test_axis_stays_where_it_is() -> None:
     scene = stacked("quadrilateral", "node", (4, 4))
     state = solved(replace(scene, loads=[Traction("upper", "y1", lambda x: -(x[:, :1] ** 2) * (1.0, 3.0))]))
     mesh = scene.bodies["upper"].mesh
-    assert np.abs(state.gather_displacement("upper")[mesh.points[:, 0] == 0.0, 0]).max() == 0.0
+    u = state.gather_displacement("upper")
+    assert np.abs(u[mesh.points[:, 0] == 0.0, 0]).max() < 1e-20 * np.abs(u).max()
     with pytest.raises(InvalidInputError, match="radial displacement is zero on the axis"):
         solved(replace(scene, supports=[Support("lower", "y0", (0.1, 0.0))]))
 
