@@ -22,8 +22,8 @@ from fenics_contact._large_deformations.load_steps import AutomaticSteps, Path, 
 from fenics_contact._large_deformations.loading import Loading
 from fenics_contact._large_deformations.moving_contact import Contact, ContactConfiguration, MovingContact
 from fenics_contact._large_deformations.newton import Effort, NonlinearEquilibrium, NotHeldError
+from fenics_contact._large_deformations.rigid_surfaces import driven_further
 from fenics_contact._scene.scene import LoadStep, Scene
-from fenics_contact._scene.supports import RigidSurface
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact.errors import InfeasibleError, InvalidInputError, LoadStepError
 from fenics_contact.feti.decomposition import Decomposition
@@ -53,7 +53,7 @@ class DeformedEquilibria:
         known: DeformedEquilibria | None = None,
     ) -> None:
         """Prepare the forms of all materials. Collective."""
-        _require_prescribed(scene)
+        _require_elastic(scene)
         self.scene, self._steps = scene, steps or AutomaticSteps()
         self._decomposition, self._timer = decomposition, timer
         self._equations = Equations(scene, decomposition)
@@ -87,8 +87,10 @@ class DeformedEquilibria:
         self._require_later(scene, start.time, time)
         with timer.phase("assemble"):
             load = self._loading(scene, time, step, overlap)
-            if scene.preloads and isinstance(before, DeformedState) and acted is not None:
-                acted = drawn_as(before, acted, load)
+            if isinstance(before, DeformedState) and acted is not None:
+                if scene.preloads:
+                    acted = drawn_as(before, acted, load)
+                acted, load = moved_as(before, acted, load, equations.contact)
             if acted is None:
                 check_held(load.torn)
             if self._unresisted is None:  # supports stay what they are in later steps
@@ -165,6 +167,34 @@ def drawn_as(before: DeformedState, acted: Loading, load: Loading) -> Loading:
     return replace(acted, torn=replace(torn, right=kept, free=replace(now.free, load=forces)))
 
 
+def moved_as(
+    before: DeformedState, acted: Loading, load: Loading, contact: Contact
+) -> tuple[Loading, Loading]:
+    """Return the load of the state before with the free components of rigid surfaces of now. Collective.
+
+    Those that were held have the force that they transmitted, those that were free are held where they were.
+    The load that is to act begins with the free components as they are.
+    """
+    at = before.equilibrium.configuration
+    if not (load.is_tracked or acted.is_tracked):
+        return acted, load
+    last = {each.place: each for each in acted.turned}
+    turned = []
+    for each in load.turned:
+        known = last.get(each.place)
+        held = np.zeros_like(each.load) if known is None else np.where(each.free, known.load, 0.0)
+        motion = at.motions.get(each.place, np.zeros_like(each.motion))
+        turned.append(replace(each, motion=motion, load=held))
+    acted = acted.with_surfaces(tuple(turned))
+    if load.is_tracked:
+        there = acted.at_motions(at.motions)
+        now = at.on(contact.at(there, at.displacement, at.contact))
+        assert now.contact is not None
+        missing = now.contact.torn.free_imbalance(now.multiplier)
+        acted = replace(acted, turned=driven_further(acted.turned, -missing))
+    return acted, load.with_surfaces(tuple(each.at(at.motions) for each in load.turned))
+
+
 def _require_more_than_springs(torn: TornSystem, failure: Exception) -> None:
     """Name motions that elastic foundations alone resist: Newton's method may need more. Collective."""
     alone = unresisted_motions(torn, sprung=False) if torn.scene.foundations else ()
@@ -176,32 +206,13 @@ def _require_more_than_springs(torn: TornSystem, failure: Exception) -> None:
         ) from failure
 
 
-def _require_prescribed(scene: Scene) -> None:
-    """Reject rigid tools, and rigid surfaces that forces move."""
+def _require_elastic(scene: Scene) -> None:
+    """Reject rigid tools on bodies that are nonlinear with small displacements."""
     if not scene.deforms_much and any(isinstance(body, ToolBody) for body in scene.bodies.values()):
         raise InvalidInputError(
             "a RigidTool needs linear materials or those for large deformations, got materials that are "
             "nonlinear with small displacements: give a body a material for large deformations"
         )
-    for support in scene.supports:
-        if isinstance(support, RigidSurface) and isinstance(scene.bodies[support.body], ToolBody):
-            if support.free.any():
-                raise InvalidInputError(
-                    f"the whole motion of tool {support.body!r} must be prescribed where bodies deform much, "
-                    f"got force {support.force!r} and moment {support.moment!r} with free components: "
-                    "prescribe displacement and rotation and read the force from State.tools()"
-                )
-            continue
-        if isinstance(support, RigidSurface) and support.free.any():
-            kinds = {type(each).__name__ for body in scene.bodies.values() for each in body.materials}
-            raise InvalidInputError(
-                "the whole motion of a RigidSurface must be prescribed where materials are nonlinear, but on "
-                f"surface {support.surface!r} of body {support.body!r} components are left free, with "
-                f"force {support.force!r} and moment {support.moment!r}, and the scene has {sorted(kinds)}: "
-                "prescribe displacement and rotation and read the force from the state's reactions(); or "
-                "apply the force by a TotalForce, which leaves the surface flexible, or to a stiff body that "
-                "is tied to the surface"
-            )
 
 
 def _state_after(
@@ -265,6 +276,9 @@ def _energies(evaluation: ResidualState, rubbed: float) -> Energies:
     strain = float(evaluation.torn.numbering.comm.allreduce(float(np.sum(stored))))
     dead = evaluation.softening is None
     work = evaluation.torn.load_work(evaluation.at.displacement) if dead else np.nan
+    turned = evaluation.load.turned
+    strain += sum(0.5 * float(each.springs @ each.motion**2) for each in turned)
+    work += sum(each.work for each in turned if each.free.any())
     surface = 0.0
     if evaluation.torn.compliance is not None or evaluation.torn.give is not None:
         given_way, kept = softened(evaluation.torn, evaluation.at.multiplier)
@@ -299,6 +313,7 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
         "parts": np.array(state.fractions),
         "since": np.array(state.since),
         "rubbed": np.array(state.energies.friction - evaluation.rubbing),
+        **{_stored_motion(place): motion for place, motion in at.motions.items()},
         "snaps": np.array([astuple(snap) for snap in state.snaps]),
     }
     pairs = zip(decomposition.meshes, at.history, strict=True)
@@ -333,6 +348,12 @@ def stored_configuration(
         stored[f"history.{mesh.body}"][mesh.cells] if f"history.{mesh.body}" in stored else None
         for mesh in decomposition.meshes
     )
+    motions = {
+        each.place: stored[_stored_motion(each.place)]
+        for each in load.turned
+        if _stored_motion(each.place) in stored
+    }
+    load = load.at_motions(motions)
     if isinstance(contact, MovingContact):
         found = contact.found_again(load, displacement, stored)
         require_rows(found.torn, stored)
@@ -341,4 +362,10 @@ def stored_configuration(
         found = contact.at(load, displacement, None)
     begin, _, largest = stored["times"]
     multiplier = stored["multiplier"][found.torn.numbering.owned]
-    return Configuration(displacement, multiplier, history, float(begin), float(largest), found), load
+    configuration = Configuration(displacement, multiplier, history, float(begin), float(largest), found)
+    return replace(configuration, motions=load.motions), load
+
+
+def _stored_motion(place: tuple[str, str]) -> str:
+    """Return the name of the stored motion of a rigid surface."""
+    return f"motion.{place[0]}.{place[1]}"

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.points import ContactPoints, are_sliding
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.obstacles import MovingObstacle
+from fenics_contact._scene.obstacles import MovingObstacle, RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.plan import MOTION_ROUNDING, held_components, point_loads, resisted_motions
 from fenics_contact.errors import ConvergenceError, InfeasibleError, together
@@ -521,9 +521,10 @@ def _of_any(torn: TornSystem, pair: ContactPair, names: list[str]) -> sp.csc_mat
     length = len(at) * slave.components
     result = np.zeros((len(names), size, length))
     for side, sign in ((pair.slave, 1.0), (pair.master, -1.0)):
-        if isinstance(side, Surface):
-            modes = torn.scene.bodies[side.body].rigid_modes(at)
-            result[names.index(side.body)] += sign * modes.reshape(length, size).T
+        name = side.body if isinstance(side, Surface) else side.name if isinstance(side, RigidTool) else None
+        if name is not None:
+            modes = torn.scene.bodies[name].rigid_modes(at)
+            result[names.index(name)] += sign * modes.reshape(length, size).T
     return sp.csc_matrix(result.reshape(-1, length))
 
 

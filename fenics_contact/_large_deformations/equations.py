@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,12 @@ from fenics_contact._large_deformations.moving_contact import (
     stiffened,
     unsymmetric_at,
     with_added,
+)
+from fenics_contact._large_deformations.rigid_surfaces import (
+    Motions,
+    placed,
+    spring_columns,
+    tracked_stiffness,
 )
 from fenics_contact._large_deformations.tangent import TangentSystem, linearised
 from fenics_contact._large_deformations.tangent_step import TangentProblem
@@ -93,6 +99,7 @@ class Configuration:
             bodies return to rest, residuals are relative to that.
         contact: The contact points whose rows the multiplier has; None at the start.
         diagonal: Of F on these rows, at a configuration near this one, owned; None where it is not known.
+        motions: U, then θ, of rigid surfaces; zero where they are not among them.
     """
 
     displacement: Vector
@@ -102,6 +109,7 @@ class Configuration:
     largest: float
     contact: ContactConfiguration | None
     diagonal: Vector | None = None
+    motions: Motions = field(default_factory=dict)
 
     def natural_step(self, caution: float = 1.0) -> Vector:
         """Return ρ of the natural map, owned, times a factor; zero where the diagonal of F is not known."""
@@ -148,9 +156,17 @@ class ResidualState:
     residuals: Residuals
     least_jacobian: float
 
-    def evaluate(self, displacement: Vector, multiplier: Vector, caution: float = 1.0) -> ResidualState:
+    def evaluate(
+        self,
+        displacement: Vector,
+        multiplier: Vector,
+        caution: float = 1.0,
+        motions: Motions | None = None,
+    ) -> ResidualState:
         """Return the equations after a Newton step from here, given λ on the present rows. Collective."""
-        at = replace(self.at, displacement=displacement, multiplier=multiplier)
+        at = replace(
+            self.at, displacement=displacement, multiplier=multiplier, motions=motions or self.at.motions
+        )
         return self.equations.evaluate(self.load, at, caution, self.at.displacement)
 
     @property
@@ -227,13 +243,17 @@ class ResidualState:
         taken[glued] = torn.jump(flexibility * left)[glued] / size[glued]
         return taken
 
-    def linearised(self, timer: PhaseTimer, known: Linearisation | None) -> Linearisation:
-        """Factor the tangents. Collective."""
+    def linearised(
+        self, timer: PhaseTimer, known: Linearisation | None, *, springs: bool = True
+    ) -> Linearisation:
+        """Factor the tangents, with those of springs of tools or without. Collective."""
         self._require_finite_tangents()
         uneven = None
         if self.softening is not None:
             uneven = unsymmetric_at(self.torn.decomposition, self.softening, self.load.rim)
         turning = self.contact.turning(self.at.multiplier, uneven)
+        if turning is not None and self.load.is_tracked and springs:
+            turning = turning.with_springs(*spring_columns(self.load.turned, self.contact.prescribed.size))
         tangents = self._tangents
         torn, further = self.torn, NO_ROWS
         if turning is not None:
@@ -244,8 +264,10 @@ class ResidualState:
                 further = FurtherRows.of(torn, self.torn, turning)
         right = np.concatenate([self.constraint_residual, np.zeros(further.count)])
         if torn.free.count:
-            load = self.torn.free_imbalance(self.at.multiplier)
-            torn = replace(torn, free=replace(torn.free, load=load))
+            load, stiffness = self.torn.free_imbalance(self.at.multiplier), None
+            if self.torn.free.tracked:
+                stiffness = tracked_stiffness(self.load.turned, self.torn, self.at.multiplier)
+            torn = replace(torn, free=replace(torn.free, load=load, stiffness=stiffness))
         increments = linearised(torn, self.at.displacement, tangents, self.unbalanced, right)
         diagonal = self.at.diagonal
         if diagonal is not None:
@@ -369,8 +391,11 @@ class Equations:
         Multipliers have the rows of the contact points of ``near``; ``caution`` is a factor on ρ of the
         natural map, ``origin`` the displacement before the last Newton step.
         """
+        load = load.at_motions(near.motions)
+        near = replace(near, displacement=placed(load.turned, load.torn, near.displacement))
         contact = self.contact.at(load, near.displacement, near.contact)
-        return self.evaluate_at(load, near.on(contact), caution, origin)
+        near = replace(near.on(contact), motions=load.motions)
+        return self.evaluate_at(load, near, caution, origin)
 
     def evaluate_at(
         self, load: Loading, at: Configuration, caution: float = 1.0, origin: Vector | None = None

@@ -295,7 +295,8 @@ class AutomaticSteps:
         """
         first = target.removed() if before is None else before
         # Slip begins where bodies are before supports and obstacles move.
-        at = start if start.contact else start.on(equations.contact.at(first, start.displacement, None))
+        begun = first.at_motions(start.motions)
+        at = start if start.contact else start.on(equations.contact.at(begun, start.displacement, None))
         assert at.contact is not None
         way = _Way(self, equations, first, target, at.contact, timer)
         now = Progress(at, first.torn, known, (at, first.torn), at.contact.start)
@@ -381,7 +382,8 @@ class _Way:
         try:
             load = self._load(fraction, *now.origin)
             assert now.at.contact is not None
-            moved = self.equations.rigid_start.moved(now.at.contact.prescribed, load, now.at.displacement)
+            there = load.at_motions(now.at.motions)
+            moved = self.equations.rigid_start.moved(now.at.contact.prescribed, there, now.at.displacement)
             found = self.steps.newton.solve(self.equations, load, now.at, self.timer, now.known, moved)
         except ConvergenceError as failure:
             return now.costing(Effort.until(failure)), failure

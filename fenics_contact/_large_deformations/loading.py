@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,10 +10,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.display import displayed
+from fenics_contact._large_deformations.rigid_surfaces import Motions, TurnedSurface, tracked_motions
 from fenics_contact._scene.scene import LoadStep, Scene
-from fenics_contact._scene.supports import RigidSurface
 from fenics_contact.errors import together
 from fenics_contact.feti.decomposition import Decomposition, prescribed_displacements
+from fenics_contact.feti.free_motions import FreeMotions
 from fenics_contact.feti.torn import TornSystem, build_torn_system
 from fenics_contact.mesh.faces import corners_of
 from fenics_contact.mesh.quality import similarity
@@ -59,6 +61,7 @@ class Loading:
         if scene.following_pressures:
             following = ((1.0, FollowingPressures(scene, decomposition)),)
         turned = TurnedSurface.all_of(scene, decomposition)
+        torn = _without_tracked(torn, turned)
         varies = step is not None and (callable(step.loads) or callable(step.supports))
         return cls(torn, prescribed, time, following, turned, step if varies else None)
 
@@ -106,12 +109,45 @@ class Loading:
         time = (1.0 - part) * first.time + part * self.time
         before = {each.place: each for each in first.turned}
         turned = tuple(each.between(before.get(each.place), part) for each in self.turned)
-        bent = prescribed.copy()
+        return Loading(torn, prescribed, time, tuple(weighted)).with_surfaces(turned)
+
+    def with_surfaces(self, turned: tuple[TurnedSurface, ...]) -> Loading:
+        """Return the load with rigid surfaces that have moved elsewhere."""
+        if not turned:
+            return self
+        bent = self.prescribed.copy()
         for surface in turned:
             bent[surface.nodes] = surface.displacement
-        if turned:
-            torn = _moved_further(torn, np.nan_to_num(bent - prescribed))
-        return Loading(torn, bent, time, tuple(weighted), turned)
+        torn = _moved_further(self.torn, np.nan_to_num(bent - self.prescribed))
+        return replace(self, torn=torn, prescribed=bent, turned=turned)
+
+    @property
+    def is_tracked(self) -> bool:
+        """Whether rigid surfaces have free components."""
+        return any(each.free.any() for each in self.turned)
+
+    @property
+    def is_sprung(self) -> bool:
+        """Whether springs act on tools."""
+        return any(each.springs.any() for each in self.turned)
+
+    @property
+    def loose(self) -> frozenset[str]:
+        """Names of the bodies of rigid surfaces with free components."""
+        return frozenset(each.surface.body for each in self.turned if each.free.any())
+
+    def at_motions(self, motions: Motions) -> Loading:
+        """Return the load where rigid surfaces have moved as given in their free components."""
+        if not self.is_tracked:
+            return self
+        now = self.with_surfaces(tuple(each.at(motions) for each in self.turned))
+        torn = _without_tracked(now.torn, ())
+        return replace(now, torn=replace(torn, free=tracked_motions(now.turned, torn)))
+
+    @property
+    def motions(self) -> Motions:
+        """U, then θ, of all rigid surfaces."""
+        return {each.place: each.motion for each in self.turned}
 
     def removed(self) -> Loading:
         """Return the same supports without movement, at time zero, and no loads."""
@@ -171,50 +207,6 @@ class Drag:
 
 
 @displayed
-@dataclass(frozen=True, eq=False)
-class TurnedSurface:
-    """A surface that turns as a rigid piece by a large angle.
-
-    Attributes:
-        motion: U, [length], then θ, in radians.
-        nodes: Its nodes, of those of all bodies, shape (n,).
-        points: Their undeformed coordinates, shape (n, dim), [length].
-    """
-
-    surface: RigidSurface
-    motion: np.ndarray
-    nodes: np.ndarray
-    points: np.ndarray
-
-    @classmethod
-    def all_of(cls, scene: Scene, decomposition: Decomposition) -> tuple[TurnedSurface, ...]:
-        """Return those of a scene."""
-        found = []
-        for support in scene.supports:
-            body = scene.bodies[support.body]
-            if isinstance(support, RigidSurface) and body.deforms_much:
-                own = np.unique(body.mesh.surfaces[support.surface])
-                nodes = decomposition.tearing.global_nodes(support.body, own)
-                found.append(cls(support, support.prescribed, nodes, body.mesh.points[own]))
-        return tuple(found)
-
-    def between(self, first: TurnedSurface | None, part: float) -> TurnedSurface:
-        """Return it at a part of the way from another motion, by default from rest."""
-        start = 0.0 if first is None else first.motion
-        return replace(self, motion=(1.0 - part) * start + part * self.motion)
-
-    @property
-    def place(self) -> tuple[str, str]:
-        """Names of the body and of the surface."""
-        return self.surface.body, self.surface.surface
-
-    @property
-    def displacement(self) -> np.ndarray:
-        """Displacement of the nodes, shape (n, dim), [length]."""
-        return self.surface.turned(self.points, self.motion)
-
-
-@displayed
 class FollowingPressures:
     """The pressures of a scene that follow their surfaces, on this rank's subdomains."""
 
@@ -265,6 +257,15 @@ class FollowingPressures:
             blocks[number] = blocks[number] + softening
         matrix = sp.block_diag(blocks, format="csr") if blocks else sp.csr_matrix((size, size))
         return force, sp.csr_matrix(matrix)
+
+
+def _without_tracked(torn: TornSystem, turned: Sequence[TurnedSurface]) -> TornSystem:
+    """Return a system whose free motions are those of preloads alone."""
+    count = sum(int(each.free.sum()) for each in turned) or torn.free.tracked
+    if not count:
+        return torn
+    free = FreeMotions(torn.free.columns[:, count:], torn.free.load[count:])
+    return replace(torn, free=free)
 
 
 def _at_rim(facets: np.ndarray, dim: int) -> np.ndarray:

@@ -120,6 +120,24 @@ class TurningForces:
         stiffness = (left * right)[kept]
         return cls(normal, normal_owner, forces, displacements, stiffness, owner[kept], corrections)
 
+    def with_springs(
+        self, columns: sp.csr_matrix, stiffness: np.ndarray, owner: np.ndarray
+    ) -> TurningForces:
+        """Return those with springs, whose rows come after those of normal forces.
+
+        `columns`: of length one, shape (n_dofs, m); `stiffness`: shape (m,), [force / length]; `owner`: node
+        whose rank owns each row, shape (m,).
+        """
+        if not len(owner):
+            return self
+        assert self.normal is not None
+        normal = replace(
+            self.normal,
+            columns=sp.hstack([self.normal.columns, columns], format="csr"),
+            values=np.concatenate([self.normal.values, stiffness]),
+        )
+        return replace(self, normal=normal, normal_owner=np.concatenate([self.normal_owner, owner]))
+
     @property
     def compliance(self) -> np.ndarray:
         """Of the rows of normal forces, of either sign, shape (m,), [length / force]."""
@@ -423,12 +441,11 @@ class ContactConfiguration:
             entries = (columns if axes is None else free_matrix(fixed, axes) @ columns).T.tocoo()
             node, component = np.divmod(entries.col, self.torn.components)
             free = ~fixed[node, component] if axes is None else np.full(len(node), True)
-            further.append(
-                on_copies(
-                    decomposition.tearing, entries.row[free], node[free], component[free],
-                    entries.data[free], owner,
-                )
+            rows = on_copies(
+                decomposition.tearing, entries.row[free], node[free], component[free], entries.data[free],
+                owner,
             )  # fmt: skip
+            further.append((rows, columns))
         return meeting_at(self.torn, points, self.prescribed, further)
 
 
@@ -496,7 +513,8 @@ class MovingContact(Contact):
     ) -> ContactConfiguration:
         """Search for the points at a displacement. Collective."""
         known, start = (None, None) if last is None else (last.points, last.start)
-        found = self._sliding.at(self._coordinates(load, displacement), known, load.time, start)
+        coordinates = self._coordinates(load, displacement)
+        found = self._sliding.at(coordinates, known, load.time, start, load.loose)
         here = found.material_points()
         start = here if start is None else start.extended(here)
         torn = meeting_at(load.torn, found.points, load.prescribed)
@@ -507,7 +525,7 @@ class MovingContact(Contact):
     ) -> ContactConfiguration:
         """Return the points that were stored by `SlidingPoints.stored`. Collective."""
         coordinates = self._coordinates(load, displacement)
-        found, start = self._sliding.found_again(stored, coordinates, load.time)
+        found, start = self._sliding.found_again(stored, coordinates, load.time, load.loose)
         torn = meeting_at(load.torn, found.points, load.prescribed)
         return ContactConfiguration(torn, found, start, load.prescribed)
 

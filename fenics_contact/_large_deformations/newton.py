@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -18,15 +19,18 @@ from fenics_contact._large_deformations.equations import (
     ResidualState,
 )
 from fenics_contact._large_deformations.loading import Loading
+from fenics_contact._large_deformations.rigid_surfaces import moved_on
 from fenics_contact._large_deformations.tangent_step import TangentStep, tangent_step, whole_step
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
-from fenics_contact.errors.kinds import FoldedFacetsError
+from fenics_contact.errors.kinds import FoldedFacetsError, safe_log
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.face_newton import FaceNewton
 from fenics_contact.qp.krylov import Stop
 from fenics_contact.qp.newton_steps import Damped, Forcing, damp, run_newton
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 from fenics_contact.qp.solution import Residuals, SolverStep
+
+_LOG = logging.getLogger(__name__)
 
 #: What to do where closed contacts and supports leave some body free to move.
 HOLD = (
@@ -122,6 +126,8 @@ class TangentNewton:
         fine: Residual of a linear system that is always small enough, relative to `tolerance`.
         hidden: Errors at contact below this part of the forces out of balance do not shorten a step: they do
             not depend on the active set then.
+        enough: Part of all residuals to which a whole step must reduce them where forces move rigid surfaces:
+            as supports do that are moved, they begin with contact in order and forces out of balance.
         slipped: Part of the slip bound within which a disc counts as slipping at the start of a load step:
             what slipped in the last one mostly goes on.
         nested: Tolerance of contact problems that are solved as a whole, at the start of a history.
@@ -143,6 +149,7 @@ class TangentNewton:
     least_care: float = 1e-3
     fine: float = 1e-4
     hidden: float = 1e-2
+    enough: float = 0.5
     slipped: float = 1e-6
     nested: float = 1e-2
 
@@ -153,7 +160,7 @@ class TangentNewton:
             InvalidInputError: If one is not between 0 and 1, or a count is not positive.
         """
         ratios = ("tolerance", "forcing", "care", "caution", "room")
-        for name in (*ratios, "near", "least_care", "fine", "hidden", "slipped", "nested"):
+        for name in (*ratios, "near", "least_care", "fine", "hidden", "enough", "slipped", "nested"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise InvalidInputError(
                     f"{name} of TangentNewton must lie between 0 and 1, got {getattr(self, name)!r}: it is a "
@@ -250,7 +257,7 @@ class _Run:
             # Gaps are measured by the diagonal of F, which is known only now.
             near = evaluation.linearised(self.timer, None)
             with self.timer.phase("assemble"):
-                evaluation = self.equations.evaluate_at(self.load, near.of(evaluation).at)
+                evaluation = self.equations.evaluate_at(evaluation.load, near.of(evaluation).at)
             state = replace(state, evaluation=evaluation, near=near, effort=Effort(factorisations=1))
         return state
 
@@ -280,13 +287,15 @@ class _Run:
         state = replace(state, evaluation=evaluation, near=near, pace=pace)
         # (b), (c) The face and its linear system.
         with self.timer.phase("solve"):
-            taken, whole = self._solved(state)
+            taken, near, whole = self._solved(state)
             change = taken.multiplier[: len(evaluation.at.multiplier)] - evaluation.at.multiplier
             further = taken.multiplier[len(change) :]
             moved = near.system.displacement(np.concatenate([change, further]), taken.motions)
             change = change + evaluation.passed_on(moved)
         # (d) The step, as far as cells and the active set allow.
-        damped = self._damped(state, moved, change)
+        tracked = evaluation.torn.free.tracked
+        turned = taken.motions[len(taken.motions) - evaluation.torn.free.count :][:tracked]
+        damped = self._damped(state, moved, change, turned)
         # (e) The next state, or the other start if the first step has failed.
         line = self._line(state, damped, taken, whole)
         promising = damped.fraction == 1.0 and line.residuals.worst < evaluation.residuals.worst
@@ -324,10 +333,12 @@ class _Run:
         comm = evaluation.torn.numbering.comm
         return global_sum(comm, np.count_nonzero(evaluation.at.multiplier))[0] > 0.0
 
-    def _solved(self, state: _State) -> tuple[TangentStep, bool]:
-        """Solve the face at the present point, or contact as a whole; return whether that was. Collective.
+    def _solved(self, state: _State) -> tuple[TangentStep, Linearisation, bool]:
+        """Solve the face at the present point, or contact as a whole. Collective.
 
         At the start of a history nothing is known of the active set.
+
+        Returns the step, the linearisation that it solves, and whether it is that of contact as a whole.
         """
         evaluation, method, near = state.evaluation, self.method, state.near
         assert near is not None
@@ -339,9 +350,9 @@ class _Run:
             problem, forcing = near.problem(evaluation), state.pace.forcing
             taken = tangent_step(problem, step, forcing, floor, method.max_products, margin=margin)
             if taken is not None:
-                return taken, False
+                return taken, near, False
         try:
-            return whole_step(near.system, evaluation.at.multiplier, step, self._whole(evaluation)), True
+            return *self._solved_whole(evaluation, near, step), True
         except InfeasibleError as reason:
             if not self._forces_known(evaluation):  # bodies at rest: nothing holds them from the start
                 raise
@@ -353,13 +364,33 @@ class _Run:
         except ConvergenceError as reason:
             raise NotHeldError(str(reason), reason.history) from reason
 
+    def _solved_whole(
+        self, evaluation: ResidualState, near: Linearisation, step: Vector
+    ) -> tuple[TangentStep, Linearisation]:
+        """Solve contact as a whole, with springs that exert their present forces. Collective.
+
+        Where nothing else holds a tool they are as if they did not give.
+        """
+        solver = self._whole(evaluation)
+        if evaluation.load.is_sprung:
+            given_way = evaluation.linearised(self.timer, None, springs=False)
+            own = step[: len(evaluation.at.multiplier)]
+            own = np.concatenate([own, np.zeros(given_way.further.count)])
+            try:
+                return whole_step(given_way.system, evaluation.at.multiplier, own, solver), given_way
+            except InfeasibleError as failure:
+                safe_log(_LOG.info, "springs alone hold a tool: %s", failure)
+        return whole_step(near.system, evaluation.at.multiplier, step, solver), near
+
     def _whole(self, evaluation: ResidualState) -> FaceNewton:
         """Return the solver of contact as a whole: where forces are known a failure cuts the load step."""
         if not self._forces_known(evaluation):
             return FaceNewton(self.method.nested)
         return FaceNewton(self.method.nested, max_products=self.method.max_products, doubts=False)
 
-    def _damped(self, state: _State, moved: Vector, change: Vector) -> Damped[ResidualState]:
+    def _damped(
+        self, state: _State, moved: Vector, change: Vector, turned: Vector
+    ) -> Damped[ResidualState]:
         """Return the end of a step as long as cells allow, or a better point of it. Collective.
 
         Forces out of balance are no reason for that: a step that turns a body strains it until the next one.
@@ -370,11 +401,14 @@ class _Run:
 
         def after(part: float) -> ResidualState:
             part *= longest
+            ends = at.displacement + part * moved, at.multiplier + part * change
             with self._assembling(state.history):
-                return start.evaluate(at.displacement + part * moved, at.multiplier + part * change, caution)
+                return start.evaluate(*ends, caution, moved_on(start.load.turned, turned, part))
 
-        full, before = after(1.0), start.residuals
-        if full.residuals.natural <= max(before.natural, self.method.hidden * full.residuals.coarse):
+        full, before, method = after(1.0), start.residuals, self.method
+        if full.residuals.natural <= max(before.natural, method.hidden * full.residuals.coarse):
+            return Damped(full, longest)
+        if start.load.is_tracked and full.residuals.worst <= method.enough * before.worst:
             return Damped(full, longest)
         earlier = (None if old is None else old.at_rows for old in (before, state.before))
         found = damp(full, after, lambda each: each.residuals.at_rows, earlier)

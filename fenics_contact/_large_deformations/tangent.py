@@ -375,9 +375,11 @@ class TangentSystem(DualSystem):
         total, count = int(offset[-1]), self.torn.free.count
         motions = kernel_matrix(self.torn.subdomains, total, mine)
         self.points = sp.csr_matrix((count, total))
-        if count:  # free motions move nothing but the right sides of rows, and have no stiffness
+        if count:  # free motions move nothing but the right sides of rows
+            known = self.torn.free.stiffness
+            own = sp.csr_matrix((count, count)) if known is None else sp.csr_matrix(known)
             self.points = sp.hstack([self.points, sp.identity(count)], format="csr")
-            self.stiffness = sp.csr_matrix(sp.block_diag([self.stiffness, sp.csr_matrix((count, count))]))
+            self.stiffness = sp.csr_matrix(sp.block_diag([self.stiffness, own]))
             motions = sp.hstack([motions, sp.csr_matrix((motions.shape[0], count))], format="csr")
         return motions
 

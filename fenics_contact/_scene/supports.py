@@ -163,9 +163,9 @@ class RigidSurface:
     Components of U and θ that are given are prescribed; the others follow from the equilibrium of the surface
     with a force and a moment at the point. Rotations are small, as all displacements, but on bodies of
     materials for large deformations: there the surface turns about the axis θ by the angle ‖θ‖, however
-    large, u = U + (R(θ) − I)(x − p), along arcs on the way, and everything must be prescribed. Other programs
-    call it a remote displacement or a kinematic coupling; for a force that leaves the surface flexible see
-    `TotalForce`.
+    large, u = U + (R(θ) − I)(x − p), along arcs on the way; the force acts where the point has moved, force
+    and moment keep their directions in space. Other programs call it a remote displacement or a kinematic
+    coupling; for a force that leaves the surface flexible see `TotalForce`.
 
     Attributes:
         body: Name of the body.
@@ -357,7 +357,9 @@ class ToolMotion:
     Components of displacement and rotation that are given are prescribed; the others follow from equilibrium
     with the contact, the force, the moment, and springs between the point and the ground, which are free of
     force where the tool is before it moves. With small displacements rotations are small; where bodies deform
-    much everything must be prescribed, and the tool turns about the axis of the rotation by its length.
+    much the tool turns about the axis of the rotation θ by its length, loads act where its point has moved
+    and keep their directions in space, and springs have the energy ½ Σ k U² + ½ Σ k θ². The reaction of the
+    tool's support is what prescribed components take, without load and springs.
 
     Attributes:
         tool: Name of the tool.

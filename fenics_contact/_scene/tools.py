@@ -76,9 +76,12 @@ class ToolBody(Body):
     @property
     def weight_slopes(self) -> np.ndarray:
         """Gradients of the weights, shape (n_nodes, dim), [1 / length]; zero along the axis of revolution."""
-        if self.axisymmetric:
-            return np.zeros(self.mesh.points.shape)
-        arms = self.mesh.points - np.array(self.tool.at)
+        return np.zeros(self.mesh.points.shape) if self.axisymmetric else self.cell_slopes
+
+    @property
+    def cell_slopes(self) -> np.ndarray:
+        """Gradients of weights that are affine over the cell, shape (n_nodes, dim), [1 / length]."""
+        arms = self.mesh.points - self.mesh.points.mean(axis=0)
         return np.asarray(arms * self.tool.dim / np.einsum("jd,jd->", arms, arms))
 
 

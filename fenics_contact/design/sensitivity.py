@@ -84,7 +84,7 @@ def solve_deformed_adjoint(
     Its tangents are factored once more at the state itself, with the stiffness of forces that turn with
     their surfaces; the columns of the face's two bases are swapped.
     """
-    _require_whole_step(state)
+    _require_differentiable(state)
     evaluation, torn = state.equilibrium.evaluation, state.torn
     exact = evaluation.linearised(PhaseTimer(), state.equilibrium.linearisation)
     system, tangent = exact.system, exact.problem(evaluation)
@@ -107,9 +107,14 @@ def solve_deformed_adjoint(
     return Adjoint(moved + system.kernel @ found.motions, multiplier, found.motions, found.products)
 
 
-def _require_whole_step(state: DeformedState) -> None:
-    """Reject friction whose derivative needs more than the start of the load step."""
+def _require_differentiable(state: DeformedState) -> None:
+    """Reject free rigid surfaces, and friction that needs more than the start of the load step."""
     torn, points = state.torn, state.equilibrium.evaluation.contact.points
+    if loose := state.equilibrium.evaluation.load.loose:
+        raise InvalidInputError(
+            "derivatives of nonlinear scenes need rigid tools and surfaces whose whole motion is prescribed, "
+            f"but that of {sorted(loose)} has free components: prescribe what State.rigid_motions() reports"
+        )
     if len(torn.frictional) == 0:
         return
     if state.since > 0.0:

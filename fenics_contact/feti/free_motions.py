@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -32,10 +32,20 @@ class FreeMotions:
         columns: Q; on nodes a row for each component of each node, shape (n_nodes · dim, n), replicated; of
             a system the owned rows, shape (n_owned, n).
         load: g, shape (n,), replicated.
+        tracked: Number of the first unknowns, whose values are known at each configuration; others follow
+            from displacements.
+        nodes: Of tracked ones Q and `dyads` on the nodes, shape (n_nodes · dim, k), replicated; else None.
+        dyads: Fields on the owned rows whose work with multipliers gives the stiffness of tracked motions,
+            shape (n_owned, k − tracked); else None.
+        stiffness: −∂(g + Qᵀλ)/∂q, shape (n, n), replicated; None where it is zero.
     """
 
     columns: sp.csr_matrix
     load: np.ndarray
+    tracked: int = 0
+    nodes: sp.csr_matrix | None = None
+    dyads: sp.csr_matrix | None = None
+    stiffness: np.ndarray | None = None
 
     @property
     def count(self) -> int:
@@ -44,13 +54,31 @@ class FreeMotions:
 
     def of_rows(self, dof: np.ndarray, relations: Sequence[Relations]) -> sp.csr_matrix:
         """Return Q of all rows, shape (n_rows, n), of those on nodes."""
-        parts = [self.columns[dof]]
-        for relation in relations:
-            dim = relation.directions.shape[1]
-            modes = [column.toarray().reshape(-1, dim) for column in self.columns.T]
-            moved = [-relation.of_supports(mode) for mode in modes] if relation.count else []
-            parts.append(sp.csr_matrix(np.array(moved).reshape(self.count, relation.count).T))
-        return sp.vstack(parts, format="csr")
+        return sp.vstack([self.columns[dof], *_of_relations(self.columns, relations)], format="csr")
+
+    def met_anew(
+        self,
+        kept: sp.csr_matrix,
+        equality: int,
+        relations: Sequence[Relations],
+        further: sp.csr_matrix | None,
+        owned: np.ndarray,
+    ) -> FreeMotions:
+        """Return those of a system on the rows of other contact points.
+
+        `kept`: picks rows that stay, shape (n_owned, n_owned before); `equality`: number of these of all
+        ranks; `relations`: those of contact; `further`: columns of further rows on nodes, (n_nodes · dim, m).
+        """
+        columns = (kept @ self.columns).tocsr()
+        if self.nodes is None:
+            return replace(self, columns=columns)
+        parts = [sp.csr_matrix((equality, self.nodes.shape[1])), *_of_relations(self.nodes, relations)]
+        if further is not None:
+            parts.append(-further.T @ self.nodes)
+        rows, count = sp.vstack(parts, format="csr")[owned], self.tracked
+        more = sp.hstack([rows[:, :count], sp.csr_matrix((len(owned), self.count - count))])
+        dyads = (kept @ self.dyads + rows[:, count:]).tocsr()
+        return replace(self, columns=(columns + more).tocsr(), dyads=dyads)
 
 
 def without_held(
@@ -85,6 +113,17 @@ def without_held(
             )
         felt[start + held] = 0.0
     return (sp.diags(felt) @ columns).tocsr()
+
+
+def _of_relations(fields: sp.csr_matrix, relations: Sequence[Relations]) -> list[sp.csr_matrix]:
+    """Return by how much fields on nodes, (n_nodes · dim, k), close rows, shape (n_rows, k)."""
+    parts = []
+    for relation in relations:
+        dim = relation.directions.shape[1]
+        modes = [column.toarray().reshape(-1, dim) for column in fields.T]
+        moved = [-relation.of_supports(mode) for mode in modes] if relation.count else []
+        parts.append(sp.csr_matrix(np.array(moved).reshape(fields.shape[1], relation.count).T))
+    return parts
 
 
 def _moving(columns: sp.csr_matrix, shape: tuple[int, ...]) -> np.ndarray:

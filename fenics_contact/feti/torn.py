@@ -256,19 +256,21 @@ class TornSystem:
     def free_motion(self, residual: np.ndarray) -> np.ndarray:
         """Return q of rigid surfaces and preloads, which fits the residual of rows best. Collective.
 
-        Replicated.
+        Replicated; zero for tracked motions, which the right sides of rows contain.
 
         Args:
             residual: c − B u, owned, shape (n_owned,), [length].
         """
-        if self.free.count == 0:
-            return np.zeros(0)
+        first, moved = self.free.tracked, np.zeros(self.free.count)
+        if self.free.count == first:
+            return moved
         # Sections lie in the last rows of ties that do not give way.
         rows = self.numbering.owned < (self.first_sprung if self.scene.preloads else self.n_gluing)
-        columns = self.free.columns[rows]
+        columns = self.free.columns[rows][:, first:]
         sums = np.column_stack([(columns.T @ columns).toarray(), -columns.T @ residual[rows]])
         sums = self.decomposition.comm.allreduce(sums)
-        return np.asarray(np.linalg.solve(sums[:, :-1], sums[:, -1]))
+        moved[first:] = np.linalg.solve(sums[:, :-1], sums[:, -1])
+        return moved
 
     def closed(self, residual: np.ndarray) -> np.ndarray:
         """Return the residual c − B u of rows, owned, after the free motions that fit it best. Collective."""
@@ -575,16 +577,19 @@ def _joined(
 
 
 def meeting_at(
-    torn: TornSystem, points: ContactPoints, prescribed: np.ndarray, further: Sequence[Rows] = ()
+    torn: TornSystem, points: ContactPoints, prescribed: np.ndarray,
+    further: Sequence[tuple[Rows, sp.csr_matrix]] = (),
 ) -> TornSystem:
     """Return a system with other contact points, those of bodies that have moved. Collective.
 
-    `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
+    `prescribed`: prescribed components of all nodes, NaN where free, shape (n_nodes, dim); `further`: rows
+    after all others, with their columns on all components of nodes, shape (n_nodes · dim, n).
     """
     ties, known = torn.ties, torn.numbering
     system = _with_rows(
-        torn.scene, torn.decomposition, torn.subdomains, (points, ties), known, prescribed, further
-    )
+        torn.scene, torn.decomposition, torn.subdomains, (points, ties), known, prescribed,
+        [rows for rows, _ in further],
+    )  # fmt: skip
     owned = system.numbering.owned
     right, supported = np.zeros((2, len(owned)))
     equality = owned < torn.n_equality  # each rank owns the same of these
@@ -596,7 +601,8 @@ def meeting_at(
     there = np.flatnonzero(torn.numbering.owned < torn.n_equality)
     entries = np.ones(len(there)), (np.flatnonzero(equality), there)
     rows = sp.csr_matrix(entries, shape=(len(owned), len(torn.numbering.owned)))
-    free = replace(torn.free, columns=(rows @ torn.free.columns).tocsr())
+    columns = sp.hstack([each for _, each in further], format="csr") if further else None
+    free = torn.free.met_anew(rows, torn.n_equality, system.relations[1:], columns, owned)
     return replace(system, right=right, supported=supported, slid=slid, free=free)
 
 

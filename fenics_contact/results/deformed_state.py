@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
@@ -15,7 +15,7 @@ from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.qp.solution import Solution, contact_step
 from fenics_contact.results.contact import RowValues
 from fenics_contact.results.fields import put_history_stress, von_mises_of
-from fenics_contact.results.forces import NodalForces, nodal_forces
+from fenics_contact.results.forces import NodalForces, Resultant, nodal_forces
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State, comm_of
 
@@ -143,7 +143,21 @@ class DeformedState(State):
     @cached_property
     def _nodal_forces(self) -> NodalForces:
         forces = nodal_forces(self.torn, self.solution.multiplier, self.torn_displacement)
-        return replace(forces, places=self._moment_arms, bed=np.zeros_like(forces.bed))
+        far = [each for each in self.equilibrium.evaluation.load.turned if each.far]
+        springs = {each.place: self._exerted(*each.sprung, each.point) for each in far if each.springs.any()}
+        moved = {each.place: each.motion[: self.scene.dim] for each in far}
+        return replace(
+            forces, places=self._moment_arms, bed=np.zeros_like(forces.bed), moved=moved, springs=springs
+        )
+
+    def _exerted(self, force: np.ndarray, moment: np.ndarray, about: np.ndarray) -> Resultant:
+        if self.scene.axisymmetric:
+            return Resultant(force, np.zeros(0), about)
+        return Resultant(force, float(moment[0]) if len(moment) == 1 else moment, about)
+
+    @property
+    def _known_motions(self) -> Mapping[tuple[str, str], np.ndarray]:
+        return self.equilibrium.evaluation.load.motions
 
     @property
     def _least_force(self) -> float:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.foundations import ElasticFoundation
+from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface, named
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
@@ -42,6 +43,9 @@ class NodalForces:
         tie: On the slave at each tied point, shape (n_ties, dim).
         bed: What materials exert that resist rigid motions (elastic beds), shape (n_nodes, dim).
         foundations: What each elastic foundation of the scene exerts, shape (n_nodes, dim) each.
+        moved: Displacement of the points of rigid surfaces by body and surface, shape (dim,), [length]; their
+            loads act there; at undeformed ones where they are not among them.
+        springs: What springs of tools exert that are not among the beds, by body and surface.
     """
 
     places: np.ndarray
@@ -51,6 +55,22 @@ class NodalForces:
     tie: np.ndarray
     bed: np.ndarray
     foundations: tuple[np.ndarray, ...] = ()
+    moved: Mapping[tuple[str, str], np.ndarray] = field(default_factory=dict)
+    springs: Mapping[tuple[str, str], Resultant] = field(default_factory=dict)
+
+    def point_load(self, support: RigidSurface, about: np.ndarray, axisymmetric: bool = False) -> Resultant:
+        """Return the load at the point of a rigid surface, about another point."""
+        force, moment = np.split(support.load, [support.dim])
+        if axisymmetric:
+            return Resultant(force, moment if isinstance(support, TurningSurface) else np.zeros(0), about)
+        point = np.array(support.at) + self.moved.get((support.body, support.surface), 0.0)
+        load = Resultant(force, float(moment[0]) if support.dim == 2 else moment, point)
+        return Resultant(force, load.moment_about(about), about)
+
+    def spring(self, support: RigidSurface, about: np.ndarray) -> Resultant | None:
+        """Return what the springs of a tool exert, about another point; None without any."""
+        exerted = self.springs.get((support.body, support.surface))
+        return None if exerted is None else Resultant(exerted.force, exerted.moment_about(about), about)
 
 
 def nodal_forces(torn: TornSystem, multiplier: np.ndarray, displacement: np.ndarray) -> NodalForces:
@@ -369,7 +389,7 @@ def support_reactions(
 ) -> Resultants:
     """Return the reaction of every support, about a point or the centroid of its surface.
 
-    That of a rigid surface is less the load at its point, to which it refers by default.
+    That of a rigid surface is less the load at its point, to which it refers by default, and springs.
     """
     scene = torn.scene
     shares = support_shares(scene, NodeNumbers.of(scene))
@@ -380,13 +400,22 @@ def support_reactions(
         point = own if about is None else point_of(about, scene.dim)
         total = resultant(share.of(forces.reaction), forces.places, point, surface, scene.axisymmetric)
         if isinstance(support, RigidSurface):
-            total = total - point_load(support, point, scene.axisymmetric)
-        if scene.deforms_much and isinstance(scene.bodies[support.body], ToolBody):
-            total = on_tool(torn, forces, support.body, point)  # its rows act on the slave alone
-            total = Resultant(-total.force, -total.moment, point, surface)
+            if (spring := forces.spring(support, point)) is not None:
+                total = total - spring
+            total = total - forces.point_load(support, point, scene.axisymmetric)
+            if support.body in _uncarried(torn):
+                total = on_tool(torn, forces, support.body, point)
+                total = Resultant(-total.force, -total.moment, point, surface)
         entries.append(total)
     places = tuple(Surface(each.body, each.surface).in_words for each in scene.supports)
     return Resultants("reaction", tuple(entries), places)
+
+
+def _uncarried(torn: TornSystem) -> set[str]:
+    """Return the tools that bodies meet like obstacles: their rows act on the slave alone."""
+    met = np.unique(torn.points.pair[np.diff(torn.points.master.indptr) == 0])
+    masters = (torn.scene.contacts[pair].master for pair in met)
+    return {master.name for master in masters if isinstance(master, RigidTool)}
 
 
 def on_tool(torn: TornSystem, forces: NodalForces, tool: str, about: np.ndarray) -> Resultant:
@@ -408,15 +437,6 @@ def foundation_forces(
         point = centroid(scene, surface) if about is None else point_of(about, scene.dim)
         entries.append(resultant(force, forces.places, point, surface, scene.axisymmetric))
     return Resultants("foundation", tuple(entries), tuple(each.place for each in scene.foundations))
-
-
-def point_load(support: RigidSurface, about: np.ndarray, axisymmetric: bool = False) -> Resultant:
-    """Return the load at the point of a rigid surface, about a point."""
-    force, moment = np.split(support.load, [support.dim])
-    if axisymmetric:
-        return Resultant(force, moment if isinstance(support, TurningSurface) else np.zeros(0), about)
-    load = Resultant(force, float(moment[0]) if support.dim == 2 else moment, np.array(support.at))
-    return Resultant(force, load.moment_about(about), about)
 
 
 @dataclass(frozen=True, eq=False)
@@ -502,11 +522,11 @@ class Balance:
     Attributes:
         loads: Of the loads.
         reactions: Of all supports.
-        obstacles: Of rigid obstacles.
-        gaps: Of contacts and ties between bodies: both sides together have no force, but a moment where
-            friction, a tie or a mean over facets transmits forces across a gap between the meshes, or where
-            one body has moments about undeformed places and the other about deformed ones.
-        beds: Of elastic foundations, springs, and materials that resist rigid motions; zero otherwise.
+        obstacles: Of rigid obstacles that are no tools.
+        gaps: Of contacts and ties between bodies, and of tools: both sides together have no force, but a
+            moment where friction, a tie or a mean over facets transmits forces across a gap, or where one
+            body has moments about undeformed places and the other about deformed ones.
+        beds: Of elastic foundations, springs, also those of tools, and materials that resist rigid motions.
         force_scale: Largest sum of the sizes of the nodal forces of one of these, [force]; where nothing acts
             a force below which bodies count as free of forces.
         moment_scale: Largest sum of the sizes of nodal forces times their distances from the point,
@@ -584,8 +604,12 @@ def force_balance(
     }
     for support in torn.scene.supports:
         if isinstance(support, RigidSurface):  # the load at its point comes in through its nodes
-            resultants["loads"] += point_load(support, point, turned)
-            resultants["reactions"] -= point_load(support, point, turned)
+            load, spring = forces.point_load(support, point, turned), forces.spring(support, point)
+            resultants["loads"] += load
+            resultants["reactions"] -= load
+            if spring is not None:
+                resultants["beds"] += spring
+                resultants["reactions"] -= spring
     arms = forces.places - point
     if torn.scene.torsion:
         arms = forces.places[:, :1]  # from the axis
@@ -600,15 +624,17 @@ def force_balance(
 
 def _parts(torn: TornSystem, forces: NodalForces) -> dict[str, np.ndarray]:
     """Return the nodal forces of each part, shape (n_nodes, dim)."""
-    between = np.array([isinstance(pair.master, Surface) for pair in torn.scene.contacts], dtype=bool)
-    meets_body = between[torn.points.pair]
+    masters = [pair.master for pair in torn.scene.contacts]
+    tools = np.array([isinstance(master, RigidTool) for master in masters], dtype=bool)[torn.points.pair]
+    meets_body = np.diff(torn.points.master.indptr) > 0
+    driven = np.flatnonzero(tools & ~meets_body)  # supports of such a tool hold what presses on it
     springs = torn.ties.count - len(torn.scene.springs)
     tied = by_node(torn.ties, forces.tie, np.arange(springs))
     sprung = by_node(torn.ties, forces.tie, np.arange(springs, torn.ties.count))
     return {
         "loads": forces.load,
-        "reactions": forces.reaction,
-        "obstacles": by_node(torn.points, forces.contact, np.flatnonzero(~meets_body)),
+        "reactions": forces.reaction + by_node(torn.points, forces.contact, driven),
+        "obstacles": by_node(torn.points, forces.contact, np.flatnonzero(~meets_body & ~tools)),
         "gaps": by_node(torn.points, forces.contact, np.flatnonzero(meets_body)) + tied,
         "beds": sum(forces.foundations, forces.bed) + sprung,
     }

@@ -117,20 +117,22 @@ def in_words(values: np.ndarray | float) -> str:
     return f"({', '.join(f'{number:.5g}' for number in known)})"
 
 
-def rigid_motion(scene: Scene, support: RigidSurface, displacement: np.ndarray) -> RigidMotion:
+def rigid_motion(
+    scene: Scene, support: RigidSurface, displacement: np.ndarray, known: np.ndarray | None = None
+) -> RigidMotion:
     """Return the motion of a rigid surface.
 
-    `displacement`: displacement of the nodes of its body, shape (n_nodes, dim), [length].
+    `displacement`: displacement of the nodes of its body, shape (n_nodes, dim), [length]; `known`: U, then θ,
+    where they are known.
     """
     body, where = scene.bodies[support.body], Surface(support.body, support.surface)
-    if body.deforms_much:  # all of it is prescribed
-        moved, turned = np.split(support.prescribed, [scene.dim])
-        return RigidMotion(where, np.array(support.at), moved, float(turned[0]) if scene.dim == 2 else turned)
-    mesh = body.mesh
-    nodes = np.unique(mesh.surfaces[support.surface])
-    modes = support.modes(mesh.points[nodes]).reshape(-1, len(support.motion))
-    size = np.linalg.norm(modes, axis=0)
-    motion = np.linalg.lstsq(modes / size, displacement[nodes].ravel(), rcond=None)[0] / size
-    motion = np.where(support.free, motion, support.prescribed)
+    motion = known
+    if motion is None:
+        mesh = body.mesh
+        nodes = np.unique(mesh.surfaces[support.surface])
+        modes = support.modes(mesh.points[nodes]).reshape(-1, len(support.motion))
+        size = np.linalg.norm(modes, axis=0)
+        motion = np.linalg.lstsq(modes / size, displacement[nodes].ravel(), rcond=None)[0] / size
+        motion = np.where(support.free, motion, support.prescribed)
     moved, turned = np.split(motion, [scene.dim])
     return RigidMotion(where, np.array(support.at), moved, float(turned[0]) if scene.dim == 2 else turned)

@@ -459,7 +459,18 @@ class State(ABC):
         Collective.
         """
         rigid = [support for support in self.scene.supports if isinstance(support, RigidSurface)]
-        return tuple(rigid_motion(self.scene, each, self.gather_displacement(each.body)) for each in rigid)
+        known = self._known_motions
+        return tuple(
+            rigid_motion(
+                self.scene, each, self.gather_displacement(each.body), known.get((each.body, each.surface))
+            )
+            for each in rigid
+        )
+
+    @property
+    def _known_motions(self) -> Mapping[tuple[str, str], np.ndarray]:
+        """U, then θ, of rigid surfaces by body and surface, where they are known."""
+        return {}
 
     @collectively("State.springs", comm_of)
     def springs(self) -> SpringForces:

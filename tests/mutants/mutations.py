@@ -174,9 +174,16 @@ MUTATIONS = (
     Mutation(
         "reactions of rigid surfaces contain the loads at their points",
         "results/forces.py",
-        "total = total - point_load(support, point, scene.axisymmetric)",
+        "total = total - forces.point_load(support, point, scene.axisymmetric)",
         "pass",
         (f"{RIGID}::test_a_rigid_surface_is_a_support_that_moves_by_itself",),
+    ),
+    Mutation(
+        "forces on rigid surfaces do not turn with them",
+        "_large_deformations/rigid_surfaces.py",
+        "np.trace(turned) * spins @ spins.T - spins @ turned @ spins.T",
+        "0.0 * spins @ turned @ spins.T",
+        ("tests/nonlinear/test_driven_tools.py::test_the_stiffness_of_a_rigid_surface_is_the_derivative_of_its_loads",),
     ),
     Mutation(
         "supports that meet have equal parts of the reaction",

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from fenics_contact._base.checks import floats
 from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
+from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._pairing.points import (
     ContactPoints,
     NodeNumbers,
@@ -120,10 +121,12 @@ class SlidingContact:
         last: SlidingPoints | LastPoints | None = None,
         time: float = 0.0,
         start: MaterialPoints | None = None,
+        loose: frozenset[str] = frozenset(),
     ) -> SlidingPoints:
         """Return the contact points of the bodies where they lie now. Collective.
 
-        `coordinates`: present coordinates of the nodes of all bodies, shape (n_nodes, dim), [length].
+        `coordinates`: present coordinates of the nodes of all bodies, shape (n_nodes, dim), [length];
+        `loose`: names of tools with free components, whose points need derivatives by their motion.
         """
         coordinates = np.asarray(coordinates, dtype=np.float64)
         needed = self.scene.points.shape
@@ -136,7 +139,9 @@ class SlidingContact:
                 )
             places = tuple(self._frame(each.obstacle, coordinates, time) for each in self.meetings)
         known = last.points if isinstance(last, SlidingPoints) else last
-        parts = [self._pair(index, coordinates, known, time, start) for index in range(len(self.meetings))]
+        parts = [
+            self._pair(index, coordinates, known, time, start, loose) for index in range(len(self.meetings))
+        ]
         points = join_points([part.points for part in parts], self.scene.dim, len(coordinates))
         differential = join_differentials(
             [part.differential for part in parts], self.scene.dim, len(coordinates)
@@ -146,13 +151,17 @@ class SlidingContact:
         return SlidingPoints(points, coordinates, means, places, differential, lost)
 
     def found_again(
-        self, stored: Mapping[str, np.ndarray], coordinates: np.ndarray, time: float
+        self,
+        stored: Mapping[str, np.ndarray],
+        coordinates: np.ndarray,
+        time: float,
+        loose: frozenset[str] = frozenset(),
     ) -> tuple[SlidingPoints, MaterialPoints]:
         """Return points that were stored, and where they stood. Collective.
 
-        `coordinates`: the coordinates of then, shape (n_nodes, dim), [length].
+        `coordinates`: the coordinates of then, shape (n_nodes, dim), [length]; `loose` as in `at`.
         """
-        found = self.at(coordinates, LastPoints.of(stored), time)
+        found = self.at(coordinates, LastPoints.of(stored), time, loose=loose)
         return found, MaterialPoints.of(stored, len(coordinates))
 
     def _pair(
@@ -162,12 +171,15 @@ class SlidingContact:
         last: Known | None,
         time: float,
         start: MaterialPoints | None,
+        loose: frozenset[str],
     ) -> _Found:
         """Return the points of one pair. Collective."""
         meeting, lost, means = self.meetings[index], np.zeros(0, dtype=np.int64), None
         if meeting.obstacle is not None:
             with together(self.comm):
                 points, differential = self._on_obstacle(meeting, coordinates, time)
+                if isinstance(meeting.obstacle, RigidTool) and meeting.obstacle.name in loose:
+                    points, differential = self._on_tool(points, differential, meeting.obstacle, coordinates)
             name = f"what ContactPair {index} asks its obstacle, {type(meeting.obstacle).__name__}"
             require_alike(self.comm, described((points.slave, points.normal, points.gap), name))
         elif meeting.facets is not None:
@@ -209,6 +221,31 @@ class SlidingContact:
         cut = meeting.slave.mirrored[meeting.candidates[chosen]]
         points = with_symmetry(points, cut, meeting.slave.planes)
         return points, without_patches(curvature, len(coordinates))
+
+    def _on_tool(
+        self, points: ContactPoints, differential: Differential, tool: RigidTool, coordinates: np.ndarray
+    ) -> tuple[ContactPoints, Differential]:
+        """Return points on a tool like those on a body, of the nodes that carry its motion.
+
+        At the foot Y of a point on the tool these have affine weights w(Y), so that its surface S = Σ w_j x_j
+        is one of patches: with orthonormal tangents t_a, S,_a = t_a, W,_a = t_a·∂w/∂Y, and n·S,_ab = −D₀ with
+        the curvature D₀ = D (I − r D)⁻¹ of the surface at Y, D being that of the distance r.
+        """
+        body, frame = self.scene.bodies[tool.name], self._frame(tool, coordinates, 0.0)
+        assert isinstance(body, ToolBody)
+        assert frame is not None
+        turn, shift = frame
+        nodes = NodeNumbers.of(self.scene).global_nodes(tool.name, np.arange(body.mesh.n_nodes))
+        foot = coordinates[points.slave] - points.distance[:, None] * points.normal
+        slopes = points.tangents @ turn @ body.cell_slopes.T
+        second = np.einsum("nad,nde,nbe->nab", points.tangents, differential.curvature, points.tangents)
+        # At edges and corners, where a foot stays, r D has an eigenvalue of one.
+        stays = (1.0 + ROUNDING) * np.eye(second.shape[1]) - points.distance[:, None, None] * second
+        bend, none = -second @ np.linalg.inv(stays), np.zeros_like(differential.curvature)
+        master = _carried(body.weights((foot - shift) @ turn), nodes, len(coordinates))
+        of_slopes = (_carried(slopes[:, a], nodes, len(coordinates)) for a in range(slopes.shape[1]))
+        points = replace(points, master=master, facet=np.zeros(points.count, dtype=np.int64))
+        return points, Differential(points.tangents, bend, tuple(of_slopes), none)
 
     def _on_means(
         self, meeting: Meeting, coordinates: np.ndarray
@@ -269,6 +306,12 @@ def _points(
         np.zeros((count, normal.shape[1] - 1)), axes, np.zeros(normal.shape, dtype=bool), distance,
         meeting.given[chosen], taken,
     )  # fmt: skip
+
+
+def _carried(weights: np.ndarray, nodes: np.ndarray, count: int) -> sp.csr_matrix:
+    """Return weights of a few nodes, shape (n, k), as those of all of them, (n, count)."""
+    rows = weights.shape[1] * np.arange(len(weights) + 1)
+    return sp.csr_matrix((weights.ravel(), np.tile(nodes, len(weights)), rows), shape=(len(weights), count))
 
 
 def _last_facets(

@@ -219,11 +219,12 @@ class SlidingPoints:
         if elastic is not None:
             way = np.einsum("na,nad->nd", elastic, points.tangents)
             foot, weights = foot - way, weights - self._moving_by(way)
-        foot[np.diff(points.master.indptr) > 0] = 0.0
+        carried = np.diff(points.master.indptr) > 0
+        foot[carried] = 0.0
         for index, placement in enumerate(self.placements):
             if placement is not None:
                 rotation, translation = placement
-                mine = points.pair == index
+                mine = (points.pair == index) & ~carried
                 foot[mine] = (foot[mine] - translation) @ rotation
         return MaterialPoints(self.key, points.pair, weights, foot)
 
@@ -372,7 +373,7 @@ class SlidingPoints:
         for index, placement in enumerate(self.placements):
             if placement is not None:
                 rotation, translation = placement
-                mine = np.flatnonzero(start.pair == index)
+                mine = np.flatnonzero((start.pair == index) & (np.diff(start.weights.indptr) == 0))
                 place[mine] = place[mine] @ rotation.T + translation
         way = self._standing @ self.coordinates - place - start.weights @ self.coordinates
         return np.asarray(way), start.weights
