@@ -27,6 +27,7 @@ from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import RigidSurface
 from fenics_contact._scene.tools import ToolBody
+from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.free_motions import FreeMotions
 from fenics_contact.feti.torn import TornSystem
@@ -188,8 +189,15 @@ class TurnedSurface:
     @cached_property
     def basis(self) -> tuple[np.ndarray, np.ndarray]:
         """Orthonormal rates, shape (n · dim, n_free), and the matrix S of q̇ ↦ S q̇ in terms of them."""
-        rates = self.rates
-        found = np.linalg.qr(rates.reshape(-1, rates.shape[2]))
+        rates = self.rates.reshape(self.points.size, -1)
+        found, size = np.linalg.qr(rates), np.linalg.norm(rates, axis=0)
+        # At a full turn rates depend on each other.
+        if np.abs(np.diag(found[1])).min(initial=np.inf) <= np.sqrt(LAST_PLACES) * size.max(initial=0.0):
+            raise ConvergenceError(
+                "rotations that are free about several axes must stay below a full turn, but the motion of "
+                f"surface {self.surface.surface!r} of body {self.surface.body!r} is {self.motion.tolist()}: "
+                "prescribe all but one, or take smaller load steps"
+            )
         return found[0], found[1]
 
 

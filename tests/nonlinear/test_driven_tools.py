@@ -36,7 +36,7 @@ from fenics_contact import (
 )
 from fenics_contact._large_deformations.rigid_surfaces import TurnedSurface
 from fenics_contact.design.sensitivity import _require_differentiable
-from fenics_contact.errors import InfeasibleError, InvalidInputError
+from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, J2Plasticity, PlaneStrain
 from fenics_contact.results.deformed_state import NewtonSteps
@@ -72,6 +72,31 @@ def test_the_stiffness_of_a_rigid_surface_is_the_derivative_of_its_loads(motion:
     assert np.abs(found).max() > 1.0
     more = rng.standard_normal(len(motion))
     np.testing.assert_allclose(start.driven_by(more).driving, start.driving + more, atol=1e-12)
+
+
+def test_turns_about_several_axes_stay_below_a_full_one() -> None:
+    """There their rates depend on each other; about one axis a surface may turn on."""
+    points, nothing = np.random.default_rng(0).standard_normal((5, 3)), np.zeros(6)
+    turned = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 2.0 * np.pi])
+    for free, rotation in ((False, (0.0, 0.0, None)), (True, None)):
+        surface = RigidSurface("body", "side", (0.0, 0.0, 0.0), rotation=rotation)
+        start = TurnedSurface(surface, turned, nothing, nothing, np.arange(5), points, far=True, whole=False)
+        if free:
+            with pytest.raises(ConvergenceError, match="about several axes must stay below a full turn"):
+                _ = start.basis
+        else:
+            assert np.abs(np.diag(start.basis[1])).min() > 0.1
+
+
+def test_a_tool_that_nothing_can_turn_stays_upright_and_is_refused_under_a_moment() -> None:
+    """A smooth disc about its centre."""
+    disc = RigidTool("disc", RigidSphere((1.0, 4.0), 3.0), at=(1.0, 4.0))
+    smooth = ToolMotion("disc", (0.0, None), None, (0.0, -20.0))
+    state = solve_scene(under_disc(smooth, tool=disc, friction=0.0), COMM)
+    assert abs(state.tools()["disc"].rotation) < 1e-4
+    assert_balanced(state)
+    with pytest.raises(InfeasibleError, match=r"body 'disc' can move away under the load: rotation \(1\)"):
+        solve_scene(under_disc(replace(smooth, moment=0.5), tool=disc, friction=0.0), COMM)
 
 
 def assert_balanced(state: State, accuracy: float = 1e-8) -> None:
