@@ -423,6 +423,9 @@ def on_tool(torn: TornSystem, forces: NodalForces, tool: str, about: np.ndarray)
     pairs = [k for k, pair in enumerate(torn.scene.contacts) if getattr(pair.master, "name", None) == tool]
     mine = np.flatnonzero(np.isin(torn.points.pair, pairs))
     places, turned = forces.places[torn.points.slave[mine]], torn.scene.axisymmetric
+    master = torn.points.master[mine]
+    carried = np.diff(master.indptr) > 0  # where the tool is, also where surfaces that give way keep apart
+    places = np.where(carried[:, None], master @ forces.places, places)
     acting = -forces.contact[mine] * ([0.0, 1.0] if turned else 1.0)  # radial ones balance each other
     return resultant(acting, places, about, None, turned)
 

@@ -19,6 +19,7 @@ from fenics_contact import (
     ContactProblem,
     Coulomb,
     DeformedState,
+    LinearClosure,
     LoadSequence,
     LoadStep,
     RigidPlane,
@@ -171,6 +172,22 @@ def test_a_plate_turns_about_all_axes_under_a_moment() -> None:
     assert np.abs(tool.rotation).min() > 0.01
     assert_balanced(state)
     assert NewtonSteps.of([state]).reduction[0] < 1e-2
+
+
+def test_surfaces_that_give_way_and_springs_of_friction_drive_a_tool_as_exact_contact() -> None:
+    """Forces and moments on the tool are those that drive it, also across a distance."""
+    scene = under_disc(TILTED)
+    soft = replace(scene.contacts[0], closure=LinearClosure(3000.0))
+    elastic = replace(scene.contacts[0], friction=Coulomb(0.5, stick_stiffness=2000.0))
+    back = replace(TILTED, force=(-3.0, -20.0))
+    steps = [LoadStep(f"{k}", supports=[BASE, motion]) for k, motion in enumerate((TILTED, back))]
+    for pair in (soft, elastic):
+        problem = ContactProblem(replace(scene, contacts=[pair]), COMM)
+        for state, side in zip(solve_steps(problem, steps), (1.0, -1.0), strict=True):
+            tool = state.tools()["disc"]
+            np.testing.assert_allclose(tool.force, (-3.0 * side, 20.0), rtol=1e-6)
+            assert tool.moment == pytest.approx(-2.4, rel=1e-6)
+            assert state.balance().imbalance < 1e-8
 
 
 def test_springs_take_what_rubber_leaves() -> None:
