@@ -115,7 +115,8 @@ class ContactWarnings:
             if angle > FAR:
                 words = (
                     f"body {name!r} has turned by {angle:.2g} rad; its material is for small rotations, "
-                    f"{angle**2 / 2:.1g} of strain is due to this alone: give it a material for large "
+                    f"{angle**2 / 2:.1g} of strain is due to this alone: "
+                    f"{'take it in space and ' * body.torsion}give it a material for large "
                     "deformations, such as StVenantKirchhoff"
                 )
                 self._log(state, name, words)

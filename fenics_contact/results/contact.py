@@ -155,7 +155,8 @@ class ContactResult:
             overlap; infinite if it brings none closer.
         """
         mine = self.on_pair(pair)
-        closing = -self.points.normal[mine] @ np.asarray(direction, dtype=np.float64)
+        along = np.asarray(direction, dtype=np.float64)
+        closing = -self.points.normal[mine][:, : len(along)] @ along  # with torsion normals have one more
         ahead = closing > 0.0
         return float(np.min(self.points.gap[mine][ahead] / closing[ahead], initial=np.inf))
 

@@ -489,6 +489,21 @@ def test_table_of_contact_points_has_three_components(tmp_path: Path) -> None:
     np.testing.assert_allclose(found, -0.2 * state.contact.pressure, rtol=1e-3)
 
 
+def test_a_body_that_turns_far_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    mesh = rectangle((1, 0), (2, 1), (3, 2))
+    turned = Support("tube", "y0", (None, 0.0, lambda x: 0.3 * x[:, 0]))
+    solved(Scene({"tube": twisting(mesh)}, [turned]))
+    assert "body 'tube' has turned by 0.3 rad" in caplog.text
+    assert "take it in space and give it a material" in caplog.text
+
+
+def test_a_shaft_travels_until_it_touches() -> None:
+    punch = twisting(rectangle((1, 1), (2, 2), (2, 2)))
+    pair = ContactPair(Surface("punch", "y0"), RigidPlane((0, 0.75), (0, 1)), Coulomb(0.3))
+    state = solved(Scene({"punch": punch}, [Support("punch", "y1")], contacts=[pair]))
+    assert state.contact.travel(np.array([0.0, -1.0])) == pytest.approx(0.25)
+
+
 def small(**given: object) -> Body:
     return Body(rectangle((1, 0), (2, 1), (2, 2)), STEEL, **{"axisymmetric": True, "torsion": True, **given})  # type: ignore[arg-type]
 
