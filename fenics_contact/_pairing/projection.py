@@ -123,6 +123,33 @@ def warn_of_edge(
         )  # fmt: skip
 
 
+def warn_of_free_master(
+    tie: AnyTie,
+    slave: tuple[FacetedSurface, np.ndarray],
+    master: tuple[FacetedSurface, np.ndarray],
+    comm: MPI.Comm,
+) -> None:
+    """Warn where supports hold what a tie would hold, and nothing holds the master there. Collective.
+
+    The support keeps such a component of the slave, see `feti.contact_rows.tied_relations`.
+
+    `slave`, `master`: surfaces, and which components of their nodes supports prescribe, (n_nodes, dim).
+    """
+    (surface, fixed), (other, held) = slave, master
+    chosen = np.flatnonzero(fixed.any(axis=1))
+    hit = shared_projection(surface, chosen, other, comm)
+    open_ = abs(node_weights(other, hit)) @ (~held).astype(float) > HELD
+    lost = (open_ & fixed[chosen[hit.point]]).any(axis=1)
+    if lost.any() and comm.rank == 0:
+        safe_log(
+            _LOG.warning,
+            "the tie of %s holds nothing at %d of %d nodes of the slave in directions in which supports hold "
+            "these, although the master is free there: let the other surface be the slave, or hold the "
+            "master by a support",
+            tie.place, np.count_nonzero(lost), len(surface.nodes),
+        )  # fmt: skip
+
+
 def warn_of_uneven_pressure(
     scene: Scene,
     pair: ContactPair | AnyTie,

@@ -32,13 +32,14 @@ from fenics_contact._pairing.points import (
 from fenics_contact._pairing.projection import (
     shared_projection,
     warn_of_edge,
+    warn_of_free_master,
     warn_of_surface,
     warn_of_uneven_pressure,
 )
 from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
 from fenics_contact._scene.pair_geometry import master_share
-from fenics_contact._scene.pairs import ContactPair, Surface
+from fenics_contact._scene.pairs import ContactPair, Surface, Tie
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
@@ -346,12 +347,12 @@ def _points_of_pairs(
     for index, pair in enumerate(pairs):
         if isinstance(pair, ContactPair) and pair.within_body:
             continue  # no part of an undeformed body is near another one
-        points = _measured(scene, pair, index, fixed, comm, finer, told=told)
+        points = _measured(scene, pair, index, supported, comm, finer, told=told)
         if isinstance(pair, ContactPair) and pair.given_gap:
             origin, mesh = scene.origin, scene.bodies[pair.slave.body].mesh.origin
             first = points
             if origin is not scene:
-                first = _measured(origin, pair, index, fixed, comm, finer, told=True)
+                first = _measured(origin, pair, index, supported, comm, finer, told=True)
             slave = first.slave - NodeNumbers.of(scene).first_of(pair.slave.body)
             points = with_given_gaps(points, first, pair, mesh.points[slave], comm)
         if scene.torsion:
@@ -367,12 +368,13 @@ def _measured(
     scene: Scene,
     pair: ContactPair | AnyTie,
     index: int,
-    fixed: np.ndarray,
+    supported: tuple[np.ndarray, LocalAxes | None],
     comm: MPI.Comm,
     finer: bool,
     told: bool,
 ) -> ContactPoints:
     """Return the points of one pair with the gaps between its surfaces. Collective."""
+    fixed, axes = supported
     numbers = NodeNumbers.of(scene)
     slave = _Side.of(scene, pair.slave, pair.geometry, numbers, finer)
     movable = ~fixed[slave.nodes].all(axis=1)
@@ -399,6 +401,9 @@ def _measured(
                 check_sides(pair, scene.sector_angle(pair), slave.surface, master.surface)
         if not told:
             warn_of_surface(scene, pair.master, pair.geometry, master.surface, comm)
+        if isinstance(pair, Tie) and not pair.sliding and not told and axes is None:
+            one, other = ((side.surface, fixed[side.nodes]) for side in (slave, master))
+            warn_of_free_master(pair, one, other, comm)
         if pair.discretisation == "mortar":
             points = _by_mortar(slave, bearing, master, comm, master_share(scene, pair))
         else:

@@ -68,7 +68,8 @@ def surface_moments(points: np.ndarray, facets: np.ndarray, axisymmetric: bool =
     rule = [(at.areas, np.einsum("k,nkd->nd", at.values, corners)) for at in every]
     areas, places = np.concatenate([area for area, _ in rule]), np.concatenate([place for _, place in rule])
     area = float(areas.sum())
-    centre = areas @ places / area
+    # A line on an axis of revolution has none: its middle is its centre.
+    centre = areas @ places / area if area > 0.0 else places.mean(axis=0)
     arms = places - centre
     return SurfaceMoments(area, origin + centre, (areas[:, None] * arms).T @ arms)
 

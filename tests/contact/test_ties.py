@@ -139,6 +139,18 @@ def test_supported_components_of_tied_nodes_are_left_to_the_support() -> None:
     assert state.torn.n_equality == state.torn.n_gluing + 90 - 5
 
 
+@pytest.mark.parametrize("slave", [0, 1])
+def test_a_master_that_only_a_held_slave_holds_is_told(slave: int, caplog: pytest.LogCaptureFixture) -> None:
+    """The support keeps what it holds of the slave, and nothing holds the master there."""
+    sides = FACES if slave == 0 else FACES[::-1]
+    held = [Support("upper", "z0", (None, None, 0.0)), Support("lower", "z0", (0.0, 0.0, None))]
+    scene = tower(supports=held, ties=[Tie(*sides)])
+    fixed = np.concatenate([~np.isnan(scene.prescribed(name)) for name in scene.bodies])
+    assert find_tied_points(scene, fixed).count > 0
+    warned = ["the master is free there" in record.message for record in caplog.records]
+    assert any(warned) == (slave == 0)
+
+
 def test_a_body_cannot_be_tied_to_itself() -> None:
     with pytest.raises(
         InvalidInputError, match="body 'ring' cannot be tied to itself: a tie joins two bodies"

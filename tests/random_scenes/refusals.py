@@ -175,7 +175,7 @@ def _frictionless(whole: Whole, torn: TornSystem) -> np.ndarray:
         column[own] = basis
         motions = np.hstack([motions, column])
     normal = _along(torn.points.jump, -torn.points.normal)
-    tied = _tied(torn.ties, [tie.sliding for tie in whole.scene.ties]).T.tocsr()
+    tied = _tied(torn.ties, whole).T.tocsr()
     _, size, basis = np.linalg.svd(sp.vstack([normal, tied]) @ motions)
     rank = int((size > 1e-8 * size.max(initial=0.0)).sum())
     unheld = motions @ basis[rank:].T
@@ -228,7 +228,7 @@ def _left_over(
         return 0.0
     held = modes[:, np.flatnonzero(~whole.free.ravel())]
     reactions = sp.hstack([held, modes @ whole.springs @ modes.T])
-    tied = modes @ _tied(torn.ties, [tie.sliding for tie in whole.scene.ties])
+    tied = modes @ _tied(torn.ties, whole)
     pressed, dragged, bound = _contact(torn.points, list(whole.scene.contacts), normal, part)
     slack = sp.identity(len(load))
     parts = [reactions, -reactions, tied, -tied, modes @ pressed, modes @ dragged, slack, -slack]
@@ -250,10 +250,11 @@ def _modes(whole: Whole) -> sp.csr_matrix:
     return sp.block_diag(blocks, format="csr")
 
 
-def _tied(ties: ContactPoints, sliding: list[bool]) -> sp.csr_matrix:
-    free = np.array(sliding, dtype=bool)[ties.pair]
-    dim = ties.normal.shape[1]
-    rows = [sp.kron(ties.jump[~free], np.eye(dim)), _along(ties.jump[free], ties.normal[free])]
+def _tied(ties: ContactPoints, whole: Whole) -> sp.csr_matrix:
+    """Return unit forces on tied points, (dofs, rows), but for what supports hold of the slave."""
+    free = np.array([tie.sliding for tie in whole.scene.ties], dtype=bool)[ties.pair]
+    bonded = sp.kron(ties.jump[~free], np.eye(whole.dim)).tocsr()
+    rows = [bonded[whole.free[ties.slave[~free]].ravel()], _along(ties.jump[free], ties.normal[free])]
     return sp.vstack(rows).T.tocsr()
 
 
