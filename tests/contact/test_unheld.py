@@ -20,7 +20,6 @@ from fenics_contact import (
     FixedPoint,
     Pressure,
     RigidPlane,
-    RigidSurface,
     Scene,
     State,
     Support,
@@ -35,7 +34,7 @@ from fenics_contact._fem.mechanics import HyperelasticMechanics
 from fenics_contact._large_deformations.newton import NotHeldError
 from fenics_contact._pairing.search import without_rounding
 from fenics_contact._scene.pairs import Friction
-from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError, LoadStepError
+from fenics_contact.errors import ConvergenceError, InfeasibleError, LoadStepError
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.gallery import block, half_disc, rectangle
@@ -292,13 +291,6 @@ def test_a_load_step_that_ends_points_at_flat_sides_on_which_nothing_acts(
     with pytest.raises(LoadStepError) as caught:
         solve_scene(pressed_disc(top, sides), MPI.COMM_SELF)
     assert "symmetry" not in str(caught.value)
-
-
-def test_a_rigid_surface_that_forces_move_is_refused_with_other_ways() -> None:
-    pushed = RigidSurface("cube", "z1", (0.5, 0.5, 1.0), force=(0.0, 0.0, -0.1))
-    message = r"surface 'z1' of body 'cube' components are left free.*NeoHooke.*reactions.*TotalForce.*tied"
-    with pytest.raises(InvalidInputError, match=message):
-        solve_scene(cube(supports=[Support("cube", "z0"), pushed]), MPI.COMM_SELF)
 
 
 def test_tangents_that_are_not_finite_cut_the_step_and_end_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
