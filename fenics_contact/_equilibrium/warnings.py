@@ -407,8 +407,8 @@ def _open_means(state: State, number: int, moved: float, most: float = 0.5) -> l
         return []
     slave, master = (surface_of(scene, side, pair.geometry) for side in (pair.slave, pair.master))
     hit = project(slave.points, slave.normals, master)
-    own = state.gather_displacement(pair.slave.body)[slave.nodes[hit.point]]
-    other = state.gather_displacement(pair.master.body)[master.nodes]
+    own = _moves(state, pair.slave)[slave.nodes[hit.point]]
+    other = _moves(state, pair.master)[master.nodes]
     gap = hit.gap + np.einsum("nd,nd->n", hit.normal, own - node_weights(master, hit) @ other)
     deep = -float(gap.min(initial=0.0))
     if deep <= most * moved:
@@ -419,6 +419,11 @@ def _open_means(state: State, number: int, moved: float, most: float = 0.5) -> l
         "for this contact, refine them there; discretisation='node' closes single nodes"
     )
     return [(number, "open means", words)]
+
+
+def _moves(state: State, surface: Surface) -> np.ndarray:
+    """Return the displacements of a body in space, of one that may twist in its section. Collective."""
+    return state.gather_displacement(surface.body)[:, : state.scene.dim]
 
 
 def _depth(state: State, number: int, pair: ContactPair, other: Surface) -> float:
@@ -443,8 +448,8 @@ def _depth(state: State, number: int, pair: ContactPair, other: Surface) -> floa
     inside = presses[slave.facets[hit.facet]].all(axis=1)
     if np.count_nonzero(inside) <= np.count_nonzero(presses):
         return 0.0
-    own = state.gather_displacement(pair.slave.body)[slave.nodes]
-    moves = state.gather_displacement(other.body)[master.nodes[near[hit.point]]]
+    own = _moves(state, pair.slave)[slave.nodes]
+    moves = _moves(state, other)[master.nodes[near[hit.point]]]
     gap = hit.gap + np.einsum("nd,nd->n", hit.normal, moves - node_weights(slave, hit) @ own)
     return -float(gap[inside].min(initial=0.0))
 

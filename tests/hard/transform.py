@@ -123,6 +123,8 @@ def _load_in_units(load: Any, length: float, force: float, dim: int) -> Any:
     powers, forces = DIMENSIONS[type(load)]
     if type(load) is not TotalForce and powers:
         powers += 3 - dim
+    if isinstance(load, TotalForce) and load.moment is not None:
+        load = replace(load, moment=_of_position(load.moment, length, length * force))
     name = "temperature_change" if isinstance(load, ThermalStrain) else "value"
     return replace(load, **{name: _of_position(load.value, length, length**powers * force**forces)})
 

@@ -134,12 +134,12 @@ def _some_contact_closes(made: Sample) -> str:
     for name in scene.bodies:
         nodes = whole.nodes(name)
         free = whole.free[nodes].ravel()
-        dofs = np.arange(scene.dim * nodes.start, scene.dim * nodes.stop)[free]
+        dofs = np.arange(whole.components * nodes.start, whole.components * nodes.stop)[free]
         Q, K = loose(rigid_motions(scene, name), free), whole.K[dofs][:, dofs].toarray()
         balanced = force[dofs] - Q @ (Q.T @ force[dofs])
         u[dofs] += np.linalg.solve(K + np.abs(np.diag(K)).max() * Q @ Q.T, balanced)
     points = _torn(made).points
-    moved = points.jump @ u.reshape(-1, scene.dim)
+    moved = points.jump @ u.reshape(-1, whole.components)
     reach = [0.0 if pair.closure is None else pair.closure.reach for pair in scene.contacts]
     gap = points.gap + np.einsum("nd,nd->n", moved, points.normal) - np.array([*reach, 0.0])[points.pair]
     return f"a contact closes by {-gap.min():.1e}" if gap.min() < -1e-3 * np.abs(moved).max() else ""
@@ -164,7 +164,7 @@ def _pressed_enough(made: Sample, message: str) -> str:
 
 def _frictionless(whole: Whole, torn: TornSystem) -> np.ndarray:
     """Return the normal forces without friction, of bodies held in all motions that only friction resists."""
-    free, dim = whole.free.ravel(), whole.dim
+    free, dim = whole.free.ravel(), whole.components
     motions = np.zeros((free.size, 0))
     for name in whole.scene.bodies:
         nodes = whole.nodes(name)
@@ -253,7 +253,7 @@ def _modes(whole: Whole) -> sp.csr_matrix:
 def _tied(ties: ContactPoints, whole: Whole) -> sp.csr_matrix:
     """Return unit forces on tied points, (dofs, rows), but for what supports hold of the slave."""
     free = np.array([tie.sliding for tie in whole.scene.ties], dtype=bool)[ties.pair]
-    bonded = sp.kron(ties.jump[~free], np.eye(whole.dim)).tocsr()
+    bonded = sp.kron(ties.jump[~free], np.eye(whole.components)).tocsr()
     rows = [bonded[whole.free[ties.slave[~free]].ravel()], _along(ties.jump[free], ties.normal[free])]
     return sp.vstack(rows).T.tocsr()
 

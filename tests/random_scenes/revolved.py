@@ -15,7 +15,9 @@ from fenics_contact import (
     Scene,
     ThermalStrain,
     TotalForce,
+    Traction,
 )
+from fenics_contact._scene.loads import Load
 from fenics_contact.materials import IsotropicElasticity, Material, OrthotropicElasticity
 from tests.hard.transform import in_units
 from tests.random_scenes.arrangements import ARRANGEMENTS, Arrangement
@@ -47,6 +49,8 @@ def revolved(seed: int) -> Sample:
     scene = with_effects(seed, dice, replace(scene, loads=acting), level)
     along = dice.weighted({0.0: 4.0, 1.0: 4.0, 100.0: 2.0})
     scene = moved(scene, np.eye(2), np.array([0.0, along]))
+    if dice.chance(0.4):
+        scene = _twisted(dice, scene, level)
     length, force = (dice.power(-6.0, 6.0) if dice.chance(0.5) else 1.0 for _ in range(2))
     dice.say(f"shifted by {along:g}, units {length:.2g} and {force:.2g}")
     if (length, force) != (1.0, 1.0):
@@ -55,6 +59,32 @@ def revolved(seed: int) -> Sample:
     tolerance = dice.weighted(TOLERANCES)
     dice.say(f"tolerance {tolerance}")
     return Sample(seed, ", ".join(dice.words), scene, parts, tolerance)
+
+
+def _twisted(dice: Dice, scene: Scene, level: float) -> Scene:
+    """Let bodies twist: supports, tractions and forces get a part around the axis."""
+    dice.say("twisted")
+    bodies = {name: replace(part, torsion=True) for name, part in scene.bodies.items()}
+    supports = [
+        replace(support, value=(*support.value, 0.0 if dice.chance(0.6) else None))
+        for support in scene.supports
+    ]
+    loads: list[Load] = []
+    for load in scene.loads:
+        size = level * dice.between(-0.3, 0.3)
+        match load:
+            case TotalForce():
+                load = replace(load, moment=size)
+            case Traction() | BodyForce() if not callable(load.value):
+                load = replace(load, value=(*load.value, size))
+            case Traction():
+                continue
+        loads.append(load)
+    foundations = [
+        replace(each, stiffness=(*each.stiffness, each.stiffness[-1])) if np.ndim(each.stiffness) else each  # type: ignore[misc]
+        for each in scene.foundations
+    ]
+    return replace(scene, bodies=bodies, supports=supports, loads=loads, foundations=foundations)
 
 
 def _put_beside_axis(dice: Dice, made: Arrangement) -> None:

@@ -32,6 +32,7 @@ from tests.random_scenes import runner
 from tests.random_scenes.generator import Sample, sample
 from tests.random_scenes.judge import Outcome, Verdict
 from tests.random_scenes.refusals import unjust
+from tests.random_scenes.revolved import revolved
 from tests.random_scenes.verifier import complaints
 
 STEEL = IsotropicElasticity(1.0, 0.3)
@@ -218,4 +219,7 @@ def test_a_seed_is_one_scene_and_seeds_meet_everything() -> None:
         "on rollers", "on springs", "linear closure", "exponential closure", "table closure", "elastic slip",
         "by pressure", "with a shear limit",
     ):  # fmt: skip
+        assert part in words, part
+    words = " ".join(revolved(seed).words for seed in range(60))
+    for part in ("of revolution", "bore 0,", "wound", "twisted", "on springs", "two", "side by side"):
         assert part in words, part

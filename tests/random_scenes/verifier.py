@@ -62,7 +62,10 @@ def complaints(state: AnyState, made: Sample) -> list[str]:
     if made.plain is not None:
         state = TurnedBack(state, made.plain, made.turn)  # type: ignore[assignment]
     whole = Whole(state.scene)
-    found = list(misplaced(whole, state.contact.points, list(state.scene.contacts)))
+    points = state.contact.points
+    if whole.components > whole.dim:  # what slips around the axis is no matter of places
+        points = replace(points, normal=points.normal[:, :2], tangents=points.tangents[:, :1, :2])
+    found = list(misplaced(whole, points, list(state.scene.contacts)))
     if found:
         return found
     figures, limit = violations(state, whole, made.tolerance), allowed(state, made.tolerance)
@@ -210,7 +213,7 @@ def _undetermined(points: ContactPoints, whole: Whole, slip: np.ndarray) -> np.n
     free = (abs(points.jump) @ whole.free.astype(float)) > 0.0
     found = slip.copy()
     for point in np.flatnonzero(~free.all(axis=1)):
-        ways = np.eye(whole.dim)[free[point]]
+        ways = np.eye(whole.components)[free[point]]
         _, _, basis = np.linalg.svd((ways @ points.normal[point])[None])
         seen = points.tangents[point] @ (basis[1:] @ ways).T
         q, size, _ = np.linalg.svd(seen, full_matrices=False)
@@ -254,7 +257,7 @@ def _equilibrium(
     state: AnyState, whole: Whole, u: np.ndarray, on_nodes: np.ndarray, tolerance: float | None
 ) -> tuple[float, float, float]:
     """Return the wrench that is left, the energy of the error that single nodes tell, and that of all."""
-    dim = whole.dim
+    dim = whole.components
     inner = (whole.K @ u.ravel()).reshape(u.shape)
     residual = inner - whole.load - on_nodes
     parts = (abs(whole.K) @ np.abs(u).ravel()).reshape(u.shape) + np.abs(whole.load) + np.abs(on_nodes)
@@ -293,7 +296,7 @@ def _tie_forces(state: AnyState, whole: Whole, wanted: np.ndarray) -> np.ndarray
         return np.zeros_like(wanted)
     sliding = np.array([tie.sliding for tie in state.scene.ties])[ties.pair]
     jump = ties.jump.toarray()
-    bonded = np.einsum("rn,cd->rcnd", jump[~sliding], np.eye(whole.dim)).reshape(-1, *wanted.shape)
+    bonded = np.einsum("rn,cd->rcnd", jump[~sliding], np.eye(whole.components)).reshape(-1, *wanted.shape)
     gliding = np.einsum("rn,rd->rnd", jump[sliding], ties.normal[sliding])
     rows = np.concatenate([bonded, gliding]) * whole.free
     rows = rows.reshape(len(rows), -1)

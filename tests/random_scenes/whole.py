@@ -126,13 +126,14 @@ def gauss(cell: CellType) -> tuple[np.ndarray, np.ndarray]:
 class Integrated:
     """Shape functions (q, k), gradients (q, c, k, d) and weights (q, c) of the cells of a mesh.
 
-    Of bodies of revolution also shape functions over the radius, (q, c, k).
+    Of bodies of revolution also shape functions over the radius, (q, c, k), and whether they may twist.
     """
 
     values: np.ndarray
     gradients: np.ndarray
     weights: np.ndarray
     hoop: np.ndarray | None = None
+    torsion: bool = False
 
     @property
     def strains(self) -> np.ndarray:
@@ -142,10 +143,17 @@ class Integrated:
             return rows
         around = np.zeros_like(rows[:, :, :1])
         around[:, :, 0, :, 0] = self.hoop
-        return np.concatenate([rows, around], axis=2)
+        section = np.concatenate([rows, around], axis=2)
+        if not self.torsion:
+            return section
+        B = np.zeros((*self.hoop.shape[:2], 6, self.hoop.shape[2], 3))
+        B[:, :, REVOLVED, :, :2] = section
+        B[:, :, 3, :, 2] = self.gradients[..., 1]
+        B[:, :, 4, :, 2] = self.gradients[..., 0] - self.hoop
+        return B
 
 
-def integrated(mesh: BodyMesh, axisymmetric: bool = False) -> Integrated:
+def integrated(mesh: BodyMesh, axisymmetric: bool = False, torsion: bool = False) -> Integrated:
     """Evaluate everything at the Gauss points of all cells."""
     cell = CELL_TYPES[mesh.cell_type]
     # No rule integrates 1 / r exactly, and the answer depends on it.
@@ -160,7 +168,8 @@ def integrated(mesh: BodyMesh, axisymmetric: bool = False) -> Integrated:
     if not axisymmetric:
         return Integrated(values, gradients, weights)
     radius = np.einsum("qk,ck->qc", values, mesh.points[mesh.cells][:, :, 0])
-    return Integrated(values, gradients, 2 * np.pi * radius * weights, values[:, None] / radius[:, :, None])
+    hoop = values[:, None] / radius[:, :, None]
+    return Integrated(values, gradients, 2 * np.pi * radius * weights, hoop, torsion)
 
 
 def strain_rows(gradients: np.ndarray) -> np.ndarray:
@@ -180,23 +189,24 @@ class Whole:
     Attributes:
         offset: Number of the first node of each body among all nodes.
         points: Coordinates of all nodes, (n_nodes, dim).
-        K: Stiffness, dof dim n + d for component d of node n.
+        components: Of a displacement: as many as coordinates, three where bodies of revolution may twist.
+        K: Stiffness, dof components n + d for component d of node n.
         springs: The part of it that foundations have.
-        load: (n_nodes, dim).
-        prescribed: (n_nodes, dim), NaN where free.
+        load: (n_nodes, components).
+        prescribed: (n_nodes, components), NaN where free.
         body_of: Number of the body of each node.
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.scene, self.dim = scene, scene.dim
+        self.scene, self.dim, self.components = scene, scene.dim, scene.components
         counts = [part.mesh.n_nodes for part in scene.bodies.values()]
         self.offset = dict(zip(scene.bodies, np.cumsum([0, *counts[:-1]]).tolist(), strict=True))
         self.body_of = np.repeat(np.arange(len(counts)), counts)
         self.points = np.concatenate([part.mesh.points for part in scene.bodies.values()])
-        self.load = np.zeros(self.points.shape)
+        self.load = np.zeros((len(self.points), self.components))
         parts = []
         for name, part in scene.bodies.items():
-            found = integrated(part.mesh, part.axisymmetric)
+            found = integrated(part.mesh, part.axisymmetric, part.torsion)
             C = np.array([_stiffness_of(material, part) for material in part.materials])
             C = C[part.material_of_cells]
             parts.append(_stiffness(part.mesh, found, C))
@@ -206,9 +216,9 @@ class Whole:
                     self.load[nodes] += _nodal(part, found, C, load)
         self.springs = self._springs()
         self.K = sp.block_diag(parts, format="csr") + self.springs
-        self.prescribed = np.full(self.points.shape, np.nan)
+        self.prescribed = np.full(self.load.shape, np.nan)
         if scene.axisymmetric:
-            self.prescribed[on_axis(self.points), 0] = 0.0
+            self.prescribed[np.ix_(on_axis(self.points), [0, 2][: self.components - 1])] = 0.0
         for support in scene.supports:
             mesh = scene.bodies[support.body].mesh
             nodes = np.unique(mesh.surfaces[support.surface]) + self.offset[support.body]
@@ -219,19 +229,21 @@ class Whole:
 
     def _springs(self) -> sp.csr_matrix:
         """Return the stiffness of foundations, of facets as they are."""
-        springs = sp.csr_matrix((self.points.size,) * 2)
+        springs = sp.csr_matrix((self.load.size,) * 2)
         for foundation in self.scene.foundations:
             mesh = self.scene.bodies[foundation.body].mesh
             facets = mesh.surfaces[foundation.surface]
             values, normal = facet_integrals(mesh, facets, self.scene.axisymmetric)
             area = np.linalg.norm(normal, axis=2)
+            normal = np.pad(normal, ((0, 0), (0, 0), (0, self.components - self.dim)))
             if np.ndim(foundation.stiffness):
-                tensor = np.einsum("qf,d,de->qfde", area, foundation.stiffness, np.eye(self.dim))
+                tensor = np.einsum("qf,d,de->qfde", area, foundation.stiffness, np.eye(self.components))
             else:
                 tensor = np.einsum("qfd,qfe,qf->qfde", normal, normal, foundation.stiffness / area)
             tensor = tensor / (area.sum() if foundation.total else 1.0)
             blocks = np.einsum("qk,ql,qfde->fkdle", values, values, tensor)
-            dofs = self.dim * (facets + self.offset[foundation.body])[..., None] + np.arange(self.dim)
+            nodes = self.components * (facets + self.offset[foundation.body])
+            dofs = nodes[..., None] + np.arange(self.components)
             rows, columns = np.broadcast_arrays(dofs[:, :, :, None, None], dofs[:, None, None, :, :])
             springs = springs + sp.csr_matrix(
                 (blocks.ravel(), (rows.ravel(), columns.ravel())), shape=springs.shape
@@ -258,10 +270,16 @@ def rigid_motions(scene: Scene, name: str) -> np.ndarray:
     points = scene.bodies[name].mesh.points
     centred = points - points.mean(axis=0)
     modes = rigid_body_modes(centred / np.abs(centred).max()).reshape(points.size, -1)
+    if scene.components > scene.dim:
+        along, around = np.zeros((2, len(points), 3))
+        along[:, 1], around[:, 2] = 1.0, points[:, 0] / points[:, 0].max()
+        return np.column_stack([along.ravel(), around.ravel()])
     return modes[:, 1:2] if scene.axisymmetric else modes
 
 
 def _stiffness_of(material: Any, part: Body) -> np.ndarray:
+    if part.torsion:
+        return elasticity(material, 3)
     if part.axisymmetric:
         return elasticity(material, 3)[np.ix_(REVOLVED, REVOLVED)]
     return elasticity(material, part.mesh.dim)
@@ -280,11 +298,12 @@ def _stiffness(mesh: BodyMesh, found: Integrated, C: np.ndarray) -> sp.csr_matri
 
 def _nodal(part: Any, found: Integrated, C: np.ndarray, load: Load) -> np.ndarray:
     """Return the nodal forces of a load, (n_nodes, dim)."""
-    mesh, force = part.mesh, np.zeros(part.mesh.points.shape)
+    mesh, components = part.mesh, 3 if part.torsion else part.mesh.dim
+    force = np.zeros((mesh.n_nodes, components))
     if isinstance(load, ThermalStrain):
         dim = 3 if part.axisymmetric else mesh.dim
         strain = np.array([thermal_strain(material, dim) for material in part.materials])
-        strain = strain[:, REVOLVED] if part.axisymmetric else strain
+        strain = strain[:, REVOLVED] if part.axisymmetric and not part.torsion else strain
         stress = np.einsum("cst,ct->cs", C, strain[part.material_of_cells]) * load.value
         work = np.einsum("qc,qcskd,cs->ckd", found.weights, found.strains, stress)
         np.add.at(force, mesh.cells, work)
@@ -296,13 +315,19 @@ def _nodal(part: Any, found: Integrated, C: np.ndarray, load: Load) -> np.ndarra
         values, normal = facet_integrals(mesh, facets, part.axisymmetric)
         area = np.linalg.norm(normal, axis=2)
         if isinstance(load, Pressure):
-            given = np.einsum("qk,qfd->fkd", values, -load.value * normal)
+            pressing = np.pad(-load.value * normal, ((0, 0), (0, 0), (0, components - mesh.dim)))
+            given = np.einsum("qk,qfd->fkd", values, pressing)
         elif callable(load.value):
             at_nodes = load.value(mesh.points[facets].reshape(-1, mesh.dim)).reshape(*facets.shape, -1)
             given = np.einsum("qk,ql,qf,fld->fkd", values, values, area, at_nodes)
         else:
             value = np.array(load.value) / (area.sum() if isinstance(load, TotalForce) else 1.0)
+            value = np.pad(value, (0, components - len(value)))
             given = np.einsum("qk,qf,d->fkd", values, area, value)
+            if part.torsion and isinstance(load, TotalForce) and load.moment is not None:
+                radius = (values @ mesh.points[facets][:, :, 0].T).reshape(area.shape)
+                twisting = load.moment * radius * area / (radius**2 * area).sum()
+                given[:, :, 2] += np.einsum("qk,qf->fk", values, twisting)
         np.add.at(force, facets, given)
     return force
 
