@@ -79,8 +79,8 @@ class Residuals:
     def beside(self, reach: float, nothing: float = 1e-10, rounding: float = 1e-11) -> Residuals:
         """Return the residuals with the gluing residual relative to smaller displacements.
 
-        Where displacements are at most `nothing` of those that cancel, jumps of `rounding` of these are none:
-        supports take up all load, and both are the last digits of K⁺.
+        Where displacements are at most ``nothing`` of those that cancel, jumps of ``rounding`` of these are
+        none: supports take up all load, and both are the last digits of K⁺.
         """
         if not 0.0 < reach < self.gluing_scale:
             return self

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -393,14 +392,10 @@ def hertz(size: int) -> tuple[Scene, float]:
 @pytest.mark.slow
 @pytest.mark.claim
 def test_a_ball_under_a_force_has_the_pressure_of_hertz_to_a_percent() -> None:
-    """And takes at most twice the seconds of the ball that is moved by as much."""
+    """And takes at most 2.7 times the products of the ball that is moved by as much."""
     loaded, peak = hertz(8)
-    start = time.perf_counter()
     state = solve_scene(loaded, MPI.COMM_SELF)
-    by_force = time.perf_counter() - start
     assert state.contact.pressure.max() == pytest.approx(peak, rel=0.01)
     way = ToolMotion("ball", tuple(map(float, state.tools()["ball"].displacement)), STRAIGHT)
     moved = Scene(loaded.deforming, [*loaded.supports[:-1], way], contacts=loaded.contacts)
-    start = time.perf_counter()
-    solve_scene(moved, MPI.COMM_SELF)
-    assert by_force < 2.0 * (time.perf_counter() - start)
+    assert state.solution.products < 2.7 * solve_scene(moved, MPI.COMM_SELF).solution.products
