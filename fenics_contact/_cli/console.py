@@ -34,7 +34,7 @@ from fenics_contact.errors import (
 from fenics_contact.output.files import OutputError
 from fenics_contact.output.result import listed_forces, scales_of
 from fenics_contact.output.tables import rounded
-from fenics_contact.results.preloads import names_of
+from fenics_contact.results.by_name import names_of
 from fenics_contact.results.state import State, pairs_in_words
 
 if TYPE_CHECKING:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import ROUNDING
-from fenics_contact._scene.preloads import Preload
-from fenics_contact._scene.springs import Spring
-from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.preloads import shortening_columns
 from fenics_contact.feti.torn import TornSystem
+from fenics_contact.results.by_name import ByName, names_of
 from fenics_contact.results.forces import NodalForces, Resultant, aligned, resultant
 
 
@@ -60,30 +59,14 @@ class SectionForces:
 
 @displayed
 @dataclass(frozen=True, eq=False)
-class Preloads(Mapping[str, SectionForces]):
+class Preloads(ByName[SectionForces]):
     """What the sections of all preloads transmit, by the names of these, in the scene's order.
 
     Preloads of the same name, as several through one body, are numbered: "plate 1", "plate 2".
     """
 
+    kind: ClassVar[str] = "preloads"
     entries: Mapping[str, SectionForces]
-
-    def __len__(self) -> int:
-        """Return the number of preloads."""
-        return len(self.entries)
-
-    def __getitem__(self, name: str) -> SectionForces:
-        """Return that of a name."""
-        if name not in self.entries:
-            raise InvalidInputError(
-                f"preloads of the scene are {', '.join(map(repr, self.entries)) or 'none'}, got {name!r}: "
-                "use one of these names"
-            )
-        return self.entries[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Return the names."""
-        return iter(self.entries)
 
     def __str__(self) -> str:
         """Return a table with one line for each preload."""
@@ -97,15 +80,6 @@ class Preloads(Mapping[str, SectionForces]):
             shown = [0.0 if k != 1 and abs(x) <= ROUNDING * size else x for k, x in enumerate(numbers)]
             rows.append((name, *(f"{x:.5g}" for x in shown)))
         return "\n".join([*aligned(rows, 1), "in [force], [length], [force·length]"])
-
-
-def names_of(preloads: Sequence[Preload | Spring]) -> list[str]:
-    """Return the names of preloads or springs, those of the same name numbered."""
-    labels = [preload.label for preload in preloads]
-    return [
-        label if labels.count(label) == 1 else f"{label} {labels[: k + 1].count(label)}"
-        for k, label in enumerate(labels)
-    ]
 
 
 def shortenings(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from fenics_contact._base.display import displayed
 from fenics_contact._base.sparse import ROUNDING
-from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.torn import TornSystem
+from fenics_contact.results.by_name import ByName, names_of
 from fenics_contact.results.forces import NodalForces, aligned
-from fenics_contact.results.preloads import names_of
 
 
 @displayed
@@ -39,27 +39,11 @@ class SpringForce:
 
 @displayed
 @dataclass(frozen=True, eq=False)
-class SpringForces(Mapping[str, SpringForce]):
+class SpringForces(ByName[SpringForce]):
     """All springs of a scene by their names, in its order; those of the same name are numbered."""
 
+    kind: ClassVar[str] = "springs"
     entries: Mapping[str, SpringForce]
-
-    def __len__(self) -> int:
-        """Return the number of springs."""
-        return len(self.entries)
-
-    def __getitem__(self, name: str) -> SpringForce:
-        """Return that of a name."""
-        if name not in self.entries:
-            raise InvalidInputError(
-                f"springs of the scene are {', '.join(map(repr, self.entries)) or 'none'}, got {name!r}: "
-                "use one of these names"
-            )
-        return self.entries[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Return the names."""
-        return iter(self.entries)
 
     def __str__(self) -> str:
         """Return a table with one line for each direction of each spring."""
