@@ -10,6 +10,7 @@ shared by several ranks on all of them in the same order.
 from __future__ import annotations
 
 import weakref
+import zlib
 from collections import Counter
 from dataclasses import dataclass
 from typing import Any
@@ -19,6 +20,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from fenics_contact._base.libraries import MPI, PETSc, check_not_forked, start
+from fenics_contact.errors.ranks import at_common_end
 
 #: Products that a factored subdomain is expected to serve: a state with friction, and its adjoint.
 PRODUCTS = 100
@@ -114,11 +116,15 @@ def _totals(size: int, interface: int, products: int, rates: Rates) -> tuple[flo
     return explicit.total(products), implicit.total(products)
 
 
-#: Size of the communicator and index in the order of registration there: the same on all its ranks.
+#: Number of the ranks that share objects, and index in the order of registration there: the same on all.
 Key = tuple[int, int]
 
+#: Ranks in the world of those who share objects, by their number.
+_groups: dict[int, list[int]] = {}
 #: Objects of several ranks whose owner is gone on this rank.
 _waiting: dict[Key, tuple[tuple[PETSc.Object, ...], object]] = {}
+#: What would retire those whose owner is in use on this rank.
+_owned: dict[Key, Any] = {}
 _registered: Counter[int] = Counter()
 
 
@@ -127,31 +133,55 @@ def dispose_with(
 ) -> None:
     """Destroy PETSc objects when their owner is no longer used.
 
-    `comm`: communicator they live on: that of the scene or of its first ranks, or None for this rank alone.
-    Objects of one rank are destroyed at once, others by `sweep`; they must be registered by all ranks in the
-    same order.
+    `comm`: communicator they live on, or None for this rank alone. Objects of one rank are destroyed at once,
+    others by `sweep`; they must be registered by all ranks in the same order.
     """
     finalizer: Any
     if comm is None or comm.size == 1:
         finalizer = weakref.finalize(owner, _destroy, objects, keep)
     else:
-        _registered[comm.size] += 1
-        finalizer = weakref.finalize(owner, _retire, (comm.size, _registered[comm.size]), objects, keep)
+        ranks = _in_world(comm)
+        group = zlib.crc32(repr(ranks).encode())
+        _groups[group] = ranks
+        _registered[group] += 1
+        key = (group, _registered[group])
+        finalizer = _owned[key] = weakref.finalize(owner, _retire, key, objects, keep)
     finalizer.atexit = False
 
 
 def sweep(comm: MPI.Comm) -> None:
-    """Destroy the shared objects that no rank uses any more. Collective on ``comm``."""
+    """Destroy what only ranks of this communicator share and none of them uses any more. Collective."""
     if comm.size == 1:
         return
-    waiting = [set(keys) for keys in comm.allgather(sorted(_waiting))]
-    for key in sorted(waiting[0]):
-        if all(key in keys for keys in waiting[: key[0]]) and key in _waiting:
+    waiting = dict(zip(_in_world(comm), map(set, comm.allgather(list(_waiting))), strict=True))
+    for key in sorted(_waiting):
+        if all(key in waiting.get(rank, ()) for rank in _groups[key[0]]):
             _destroy(*_waiting.pop(key))
 
 
+def _in_world(comm: MPI.Comm) -> list[int]:
+    """Return the ranks of a communicator as numbered in the world."""
+    group = comm.group
+    return list(MPI.Group.Translate_ranks(group, range(group.size), MPI.COMM_WORLD.group))
+
+
 def _retire(key: Key, objects: tuple[PETSc.Object, ...], keep: object) -> None:
+    del _owned[key]
     _waiting[key] = objects, keep
+
+
+def _destroy_all(comm: MPI.Comm) -> None:
+    """Destroy the shared objects, in use or not, at the end of the program. Collective on ``comm``.
+
+    PETSc keeps data with a communicator as long as it has objects there, and cannot free them after its own
+    end: MPI_Finalize would stop halfway, and MPICH take the rank for one that crashed and kill the others.
+    """
+    for finalizer in list(_owned.values()):
+        finalizer()
+    sweep(comm)
+
+
+at_common_end(_destroy_all)
 
 
 def _destroy(objects: tuple[PETSc.Object, ...], keep: object) -> None:

@@ -56,8 +56,11 @@ FAILED = 0
 #: Position of ranks whose program has ended.
 ENDED = "nothing any more, for its program has ended"
 
-#: Duplicates in use: ranks that meet there are answered at the end of the program, too.
+#: Duplicates in use, on all ranks in the order in which they were made: ranks that meet there are answered at
+#: the end of the program, too.
 _open: dict[int, MPI.Comm] = {}
+#: What the ranks of each of them do together once all have come to the end.
+_last: list[Callable[[MPI.Comm], None]] = []
 _LOG = logging.getLogger(__name__)
 _WAITING = (
     "rank %d waits since %.0f s for the others in %s, which is collective: if they are not just slower, call "
@@ -87,6 +90,14 @@ def own_of(comm: MPI.Comm) -> MPI.Comm:
     atexit.unregister(_answer_until_all_have_ended)
     atexit.register(_answer_until_all_have_ended, os.getpid())
     return cast("MPI.Comm", own)
+
+
+def at_common_end(function: Callable[[MPI.Comm], None]) -> None:
+    """Call a function with each communicator on which ranks met, when their programs have all ended.
+
+    The function may communicate there: the ranks call it in the same order, while MPI and PETSc still run.
+    """
+    _last.append(function)
 
 
 def _duplicated(comm: MPI.Comm) -> MPI.Comm:
@@ -188,6 +199,9 @@ def _answer_until_all_have_ended(process: int) -> None:
             _open[key].allgather(None if FAILED in post.places else ENDED)
             posts[key] = Post(_open[key], place)
         time.sleep(min(PAUSE * (time.monotonic() - begun), LONGEST_PAUSE))
+    for own in _open.values():
+        for function in _last:
+            function(own)
 
 
 #: Marks errors that all ranks have raised already.

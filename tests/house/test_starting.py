@@ -64,6 +64,25 @@ def test_a_rank_that_worked_alone_works_with_others(mpirun: Callable[..., str]) 
     assert ratios == pytest.approx(3 * [1.0], rel=1e-5)
 
 
+def test_nothing_that_ranks_share_is_left_at_the_end(mpirun: Callable[..., str]) -> None:
+    """PETSc could not free it after its own end, and MPICH's launcher would kill ranks that came later."""
+    script = """
+        import atexit, sys
+        from mpi4py import MPI
+        from fenics_contact._base import sparse
+        from tests.house.pressed_block import solve
+
+        atexit.register(lambda: sys.stdout.write(f"{len(sparse._owned)} {len(sparse._waiting)}\\n"))
+        half = MPI.COMM_WORLD.Split(MPI.COMM_WORLD.rank // 2, -MPI.COMM_WORLD.rank)
+        kept = [solve(half), solve(MPI.COMM_WORLD)]
+        if MPI.COMM_WORLD.rank == 2:
+            kept.pop()
+        sys.stdout.write(f"{len(sparse._owned) > 0}\\n")
+    """
+    lines = mpirun(script, 3, timeout=60.0, fresh=True).splitlines()
+    assert sorted(lines) == 3 * ["0 0"] + 3 * ["True"]
+
+
 def test_signals_keep_the_handlers_that_they_have_when_petsc_starts(mpirun: Callable[..., str]) -> None:
     """As those of an interruptible run. PETSc takes SIGHUP from all, SIGTERM under MPICH."""
     script = """
