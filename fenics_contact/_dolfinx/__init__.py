@@ -55,6 +55,7 @@ from fenics_contact._dolfinx.reading import (
     read_tags,
     tag_arrays,
 )
+from fenics_contact._dolfinx.refinement import halved_simplices
 from fenics_contact._dolfinx.templates import (
     cellwise_space,
     constant_symbol,
@@ -89,6 +90,7 @@ __all__ = [
     "fem",
     "field_symbols",
     "global_dofs",
+    "halved_simplices",
     "has_torsion",
     "input_cells",
     "is_revolved",

@@ -1,4 +1,4 @@
-"""Meshes of bodies: cells, faces, named sides, quality; independent of finite elements."""
+"""Meshes of bodies: cells, faces, named sides, quality, local refinement; independent of forms."""
 
 from fenics_contact.mesh.bisection import bisection_partition
 from fenics_contact.mesh.cell_types import CellType
@@ -6,13 +6,16 @@ from fenics_contact.mesh.faces import boundary_faces, merge_duplicate_nodes
 from fenics_contact.mesh.quadratic import quadratic
 from fenics_contact.mesh.quadratic_nodes import in_vtk_order
 from fenics_contact.mesh.quality import scaled_jacobian
+from fenics_contact.mesh.refinement import Refinement, refined
 
 __all__ = [
     "CellType",
+    "Refinement",
     "bisection_partition",
     "boundary_faces",
     "in_vtk_order",
     "merge_duplicate_nodes",
     "quadratic",
+    "refined",
     "scaled_jacobian",
 ]

@@ -46,7 +46,7 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
     if linear.order == 2:
         raise InvalidInputError(f"quadratic needs linear cells, got {linear.plural}: use the mesh as it is")
     kind = _QUADRATIC[linear.vertices.shape]
-    points, cells = _with_more_nodes(mesh.points, mesh.cells, linear, kind)
+    points, cells = with_more_nodes(mesh.points, mesh.cells, linear, kind)
     boundary, _ = boundary_faces(cells, mesh.dim)
     surfaces = {
         name: boundary[match_faces(facets, corners_of(boundary, mesh.dim))]
@@ -64,7 +64,7 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
     return BodyMesh(points, cells, surfaces, mesh.grid, mesh.regions, mesh.coincident_nodes, mesh.shapes)
 
 
-def _with_more_nodes(
+def with_more_nodes(
     points: np.ndarray, cells: np.ndarray, linear: CellType, kind: CellType
 ) -> tuple[np.ndarray, np.ndarray]:
     """Add a node at the mean of the vertices around it, once for all cells that share it."""

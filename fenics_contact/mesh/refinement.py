@@ -1,0 +1,173 @@
+"""Local refinement of simplices: marked cells are halved, surfaces, regions and true shapes carried along."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from fenics_contact import _dolfinx
+from fenics_contact._base.checks import brief
+from fenics_contact._base.display import displayed
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.body_mesh import BodyMesh, check_jacobians
+from fenics_contact.mesh.cell_types import CELL_TYPES, CellType, shape_values
+from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
+from fenics_contact.mesh.quadratic import with_more_nodes
+from fenics_contact.shapes.simple import closest_points
+
+_LINEAR = {2: CELL_TYPES["triangle"], 3: CELL_TYPES["tetrahedron"]}
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """A refined mesh, and where its cells and nodes come from.
+
+    Attributes:
+        mesh: The refined mesh. Its first vertices are those of the coarse one, with the same numbers.
+        parents: The coarse cell in which each cell lies, shape (n_cells,), ascending.
+        positions: Where in its coarse cell each node of each cell lies, in reference coordinates, shape
+            (n_cells, nodes of a cell, dim).
+    """
+
+    mesh: BodyMesh
+    parents: np.ndarray
+    positions: np.ndarray
+
+
+def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
+    """Halve the edges of some simplices, and of as many others as keep the mesh conforming.
+
+    New nodes on surfaces whose shape the mesh carries lie on the shape, those of quadratic cells else on the
+    curved facets. Surfaces and regions are carried to the new cells; a structured grid is lost. The angles of
+    the cells stay bounded however often they are refined: every cell with a halved edge has its longest edge
+    halved. Source: A. Plaza, G.F. Carey, Applied Numerical Mathematics 32 (2000) 195-218.
+
+    Args:
+        mesh: Triangles or tetrahedra, linear or quadratic.
+        marked: Numbers of cells, or a mark for every cell, shape (n_cells,) bool.
+
+    Raises:
+        InvalidInputError: If the cells are no simplices, no such cells exist, the mesh has nodes that
+            coincide, or new nodes move so far onto a shape that a cell is inverted.
+
+    Example:
+        >>> from fenics_contact.gallery import rectangle
+        >>> plate = rectangle((0.0, 0.0), (2.0, 1.0), (4, 2), cell="triangle")
+        >>> near = np.linalg.norm(plate.points[plate.cells].mean(axis=1), axis=1) < 0.5
+        >>> fine = refined(plate, near)
+        >>> fine.mesh.n_cells > plate.n_cells, fine.mesh.volume
+        (True, 2.0)
+    """
+    chosen = _checked_marks(mesh, marked)
+    kind, linear = CELL_TYPES[mesh.cell_type], _LINEAR[mesh.dim]
+    vertices, inverse = np.unique(mesh.cells[:, : mesh.dim + 1], return_inverse=True)
+    skeleton = inverse.reshape(-1, mesh.dim + 1)
+    ends, cells = _identified(mesh.points[vertices], skeleton, linear, chosen)
+    parents, places, cells = _placed_in_parents(ends, cells, skeleton, linear)
+    points = mesh.points[vertices[ends]].mean(axis=1)
+    if kind.order == 2:
+        points, cells = with_more_nodes(points, cells, linear, kind)
+    positions = np.einsum("kv,cvi->cki", shape_values(linear, kind.nodes), places)
+    points = _mapped(mesh, kind, parents, positions, cells, len(points))
+    points[: len(vertices)] = mesh.points[vertices]
+    surfaces = _carried_surfaces(mesh, ends, cells, vertices)
+    for name, shape in mesh.shapes.items():
+        new = np.unique(surfaces[name])
+        new = new[new >= len(vertices)]
+        points[new] = closest_points(shape, points[new])
+    check_jacobians(points, cells, "mark more cells along curved surfaces, or leave their shapes away")
+    regions = {name: np.flatnonzero(np.isin(parents, inside)) for name, inside in mesh.regions.items()}
+    fine = BodyMesh(points, cells, surfaces, None, regions, shapes=mesh.shapes)
+    return Refinement(fine, parents, positions)
+
+
+def _checked_marks(mesh: BodyMesh, marked: ArrayLike) -> np.ndarray:
+    """Return the numbers of the marked cells."""
+    if not CELL_TYPES[mesh.cell_type].is_simplex:
+        raise InvalidInputError(
+            f"refined needs triangles or tetrahedra, got {mesh.cells_in_words}: make a mesh of simplices, or "
+            "a finer one of these cells"
+        )
+    if mesh.coincident_nodes or mesh.cuts:
+        raise InvalidInputError(
+            "refined needs a mesh without coincident nodes, got one with a crack or a section: refine the "
+            "mesh before it is cut"
+        )
+    marks = np.asarray(marked)
+    if marks.dtype == bool and marks.shape == (mesh.n_cells,):
+        marks = np.flatnonzero(marks)
+    fits = marks.ndim == 1 and np.issubdtype(marks.dtype, np.integer) and marks.size > 0
+    if not fits or marks.min() < 0 or marks.max() >= mesh.n_cells:
+        raise InvalidInputError(
+            f"marked must be at least one of the cells 0 to {mesh.n_cells - 1}, or a bool for each, got "
+            f"{brief(marked)}: give the cells to halve"
+        )
+    return marks
+
+
+def _identified(
+    points: np.ndarray, skeleton: np.ndarray, linear: CellType, chosen: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the two coarse vertices between which each fine one lies, equal for old ones, and fine cells.
+
+    Old vertices keep their numbers, new ones follow in the order of their ends, whatever dolfinx's order is.
+    """
+    found, cells = _dolfinx.halved_simplices(points, skeleton, linear.name, chosen)
+    pairs = [skeleton[:, list(pair)] for pair in zip(*np.triu_indices(len(linear.edges), 1), strict=True)]
+    edges = np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
+    ends = np.concatenate([np.repeat(np.arange(len(points)), 2).reshape(-1, 2), edges])
+    _, which = cKDTree(points[ends].mean(axis=1)).query(found)
+    used, renumbered = np.unique(np.concatenate([np.arange(len(points)), which]), return_inverse=True)
+    return ends[used], renumbered[len(points) :][cells]
+
+
+def _placed_in_parents(
+    ends: np.ndarray, cells: np.ndarray, skeleton: np.ndarray, linear: CellType
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return parent, reference coordinates of the vertices in it, and vertices of each cell, by parent."""
+    size = skeleton.shape[1]
+    parents = match_faces(_spanned(ends, cells), skeleton)
+    order = np.lexsort((*np.sort(cells, axis=1).T, parents))
+    parents, cells = parents[order], np.sort(cells[order], axis=1)
+    local = (skeleton[parents][:, None, None, :] == ends[cells][..., None]).argmax(axis=3)
+    places = linear.vertices[local].mean(axis=2)
+    turned = np.linalg.det(places[:, 1:] - places[:, :1]) < 0.0
+    flip = [*range(size - 2), size - 1, size - 2]
+    cells[turned], places[turned] = cells[turned][:, flip], places[turned][:, flip]
+    return parents, places, cells
+
+
+def _spanned(ends: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return the coarse vertices of the cells or facets in which fine ones lie, given by their vertices.
+
+    Between them, the vertices of a fine cell lie on edges of all vertices of its coarse cell.
+    """
+    among = np.sort(ends[faces].reshape(len(faces), -1), axis=1)
+    first = np.column_stack([np.ones(len(faces), dtype=bool), np.diff(among, axis=1) > 0])
+    return among[first].reshape(len(faces), -1)
+
+
+def _mapped(
+    mesh: BodyMesh, kind: CellType, parents: np.ndarray, positions: np.ndarray, cells: np.ndarray, count: int
+) -> np.ndarray:
+    """Return the coordinates of the fine nodes, where the maps of the coarse cells take them."""
+    points = np.empty((count, mesh.dim))
+    values = shape_values(kind, positions.reshape(-1, mesh.dim)).reshape(*cells.shape, -1)
+    points[cells] = np.einsum("ckn,cni->cki", values, mesh.points[mesh.cells[parents]])
+    return points
+
+
+def _carried_surfaces(
+    mesh: BodyMesh, ends: np.ndarray, cells: np.ndarray, vertices: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return the fine facets of the surfaces."""
+    boundary, _ = boundary_faces(cells, mesh.dim)
+    spanned = vertices[_spanned(ends, corners_of(boundary, mesh.dim))]
+    return {
+        name: boundary[match_faces(spanned, corners_of(facets, mesh.dim)) >= 0]
+        for name, facets in mesh.surfaces.items()
+    }
