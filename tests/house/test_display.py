@@ -96,7 +96,7 @@ from fenics_contact.design import (
 )
 from fenics_contact.design.adjoint import linearise_face, solve_adjoint
 from fenics_contact.design.remeshed import Remeshing
-from fenics_contact.gallery import block
+from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
     FinitePlasticity,
     J2Plasticity,
@@ -109,6 +109,7 @@ from fenics_contact.materials import (
     PlaneStress,
     StVenantKirchhoff,
 )
+from fenics_contact.mesh import refined
 from fenics_contact.mesh.cell_types import CELL_TYPES
 from fenics_contact.qp import FaceNewton
 from fenics_contact.results import (
@@ -173,7 +174,7 @@ def objects() -> dict[str, Any]:
         Preload("block", Section((0, 0, 0.5), (0, 0, 1))),
         Preloads({"block": drawn}), drawn, SpringForces({"rod": sprung}), sprung,
         RigidMotion(Surface("block", "z1"), np.zeros(3), np.ones(3), np.arange(3.0)),
-        limits, BundleTrust(),
+        limits, BundleTrust(), refined(rectangle((0, 0), (1, 1), (2, 2), "triangle"), [0]),
         minimize(bowl, np.ones(60), constraints=NonlinearConstraint(bowl, 90.0, name="size")),
         NonlinearConstraint(bowl, 90.0), Checkpoint("run.npz"), search,
         pose(bowl, np.zeros(60), constraints=limits),
