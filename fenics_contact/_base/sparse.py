@@ -116,11 +116,11 @@ def _totals(size: int, interface: int, products: int, rates: Rates) -> tuple[flo
     return explicit.total(products), implicit.total(products)
 
 
-#: Number of the ranks that share objects, and index in the order of registration there: the same on all.
+#: Place in `_groups` of the ranks that share objects, and index in the order of registration by these.
 Key = tuple[int, int]
 
-#: Ranks in the world of those who share objects, by their number.
-_groups: dict[int, list[int]] = {}
+#: Groups of ranks that share objects, in an order of this rank's own.
+_groups: list[MPI.Group] = []
 #: Objects of several ranks whose owner is gone on this rank.
 _waiting: dict[Key, tuple[tuple[PETSc.Object, ...], object]] = {}
 #: What would retire those whose owner is in use on this rank.
@@ -140,11 +140,9 @@ def dispose_with(
     if comm is None or comm.size == 1:
         finalizer = weakref.finalize(owner, _destroy, objects, keep)
     else:
-        ranks = _in_world(comm)
-        group = zlib.crc32(repr(ranks).encode())
-        _groups[group] = ranks
-        _registered[group] += 1
-        key = (group, _registered[group])
+        place = _place_of(comm)
+        _registered[place] += 1
+        key = (place, _registered[place])
         finalizer = _owned[key] = weakref.finalize(owner, _retire, key, objects, keep)
     finalizer.atexit = False
 
@@ -153,16 +151,34 @@ def sweep(comm: MPI.Comm) -> None:
     """Destroy what only ranks of this communicator share and none of them uses any more. Collective."""
     if comm.size == 1:
         return
-    waiting = dict(zip(_in_world(comm), map(set, comm.allgather(list(_waiting))), strict=True))
-    for key in sorted(_waiting):
-        if all(key in waiting.get(rank, ()) for rank in _groups[key[0]]):
+    sharing: dict[Key, tuple[Key, list[int]]] = {}
+    for key in _waiting:
+        ranks = _ranks_in(comm, _groups[key[0]])
+        if MPI.UNDEFINED not in ranks:
+            sharing[zlib.crc32(repr(ranks).encode()), key[1]] = key, ranks
+    waiting = [set(labels) for labels in comm.allgather(list(sharing))]
+    for label, (key, ranks) in sorted(sharing.items()):
+        if all(label in waiting[rank] for rank in ranks):
             _destroy(*_waiting.pop(key))
 
 
-def _in_world(comm: MPI.Comm) -> list[int]:
-    """Return the ranks of a communicator as numbered in the world."""
+def _place_of(comm: MPI.Comm) -> int:
+    """Return the place of a communicator's ranks in `_groups`."""
     group = comm.group
-    return list(MPI.Group.Translate_ranks(group, range(group.size), MPI.COMM_WORLD.group))
+    for place, known in enumerate(_groups):
+        if MPI.Group.Compare(group, known) == MPI.IDENT:
+            group.Free()
+            return place
+    _groups.append(group)
+    return len(_groups) - 1
+
+
+def _ranks_in(comm: MPI.Comm, group: MPI.Group) -> list[int]:
+    """Return the numbers that the ranks of a group have in a communicator, undefined where they have none."""
+    whole = comm.group
+    ranks = list(MPI.Group.Translate_ranks(group, range(group.size), whole))
+    whole.Free()
+    return ranks
 
 
 def _retire(key: Key, objects: tuple[PETSc.Object, ...], keep: object) -> None:

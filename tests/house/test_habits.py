@@ -32,11 +32,9 @@ def python_files() -> list[Path]:
 PROGRAM = "fenics_contact.__main__"
 #: Where all commands write through, on rank 0 alone.
 CONSOLE = "fenics_contact._cli.console"
-#: Ranks have one number each there, which those of several communicators share; nothing is sent.
-NUMBERS = "fenics_contact._base.sparse"
 
 
-@pytest.mark.parametrize(("name", "allowed"), [("print", [CONSOLE]), ("COMM_WORLD", [PROGRAM, NUMBERS])])
+@pytest.mark.parametrize(("name", "allowed"), [("print", [CONSOLE]), ("COMM_WORLD", [PROGRAM])])
 def test_the_package_never_uses(name: str, allowed: list[str]) -> None:
     house = modules()
     assert len(house) > 10, "hardly any modules were found: nothing was tested"

@@ -29,15 +29,15 @@ class Owner:
 
 
 class TwoRanks:
-    """A communicator of two ranks of which the other still uses what has the numbers given."""
+    """A communicator of two ranks of which the other still uses what was registered as the numbers given."""
 
     size = 2
 
-    def __init__(self, *used: disposal.Key) -> None:
+    def __init__(self, *used: int) -> None:
         self.used = used
 
     def allgather(self, waiting: list[disposal.Key]) -> list[list[disposal.Key]]:
-        return [waiting, [key for key in waiting if key not in self.used]]
+        return [waiting, [label for label in waiting if label[1] not in self.used]]
 
 
 def test_objects_of_one_rank_are_destroyed_with_their_owner() -> None:
@@ -49,13 +49,15 @@ def test_objects_of_one_rank_are_destroyed_with_their_owner() -> None:
 
 
 def test_shared_objects_wait_until_no_rank_uses_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(disposal, "_in_world", lambda comm: [0, 1])
+    monkeypatch.setattr(disposal, "_ranks_in", lambda comm, group: [0, 1])
+    monkeypatch.setattr(disposal, "_place_of", lambda comm: 0)
+    monkeypatch.setattr(disposal, "_groups", [MPI.COMM_SELF.group])
     owner, held = Owner(), Petsc()
     dispose_with(owner, held, comm=TwoRanks())  # type: ignore[arg-type]
-    (key,) = disposal._owned
+    ((_, index),) = disposal._owned
     del owner
     assert held.destroyed == 0
-    sweep(TwoRanks(key))  # type: ignore[arg-type]
+    sweep(TwoRanks(index))  # type: ignore[arg-type]
     assert held.destroyed == 0
     sweep(TwoRanks())  # type: ignore[arg-type]
     assert held.destroyed == 1
