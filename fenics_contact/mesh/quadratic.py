@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
@@ -16,7 +18,7 @@ from fenics_contact.mesh.cell_types import (
     shape_values,
 )
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
-from fenics_contact.shapes.simple import closest_points
+from fenics_contact.shapes.simple import SurfaceShape, closest_points
 
 _QUADRATIC = {cell.vertices.shape: cell for cell in (TRIANGLE6, QUADRILATERAL9, TETRAHEDRON10, HEXAHEDRON27)}
 
@@ -52,16 +54,27 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
         name: boundary[match_faces(facets, corners_of(boundary, mesh.dim))]
         for name, facets in mesh.surfaces.items()
     }
-    placed = np.zeros(len(points), dtype=bool)
-    for name, shape in mesh.shapes.items():
-        own = np.unique(surfaces[name])
-        own = own[own >= mesh.n_nodes]
-        points[own] = closest_points(shape, points[own])
-        placed[own] = True
+    placed = put_on_shapes(points, surfaces, mesh.shapes, mesh.n_nodes)
     if placed.any():
         _follow(points, cells, kind, placed)
     check_jacobians(points, cells, "refine the mesh along its curved surfaces, or leave their shapes away")
     return BodyMesh(points, cells, surfaces, mesh.grid, mesh.regions, mesh.coincident_nodes, mesh.shapes)
+
+
+def put_on_shapes(
+    points: np.ndarray, surfaces: Mapping[str, np.ndarray], shapes: Mapping[str, SurfaceShape], first: int
+) -> np.ndarray:
+    """Move nodes of surfaces, those from number ``first`` on, to the closest points of the shapes.
+
+    Returns which nodes these are, shape (n_nodes,).
+    """
+    placed = np.zeros(len(points), dtype=bool)
+    for name, shape in shapes.items():
+        own = np.unique(surfaces[name])
+        own = own[own >= first]
+        points[own] = closest_points(shape, points[own])
+        placed[own] = True
+    return placed
 
 
 def with_more_nodes(

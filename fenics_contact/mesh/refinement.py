@@ -15,8 +15,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh, check_jacobians
 from fenics_contact.mesh.cell_types import CELL_TYPES, CellType, shape_values
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
-from fenics_contact.mesh.quadratic import with_more_nodes
-from fenics_contact.shapes.simple import closest_points
+from fenics_contact.mesh.quadratic import put_on_shapes, with_more_nodes
 
 _LINEAR = {2: CELL_TYPES["triangle"], 3: CELL_TYPES["tetrahedron"]}
 
@@ -75,10 +74,7 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
     points = _mapped(mesh, kind, parents, positions, cells, len(points))
     points[: len(vertices)] = mesh.points[vertices]
     surfaces = _carried_surfaces(mesh, ends, cells, vertices)
-    for name, shape in mesh.shapes.items():
-        new = np.unique(surfaces[name])
-        new = new[new >= len(vertices)]
-        points[new] = closest_points(shape, points[new])
+    put_on_shapes(points, surfaces, mesh.shapes, len(vertices))
     check_jacobians(points, cells, "mark more cells along curved surfaces, or leave their shapes away")
     regions = {name: np.flatnonzero(np.isin(parents, inside)) for name, inside in mesh.regions.items()}
     fine = BodyMesh(points, cells, surfaces, None, regions, shapes=mesh.shapes)
@@ -130,9 +126,10 @@ def _placed_in_parents(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return parent, reference coordinates of the vertices in it, and vertices of each cell, by parent."""
     size = skeleton.shape[1]
+    cells = np.sort(cells, axis=1)
     parents = match_faces(_spanned(ends, cells), skeleton)
-    order = np.lexsort((*np.sort(cells, axis=1).T, parents))
-    parents, cells = parents[order], np.sort(cells[order], axis=1)
+    order = np.lexsort((*cells.T, parents))
+    parents, cells = parents[order], cells[order]
     local = (skeleton[parents][:, None, None, :] == ends[cells][..., None]).argmax(axis=3)
     places = linear.vertices[local].mean(axis=2)
     turned = np.linalg.det(places[:, 1:] - places[:, :1]) < 0.0
