@@ -54,12 +54,30 @@ def cut_between(mesh: BodyMesh, name: Hashable, before: np.ndarray, behind: np.n
 
 def closed(mesh: BodyMesh) -> BodyMesh:
     """Return the cells as if no cut had been made; some of the points are unused then."""
-    node, result = np.arange(mesh.n_nodes), copy(mesh)
+    result = copy(mesh)
+    result.__dict__.pop("linear", None)
+    result._set(cells=_before_cuts(mesh)[mesh.cells], surfaces={}, _cuts={})
+    return result
+
+
+def _before_cuts(mesh: BodyMesh) -> np.ndarray:
+    """Return the node before all cuts of each node, shape (n_nodes,)."""
+    node = np.arange(mesh.n_nodes)
     for cut in reversed(list(mesh.cuts.values())):
         node[cut.pairs[:, 0]] = cut.pairs[:, 1]
-    result.__dict__.pop("linear", None)
-    result._set(cells=node[mesh.cells], surfaces={}, _cuts={})
-    return result
+    return node
+
+
+def sewn(mesh: BodyMesh) -> BodyMesh:
+    """Return the mesh before it was cut, with its surfaces; cells and nodes keep numbers."""
+    if not mesh.cuts:
+        return mesh
+    node = _before_cuts(mesh)
+    kept = mesh.n_nodes - sum(len(cut.pairs) for cut in mesh.cuts.values())
+    surfaces = {name: node[facets] for name, facets in mesh.surfaces.items()}
+    return BodyMesh(
+        mesh.points[:kept], node[mesh.cells], surfaces, mesh.grid, mesh.regions, shapes=mesh.shapes
+    )
 
 
 def pieces(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:

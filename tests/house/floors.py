@@ -16,6 +16,7 @@ FLOORS = [
     {"results"},
     {"_equilibrium"},
     {"design"},
+    {"_adaptive"},
     {"_scene_file", "output", "pictures", "_responses"},
     {"_page", "study"},
     {"_cli"},

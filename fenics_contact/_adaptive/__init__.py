@@ -1,0 +1,1 @@
+"""Meshes and solver effort that follow the accuracy one asks for."""

@@ -1,0 +1,55 @@
+"""The same scene on refined meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from numpy.typing import ArrayLike
+
+from fenics_contact._base.display import displayed
+from fenics_contact._scene.scene import Scene
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.cuts import sewn
+from fenics_contact.mesh.refinement import Refinement, refined
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class SceneRefinement:
+    """A scene on refined meshes, and where their cells come from.
+
+    Attributes:
+        scene: The scene.
+        refinements: Body name -> its refinement. Bodies that kept their mesh are left out.
+    """
+
+    scene: Scene
+    refinements: Mapping[str, Refinement]
+
+
+def refine_scene(scene: Scene, marked: Mapping[str, ArrayLike]) -> SceneRefinement:
+    """Refine the meshes of some bodies; supports, loads and pairs are those of the same surfaces.
+
+    Bodies with sections of preloads are refined as wholes and cut again.
+
+    Args:
+        scene: The scene.
+        marked: Body name -> marked cells, see `fenics_contact.mesh.refined`; those that are not named, or
+            have no marked cells, keep their mesh.
+
+    Raises:
+        InvalidInputError: If there is no such body, its cells cannot be refined, or one of its surfaces is
+            refined so that a new node lies off its shape.
+    """
+    unknown = sorted(set(marked) - set(scene.bodies))
+    if unknown:
+        raise InvalidInputError(
+            f"marked must name bodies of the scene, {sorted(scene.bodies)}, got {unknown[0]!r}: take one "
+            "of these"
+        )
+    bodies, refinements = dict(scene.bodies), {}
+    for name, cells in marked.items():
+        refinements[name] = refined(sewn(bodies[name].mesh), cells)
+        bodies[name] = replace(bodies[name], mesh=refinements[name].mesh)
+    return SceneRefinement(replace(scene, bodies=bodies), refinements)
