@@ -35,6 +35,7 @@ from fenics_contact.output.files import OutputError
 from fenics_contact.output.result import listed_forces, scales_of
 from fenics_contact.output.tables import rounded
 from fenics_contact.results.by_name import names_of
+from fenics_contact.results.resolution import in_words
 from fenics_contact.results.state import State, pairs_in_words
 
 if TYPE_CHECKING:
@@ -288,6 +289,8 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
         rows["held by nothing"] = " and ".join(map(str, state.unheld)) + ": stays where it is"
     if state.known_errors is not None:
         rows |= {f"error, {name}": words for name, words in state.known_errors.in_words.items()}
+    if state.peak_doubts:
+        rows["peak pressure"] = in_words(state.peak_doubts)
     rows["seconds"] = ", ".join(f"{name} {spent:.2f}" for name, spent in state.seconds.items())
     return {name: words for name, words in rows.items() if not words.startswith("nan")}
 

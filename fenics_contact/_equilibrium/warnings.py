@@ -7,18 +7,18 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from fenics_contact._base.display import counted
 from fenics_contact._base.libraries import MPI
+from fenics_contact._equilibrium.peaks import coarse_peak, unmatched_nodes
 from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.pair_geometry import Outline, bodies_near, outline_of, unpaired
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import TILT, surface_of
 from fenics_contact._scene.scene import Scene
-from fenics_contact._surfaces.facets import FacetedSurface, outside, share_areas
+from fenics_contact._surfaces.facets import outside, share_areas
 from fenics_contact._surfaces.projection import node_weights, project
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.errors.kinds import safe_log
@@ -26,12 +26,11 @@ from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import computed_rounding, vector_areas
 from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.resolution import PeakDoubt
 from fenics_contact.results.state import State
 
 #: Errors up to this share of what moves are small.
 SHARE = 0.1
-#: By how much the largest pressure may be off, by the edges of facets from its point to the next open one.
-OFF = {1: "by a half or more", 2: "by a tenth"}
 #: Rotation [rad], as the root mean square of all cells, that triggers the warning: it strains a body of small
 #: strain by half of its square.
 FAR = 0.05
@@ -55,9 +54,11 @@ class ContactWarnings:
         if isinstance(state, LinearState):
             if design and self._points is not None:
                 return
-            for pair, kind, words in self._doubts(state):
+            found, peaks = self._doubts(state)
+            for pair, kind, words in found:
                 if not (design and kind == "overlap"):
                     self._log(state, (pair, kind), words, _LOG.info if kind == "rough peak" else None)
+            object.__setattr__(state, "peak_doubts", peaks)
         elif not state.scene.deforms_much:
             for number in range(len(state.scene.contacts)):
                 for pair, kind, words in _slid_far(state, number):
@@ -67,18 +68,19 @@ class ContactWarnings:
 
     def overlaps(self, state: LinearState) -> tuple[str, ...]:
         """Return words about the pairs whose surfaces overlap before they are loaded. Collective."""
-        return tuple(words for _, kind, words in self._doubts(state) if kind == "overlap")
+        return tuple(words for _, kind, words in self._doubts(state)[0] if kind == "overlap")
 
     def _log(self, state: State, key: Hashable, words: str, log: Callable[..., None] | None = None) -> None:
         if key not in self._given and state.torn.decomposition.comm.rank == 0:
             safe_log(log or _LOG.warning, "%s", words)
         self._given.add(key)
 
-    def _doubts(self, state: LinearState) -> list[tuple[int, str, str]]:
-        """Return pair, kind and words of all doubts about a state. Collective."""
+    def _doubts(self, state: LinearState) -> tuple[list[tuple[int, str, str]], tuple[PeakDoubt, ...]]:
+        """Return pair, kind and words of all doubts about a state, and those about peaks. Collective."""
         torn, contact, found = state.torn, state.contact, list[tuple[int, str, str]]()
+        peaks = list[PeakDoubt]()
         if contact.points.count == 0:
-            return found
+            return found, ()
         if contact.points is not self._points:
             self._points, self._finer = contact.points, _finer_gap(torn)
         change, pressed_in = self._finer - contact.points.gap, _indentation(state)
@@ -96,12 +98,15 @@ class ContactWarnings:
             error = float(np.abs(change[mine][nearest <= moved]).max(initial=0.0))
             if error > SHARE * moved:  # which points press is not known then
                 found.append((number, "facets", _words_of_facets(pair, error, moved)))
-            else:
-                found += _coarse_peak(state, number, pressed_in)
+            elif peak := coarse_peak(state, number, pressed_in):
+                peaks.append(peak)
+                found.append((number, "peak" if peak.cells == 1 else "rough peak", peak.warning))
+            elif unmatched := unmatched_nodes(state, number):
+                peaks.append(unmatched)
             overlap = -float(before[touching].min(initial=0.0))
             if overlap > max(error, SHARE * moved):
                 found.append((number, "overlap", _words_of_overlap(pair, overlap, moved)))
-        return found
+        return found, tuple(peaks)
 
     def _warn_of_large_rotations(self, state: State) -> None:
         """Warn of bodies of small strain that turn so far that they are strained by it. Collective."""
@@ -312,63 +317,6 @@ def _is_curved(scene: Scene, side: Surface, pair: ContactPair) -> bool:
     shapes = scene.bodies[side.body].mesh.origin.shapes
     known = pair.geometry == "best" and side.name in shapes
     return not known and surface_of(scene, side, "reconstructed").relief is not None
-
-
-def _coarse_peak(
-    state: State, number: int, pressed_in: np.ndarray, curved: float = 0.1
-) -> list[tuple[int, str, str]]:
-    """Return the doubt about a pair whose largest pressure lies next to its edge, if there is one.
-
-    So it is of round bodies. Contact that ends where a surface ends, or between planes that lift off each
-    other, has no peak that more points would resolve.
-
-    `pressed_in`: how far its force presses each contact point in, shape (n,), [length]; `curved`: gaps that
-    grow by this share of how far the point of the largest pressure is pressed in are curved.
-    """
-    contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
-    mine = contact.on_pair(number)
-    pressing = contact.normal_force[mine] > 0.0
-    if not pressing.any():
-        return []
-    slave = surface_of(scene, pair.slave, "faceted")
-    node = np.searchsorted(
-        slave.nodes, contact.points.slave[mine] - NodeNumbers.of(scene).first_of(pair.slave.body)
-    )
-    top = np.argmax(contact.pressure[mine])
-    joined, rim = _joined(slave)
-    if rim[node[top]] and not slave.mirrored[node[top]].any():
-        return []
-    gap = np.full(len(slave.nodes), np.nan)
-    gap[node[~pressing]] = contact.points.gap[mine[~pressing]]
-    near = joined[node[top]].indices
-    for steps, reached in ((1, near), (2, joined[near].indices)):
-        opened = gap[reached][~np.isnan(gap[reached])]
-        if len(opened):
-            grown = opened.min() - contact.points.gap[mine[top]]
-            if grown > curved * pressed_in[mine[top]]:
-                kind = "peak" if steps == 1 else "rough peak"
-                return [(number, kind, _words_of_peak(pair, int(pressing.sum()), steps))]
-            break
-    return []
-
-
-def _joined(surface: FacetedSurface) -> tuple[sp.csr_matrix, np.ndarray]:
-    """Return which nodes an edge of a facet joins, (n, n), and which lie on the rim, (n,)."""
-    ends = surface.facets.ravel(), np.roll(surface.facets, -1, axis=1).ravel()
-    one, other = np.concatenate(ends), np.concatenate(ends[::-1])
-    count = np.bincount(surface.facets.ravel())
-    joined = sp.csr_matrix((np.ones(len(one)), (one, other)), shape=(len(count), len(count)))
-    return joined, (joined.getnnz(axis=1) != count) | (count == 1)
-
-
-def _words_of_peak(pair: ContactPair, count: int, steps: int) -> str:
-    points = counted(count, "point presses", "points press")
-    cells = counted(steps, "cell")
-    return (
-        f"the contact of {pair.place} is too small for its cells: {points}, and it ends within "
-        f"{cells} of the largest pressure, which may be off {OFF[steps]}; four cells on the half width of a "
-        "contact have it to about a percent: refine the meshes there"
-    )
 
 
 def _passing_nodes(state: State, number: int, moved: float) -> list[tuple[int, str, str]]:

@@ -213,6 +213,9 @@ class PairGeometry:
             prescribes, if that is larger. None if neither is known.
         discretisation: Where contact is enforced, and why, see `ContactPair.reason`.
         given: What the pair gives in place of measured gaps, in words, see `ContactPair.given_gap`.
+        wider: How much wider facets of the master are than those of the slave where these are nearest; 1 on
+            obstacles, NaN if they do not face each other.
+        by_nodes: Whether contact is by nodes.
     """
 
     slave: str
@@ -221,6 +224,8 @@ class PairGeometry:
     approach: float | None
     discretisation: str
     given: str = ""
+    wider: float = 1.0
+    by_nodes: bool = False
 
     @property
     def share(self) -> float | None:
@@ -229,7 +234,7 @@ class PairGeometry:
 
     def __str__(self) -> str:
         """Describe it in one line."""
-        parts = f"{self.slave} on {self.master}", self.discretisation, self.given, "facets "
+        parts = f"{self.slave} on {self.master}", self.discretisation, self.given, self.match(), "facets "
         words = "; ".join(filter(None, parts))
         if self.height == 0.0:
             return words + "miss nothing"
@@ -237,6 +242,26 @@ class PairGeometry:
         known = "of an unknown part" if share is None else f"{100 * share:.2g} %"
         by = "" if self.approach is None else f" (about {self.approach:.2g})"
         return words + f"miss it by up to {self.height:.2g}, {known} of the approach{by}"
+
+    def match(self, much: float = 3.0) -> str:
+        """Return in words how badly the sizes of facets match, and what to do; empty if they do well enough.
+
+        Args:
+            much: Ratio of their widths that is worth a word. The pressure of a contact has no more detail
+                than the wider facets of the master; nodes of the master that are much closer than those of
+                the slave pass between these.
+        """
+        if self.wider > much:
+            return (
+                f"facets of the master are {self.wider:.2g} times as wide as the slave's, and the pressure "
+                "is only as fine as these: refine the master"
+            )
+        if self.by_nodes and self.wider < 1.0 / much:
+            return (
+                f"facets of the slave are {1.0 / self.wider:.2g} times as wide as the master's: let the "
+                "finer surface be the slave"
+            )
+        return ""
 
 
 @dataclass(frozen=True)
@@ -276,7 +301,22 @@ def pair_geometry(scene: SceneParts, pair: ContactPair) -> PairGeometry:
     if pair.gives_all_gaps:
         height = 0.0
     names = name, _name(scene, pair, pair.master, master)
-    return PairGeometry(*names, height, approach, in_words(pair), pair.given_gap)
+    wider, by_nodes = _wider(slave, master, met), not pair.by_mortar
+    return PairGeometry(*names, height, approach, in_words(pair), pair.given_gap, wider, by_nodes)
+
+
+def _wider(slave: FacetedSurface, master: FacetedSurface, met: _Meeting) -> float:
+    """Return `PairGeometry.wider`."""
+    if len(met.node) == 0:
+        return float("nan")
+    nearest = np.argmin(met.gap)
+    around = (slave.facets == met.node[nearest]).any(axis=1)
+    own, other = slave.facets[around], master.facets[[met.facet[nearest]]]
+    sizes = [
+        quadrature_areas(side.points, facets).mean() * (2.0 if side.corners == 3 else 1.0)
+        for side, facets in ((slave, own), (master, other))
+    ]
+    return float((sizes[1] / sizes[0]) ** (1.0 / (slave.dim - 1)))
 
 
 def _name(scene: SceneParts, pair: ContactPair, surface: Surface, faceted: FacetedSurface) -> str:

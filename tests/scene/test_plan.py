@@ -284,6 +284,24 @@ def test_an_approach_may_be_prescribed_or_unknown() -> None:
     assert unknown.height > 1.5 * ball("xy").plan().contacts[0].height, "then all facets count"
 
 
+@pytest.mark.parametrize(
+    ("counts", "words"),
+    [
+        (2, ""),
+        (1, "facets of the master are 4 times as wide as the slave's, and the pressure is only as fine as"),
+        (16, "facets of the slave are 4 times as wide as the master's: let the finer surface be the slave; "),
+    ],
+)
+def test_facets_of_very_different_widths_are_named(counts: int, words: str) -> None:
+    lower = block((0, 0, 0), (1, 1, 1), (counts, counts, 1))
+    bodies = {"lower": Body(lower, STEEL), "upper": stack().bodies["upper"]}
+    contacts = [replace(pair()[0], discretisation="node")]
+    (found,) = replace(stack(), bodies=bodies, contacts=contacts).plan(ranks=1).contacts
+    assert found.wider == pytest.approx(4.0 / counts)
+    assert str(found) == f"flat on flat; node; {words}facets miss nothing" or (words and words in str(found))
+    assert replace(found, by_nodes=False).match() == (found.match() if counts < 4 else "")
+
+
 def test_a_scene_is_made_without_what_its_plan_computes(mpirun: Callable[..., str]) -> None:
     script = """
     import sys
