@@ -34,7 +34,7 @@ from fenics_contact._large_deformations.tangent_step import TangentProblem
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import ConvergenceError, together
 from fenics_contact.feti.decomposition import Decomposition
-from fenics_contact.feti.subdomain import foundation_of
+from fenics_contact.feti.subdomain import SubdomainMesh, foundation_of
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp.reductions import Vector, global_max, global_min, global_sum
 from fenics_contact.qp.solution import Residuals, contact_step
@@ -415,6 +415,10 @@ class Equations:
             moved = (at.displacement[part] for part in self.decomposition.parts)
             responses = tuple(map(_on_bed, responses, self._beds, moved))
             external, softening = load.at(at.displacement)
+            if (follow := self.decomposition.following) is not None:
+                responses = tuple(map(_following, responses, self.decomposition.meshes))
+                external = follow.T @ external
+                softening = None if softening is None else (follow.T @ softening @ follow).tocsr()
         internal = np.concatenate([np.zeros(0), *(response.force for response in responses)])
         bound = torn.B.T @ torn.numbering.to_local(at.multiplier)
         # What is no more than rounding of strains and of positions is none.
@@ -435,6 +439,18 @@ class Equations:
         return ResidualState(
             self, load, at, responses, external, softening, unbalanced, open_, residuals, least
         )
+
+
+def _following(response: Response, mesh: SubdomainMesh) -> Response:
+    """Return a response to the displacement of nodes that do not hang."""
+    following = mesh.following
+    if following is None:
+        return response
+    return replace(
+        response,
+        force=following.force(response.force),
+        tangent=lambda: following.stiffness(response.stiffness),
+    )
 
 
 def _on_bed(response: Response, bed: sp.csr_matrix | None, displacement: Vector) -> Response:

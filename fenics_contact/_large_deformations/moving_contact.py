@@ -20,7 +20,7 @@ from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import share_areas
-from fenics_contact.errors import together
+from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.contact_rows import on_copies
 from fenics_contact.feti.decomposition import Decomposition
@@ -120,9 +120,7 @@ class TurningForces:
         stiffness = (left * right)[kept]
         return cls(normal, normal_owner, forces, displacements, stiffness, owner[kept], corrections)
 
-    def with_springs(
-        self, columns: sp.csr_matrix, stiffness: np.ndarray, owner: np.ndarray
-    ) -> TurningForces:
+    def with_springs(self, columns: sp.csr_matrix, stiffness: np.ndarray, owner: np.ndarray) -> TurningForces:
         """Return those with springs, whose rows come after those of normal forces.
 
         `columns`: of length one, shape (n_dofs, m); `stiffness`: shape (m,), [force / length]; `owner`: node
@@ -480,6 +478,13 @@ class MovingContact(Contact):
         surfaces = [
             side for pair in scene.contacts for side in (pair.slave, pair.master) if isinstance(side, Surface)
         ]
+        for side in surfaces:
+            hanging = scene.bodies[side.body].mesh.hanging
+            if hanging is not None and np.isin(hanging.nodes, scene.facets(side)).any():
+                raise InvalidInputError(
+                    "contact of bodies that deform much needs surfaces without hanging nodes, but "
+                    f"{side.name!r} of body {side.body!r} has some: refine all cells at that surface"
+                )
         numbers = [decomposition.tearing.global_nodes(s.body, np.unique(scene.facets(s))) for s in surfaces]
         tools = [name for name, body in scene.bodies.items() if isinstance(body, ToolBody)]
         numbers += [

@@ -70,7 +70,7 @@ class TurnedSurface:
             body = scene.bodies[support.body]
             if not (body.deforms_much or support.free.any()):
                 continue
-            own = np.unique(body.mesh.surfaces[support.surface])
+            own = body.mesh.nodes_to_hold(support.surface)
             nodes = decomposition.tearing.global_nodes(support.body, own)
             springs = np.zeros(len(support.motion))
             if isinstance(body, ToolBody) and body.springs:

@@ -431,7 +431,12 @@ def _measured(
             "surfaces' names and where the bodies lie"
         )
     gap = without_rounding(points.gap, slave.surface.points)
-    return replace(points, pair=np.full(points.count, index), gap=gap, distance=gap)
+    points = replace(points, pair=np.full(points.count, index), gap=gap, distance=gap)
+    if not scene.has_hanging_nodes:
+        return points
+    from fenics_contact._pairing.following import on_masters
+
+    return on_masters(points, scene, pair.slave.body, pair.discretisation == "mortar")
 
 
 def _symmetric(points: ContactPoints, slave: _Side, master: _Side) -> np.ndarray:

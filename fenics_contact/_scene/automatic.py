@@ -136,7 +136,7 @@ class AutomaticContact(Sequence[ContactPair]):
                 f"body {name!r} must have no surface 'boundary' yet, as AutomaticContact.self_contact names "
                 "all of its facets so: rename it"
             )
-        facets, _ = boundary_faces(mesh.cells, mesh.dim)
+        facets, _ = boundary_faces(mesh.cells, mesh.dim, mesh.hanging)
         return replace(mesh, surfaces={**mesh.surfaces, "boundary": facets})
 
     def _pair(self, scene: SceneParts, one: str, other: str) -> ContactPair:
@@ -156,7 +156,9 @@ class AutomaticContact(Sequence[ContactPair]):
 
 def _facet_size(mesh: BodyMesh) -> float:
     """Return the mean size of the facets of a body's boundary, [length]."""
-    return _mean_size(mesh.points[corners_of(boundary_faces(mesh.cells, mesh.dim)[0], mesh.dim)])
+    return _mean_size(
+        mesh.points[corners_of(boundary_faces(mesh.cells, mesh.dim, mesh.hanging)[0], mesh.dim)]
+    )
 
 
 def _size(mesh: BodyMesh, surface: str) -> float:

@@ -425,7 +425,7 @@ class Unpaired:
 def outline_of(mesh: BodyMesh) -> Outline:
     """Return the boundary and the inside of a body, which depend on its cells alone."""
     cells = mesh.linear.cells
-    facets, behind = boundary_faces(cells, mesh.dim)
+    facets, behind = boundary_faces(cells, mesh.dim, mesh.hanging)
     return facets, cells[behind], cells[:, cell_type_of(cells, mesh.dim).simplices].reshape(-1, mesh.dim + 1)
 
 

@@ -433,7 +433,7 @@ class SceneParts:
     def given(self, support: Support | RigidSurface) -> tuple[np.ndarray, np.ndarray]:
         """Return the nodes of a support, ascending, and what it prescribes, NaN where free, (n, dim)."""
         body = self.bodies[support.body]
-        nodes = np.unique(body.mesh.surfaces[support.surface])
+        nodes = body.mesh.nodes_to_hold(support.surface)
         points = body.mesh.points[nodes]
         if isinstance(support, RigidSurface) and body.deforms_much:
             return nodes, support.turned(points, support.prescribed)
@@ -452,6 +452,11 @@ class SceneParts:
     def points(self) -> np.ndarray:
         """Coordinates of the nodes of all bodies in their order, shape (n_nodes, dim), [length]."""
         return np.concatenate([body.mesh.points for body in self.bodies.values()])
+
+    @property
+    def has_hanging_nodes(self) -> bool:
+        """Whether nodes of some body hang on edges or faces of larger cells."""
+        return any(body.mesh.hanging is not None for body in self.bodies.values())
 
     def has_meshes_of(self, other: SceneParts) -> bool:
         """Return whether its bodies have the very meshes of those of another scene."""

@@ -57,10 +57,12 @@ def held_directions(
     """
     direction = direction_of(mesh, roller)
     if direction is not None:
-        nodes = np.unique(mesh.surfaces[roller.surface])
+        nodes = mesh.nodes_to_hold(roller.surface)
         directions = np.tile(direction, (len(nodes), 1))
     else:
         nodes, directions = _normals(mesh, roller.surface, mirrored, planes)
+        firm = np.isin(nodes, mesh.nodes_to_hold(roller.surface))
+        nodes, directions = nodes[firm], directions[firm]
     return HeldDirections(roller.surface, nodes, directions, roller.amounts(mesh.points[nodes]))
 
 

@@ -216,7 +216,7 @@ class SurfaceDesign:
         width = TRANSITION * extent if self.transition is None else self.transition
         distance, _ = cKDTree(surface).query(mesh.points)
         far = distance > max(FAR * extent, width)
-        facets, _ = boundary_faces(mesh.cells, mesh.dim)
+        facets, _ = boundary_faces(mesh.cells, mesh.dim, mesh.hanging)
         facets = facets[~cut[facets].all(axis=1).any(axis=1)]
         boundary = np.setdiff1d(facets, self.lattice.nodes)
         far[boundary] |= distance[boundary] > width

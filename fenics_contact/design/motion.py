@@ -43,6 +43,7 @@ from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.subdomain import Subdomain
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import boundary_faces
+from fenics_contact.mesh.hanging import require_none
 from fenics_contact.results.fields import body_mesh
 from fenics_contact.results.state import State
 
@@ -277,7 +278,7 @@ def volume_by_points(mesh: BodyMesh, axisymmetric: bool = False) -> np.ndarray:
 
     Moving the boundary by v changes the volume by ∫ v·n dA, so that only boundary nodes count.
     """
-    faces, _ = boundary_faces(mesh.cells, mesh.dim)
+    faces, _ = boundary_faces(mesh.cells, mesh.dim, mesh.hanging)
     result = np.zeros_like(mesh.points)
     for at in gauss_points(mesh.points, faces, axisymmetric):
         np.add.at(result, faces, at.values[:, None] * at.normals[:, None])
@@ -298,6 +299,10 @@ class DesignGeometry:
 
         `scene`: the scene in its reference shape.
         """
+        for name, body in scene.bodies.items():
+            require_none(
+                body.mesh.hanging, f"a design with body {name!r}", "refine it everywhere, or take simplices"
+            )
         if scene.sectors:
             raise InvalidInputError(
                 f"designs have no derivatives of cyclic symmetry, the scene ties {scene.sectors[0].place}: "

@@ -24,8 +24,9 @@ from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.inverse import Condensations
 from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.subdomain import SubdomainMesh, cut_out
+from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cuts import pieces
-from fenics_contact.mesh.partition import check_face_connected
+from fenics_contact.mesh.partition import check_face_connected, kept_together
 
 
 @displayed
@@ -201,6 +202,17 @@ def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
     return prescribed_along(scene, tearing)[0]
 
 
+def hanging_nodes(scene: Scene, numbers: NodeNumbers) -> np.ndarray | None:
+    """Return the numbers of the hanging nodes of all bodies, shape (n,); None without any."""
+    meshes = {name: scene.bodies[name].mesh for name in numbers.body_names}
+    found = [
+        numbers.global_nodes(name, mesh.hanging.nodes)
+        for name, mesh in meshes.items()
+        if mesh.hanging is not None
+    ]
+    return np.concatenate(found) if found else None
+
+
 def prescribed_along(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalAxes | None]:
     """Collect the supports node by node, with the axes of nodes that rollers hold.
 
@@ -289,21 +301,30 @@ class GluingRows:
         return np.nan_to_num(prescribed).ravel()[self.dof]
 
 
-def gluing_rows(tearing: Tearing, fixed: np.ndarray, axes: LocalAxes | None = None) -> GluingRows:
+def gluing_rows(
+    tearing: Tearing,
+    fixed: np.ndarray,
+    axes: LocalAxes | None = None,
+    hanging: np.ndarray | None = None,
+) -> GluingRows:
     """Build the equality rows B_E u = c_E, for which B_E D⁻¹ B_Eᵀ is diagonal, D the stiffness of copies.
 
     A free component of a node with m copies has m − 1 gluing rows of unit length (see `weighted_helmert`, c =
     0). A prescribed one has m rows, one for each copy, which glue it as well. Components are along the `axes`
-    of nodes, which keeps them orthogonal.
+    of nodes, which keeps them orthogonal. Hanging nodes have no rows, as each copy follows its masters.
 
-    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim).
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `hanging`: numbers of hanging
+    nodes, none of which is.
     """
-    multiplicity = tearing.multiplicity
+    multiplicity = tearing.multiplicity.copy()
+    if hanging is not None:
+        multiplicity[hanging] = 1
     counts = np.where(fixed, multiplicity[:, None], multiplicity[:, None] - 1)
     start = np.concatenate([[0], np.cumsum(counts.ravel())])
     parts = [_prescribed_entries(tearing, fixed, start)]
     for copies in np.unique(multiplicity[multiplicity > 1]):
-        parts.append(_glued_entries(tearing, fixed, start, int(copies)))
+        glued = ~fixed & (multiplicity == copies)[:, None]
+        parts.append(_glued_entries(tearing, glued, start, int(copies)))
     row, copy, component, entry = (np.concatenate(column) for column in zip(*parts, strict=True))
     if axes is not None:
         row, copy, component, entry = _turned_entries(tearing, axes, row, copy, component, entry)
@@ -345,9 +366,9 @@ def _prescribed_entries(tearing: Tearing, fixed: np.ndarray, start: np.ndarray) 
 
 
 def _glued_entries(
-    tearing: Tearing, fixed: np.ndarray, start: np.ndarray, copies: int
+    tearing: Tearing, glued: np.ndarray, start: np.ndarray, copies: int
 ) -> tuple[np.ndarray, ...]:
-    node, component = np.nonzero(~fixed & (tearing.multiplicity == copies)[:, None])
+    node, component = np.nonzero(glued)
     copy_of = tearing.first_copy[node][:, None] + np.arange(copies)
     matrix = weighted_helmert(tearing.copy_stiffness[copy_of])
     k, j = np.nonzero(np.tri(copies - 1, copies, 1))
@@ -396,6 +417,16 @@ class Decomposition:
         """Where each of this rank's subdomains lies in its torn vectors."""
         ends = self.tearing.components * self.block_offset
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+
+    @cached_property
+    def following(self) -> sp.csr_matrix | None:
+        """T on this rank's torn vectors, what hanging nodes do at others' displacement; None without any."""
+        if all(mesh.following is None for mesh in self.meshes):
+            return None
+        parts = [
+            sp.identity(mesh.size) if mesh.following is None else mesh.following.means for mesh in self.meshes
+        ]
+        return sp.csr_matrix(sp.block_diag(parts))
 
     @cached_property
     def held(self) -> tuple[np.ndarray, np.ndarray]:
@@ -447,7 +478,7 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
     check_same_input(comm, scene, partitions=partitions)
     with together(comm):
         _check_partitions(scene, partitions)
-        partitions = {name: pieces(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
+        partitions = {name: _whole(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
     forms = FormLibrary(comm)
     forms.prepare(scene)
     # Ranks agree on errors after each local stage, before the next collective one.
@@ -464,10 +495,15 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
     with together(comm):
         meshes = tuple(_cut(scene, partitions, tearing, int(number)) for number in here)
         prescribed, axes = prescribed_along(scene, tearing)
-        gluing = gluing_rows(tearing, ~np.isnan(prescribed), axes)
+        gluing = gluing_rows(tearing, ~np.isnan(prescribed), axes, hanging_nodes(scene, tearing))
     block_offset = np.cumsum([0] + [len(mesh.nodes) for mesh in meshes])
     copy_block = _copy_blocks(tearing, meshes, block_offset)
     return Decomposition(comm, tearing, dict(partitions), meshes, block_offset, copy_block, gluing, forms)
+
+
+def _whole(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
+    """Return a partition whose subdomains no cut crosses, with whole sets of siblings at hanging nodes."""
+    return kept_together(mesh, pieces(mesh, partition))
 
 
 def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> None:

@@ -142,7 +142,7 @@ def free_motions(scene: Scene, tearing: Tearing) -> FreeMotions:
         if not isinstance(surface, RigidSurface) or not surface.free.any():
             continue
         mesh = scene.bodies[surface.body].mesh
-        own = np.unique(mesh.surfaces[surface.surface])
+        own = mesh.nodes_to_hold(surface.surface)
         modes = surface.modes(mesh.points[own])[:, :, surface.free]
         others = [support for place, support in enumerate(scene.supports) if place != number]
         prescribed, axes = scene.prescribed_along(surface.body, others)

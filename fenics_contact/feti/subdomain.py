@@ -21,6 +21,7 @@ from fenics_contact._scene.loads import Load, SurfaceLoad
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.factor import fixing_nodes
+from fenics_contact.feti.following import Following
 from fenics_contact.feti.foundations import foundation_stiffness, separated
 from fenics_contact.materials.elastic import Material
 from fenics_contact.mesh.faces import corners_of
@@ -89,6 +90,7 @@ class SubdomainMesh:
         nodes: Nodes of the body, by block: block b sits on node ``nodes[b]``.
         space: dolfinx function space of displacements on the subdomain's own mesh.
         facets: Surface of the body -> (cells, local facets) on this mesh; `facets_of` adds to it.
+        following: Its hanging nodes; None without any.
     """
 
     number: int
@@ -97,6 +99,7 @@ class SubdomainMesh:
     nodes: np.ndarray
     space: _dolfinx.fem.FunctionSpace
     facets: dict[str, tuple[np.ndarray, np.ndarray]]
+    following: Following | None = None
 
     @property
     def components(self) -> int:
@@ -183,7 +186,8 @@ def cut_out(number: int, body_name: str, body: Body, cells: np.ndarray) -> Subdo
     input_nodes, dofs = _dolfinx.node_dofs(space)
     nodes = np.empty(len(used), dtype=np.int64)
     nodes[dofs] = used[input_nodes]
-    return SubdomainMesh(number, body_name, cells[_dolfinx.input_cells(own)], nodes, space, {})
+    following = Following.of(mesh, nodes, body.components)
+    return SubdomainMesh(number, body_name, cells[_dolfinx.input_cells(own)], nodes, space, {}, following)
 
 
 def assemble(
@@ -218,6 +222,8 @@ def assemble(
         _dolfinx.update_coordinates(mesh.space.mesh, coordinates)
         force += _dolfinx.assemble_vector(form)
     _check_finite(force, mesh)
+    if mesh.following is not None:
+        force = mesh.following.force(force)
     return replace(earlier, loads=acting, load=force)
 
 
@@ -251,7 +257,8 @@ def _with_stiffness(
         elastic = sp.csr_matrix((data, indices, indptr), shape=(mesh.size, mesh.size))
         if isinstance(body, ToolBody) and body.springs:
             return (elastic + sp.csr_matrix(body.spring_matrix(points))).tocsr()
-        return (elastic + bed).tocsr() if bed.nnz else elastic
+        whole = (elastic + bed).tocsr() if bed.nnz else elastic
+        return whole if mesh.following is None else mesh.following.stiffness(whole)
 
     bed = foundation_of(mesh, body, foundations)
     matrix = CachedMatrix(stiffness)

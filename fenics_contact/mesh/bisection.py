@@ -16,7 +16,14 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cuts import closed, pieces
 from fenics_contact.mesh.faces import coordinate_rounding
-from fenics_contact.mesh.partition import cell_weights, check_one_piece, check_parts, face_areas, merge_pieces
+from fenics_contact.mesh.partition import (
+    cell_weights,
+    check_one_piece,
+    check_parts,
+    face_areas,
+    kept_together,
+    merge_pieces,
+)
 
 LAYER = 1e-12
 """Cells whose centres differ by less than this fraction of the body's extent lie in one layer."""
@@ -61,7 +68,7 @@ def bisection_partition(mesh: BodyMesh, parts: int) -> np.ndarray:
                 partition[piece.cells] = piece.first
             else:
                 pending += piece.halves()
-    return merge_pieces(mesh, partition)
+    return kept_together(mesh, merge_pieces(mesh, partition))
 
 
 @dataclass(frozen=True, eq=False)

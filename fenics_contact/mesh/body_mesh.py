@@ -24,6 +24,7 @@ from fenics_contact.mesh.faces import (
     match_faces,
     start_at_smallest,
 )
+from fenics_contact.mesh.hanging import HangingNodes, nodes_to_hold
 from fenics_contact.mesh.quadratic_nodes import check_node_order
 from fenics_contact.mesh.quality import check_shapes, jacobian_ratio, similarity, thickness
 from fenics_contact.shapes.combined import placed
@@ -124,13 +125,18 @@ def _check_resolved(points: np.ndarray, thick: np.ndarray) -> None:
 
 
 def checked_surfaces(
-    surfaces: Mapping[str, ArrayLike], cells: np.ndarray, n_nodes: int, dim: int
+    surfaces: Mapping[str, ArrayLike],
+    cells: np.ndarray,
+    n_nodes: int,
+    dim: int,
+    *,
+    hanging: HangingNodes | None = None,
 ) -> dict[str, np.ndarray]:
     """Return named facets, (n_facets, nodes of a facet) int64, outward boundary faces of the cells."""
     checked: dict[str, np.ndarray] = {}
     if not surfaces:
         return checked
-    boundary = boundary_faces(cells, dim)[0]
+    boundary = boundary_faces(cells, dim, hanging)[0]
     for name, facets in surfaces.items():
         array = _integers(facets, f"surface '{name}'")
         if array.ndim != 2 or array.shape[1] != boundary.shape[1] or array.shape[0] == 0:
@@ -235,6 +241,34 @@ def checked_regions(regions: Mapping[str, ArrayLike], n_cells: int) -> dict[str,
     return checked
 
 
+def check_hanging(hanging: HangingNodes, points: np.ndarray, n_cells: int) -> None:
+    """Reject hanging nodes that are not at the mean of masters which do not hang.
+
+    `points`: coordinates, (n_nodes, 3 | 2).
+    """
+    nodes, masters, levels = hanging.nodes, hanging.masters, hanging.levels
+    shape = (len(nodes), 2 ** (points.shape[1] - 1))
+    if masters.shape != shape or levels.shape != (n_cells,) or np.any(np.diff(nodes) <= 0) or not len(nodes):
+        raise InvalidInputError(
+            f"hanging must have nodes in ascending order, masters of shape {shape} and a level for each of "
+            f"{n_cells} cells, got {len(nodes)} nodes, masters {masters.shape} and levels {levels.shape}: "
+            "let mesh.refined make them"
+        )
+    every = np.concatenate([nodes, masters.ravel()])
+    if every.min() < 0 or every.max() >= len(points) or np.isin(masters, nodes).any():
+        raise InvalidInputError(
+            f"masters of hanging nodes must be nodes 0 to {len(points) - 1} that do not hang, got others: "
+            "let mesh.refined make them"
+        )
+    away = np.abs(points[nodes] - points[masters].mean(axis=1)).max(axis=1)
+    off = np.flatnonzero(away > 2 * coordinate_rounding(points))
+    if off.size:
+        raise InvalidInputError(
+            f"hanging nodes must lie at the mean of their masters, {off.size} of {len(nodes)} do not, first "
+            f"node {nodes[off[0]]} by {away[off[0]]:.3g}: let mesh.refined place them"
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Cut:
     """Faces of cells along which a mesh is cut.
@@ -273,6 +307,8 @@ class BodyMesh:
         coincident_nodes: Whether nodes may coincide, as on the two sides of a crack.
         shapes: Name of a surface to the true shape that its facets approximate, such as a `Cylinder`; contact
             uses it for gaps and normals. Other surfaces are reconstructed from their nodes.
+        hanging: The nodes of small cells in the middle of edges and faces of larger ones, which `refined`
+            makes; by default none.
 
     Raises:
         InvalidInputError: If an array has the wrong shape or type, a coordinate is not finite, a node
@@ -296,6 +332,7 @@ class BodyMesh:
     regions: Mapping[str, np.ndarray] = field(default_factory=dict)
     coincident_nodes: bool = False
     shapes: Mapping[str, SurfaceShape] = field(default_factory=dict)
+    hanging: HangingNodes | None = None
     _origin: BodyMesh | None = field(default=None, init=False, repr=False)
     _off_shapes: Mapping[str, np.ndarray] = field(default_factory=dict, init=False, repr=False)
     _cuts: Mapping[Hashable, Cut] = field(default_factory=dict, init=False, repr=False)
@@ -320,18 +357,26 @@ class BodyMesh:
             raise
         if not self.coincident_nodes:
             check_no_coincident_nodes(points)
-        self._set(surfaces=checked_surfaces(self.surfaces, cells, *points.shape))
-        self._set(_off_shapes=check_shapes(self.points, self.surfaces, self.shapes))
+        if self.hanging is not None:
+            check_hanging(self.hanging, points, len(cells))
+        self._set(surfaces=checked_surfaces(self.surfaces, cells, *points.shape, hanging=self.hanging))
+        self._set(_off_shapes=self._checked_shapes(self.shapes))
 
     def _set(self, **values: object) -> None:
         for name, value in values.items():
             object.__setattr__(self, name, value)
+
+    def _checked_shapes(self, shapes: Mapping[str, SurfaceShape]) -> dict[str, np.ndarray]:
+        return check_shapes(
+            self.points, self.surfaces, shapes, None if self.hanging is None else self.hanging.nodes
+        )
 
     def _facts(self) -> dict[str, Any]:
         low, high = self.points.min(axis=0), self.points.max(axis=0)
         return {
             "cells": self.cells_in_words,
             "nodes": self.n_nodes,
+            **({} if self.hanging is None else {"hanging nodes": len(self.hanging.nodes)}),
             "extent": " × ".join(f"{a:.6g} to {b:.6g}" for a, b in zip(low, high, strict=True)),
             "surfaces": _sizes(self.surfaces),
             "regions": _sizes(self.regions),
@@ -408,7 +453,7 @@ class BodyMesh:
         Raises:
             InvalidInputError: If there is no such surface, or its nodes do not lie on the shape.
         """
-        off = check_shapes(self.points, self.surfaces, shapes)
+        off = self._checked_shapes(shapes)
         result = copy(self)
         result._set(shapes=dict(shapes), _origin=None, _off_shapes=off)
         return result
@@ -437,6 +482,7 @@ class BodyMesh:
 
         Args:
             points: New coordinates, (n_nodes, 3 | 2); of a mesh with `cuts` those before it was cut will do.
+                Those of `hanging` nodes follow from their masters'.
 
         Returns:
             The moved mesh.
@@ -482,6 +528,8 @@ class BodyMesh:
 
     def _at(self, points: np.ndarray) -> BodyMesh:
         new_points = checked_points(self._on_both_sides(points), self.points.shape)
+        if self.hanging is not None:
+            new_points = checked_points(self.hanging.placed(new_points))
         check_jacobians(
             new_points,
             self.cells,
@@ -498,6 +546,14 @@ class BodyMesh:
             if len(points) == cut.pairs[0, 0]:
                 points = np.concatenate([points, np.asarray(points)[cut.pairs[:, 1]]])
         return points
+
+    def nodes_to_hold(self, surface: str) -> np.ndarray:
+        """Return the nodes by which a support holds a surface, ascending: hanging ones follow their masters.
+
+        Raises:
+            InvalidInputError: If the surface contains a hanging node, but not all its masters.
+        """
+        return nodes_to_hold(self.hanging, surface, self.surfaces[surface])
 
     @cached_property
     def linear(self) -> BodyMesh:

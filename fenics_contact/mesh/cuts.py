@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from fenics_contact.mesh.body_mesh import BodyMesh, Cut
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces, neighbours, shared_faces
+from fenics_contact.mesh.hanging import require_none
 
 
 def nodes_between(mesh: BodyMesh, before: np.ndarray, behind: np.ndarray) -> np.ndarray:
@@ -26,6 +27,7 @@ def cut_between(mesh: BodyMesh, name: Hashable, before: np.ndarray, behind: np.n
 
     `before`, `behind`: cells on both sides, shape (n,) each.
     """
+    require_none(mesh.hanging, "a section", "refine no cells there, or take simplices")
     shared = nodes_between(mesh, before, behind)
     faces, sides = shared_faces(mesh.cells, mesh.dim)
     side = np.zeros(mesh.n_cells)

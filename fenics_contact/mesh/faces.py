@@ -10,6 +10,8 @@ Cells of four nodes are tetrahedra unless ``dim=2``.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -17,6 +19,9 @@ from scipy.spatial import cKDTree
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cell_types import FACET_TYPES, cell_type_of
+
+if TYPE_CHECKING:
+    from fenics_contact.mesh.hanging import HangingNodes
 
 LAST_BITS = 8.0
 """A rotated and shifted coordinate is off by a few units in the last place; a difference by twice as many."""
@@ -154,12 +159,15 @@ def number_faces(faces: np.ndarray) -> np.ndarray:
     return numbers
 
 
-def boundary_faces(cells: np.ndarray, dim: int = 3) -> tuple[np.ndarray, np.ndarray]:
+def boundary_faces(
+    cells: np.ndarray, dim: int = 3, hanging: HangingNodes | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Extract the faces that belong to only one cell.
 
     Args:
         cells: Node numbers, as in `cell_faces`.
         dim: Dimension of the space, 2 or 3.
+        hanging: Hanging nodes of the mesh. The faces of small cells on those of larger ones lie inside then.
 
     Returns:
         The faces, outward, (n, nodes of a face), and the cell that each belongs to, (n,), ascending.
@@ -168,11 +176,37 @@ def boundary_faces(cells: np.ndarray, dim: int = 3) -> tuple[np.ndarray, np.ndar
     flat = faces.reshape(-1, faces.shape[2])
     numbers = number_faces(flat)
     single = np.flatnonzero(np.bincount(numbers)[numbers] == 1)
+    if hanging is not None:
+        small, large = _on_larger(flat[single], hanging)
+        single = np.delete(single, np.concatenate([small, large]))
     return flat[single], single // faces.shape[1]
 
 
-def shared_faces(cells: np.ndarray, dim: int = 3) -> tuple[np.ndarray, np.ndarray]:
-    """Find the faces that two cells share.
+def _on_larger(faces: np.ndarray, hanging: HangingNodes) -> tuple[np.ndarray, np.ndarray]:
+    """Return which faces lie on larger ones, and on which, shape (n,) each.
+
+    With its hanging nodes replaced by their masters, a face on a larger one has the nodes of that.
+
+    `faces`: faces of linear cells that belong to one cell, (n_faces, k).
+    """
+    size = faces.shape[1]
+    row_of = np.full(int(faces.max(initial=0)) + 1, -1)
+    known = hanging.nodes[hanging.nodes < len(row_of)]
+    row_of[known] = np.arange(len(known))
+    candidates = np.flatnonzero((row_of[faces] >= 0).any(axis=1))
+    row = row_of[faces[candidates]]
+    spanned = np.where((row >= 0)[:, :, None], hanging.masters[row], faces[candidates][:, :, None])
+    spanned = np.sort(spanned.reshape(len(candidates), -1), axis=1)
+    first = np.column_stack([np.ones(len(candidates), dtype=bool), np.diff(spanned, axis=1) > 0])
+    fits = np.count_nonzero(first, axis=1) == size
+    larger = match_faces(spanned[fits][first[fits]].reshape(-1, size), faces)
+    return candidates[fits][larger >= 0], larger[larger >= 0]
+
+
+def shared_faces(
+    cells: np.ndarray, dim: int = 3, hanging: HangingNodes | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Find the faces that two cells share; where cells have different sizes, those of the smaller ones.
 
     Returns the faces, outward of the first cell, (n, nodes of a face), and their two cells, (n, 2).
     """
@@ -188,12 +222,18 @@ def shared_faces(cells: np.ndarray, dim: int = 3) -> tuple[np.ndarray, np.ndarra
         )
     order = np.argsort(numbers, kind="stable")
     order = order[counts[numbers[order]] == 2]
-    return flat[order[::2]], (order // faces.shape[1]).reshape(-1, 2)
+    found, pairs = flat[order[::2]], (order // faces.shape[1]).reshape(-1, 2)
+    if hanging is not None:
+        single = np.flatnonzero(counts[numbers] == 1)
+        small, large = (single[which] for which in _on_larger(flat[single], hanging))
+        found = np.concatenate([found, flat[small]])
+        pairs = np.concatenate([pairs, np.column_stack([small, large]) // faces.shape[1]])
+    return found, pairs
 
 
-def neighbours(cells: np.ndarray, dim: int = 3) -> np.ndarray:
+def neighbours(cells: np.ndarray, dim: int = 3, hanging: HangingNodes | None = None) -> np.ndarray:
     """Find the pairs of cells that share a face, (n, 2); arguments and errors as in `shared_faces`."""
-    return shared_faces(cells, dim)[1]
+    return shared_faces(cells, dim, hanging)[1]
 
 
 def match_faces(faces: np.ndarray, candidates: np.ndarray) -> np.ndarray:
@@ -209,12 +249,14 @@ def match_faces(faces: np.ndarray, candidates: np.ndarray) -> np.ndarray:
     return position[numbers[candidates.shape[0] :]]
 
 
-def orient(cells: np.ndarray, facets: np.ndarray, dim: int = 3) -> np.ndarray:
+def orient(
+    cells: np.ndarray, facets: np.ndarray, dim: int = 3, hanging: HangingNodes | None = None
+) -> np.ndarray:
     """Return boundary facets in the cells' order: cyclic and outward.
 
     `facets`: node numbers, (n, nodes of a face), the corners in any order.
     """
-    boundary, _ = boundary_faces(cells, dim)
+    boundary, _ = boundary_faces(cells, dim, hanging)
     matches = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
     if np.any(matches < 0):
         lost = np.flatnonzero(matches < 0)

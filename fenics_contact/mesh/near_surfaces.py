@@ -66,7 +66,7 @@ class _Side:
     """The boundary of a body, facet by facet."""
 
     def __init__(self, mesh: BodyMesh) -> None:
-        self.facets, _ = boundary_faces(mesh.cells, mesh.dim)
+        self.facets, _ = boundary_faces(mesh.cells, mesh.dim, mesh.hanging)
         corners = mesh.points[corners_of(self.facets, mesh.dim)]
         self.centre = corners.mean(axis=1)
         self.radius = np.linalg.norm(corners - self.centre[:, None], axis=2).max(axis=1)

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 from fenics_contact._base.checks import check_count
@@ -92,7 +92,7 @@ def merge_pieces(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> np.nd
     Returns (n_cells,) subdomain numbers, the same subdomains.
     """
     partition = _checked_partition(mesh, partition).copy()
-    pairs = neighbours(mesh.cells, mesh.dim)
+    pairs = neighbours(mesh.cells, mesh.dim, mesh.hanging)
     while True:
         piece, owner = _face_pieces(mesh, partition, pairs)
         by_size = np.lexsort((np.arange(owner.size), -np.bincount(piece)))
@@ -114,6 +114,48 @@ def merge_pieces(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> np.nd
         partition = target[piece]
 
 
+def siblings(mesh: BodyMesh) -> np.ndarray:
+    """Return which cells must lie in one subdomain, by the number of each such set, shape (n_cells,).
+
+    At a hanging node they are the parts of one cell, which together have all masters of the node: a subdomain
+    with all of them needs no equation for the node.
+    """
+    hanging = mesh.hanging
+    assert hanging is not None
+    faces, pairs = shared_faces(mesh.cells, mesh.dim)
+    row_of = np.full(mesh.n_nodes, -1)
+    row_of[hanging.nodes] = np.arange(len(hanging.nodes))
+    joined = np.zeros(len(pairs), dtype=bool)
+    for column in range(faces.shape[1]):  # corners of a face
+        row = row_of[faces[:, column]]
+        here = np.flatnonzero(row >= 0)
+        # Of an edge or a face that was halved, each part has one corner: different ones in different parts.
+        mine = hanging.masters[row[here]]
+        has = [(mesh.cells[side][:, :, None] == mine[:, None, :]).any(axis=1) for side in pairs[here].T]
+        joined[here] |= (has[0] != has[1]).any(axis=1)
+    links = pairs[joined]
+    graph = coo_matrix((np.ones(len(links), dtype=bool), tuple(links.T)), shape=2 * (mesh.n_cells,))
+    return np.asarray(connected_components(graph, directed=False)[1])
+
+
+def kept_together(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> np.ndarray:
+    """Return a partition that splits no siblings at hanging nodes; the same one where it splits none.
+
+    They go to the subdomain that has most of them. Subdomains that lose all their cells vanish.
+
+    `partition`: subdomain of each cell, shape (n_cells,).
+    """
+    if mesh.hanging is None or np.shape(partition) != (mesh.n_cells,):
+        return partition
+    group = siblings(mesh)
+    counts = csr_matrix((np.ones(mesh.n_cells), (group, partition)))
+    if counts.nnz == counts.shape[0]:
+        return partition
+    whole = np.asarray(counts.argmax(axis=1)).ravel()[group]
+    whole = np.unique(whole, return_inverse=True)[1].ravel()
+    return merge_pieces(mesh, whole, body)
+
+
 _APART = (
     "join nodes that coincide with `merge_duplicate_nodes`, or give each separate part a mesh and a body of "
     "its own"
@@ -128,7 +170,7 @@ def check_one_piece(mesh: BodyMesh, body: str = "") -> None:
     """Reject a mesh that is not connected through faces, other than where a section cuts it."""
     mesh = closed(mesh) if mesh.cuts else mesh
     piece, owner = _face_pieces(
-        mesh, np.zeros(mesh.n_cells, dtype=np.int64), neighbours(mesh.cells, mesh.dim)
+        mesh, np.zeros(mesh.n_cells, dtype=np.int64), neighbours(mesh.cells, mesh.dim, mesh.hanging)
     )
     if owner.size > 1:
         sizes = np.sort(np.bincount(piece))[::-1]
@@ -144,7 +186,7 @@ def check_face_connected(mesh: BodyMesh, partition: np.ndarray, body: str = "") 
     `partition`: (n_cells,) subdomain numbers.
     """
     partition = _checked_partition(mesh, partition)
-    _, owner = _face_pieces(mesh, partition, neighbours(mesh.cells, mesh.dim))
+    _, owner = _face_pieces(mesh, partition, neighbours(mesh.cells, mesh.dim, mesh.hanging))
     pieces = np.bincount(owner)
     torn = np.flatnonzero(pieces > 1)
     if torn.size:
@@ -176,7 +218,7 @@ def _checked_partition(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
 
 def face_areas(mesh: BodyMesh) -> tuple[np.ndarray, np.ndarray]:
     """Return the pairs of cells that share a face, (n, 2), and its area (in the plane length), (n,)."""
-    faces, pairs = shared_faces(mesh.cells, mesh.dim)
+    faces, pairs = shared_faces(mesh.cells, mesh.dim, mesh.hanging)
     return pairs, np.linalg.norm(vector_areas(mesh.points, faces), axis=1)
 
 

@@ -18,6 +18,7 @@ from fenics_contact.mesh.cell_types import (
     shape_values,
 )
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
+from fenics_contact.mesh.hanging import require_none
 from fenics_contact.shapes.simple import SurfaceShape, closest_points
 
 _QUADRATIC = {cell.vertices.shape: cell for cell in (TRIANGLE6, QUADRILATERAL9, TETRAHEDRON10, HEXAHEDRON27)}
@@ -47,6 +48,7 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
     linear = cell_type_of(mesh.cells, mesh.dim)
     if linear.order == 2:
         raise InvalidInputError(f"quadratic needs linear cells, got {linear.plural}: use the mesh as it is")
+    require_none(mesh.hanging, "quadratic", "refine everywhere, or take more linear cells")
     kind = _QUADRATIC[linear.vertices.shape]
     points, cells = with_more_nodes(mesh.points, mesh.cells, linear, kind)
     boundary, _ = boundary_faces(cells, mesh.dim)
@@ -54,7 +56,7 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
         name: boundary[match_faces(facets, corners_of(boundary, mesh.dim))]
         for name, facets in mesh.surfaces.items()
     }
-    placed = put_on_shapes(points, surfaces, mesh.shapes, mesh.n_nodes)
+    placed = put_on_shapes(points, surfaces, mesh.shapes, np.arange(len(points)) >= mesh.n_nodes)
     if placed.any():
         _follow(points, cells, kind, placed)
     check_jacobians(points, cells, "refine the mesh along its curved surfaces, or leave their shapes away")
@@ -62,16 +64,19 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
 
 
 def put_on_shapes(
-    points: np.ndarray, surfaces: Mapping[str, np.ndarray], shapes: Mapping[str, SurfaceShape], first: int
+    points: np.ndarray,
+    surfaces: Mapping[str, np.ndarray],
+    shapes: Mapping[str, SurfaceShape],
+    movable: np.ndarray,
 ) -> np.ndarray:
-    """Move nodes of surfaces, those from number ``first`` on, to the closest points of the shapes.
+    """Move nodes of surfaces, where they are marked as movable, to the closest points of the shapes.
 
     Returns which nodes these are, shape (n_nodes,).
     """
     placed = np.zeros(len(points), dtype=bool)
     for name, shape in shapes.items():
         own = np.unique(surfaces[name])
-        own = own[own >= first]
+        own = own[movable[own]]
         points[own] = closest_points(shape, points[own])
         placed[own] = True
     return placed

@@ -158,11 +158,15 @@ def distance_in_edges(points: np.ndarray, facets: np.ndarray, shape: SurfaceShap
 
 
 def check_shapes(
-    points: np.ndarray, surfaces: Mapping[str, np.ndarray], shapes: Mapping[str, SurfaceShape]
+    points: np.ndarray,
+    surfaces: Mapping[str, np.ndarray],
+    shapes: Mapping[str, SurfaceShape],
+    hanging: np.ndarray | None = None,
 ) -> dict[str, np.ndarray]:
     """Reject shapes on which a surface does not lie.
 
-    `points`: coordinates, (n_nodes, 3 | 2), [length]; `shapes`: name of a surface to its shape.
+    `points`: coordinates, (n_nodes, 3 | 2), [length]; `shapes`: name of a surface to its shape; `hanging`:
+    nodes that lie on larger facets, not on shapes.
 
     Returns the name of each of these surfaces to the distances of its nodes, see `distance_in_edges`.
     """
@@ -179,6 +183,8 @@ def check_shapes(
                 f"{type(shape).__name__} is for {dim}: in the plane give curves, such as a Circle"
             )
         away = distance_in_edges(points, surfaces[name], shape)
+        if hanging is not None:
+            away[np.isin(np.unique(surfaces[name]), hanging)] = 0.0
         off = away > FARTHEST
         if off.any():
             raise InvalidInputError(

@@ -1,4 +1,4 @@
-"""Local refinement of simplices: marked cells are halved, surfaces, regions and true shapes carried along."""
+"""Local refinement: marked cells are halved, surfaces, regions and true shapes carried along."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh, check_jacobians
 from fenics_contact.mesh.cell_types import CELL_TYPES, CellType, shape_values
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
+from fenics_contact.mesh.halving import halved
 from fenics_contact.mesh.quadratic import put_on_shapes, with_more_nodes
 
 _LINEAR = {2: CELL_TYPES["triangle"], 3: CELL_TYPES["tetrahedron"]}
@@ -38,19 +39,24 @@ class Refinement:
 
 
 def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
-    """Halve the edges of some simplices, and of as many others as keep the mesh conforming.
+    """Halve some cells, and as many others as the mesh needs.
+
+    Of simplices others are halved until the mesh conforms. The angles of the cells stay bounded however often
+    they are refined: every cell with a halved edge has its longest edge halved (A. Plaza, G.F. Carey, Applied
+    Numerical Mathematics 32 (2000) 195-218). Linear quadrilaterals and hexahedra are halved in every
+    direction into 4 or 8; nodes in the middle of edges and faces of larger cells hang (`BodyMesh.hanging`),
+    and others are halved only so that cells that share a point differ by one level.
 
     New nodes on surfaces whose shape the mesh carries lie on the shape, those of quadratic cells else on the
-    curved facets. Surfaces and regions are carried to the new cells; a structured grid is lost. The angles of
-    the cells stay bounded however often they are refined: every cell with a halved edge has its longest edge
-    halved. Source: A. Plaza, G.F. Carey, Applied Numerical Mathematics 32 (2000) 195-218.
+    curved facets; hanging nodes lie on the larger facet. Surfaces and regions are carried to the new cells; a
+    structured grid is lost.
 
     Args:
-        mesh: Triangles or tetrahedra, linear or quadratic.
+        mesh: Triangles or tetrahedra, linear or quadratic; linear quadrilaterals or hexahedra.
         marked: Numbers of cells, or a mark for every cell, shape (n_cells,) bool.
 
     Raises:
-        InvalidInputError: If the cells are no simplices, no such cells exist, the mesh has nodes that
+        InvalidInputError: If the cells are of another type, no such cells exist, the mesh has nodes that
             coincide, or new nodes move so far onto a shape that a cell is inverted.
 
     Example:
@@ -63,6 +69,8 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
     """
     chosen = _checked_marks(mesh, marked)
     kind, linear = CELL_TYPES[mesh.cell_type], _LINEAR[mesh.dim]
+    if not kind.is_simplex:
+        return Refinement(*halved(mesh, chosen))
     vertices, inverse = np.unique(mesh.cells[:, : mesh.dim + 1], return_inverse=True)
     skeleton = inverse.reshape(-1, mesh.dim + 1)
     ends, cells = _identified(mesh.points[vertices], skeleton, linear, chosen)
@@ -74,7 +82,7 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
     points = _mapped(mesh, kind, parents, positions, cells, len(points))
     points[: len(vertices)] = mesh.points[vertices]
     surfaces = _carried_surfaces(mesh, ends, cells, vertices)
-    put_on_shapes(points, surfaces, mesh.shapes, len(vertices))
+    put_on_shapes(points, surfaces, mesh.shapes, np.arange(len(points)) >= len(vertices))
     check_jacobians(points, cells, "mark more cells along curved surfaces, or leave their shapes away")
     regions = {name: np.flatnonzero(np.isin(parents, inside)) for name, inside in mesh.regions.items()}
     fine = BodyMesh(points, cells, surfaces, None, regions, shapes=mesh.shapes)
@@ -83,10 +91,11 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
 
 def _checked_marks(mesh: BodyMesh, marked: ArrayLike) -> np.ndarray:
     """Return the numbers of the marked cells."""
-    if not CELL_TYPES[mesh.cell_type].is_simplex:
+    kind = CELL_TYPES[mesh.cell_type]
+    if kind.order == 2 and not kind.is_simplex:
         raise InvalidInputError(
-            f"refined needs triangles or tetrahedra, got {mesh.cells_in_words}: make a mesh of simplices, or "
-            "a finer one of these cells"
+            "refined needs simplices, or linear quadrilaterals or hexahedra, got "
+            f"{mesh.cells_in_words}: take linear cells, or a finer mesh of these"
         )
     if mesh.coincident_nodes or mesh.cuts:
         raise InvalidInputError(

@@ -178,7 +178,7 @@ def flat_sides(
     Sides are flat where they are so in the reference shape; the nodes of the mesh near a designed surface
     follow it a little.
     """
-    facets, _ = boundary_faces(mesh.linear.cells, mesh.dim)
+    facets, _ = boundary_faces(mesh.linear.cells, mesh.dim, mesh.hanging)
     areas = vector_areas(mesh.points, facets)
     across = _across(facets)
     labels = _labels(facets, areas, across, surfaces, angle)

@@ -177,7 +177,7 @@ def write_stl(
 
 def _triangles(mesh: BodyMesh) -> tuple[np.ndarray, np.ndarray]:
     """Return the points of the boundary and its triangles, outward."""
-    facets, _ = boundary_faces(mesh.linear.cells, mesh.dim)
+    facets, _ = boundary_faces(mesh.linear.cells, mesh.dim, mesh.hanging)
     triangles = facets[:, FACET_TYPES[facets.shape[1], 3].simplices].reshape(-1, 3)
     nodes, numbers = np.unique(triangles, return_inverse=True)
     return mesh.points[nodes], numbers.reshape(-1, 3)

@@ -157,6 +157,10 @@ def _slave_surface(state: State, which: int | str) -> _SlaveSurface:
     pressure[place] = (contact.pressure * (contact.status > 0))[point]
     spread[place] = _modulus(state, pair) * np.maximum(contact.gap[point], 0.0)
     whole = np.searchsorted(surface.nodes, scene.bodies[slave.body].mesh.surfaces[slave.name])
+    hanging, fill = scene.bodies[slave.body].mesh.hanging, None
+    if hanging is not None:
+        fill = hanging.filled(surface.nodes, np.isin(np.arange(len(nodes)), place))
+        pressure, spread = fill @ pressure, fill @ spread
     pressure, spread = filled_at_corners(whole, pressure), np.maximum(filled_at_corners(whole, spread), 0.0)
     on_axis = scene.bodies[slave.body].on_axis[surface.nodes]
     if scene.axisymmetric:
@@ -170,8 +174,11 @@ def _slave_surface(state: State, which: int | str) -> _SlaveSurface:
     facing[place] = 1.0
     if by_mortar:
         areas = nodal_areas(surface.points, whole, scene.axisymmetric).ravel()
-        whole_area = np.bincount(point, np.bincount(whole.ravel(), areas)[place], points.count)
+        of_nodes = np.bincount(whole.ravel(), areas)
+        of_nodes = of_nodes if fill is None else fill.T @ of_nodes
+        whole_area = np.bincount(point, of_nodes[place], points.count)
         facing[place] = contact.nominal_area[point] / whole_area[point]
+    facing = facing if fill is None else fill @ facing
     facing = np.maximum(filled_at_corners(whole, facing), 0.0)
     if scene.axisymmetric:
         facing = np.clip(filled_on_axis(whole, facing, on_axis), 0.0, 1.0)

@@ -308,7 +308,12 @@ def contact_fields(
                 alone = ~np.isin(every, contact.points.slave)
                 field[every[alone] - start] = given[alone]
             field[nodes[own]] = values[own]
-            facets = scene.bodies[body].mesh.surfaces[scene.contacts[pair].slave.name]
+            mesh = scene.bodies[body].mesh
+            facets = mesh.surfaces[scene.contacts[pair].slave.name]
+            if filled and mesh.hanging is not None:
+                on_surface = np.unique(facets)
+                known = np.isin(on_surface, nodes[own])
+                field[on_surface] = mesh.hanging.filled(on_surface, known) @ field[on_surface]
             field = filled_at_corners(facets, field) if filled else field
             if filled and scene.axisymmetric and field.ndim == 1:  # slip is zero there
                 field = filled_on_axis(facets, field, scene.bodies[body].on_axis)

@@ -8,8 +8,11 @@ import dolfinx.fem
 import dolfinx.fem.petsc
 import dolfinx.mesh
 import numpy as np
+import scipy.sparse as sp
 import ufl
 from petsc4py import PETSc
+from scipy.sparse.linalg import spsolve
+from scipy.spatial import cKDTree
 
 from fenics_contact import Body, BodyForce, Scene, Traction, _dolfinx
 from fenics_contact.materials import IsotropicElasticity
@@ -33,7 +36,10 @@ def displacement(scene: Scene, name: str) -> np.ndarray:
     A.assemble()
     b = dolfinx.fem.petsc.assemble_vector(vector_form)
     fixed, value = _prescribed(scene, name, body, nodes, dofs)
-    x = _solve(A, b, fixed, value)
+    if body.mesh.hanging is None:
+        x = _solve(A, b, fixed, value)
+    else:
+        x = _solve_following(A, b, fixed, value, _followed(body, nodes, dofs))
     result = np.empty_like(body.mesh.points)
     result[nodes] = x.reshape(-1, 3)[dofs]
     return result
@@ -90,6 +96,44 @@ def _prescribed(
     assert fixed
     rows, first = np.unique(np.concatenate(fixed), return_index=True)
     return rows, np.concatenate(value)[first]
+
+
+def _followed(body: Body, nodes: np.ndarray, dofs: np.ndarray) -> sp.csr_matrix:
+    """Return T: the displacement of all nodes for that of nodes which do not hang, zero columns of others.
+
+    Where a node hangs is found from the coordinates alone.
+    """
+    mesh, block = body.mesh, np.empty(body.mesh.n_nodes, dtype=np.int64)
+    block[nodes] = dofs
+    edges = [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]]
+    faces = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [2, 3, 7, 6], [0, 4, 7, 3], [1, 2, 6, 5]]
+    tree, entries = cKDTree(mesh.points), {}
+    for parts in (edges, faces):
+        corners = mesh.cells[:, parts].reshape(-1, len(parts[0]))
+        away, node = tree.query(mesh.points[corners].mean(axis=1))
+        for row in np.flatnonzero(away < 1e-10):
+            entries[block[node[row]]] = block[corners[row]]
+    assert entries
+    matrix = sp.identity(mesh.n_nodes, format="lil")
+    for node, masters in entries.items():
+        matrix[node, node] = 0.0
+        for master in masters:
+            matrix[node, master] = 1.0 / len(masters)
+    return sp.kron(matrix, sp.identity(3), format="csr")
+
+
+def _solve_following(
+    A: Any, b: Any, fixed: np.ndarray, value: np.ndarray, followed: sp.csr_matrix
+) -> np.ndarray:
+    indptr, indices, data = A.getValuesCSR()
+    K = sp.csr_matrix((data, indices, indptr), shape=followed.shape)
+    K, f, x = followed.T @ K @ followed, followed.T @ b.array_r, np.zeros(len(b.array_r))
+    kept = np.flatnonzero(followed.getnnz(axis=0))
+    x[fixed] = value
+    free = np.setdiff1d(kept, fixed)
+    held = np.intersect1d(kept, fixed)
+    x[free] = spsolve(K[free][:, free].tocsc(), f[free] - K[free][:, held] @ x[held])
+    return np.asarray(followed @ x)
 
 
 def _solve(A: Any, b: Any, fixed: np.ndarray, value: np.ndarray) -> np.ndarray:

@@ -1,0 +1,64 @@
+"""Hanging nodes of a subdomain: their displacement is the mean of that of their masters in the subdomain.
+
+With u_h = W u_m, written u = T u, the energy of a subdomain is that of Tᵀ K T and Tᵀ f. A stiffness between
+hanging nodes and the means of their masters keeps them as unknowns, whose number and numbering stay:
+
+    K' = Tᵀ K T + s Cᵀ C,    C u = u_h − W u_m.
+
+Its kernel is that of K, as rigid motions satisfy C u = 0. No row of B acts on hanging nodes, and so the
+equation K' u = Tᵀ f − Bᵀ λ gives C u = 0 exactly, whatever s is. Gluing the masters of two subdomains glues
+what hangs on them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact.mesh.body_mesh import BodyMesh
+
+
+@dataclass(frozen=True, eq=False)
+class Following:
+    """The hanging nodes of a subdomain.
+
+    Attributes:
+        means: T, shape (n, n).
+        apart: C, shape (number of their components, n).
+    """
+
+    means: sp.csr_matrix
+    apart: sp.csr_matrix
+
+    @classmethod
+    def of(cls, mesh: BodyMesh, nodes: np.ndarray, components: int) -> Following | None:
+        """Return those among the nodes of a subdomain, given by block; None without any."""
+        hanging = mesh.hanging
+        if hanging is None:
+            return None
+        block = np.full(mesh.n_nodes, -1)
+        block[nodes] = np.arange(len(nodes))
+        here = block[hanging.nodes] >= 0
+        if not here.any():
+            return None
+        own, masters = block[hanging.nodes[here]], block[hanging.masters[here]]
+        assert (masters >= 0).all()  # siblings are kept together
+        count, width = masters.shape
+        row, weight = np.repeat(np.arange(count), width), np.full(masters.size, 1.0 / width)
+        one, size = np.ones(count), len(nodes)
+        chosen = sp.csr_matrix((one, (np.arange(count), own)), shape=(count, size))
+        apart = chosen - sp.csr_matrix((weight, (row, masters.ravel())), shape=(count, size))
+        every = sp.identity(components)
+        means = sp.identity(size) - chosen.T @ apart
+        return cls(sp.kron(means, every, format="csr"), sp.kron(apart, every, format="csr"))
+
+    def stiffness(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
+        """Return Tᵀ K T + s Cᵀ C, with s the mean of the diagonal's entries."""
+        typical = float(np.abs(matrix.diagonal()).mean())
+        return (self.means.T @ matrix @ self.means + typical * (self.apart.T @ self.apart)).tocsr()
+
+    def force(self, force: np.ndarray) -> np.ndarray:
+        """Return Tᵀ f."""
+        return np.asarray(self.means.T @ force)

@@ -1,0 +1,172 @@
+"""Halving of quadrilaterals and hexahedra: marked cells become 2^dim, nodes beside larger cells hang."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.mesh.body_mesh import BodyMesh, check_jacobians
+from fenics_contact.mesh.cell_types import HEXAHEDRON27, QUADRILATERAL9, CellType
+from fenics_contact.mesh.faces import match_faces, number_faces
+from fenics_contact.mesh.hanging import HangingNodes
+from fenics_contact.mesh.quadratic import put_on_shapes
+
+_HALVED = {2: QUADRILATERAL9, 3: HEXAHEDRON27}
+"""Quadratic cells, whose nodes are those of the halved linear ones, and whose pieces are their parts."""
+
+
+def halved(mesh: BodyMesh, chosen: np.ndarray) -> tuple[BodyMesh, np.ndarray, np.ndarray]:
+    """Halve linear quadrilaterals or hexahedra in every direction, and what is two levels larger beside them.
+
+    Cells that share a point differ by one level at most, so that no master of a hanging node hangs.
+
+    `chosen`: numbers of the marked cells.
+
+    Returns the refined mesh; the parent of each cell, ascending, (n_cells,); and where in its parent each
+    node of each cell lies, (n_cells, nodes of a cell, dim).
+    """
+    kind = _HALVED[mesh.dim]
+    levels = np.zeros(mesh.n_cells, dtype=np.int64) if mesh.hanging is None else mesh.hanging.levels
+    split = _balanced(mesh, kind, levels, chosen)
+    large, small = np.flatnonzero(split), np.flatnonzero(~split)
+    between, number = _new_nodes(mesh, kind, large)
+    nodes = np.column_stack([mesh.cells[large], number])
+    parents = np.concatenate([small, np.repeat(large, len(kind.pieces))])
+    order = np.argsort(parents, kind="stable")
+    cells = np.concatenate([mesh.cells[small], nodes[:, kind.pieces].reshape(-1, len(kind.vertices))])[order]
+    places = kind.nodes[kind.pieces], kind.vertices[None]
+    positions = np.concatenate(
+        [np.tile(places[1], (len(small), 1, 1)), np.tile(places[0], (len(large), 1, 1))]
+    )
+    hanging = _still_hanging(mesh, kind, cells, between, (levels + split)[parents[order]])
+    surfaces = _parts_of_surfaces(mesh, kind, large, nodes)
+    points = _placed(mesh, kind, between, nodes, surfaces, hanging)
+    check_jacobians(points, cells, "mark more cells along curved surfaces, or leave their shapes away")
+    regions = {name: np.flatnonzero(np.isin(parents[order], inside)) for name, inside in mesh.regions.items()}
+    fine = BodyMesh(points, cells, surfaces, None, regions, shapes=mesh.shapes, hanging=hanging)
+    return fine, parents[order], positions[order]
+
+
+def _entities(kind: CellType, cells: np.ndarray) -> np.ndarray:
+    """Return the corners of edges and faces of cells, (n_cells, n, 2 | 4), each end of edges twice in space.
+
+    In the order of the nodes that a quadratic cell has there.
+    """
+    corners = [np.flatnonzero(values > 0.1) for values in _corner_weights(kind)[:-1]]
+    width = 2 ** (kind.dim - 1)
+    return cells[:, np.stack([np.tile(own, width // len(own)) for own in corners])]
+
+
+def _corner_weights(kind: CellType) -> np.ndarray:
+    """Return the weights of the vertices in the middles of edges, faces and cell, (n, n_vertices)."""
+    count = len(kind.vertices)
+    linear = kind.nodes[count:]
+    signed = np.where(kind.vertices[None] > 0.5, linear[:, None], 1.0 - linear[:, None])
+    return np.asarray(signed.prod(axis=2))
+
+
+def _balanced(mesh: BodyMesh, kind: CellType, levels: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Mark the chosen cells, and others until those that share a point differ by one level, (n_cells,)."""
+    cell, node = np.repeat(np.arange(mesh.n_cells), mesh.cells.shape[1]), mesh.cells.ravel()
+    if mesh.hanging is not None:  # larger cells touch the nodes that hang on them
+        there = _entities(kind, mesh.cells)
+        which = match_faces(there.reshape(-1, there.shape[2]), mesh.hanging.masters)
+        found = np.flatnonzero(which >= 0)
+        cell = np.concatenate([cell, found // there.shape[1]])
+        node = np.concatenate([node, mesh.hanging.nodes[which[found]]])
+    split = np.zeros(mesh.n_cells, dtype=bool)
+    split[chosen] = True
+    while True:
+        highest = np.zeros(mesh.n_nodes, dtype=np.int64)
+        np.maximum.at(highest, node, (levels + split)[cell])
+        behind = np.unique(cell[(levels + split)[cell] < highest[node] - 1])
+        if not len(behind):
+            return split
+        split[behind] = True
+
+
+def _new_nodes(mesh: BodyMesh, kind: CellType, large: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Number the nodes in the middle of edges, faces and cells, those that were there by their old numbers.
+
+    Returns the corners between which new nodes lie, edges' and faces' as `_entities`, in the order of their
+    numbers, and the numbers in each cell, (n_large, n).
+    """
+    there = _entities(kind, mesh.cells[large])
+    flat = there.reshape(-1, there.shape[2])
+    known = np.zeros((0, there.shape[2]), dtype=np.int64) if mesh.hanging is None else mesh.hanging.masters
+    key = number_faces(np.concatenate([known, flat]))
+    node_of = np.full(key.max(initial=-1) + 1, -1)
+    if mesh.hanging is not None:
+        node_of[key[: len(known)]] = mesh.hanging.nodes
+    unique, first = np.unique(key[len(known) :], return_index=True)
+    new = node_of[unique] < 0
+    node_of[unique[new]] = mesh.n_nodes + np.arange(new.sum())
+    number = node_of[key[len(known) :]].reshape(there.shape[:2])
+    centres = mesh.n_nodes + np.count_nonzero(new) + np.arange(len(large))
+    return flat[first[new]], np.column_stack([number, centres])
+
+
+def _still_hanging(
+    mesh: BodyMesh, kind: CellType, cells: np.ndarray, between: np.ndarray, levels: np.ndarray
+) -> HangingNodes | None:
+    """Return the nodes in the middle of edges and faces of the refined cells; None without any."""
+    masters, nodes = between, mesh.n_nodes + np.arange(len(between))
+    if mesh.hanging is not None:
+        masters = np.concatenate([mesh.hanging.masters, masters])
+        nodes = np.concatenate([mesh.hanging.nodes, nodes])
+    touched = np.zeros(int(cells.max()) + 1, dtype=bool)
+    touched[masters] = True
+    larger = _entities(kind, cells[touched[cells].sum(axis=1) > 1]).reshape(-1, masters.shape[1])
+    hangs = np.zeros(len(masters), dtype=bool)
+    which = match_faces(larger, masters)
+    hangs[which[which >= 0]] = True
+    if not hangs.any():
+        return None
+    return HangingNodes(nodes[hangs], masters[hangs], levels)
+
+
+def _parts_of_surfaces(
+    mesh: BodyMesh, kind: CellType, large: np.ndarray, nodes: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return the facets of the surfaces, those of halved cells replaced by their parts.
+
+    `nodes`: all nodes of the halved cells, as of quadratic ones.
+    """
+    faces = nodes[:, kind.faces].reshape(-1, kind.faces.shape[1])
+    corners = 2 ** (kind.dim - 1)
+    result = {}
+    for name, facets in mesh.surfaces.items():
+        both = number_faces(np.concatenate([facets, faces[:, :corners]]))
+        place = np.full(both.max(initial=-1) + 1, -1)
+        place[both[len(facets) :]] = np.arange(len(faces))
+        of_face = place[both[: len(facets)]]
+        parts = faces[of_face[of_face >= 0]][:, kind.face_pieces].reshape(-1, corners)
+        result[name] = np.concatenate([facets[of_face < 0], parts])
+    return result
+
+
+def _placed(
+    mesh: BodyMesh,
+    kind: CellType,
+    between: np.ndarray,
+    nodes: np.ndarray,
+    surfaces: dict[str, np.ndarray],
+    hanging: HangingNodes | None,
+) -> np.ndarray:
+    """Return coordinates: new nodes and those that hang no more lie on the shapes of their surfaces.
+
+    Nodes that hang lie at the mean of their masters.
+    """
+    n_old, count = mesh.n_nodes, mesh.n_nodes + len(between) + len(nodes)
+    moves = np.zeros(count, dtype=bool)
+    moves[n_old:] = True
+    if mesh.hanging is not None:
+        moves[mesh.hanging.nodes] = True
+    if hanging is not None:
+        moves[hanging.nodes] = False
+    points = np.concatenate([mesh.points, np.empty((count - n_old, mesh.dim))])
+    put_on_shapes(points, mesh.surfaces, mesh.shapes, moves)
+    points[n_old : n_old + len(between)] = points[between].mean(axis=1)
+    points[nodes[:, -1]] = points[nodes[:, : len(kind.vertices)]].mean(axis=1)
+    moves[:n_old] = False
+    put_on_shapes(points, surfaces, mesh.shapes, moves)
+    return points if hanging is None else hanging.placed(points)

@@ -1,0 +1,91 @@
+"""Hanging nodes: those of small cells on an edge or a face of a larger neighbour, which they follow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._base.display import displayed
+from fenics_contact.errors import InvalidInputError
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class HangingNodes:
+    """Nodes whose displacement is the mean of that of others, u_h = 1/k Σ u_j, so that bodies do not gape.
+
+    They lie at the mean of their masters, also where a surface is curved: on the larger facet, not on a shape
+    that it approximates.
+
+    Attributes:
+        nodes: Their numbers, ascending, shape (n,).
+        masters: The corners of the larger face that each lies on, none of which hangs, shape (n, 2) in the
+            plane, (n, 4) in space; in the middle of an edge its two ends, each twice.
+        levels: How often each cell was halved, shape (n_cells,); cells that share a point differ by one at
+            most.
+    """
+
+    nodes: np.ndarray
+    masters: np.ndarray
+    levels: np.ndarray
+
+    def placed(self, points: np.ndarray) -> np.ndarray:
+        """Return values at all nodes, those of hanging ones the means of their masters, (n_nodes, ...)."""
+        result = np.array(points, dtype=np.float64)
+        result[self.nodes] = result[self.masters].mean(axis=1)
+        return result
+
+    def means(self, n_nodes: int) -> sp.csr_matrix:
+        """Return W with u_h = W u, shape (n, n_nodes)."""
+        row = np.repeat(np.arange(len(self.nodes)), self.masters.shape[1])
+        weights = np.full(self.masters.size, 1.0 / self.masters.shape[1])
+        return sp.csr_matrix((weights, (row, self.masters.ravel())), shape=(len(self.nodes), n_nodes))
+
+    def followed(self, n_nodes: int) -> sp.csr_matrix:
+        """Return T with T u = u but at hanging nodes, where it is W u, shape (n_nodes, n_nodes)."""
+        stays = np.ones(n_nodes)
+        stays[self.nodes] = 0.0
+        chosen = np.ones(len(self.nodes)), (self.nodes, np.arange(len(self.nodes)))
+        spread = sp.csr_matrix(chosen, shape=(n_nodes, len(self.nodes)))
+        return (sp.diags(stays) + spread @ self.means(n_nodes)).tocsr()
+
+    def filled(self, nodes: np.ndarray, known: np.ndarray) -> sp.csr_matrix:
+        """Return what fills in values at hanging nodes among some nodes, shape (n_nodes, n_nodes).
+
+        `nodes`: numbers, ascending, with the masters of those that hang; `known`: marks of those with values.
+        """
+        mine = np.isin(self.nodes, nodes[~known])
+        place = np.searchsorted(nodes, self.nodes[mine])
+        masters = np.searchsorted(nodes, self.masters[mine])
+        row = np.concatenate([np.delete(np.arange(len(nodes)), place), np.repeat(place, masters.shape[1])])
+        column = np.concatenate([np.delete(np.arange(len(nodes)), place), masters.ravel()])
+        weight = np.ones(len(row))
+        weight[len(nodes) - len(place) :] = 1.0 / masters.shape[1]
+        return sp.csr_matrix((weight, (row, column)), shape=2 * (len(nodes),))
+
+
+def nodes_to_hold(hanging: HangingNodes | None, surface: str, facets: np.ndarray) -> np.ndarray:
+    """Return the nodes by which a support holds a surface, ascending: hanging ones follow their masters."""
+    nodes = np.unique(facets)
+    if hanging is None:
+        return nodes
+    mine = np.isin(hanging.nodes, nodes)
+    masters = hanging.masters[mine]
+    outside = ~np.isin(masters, nodes).all(axis=1)
+    if outside.any():
+        raise InvalidInputError(
+            f"surfaces with supports must contain the masters of their hanging nodes, {surface!r} lacks some "
+            f"of {np.count_nonzero(outside)} nodes, the first {hanging.nodes[mine][outside][0]} with "
+            f"masters {np.unique(masters[outside][0]).tolist()}: take all facets on the faces of larger cells"
+        )
+    return np.setdiff1d(nodes, hanging.nodes)
+
+
+def require_none(hanging: HangingNodes | None, what: str, remedy: str) -> None:
+    """Reject the hanging nodes of a mesh for what cannot deal with them."""
+    if hanging is not None:
+        raise InvalidInputError(
+            f"{what} needs a mesh without hanging nodes, this one has {len(hanging.nodes)}: {remedy}"
+        )
