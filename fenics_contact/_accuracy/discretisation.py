@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -214,6 +214,11 @@ class DiscretisationError:
     _sizes: Mapping[str, int] = field(repr=False)
     _own: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(repr=False)
 
+    @property
+    def own_cells(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Body name -> this rank's cells and their parts."""
+        return {name: (cells, np.sqrt(squares)) for name, (cells, squares) in self._own.items()}
+
     def by_cell(self, body: str) -> np.ndarray:
         """Return the part of each cell of a body in the body's order, shape (n_cells,), replicated.
 
@@ -227,8 +232,8 @@ class DiscretisationError:
                 f"body must be one of {sorted(self._sizes)}, got {body!r}: take a name of the scene"
             )
         values = np.zeros(self._sizes[body])
-        cells, squares = self._own[body]
-        values[cells] = np.sqrt(squares)
+        cells, parts = self.own_cells[body]
+        values[cells] = parts
         return np.asarray(self._comm.allreduce(values))
 
 
@@ -251,25 +256,100 @@ def discretisation_error(torn: TornSystem, displacement: np.ndarray) -> Discreti
     """
     scene, comm = torn.scene, torn.decomposition.comm
     energies = {name: _Energies(torn, body) for name, body in scene.bodies.items()}
-    nodal = nodal_mean(torn.decomposition, displacement)
-    cells = {name: [np.zeros(0, dtype=np.int64)] for name in scene.bodies}
-    squares = {name: [np.zeros(0)] for name in scene.bodies}
-    for order in sorted({body.mesh.order for body in scene.bodies.values()}):
-        sites = find_sites(torn, order)
-        displacements = nodal[sites.node]
-        gradients = recovered_gradients(sites, displacements)
-        for subdomain in torn.subdomains:
-            mesh = subdomain.mesh
-            if mesh.number in sites.of_cells:
-                of_cells = sites.of_cells[mesh.number]
-                energy = energies[mesh.body].by_cell(subdomain, displacements[of_cells], gradients[of_cells])
-                cells[mesh.body].append(mesh.cells)
-                squares[mesh.body].append(energy)
-    own = {name: (np.concatenate(cells[name]), np.concatenate(squares[name])) for name in scene.bodies}
+    parts = Parts(scene.bodies)
+    for subdomain, [(u, g)] in recovered_fields(torn, displacement):
+        parts.add(subdomain, energies[subdomain.mesh.body].by_cell(subdomain, u, g))
+    own = parts.joined()
     sums = comm.allreduce(np.array([values.sum() for _, values in own.values()]))
     by_body = {name: float(np.sqrt(value)) for name, value in zip(own, sums, strict=True)}
     sizes = {name: body.mesh.n_cells for name, body in scene.bodies.items()}
     return DiscretisationError(float(np.sqrt(sums.sum())), by_body, comm, sizes, own)
+
+
+def recovered_fields(
+    torn: TornSystem, *fields: np.ndarray
+) -> Iterator[tuple[Subdomain, list[tuple[np.ndarray, np.ndarray]]]]:
+    """Yield each of this rank's subdomains with fields and their recovered gradients. Collective.
+
+    `fields`: torn fields of this rank, shape (torn_size,) each; where copies of a node differ, their mean is
+    used.
+
+    Yields of each field its values at the nodes of the cells, shape (n_cells, nodes of a cell, dim), and the
+    gradients there, shape (n_cells, nodes of a cell, dim, dim).
+    """
+    nodal = np.hstack([nodal_mean(torn.decomposition, field) for field in fields])
+    columns = [slice(k * torn.components, (k + 1) * torn.components) for k in range(len(fields))]
+    for order in sorted({body.mesh.order for body in torn.scene.bodies.values()}):
+        sites = find_sites(torn, order)
+        values = nodal[sites.node]
+        gradients = recovered_gradients(sites, values)
+        for subdomain in torn.subdomains:
+            if subdomain.mesh.number in sites.of_cells:
+                of_cells = sites.of_cells[subdomain.mesh.number]
+                yield subdomain, [(values[:, own][of_cells], gradients[:, own][of_cells]) for own in columns]
+
+
+class Parts:
+    """Values of cells, collected subdomain by subdomain."""
+
+    def __init__(self, bodies: Iterable[str]) -> None:
+        """Start with none."""
+        self._cells = {name: [np.zeros(0, dtype=np.int64)] for name in bodies}
+        self._values = {name: [np.zeros(0)] for name in bodies}
+
+    def add(self, subdomain: Subdomain, values: np.ndarray) -> None:
+        """Add the values of the cells of a subdomain, shape (n_cells,)."""
+        self._cells[subdomain.mesh.body].append(subdomain.mesh.cells)
+        self._values[subdomain.mesh.body].append(values)
+
+    def joined(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Return this rank's cells of each body and their values."""
+        return {
+            name: (np.concatenate(cells), np.concatenate(self._values[name]))
+            for name, cells in self._cells.items()
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorProducts:
+    """Products in energy of the estimated errors of two fields on this rank's cells, by body.
+
+    Each is a pair of cells and values as of `Parts`.
+
+    Attributes:
+        first: ∫ C e : e, e the error of the first field's gradient.
+        second: The same of the second one.
+        product: ∫ C e₁ : e₂.
+    """
+
+    first: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    second: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    product: Mapping[str, tuple[np.ndarray, np.ndarray]]
+
+
+def error_products(torn: TornSystem, first: np.ndarray, second: np.ndarray) -> ErrorProducts:
+    """Estimate ∫ C e₁ : e₂ of the errors of two torn fields on each cell, see `discretisation_error`.
+
+    With the second scaled by s so that both have the same energy it follows from three energies,
+
+        2 s ∫ C e₁ : e₂ = ∫ C (e₁ + s e₂) : (e₁ + s e₂) − ∫ C e₁ : e₁ − s² ∫ C e₂ : e₂.
+
+    Collective.
+    """
+    bodies = torn.scene.bodies
+    energies = {name: _Energies(torn, body) for name, body in bodies.items()}
+    known = list(recovered_fields(torn, first, second))
+    squares = [[energies[part.mesh.body].by_cell(part, *field) for field in fields] for part, fields in known]
+    sums = np.zeros(2) + sum(np.array([own.sum() for own in pair]) for pair in squares)
+    mine, theirs = torn.decomposition.comm.allreduce(sums)
+    scale = float(np.sqrt(mine / theirs)) if mine > 0.0 and theirs > 0.0 else 1.0
+    results = tuple(Parts(bodies) for _ in range(3))
+    for (part, ((u, g), (w, h))), (own, other) in zip(known, squares, strict=True):
+        both = energies[part.mesh.body].by_cell(part, u + scale * w, g + scale * h)
+        product = (both - own - scale**2 * other) / (2.0 * scale)
+        for result, values in zip(results, (own, other, product), strict=True):
+            result.add(part, values)
+    return ErrorProducts(*(result.joined() for result in results))
 
 
 class _Energies:

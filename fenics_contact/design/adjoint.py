@@ -291,7 +291,9 @@ def solve_adjoint(
     if transposed is None:
         raise ConvergenceError(NOT_HELD)
     flexed = system.inverse(partials.by_displacement)
-    right = linearised.moving.T @ (factor * (system.jump(flexed) - partials.by_multiplier))
+    # Rows that supports alone determine have no force, whatever an objective makes of it.
+    by_multiplier = np.where(state.rows.between_supports, 0.0, partials.by_multiplier)
+    right = linearised.moving.T @ (factor * (system.jump(flexed) - by_multiplier))
     load = np.asarray(problem.comm.allreduce(system.kernel.T @ partials.by_displacement))
     if partials.by_motion is not None:
         load += system.points.T @ partials.by_motion

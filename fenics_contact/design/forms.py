@@ -66,6 +66,11 @@ class ShapeForms:
         self._templates = Templates(comm)
 
     @property
+    def nothing_moves(self) -> bool:
+        """Whether no derivative by nodes is needed, so that none need be compiled."""
+        return self.moving is not None and not self.moving.any()
+
+    @property
     def compiled(self) -> tuple[tuple[object, ...], ...]:
         """Names of the forms compiled so far."""
         return self._templates.names

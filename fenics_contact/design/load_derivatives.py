@@ -158,6 +158,8 @@ def strain_work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: 
 
     `u`: torn displacement of this rank, [length].
     """
+    if forms.nothing_moves:
+        return np.zeros((torn.decomposition.tearing.n_nodes, torn.components))
     for name, body in torn.scene.bodies.items():  # all ranks compile, also for bodies without a part on them
         for materials in sets_in_use(torn, name):
             forms.virtual_work_by_shape(materials, body.cell_type)

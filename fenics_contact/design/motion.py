@@ -395,7 +395,7 @@ class BodyIntegral:
     def derivatives(self, *numbers: float) -> dict[str, np.ndarray]:
         """Return the derivatives by displacements and shape, by UFL. Collective."""
         torn, u = self.state.torn, self.state.torn_displacement
-        by_shape, by_displacement = (self._prepare(by, numbers) for by in ("shape", "displacement"))
+        by_displacement = self._prepare("displacement", numbers)
 
         def assemble(bind: Bind, subdomain: Subdomain, functions: Functions) -> np.ndarray:
             if subdomain.mesh.body != self.body:
@@ -403,8 +403,12 @@ class BodyIntegral:
             return _dolfinx.assemble_vector(bind(subdomain, functions, [subdomain.mesh.space]))
 
         gradient = [assemble(by_displacement, *each) for each in subdomain_fields(torn, [u])]
-        moving = sum_over_subdomains(torn, [u], partial(assemble, by_shape), self.forms.moving)
-        return {"by_displacement": np.concatenate(gradient), "by_shape": moving + self._by_heat(numbers)}
+        moving = np.zeros((torn.decomposition.tearing.n_nodes, torn.components))
+        if not self.forms.nothing_moves:
+            by_shape = self._prepare("shape", numbers)
+            moving = sum_over_subdomains(torn, [u], partial(assemble, by_shape), self.forms.moving)
+            moving = moving + self._by_heat(numbers)
+        return {"by_displacement": np.concatenate(gradient), "by_shape": moving}
 
     def _by_heat(self, numbers: tuple[float, ...]) -> np.ndarray | float:
         """Return the derivative by the places at which temperatures are evaluated. Collective."""

@@ -1,0 +1,177 @@
+"""What contact laws that hold at nodes miss between them, and what nodal forces miss of pressures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._scene.obstacles import RigidTool
+from fenics_contact._scene.pairs import ContactPair, Surface
+from fenics_contact._scene.parts import surface_of
+from fenics_contact._scene.tools import ToolBody
+from fenics_contact._surfaces.facets import FacetedSurface, has_midside_pressure, heights, shape_functions
+from fenics_contact._surfaces.projection import Projection, interpolated_normal, node_weights, project
+from fenics_contact.design.objective import Partials
+from fenics_contact.errors import together
+from fenics_contact.feti.averages import nodal_mean_at
+from fenics_contact.mesh.cell_types import FACET_TYPES, quadrature
+from fenics_contact.results.linear_state import LinearState
+from fenics_contact.shapes.simple import evaluate_shape
+
+
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Points of quadrature on the true slave surface of a pair, on this rank's share of its facets.
+
+    Attributes:
+        points: Their coordinates, shape (n, dim), [length].
+        normal: Outward unit normals of the slave, shape (n, dim).
+        weight: The area that belongs to each, shape (n,), [length²] or [length].
+        values: Weights of the surface's nodes in fields, shape (n, n_nodes).
+    """
+
+    points: np.ndarray
+    normal: np.ndarray
+    weight: np.ndarray
+    values: sp.csr_matrix
+
+    @classmethod
+    def of(cls, surface: FacetedSurface, facets: np.ndarray, degree: int = 4) -> _Places:
+        """Return the points of a rule of a degree on some facets, (n_facets,)."""
+        local, weights = quadrature(FACET_TYPES[surface.corners, surface.dim], degree)
+        if surface.corners != 3:  # facets use coordinates from −1 to 1, as their shape functions do
+            local, weights = 2.0 * local - 1.0, weights * 2.0 ** (surface.dim - 1)
+        facet, local = np.repeat(facets, len(local)), np.tile(local, (len(facets), 1))
+        values, slopes = shape_functions(local, surface.corners)
+        nodes = surface.facets[facet]
+        points = np.einsum("nk,nkd->nd", values, surface.points[nodes])
+        along = np.einsum("nka,nkd->nad", slopes, surface.points[nodes])
+        gram = np.einsum("nad,nbd->nab", along, along)
+        area = np.tile(weights, len(facets)) * np.sqrt(np.linalg.det(gram))
+        if surface.axisymmetric:
+            area = 2.0 * np.pi * points[:, 0] * area
+        normal, _ = interpolated_normal(values, surface.normals[nodes])
+        nothing, every = np.zeros(len(facet)), np.arange(len(facet))
+        here = Projection(every, facet, local, nothing, normal, nothing, every[:0])
+        height = heights(surface, facet, local).value[:, None]
+        return cls(points + height * normal, normal, area, node_weights(surface, here))
+
+    def part(self, chosen: np.ndarray) -> _Places:
+        """Return some of the points."""
+        return _Places(self.points[chosen], self.normal[chosen], self.weight[chosen], self.values[chosen])
+
+
+class _Slave:
+    """The slave of a pair with values of contact points at its nodes."""
+
+    def __init__(self, state: LinearState, index: int) -> None:
+        """Find the nodes of the points of a pair."""
+        torn, pair = state.torn, state.torn.scene.contacts[index]
+        self.surface = surface_of(torn.scene, pair.slave, pair.geometry)
+        self.nodes = torn.decomposition.tearing.global_nodes(pair.slave.body, self.surface.nodes)
+        self.mine = np.flatnonzero(torn.points.pair == index)
+        self.place = np.searchsorted(self.nodes, torn.points.slave[self.mine])
+
+    def at_nodes(self, values: np.ndarray) -> np.ndarray:
+        """Return values of all contact points at the nodes of the surface, zero at others, (n_nodes, ...)."""
+        result = np.zeros((len(self.nodes), *values.shape[1:]))
+        result[self.place] = values[self.mine]
+        return result
+
+    def facets(self, state: LinearState, weight: np.ndarray) -> np.ndarray:
+        """Return this rank's share of the facets all of whose nodes have points, and one of them a weight."""
+        comm, known = state.torn.decomposition.comm, self.at_nodes(np.ones(state.torn.points.count)) > 0.0
+        facets = self.surface.facets
+        chosen = known[facets].all(axis=1) & (weight[facets] != 0.0).any(axis=1)
+        return np.asarray(np.flatnonzero(chosen)[comm.rank :: comm.size])
+
+
+def between_nodes(state: LinearState, multiplier: np.ndarray) -> float:
+    """Return Σ ∫ ζ (g + n·(u_s − u_m) − r) over the slaves of all pairs. Collective.
+
+    Contact holds at nodes, or as a mean: between them facets of one surface enter the other one, or leave
+    gaps where the surfaces are curved. The function ζ interpolates forces per area, r the residuals at the
+    contact points; the gap g and the normal n are those of the true surfaces in each point.
+
+    `multiplier`: forces ζ of an adjoint, owned.
+    """
+    torn, total = state.torn, 0.0
+    pressing, residual = (
+        torn.numbering.gather(x, torn.normal_rows) for x in (multiplier, state.rows.residual)
+    )
+    for index, pair in enumerate(torn.scene.contacts):
+        if not pair.within_body:
+            total += _of_pair(state, index, pair, pressing, residual)
+    return float(torn.decomposition.comm.allreduce(total))
+
+
+def _of_pair(
+    state: LinearState, index: int, pair: ContactPair, pressing: np.ndarray, residual: np.ndarray
+) -> float:
+    torn, slave = state.torn, _Slave(state, index)
+    decomposition, points, field = torn.decomposition, torn.points, state.conforming_displacement
+    if has_midside_pressure(slave.surface.facets if slave.surface.whole is None else slave.surface.whole):
+        return 0.0  # without forces at the corners; the error of quadratic facets is small
+    weight = slave.at_nodes(pressing / points.area)
+    # Where a pair gives other gaps than the measured ones, the difference is interpolated.
+    missed = slave.at_nodes(residual - (points.gap - points.distance))
+    own = nodal_mean_at(decomposition, field, slave.nodes)[:, : slave.surface.dim]
+    places = _Places.of(slave.surface, slave.facets(state, weight))
+    found, gap, normal, theirs = _opposite(state, pair, places)
+    places = places.part(found)
+    closing = places.values @ own - theirs[:, : slave.surface.dim]
+    opened = gap + np.einsum("nd,nd->n", normal, closing) - places.values @ missed
+    return float(places.weight * (places.values @ weight) @ opened)
+
+
+def _opposite(
+    state: LinearState, pair: ContactPair, places: _Places
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return which points face the master, their gaps and normals, and how it moves there. Collective."""
+    torn, scene, field = state.torn, state.torn.scene, state.conforming_displacement
+    decomposition = torn.decomposition
+    tearing, comm = decomposition.tearing, decomposition.comm
+    if isinstance(pair.master, Surface):
+        master = surface_of(scene, pair.master, pair.geometry)
+        nodes = tearing.global_nodes(pair.master.body, master.nodes)
+        moved = nodal_mean_at(decomposition, field, nodes)
+        with together(comm):
+            hit = project(places.points, places.normal, master)
+        return hit.point, hit.gap, hit.normal, node_weights(master, hit) @ moved
+    every = np.arange(len(places.points))
+    with together(comm):
+        gap = evaluate_shape(pair.master, "distance", places.points)
+        normal = evaluate_shape(pair.master, "normals", places.points)
+    moved = np.zeros_like(places.points)
+    if isinstance(pair.master, RigidTool):
+        body = scene.bodies[pair.master.name]
+        assert isinstance(body, ToolBody)
+        nodes = tearing.global_nodes(pair.master.name, np.arange(body.mesh.n_nodes))
+        moved = body.weights(places.points) @ nodal_mean_at(decomposition, field, nodes)
+    return every, gap, normal, moved
+
+
+def of_pressures(state: LinearState, partials: Partials) -> float:
+    """Return by how much an objective changes from nodal forces per area to the pressures at the nodes.
+
+    A nodal force λ_i = ∫ p φ_i is a mean of the pressure about the node. With M_ij = ∫ φ_i φ_j the pressure
+    at the node is p_i = λ_i / A_i + ½ (λ_i − Σ_j M_ij λ_j / A_j) / A_i + O(h⁴): the second moment of M_i is
+    twice that of φ_i on linear facets; on quadratic ones nothing is added. The sum of forces stays the same,
+    so that sums over nodes are integrals up to the rim of a surface. Collective.
+    """
+    torn, points = state.torn, state.torn.points
+    rows = torn.numbering.gather(partials.by_multiplier, torn.normal_rows)
+    total = 0.0
+    for index, pair in enumerate(torn.scene.contacts):
+        slave = None if pair.within_body else _Slave(state, index)
+        if slave is None or slave.surface.whole is not None:
+            continue
+        pressure = slave.at_nodes(state.contact.normal_force / points.area)
+        by_force, every = slave.at_nodes(rows), np.ones(len(slave.nodes))
+        places = _Places.of(slave.surface, slave.facets(state, every), degree=2)
+        area = places.values.T @ places.weight
+        spread = places.values.T @ (places.weight * (places.values @ pressure))
+        total += 0.5 * float(by_force @ (area * pressure - spread))
+    return float(torn.decomposition.comm.allreduce(total))

@@ -1,0 +1,286 @@
+"""The error of a quantity of a state: by mesh, geometry, solver and friction law, with the adjoint's weights.
+
+With the adjoint w, ζ of the quantity J at a state, linearised with its statuses of contact, stick and slip,
+
+    J(u) − J_h(u_h) ≈ a(u − u_h, w − w_h) − ½ J''(u − u_h, u − u_h) + ∫ ζ (c − B u_h) + J_h(p) − J_h(p_h).
+
+The first two are sums over cells of ∫ C (G u_h − ∇u_h) : (G w_h − ∇w_h), with gradients G recovered from both
+fields, and of half of the same of u_h alone for energies, J'' = a; of other quantities J'' is left out. The
+third is what contact misses between nodes, the last that a nodal force is a mean of the pressure around its
+node. What remains is of higher order where solutions are smooth, but for two things. The rim of a contact
+between curved bodies lies somewhere between two nodes, which adds an error of the same order that changes
+its sign from mesh to mesh. And at singular corners, where a recovered gradient misses a part of the error,
+the first term is about 0.6 of what it should be.
+
+References:
+    R. Becker, R. Rannacher, An optimal control approach to a posteriori error estimation in finite element
+    methods, Acta Numer. 10 (2001) 1-102. J. T. Oden, S. Prudhomme, Goal-oriented error estimation and
+    adaptivity for the finite element method, Comput. Math. Appl. 41 (2001) 735-756.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fenics_contact._accuracy.discretisation import ErrorProducts, discretisation_error, error_products
+from fenics_contact._adaptive.contact_residuals import between_nodes, of_pressures
+from fenics_contact._base.display import displayed
+from fenics_contact._base.libraries import MPI
+from fenics_contact._base.progress import Task
+from fenics_contact._base.threads import one_thread
+from fenics_contact.design.adjoint import NOT_HELD, Adjoint, LinearisedFace, WeakChoice, linearise_face
+from fenics_contact.design.contact_derivatives import bound_sensitivity
+from fenics_contact.design.forms import ShapeForms
+from fenics_contact.design.objective import (
+    Objective,
+    Partials,
+    WeightedSum,
+    asking,
+    finite_partials,
+    finite_value,
+)
+from fenics_contact.design.objectives import (
+    LargestPressure,
+    PressureNorm,
+    StrainEnergy,
+    TotalPotential,
+    points_of,
+)
+from fenics_contact.design.sensitivity import adjoint_of
+from fenics_contact.errors import ConvergenceError, InvalidInputError, collectively
+from fenics_contact.results.linear_state import LinearState, as_linear
+from fenics_contact.results.state import State, comm_of
+
+#: Name of a body -> this rank's cells, and a value of each.
+OfCells = Mapping[str, tuple[np.ndarray, np.ndarray]]
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class GoalError:
+    """Estimated parts of J − J_h, the exact value of a quantity less that of a state, in its unit.
+
+    All are estimates with a sign, none is a bound.
+
+    Attributes:
+        value: J_h, that of the state.
+        mesh: By the mesh; NaN if there is no adjoint, see ``without_adjoint``.
+        uncancelled: The same if no parts of it cancelled, ≥ 0: where it is much larger than ``mesh``, that
+            is uncertain.
+        geometry: By contact surfaces that are not measured between the true shapes, to first order: zero
+            where these are used, or all is flat. The rest of the boundary is not included.
+        solver: By the residuals of the solver, with friction at its own slip bounds, to first order.
+        friction: By slip bounds of the solver that are not those of its normal forces, to first order.
+        without_adjoint: Why there is no adjoint, in words; empty where there is one. All parts are then NaN,
+            and the shares of cells those of the energy norm.
+    """
+
+    value: float
+    mesh: float
+    uncancelled: float
+    geometry: float
+    solver: float
+    friction: float
+    without_adjoint: str
+    _comm: MPI.Comm = field(repr=False)
+    _sizes: Mapping[str, int] = field(repr=False)
+    _own: OfCells = field(repr=False)
+
+    @property
+    def total(self) -> float:
+        """J − J_h, the sum of all parts."""
+        return self.mesh + self.geometry + self.solver + self.friction
+
+    def by_cell(self, body: str) -> np.ndarray:
+        """Return the share of each cell of a body in the mesh's part, shape (n_cells,), replicated.
+
+        It is √(∫ C e : e ∫ C f : f) with the errors e of the state and f of the adjoint, for energies with
+        half of ∫ C e : e: it has no sign and bounds what the cell adds. Collective.
+
+        Raises:
+            InvalidInputError: If there is no such body.
+        """
+        if body not in self._sizes:
+            raise InvalidInputError(
+                f"body must be one of {sorted(self._sizes)}, got {body!r}: take a name of the scene"
+            )
+        values = np.zeros(self._sizes[body])
+        cells, own = self._own[body]
+        values[cells] = own
+        return np.asarray(self._comm.allreduce(values))
+
+    @property
+    def in_words(self) -> dict[str, str]:
+        """Name of each part -> its size, and relative to the value."""
+        parts = {name: getattr(self, name) for name in ("mesh", "geometry", "solver", "friction", "total")}
+        return {"value": f"{self.value:.6g}", **{name: self._sized(part) for name, part in parts.items()}}
+
+    def _sized(self, part: float) -> str:
+        if np.isnan(part):
+            return f"not known: {self.without_adjoint}"
+        return f"{part:+.3g} ({100 * part / abs(self.value):+.2g} %)" if self.value else f"{part:+.3g}"
+
+    def __str__(self) -> str:
+        """Return one line for each part."""
+        return "\n".join(f"{name:10s}{words}" for name, words in self.in_words.items())
+
+
+def _comm_of(state: State, *_: object, **__: object) -> MPI.Comm:
+    return comm_of(state)
+
+
+@collectively("goal_error", _comm_of)
+def goal_error(
+    state: State,
+    objective: Objective,
+    *,
+    choice: WeakChoice = WeakChoice.RELEASED,
+    tolerance: float = 1e-4,
+) -> GoalError:
+    """Estimate the error of a quantity of a state by its adjoint. Collective.
+
+    Costs one adjoint, about as many products as a step of the solver, and the recovery of two gradients.
+
+    The adjoint of the largest pressure is that of `PressureNorm` with an exponent such that three nodes
+    count, or nine in space: that of a single node is not resolved by the mesh. What earlier load steps add to
+    the error is not included.
+
+    Args:
+        state: The equilibrium, of small strains and linear materials.
+        objective: The quantity.
+        choice: Branch of weakly active points.
+        tolerance: Relative residual of the adjoint.
+
+    Raises:
+        InvalidInputError: If materials are nonlinear, the state has no multipliers (see
+            `LinearState.dual`), or the quantity is zero and nothing that loads the bodies reaches it.
+        ConvergenceError: If the adjoint does not converge; not where some body can slide on the face of the
+            state, see ``without_adjoint``.
+
+    Example:
+        >>> error = goal_error(state, LargestPressure())  # doctest: +SKIP
+        >>> print(error)  # doctest: +SKIP
+        >>> cells = error.by_cell("block")  # doctest: +SKIP
+    """
+    linear, comm = as_linear(state, "errors of quantities"), comm_of(state)
+    with Task("error of a quantity"), one_thread(comm):
+        # No node moves: derivatives by the shape are neither compiled nor evaluated.
+        forms = ShapeForms(comm, np.zeros(state.torn.decomposition.tearing.n_nodes, dtype=bool))
+        with asking(comm):
+            value = finite_value(objective.value(state, forms))
+            smooth = smoothed(objective, state, forms)
+            partials = finite_partials(smooth.partials(state, forms))
+        linearised = linearise_face(state, choice)
+        try:
+            adjoint, of_solver, partials = adjoint_of(linear, partials, linearised, tolerance)
+        except ConvergenceError as error:
+            if str(error) != NOT_HELD:
+                raise
+            return _without_adjoint(linear, value, str(error))
+        products = error_products(state.torn, linear.conforming_displacement, adjoint.displacement)
+        inside, shares = _in_cells(state, products, energy_weight(smooth))
+        others = between_nodes(linear, adjoint.multiplier), of_pressures(linear, partials)
+        bound = _sum(comm, shares) + float(np.abs(others).sum())
+        _require_reached(state, objective, (value, bound), partials, 0.01 * tolerance)
+        geometry, friction = (
+            _by_geometry(linear, adjoint),
+            _by_friction(linear, partials, adjoint, linearised),
+        )
+    return GoalError(
+        value, inside + sum(others), bound, geometry, of_solver.correction, friction, "",
+        comm, _sizes(state), shares,
+    )  # fmt: skip
+
+
+def smoothed(objective: Objective, state: State, forms: ShapeForms, spots: int = 3) -> Objective:
+    """Return an objective with the same value at a state, whose adjoint the mesh resolves. Collective.
+
+    `spots`: how many nodes along each direction the norm that replaces a largest pressure depends on.
+    """
+    if isinstance(objective, WeightedSum):
+        return WeightedSum(tuple((weight, smoothed(each, state, forms)) for weight, each in objective.terms))
+    if not isinstance(objective, LargestPressure):
+        return objective
+    highest = objective.value(state, forms)
+    ratio = state.contact.pressure[points_of(state, "LargestPressure", objective.pair)] / highest
+    wanted, p = spots ** (state.scene.dim - 1), 100.0
+    # Nodes count by p^(P − 1); so many equal ones would have the same sums of these and of their squares.
+    while p > 2.0 and (ratio ** (p - 1.0)).sum() ** 2 < wanted * (ratio ** (2.0 * p - 2.0)).sum():
+        p = max(2.0, 0.9 * p)
+    norm = PressureNorm(objective.pair, p=p)
+    return (highest / norm.value(state, forms)) * norm
+
+
+def energy_weight(objective: Objective) -> float:
+    """Return k of J'' = k a, the second derivative of an objective; zero where it is not known."""
+    if isinstance(objective, StrainEnergy | TotalPotential):
+        return 1.0
+    if isinstance(objective, WeightedSum):
+        return float(sum(weight * energy_weight(each) for weight, each in objective.terms))
+    return 0.0
+
+
+def _in_cells(state: State, products: ErrorProducts, weight: float) -> tuple[float, OfCells]:
+    """Return Σ ∫ C e : f − ½ k ∫ C e : e over all cells, and the share of each. Collective."""
+    shares, total = {}, 0.0
+    for name, (cells, own) in products.first.items():
+        other, product = products.second[name][1], products.product[name][1]
+        total += float((product - 0.5 * weight * own).sum())
+        shares[name] = cells, np.sqrt(own * other) + 0.5 * abs(weight) * own
+    return float(comm_of(state).allreduce(total)), shares
+
+
+def _sum(comm: MPI.Comm, shares: OfCells) -> float:
+    return float(comm.allreduce(sum(float(values.sum()) for _, values in shares.values())))
+
+
+def _sizes(state: State) -> dict[str, int]:
+    return {name: body.mesh.n_cells for name, body in state.scene.bodies.items()}
+
+
+def _require_reached(
+    state: State, objective: Objective, found: tuple[float, float], partials: Partials, least: float
+) -> None:
+    """Reject a quantity that is zero with all its parts, and has no error. Collective.
+
+    `found`: the quantity, and its error if no parts cancel; `least`: what is small relative to the sizes of
+    the displacements and forces on which it depends.
+    """
+    comm, fields = comm_of(state), (state.torn_displacement, state.rows.multiplier)
+    largest = [comm.allreduce(float(np.abs(x).max(initial=0.0)), op=MPI.MAX) for x in fields]
+    slopes = (partials.by_displacement, partials.by_multiplier)
+    sums = [comm.allreduce(float(np.abs(x).sum())) for x in slopes]
+    if max(map(abs, found)) <= least * float(np.dot(largest, sums)):
+        raise InvalidInputError(
+            f"the error of a quantity needs one that the loads reach, but {objective!r} is zero and stays "
+            "zero on every mesh: it is measured where supports hold the body, where no load is transmitted, "
+            "or along a direction in which nothing acts; choose another place or direction"
+        )
+
+
+def _by_geometry(state: LinearState, adjoint: Adjoint) -> float:
+    """Return ζ·(g* − g), the effect of gaps g* between better known surfaces. Collective; no product."""
+    torn = state.torn
+    if not torn.points.count:
+        return 0.0
+    weight = torn.numbering.gather(adjoint.multiplier, torn.normal_rows)
+    return float(weight @ (torn.finer_gap() - torn.points.gap))
+
+
+def _by_friction(
+    state: LinearState, partials: Partials, adjoint: Adjoint, linearised: LinearisedFace
+) -> float:
+    """Return the effect of slip bounds that follow the normal forces instead of the solver's. Collective."""
+    torn, rows = state.torn, state.rows
+    by_bound = bound_sensitivity(torn, partials.by_multiplier, adjoint.displacement, linearised)
+    missed = torn.law.bound(rows.multiplier) - rows.slip_bound
+    return float(comm_of(state).allreduce(float(by_bound[torn.owned_discs] @ missed)))
+
+
+def _without_adjoint(state: LinearState, value: float, why: str) -> GoalError:
+    """Return unknown parts, and the energy norm by cell. Collective."""
+    energy, nan = discretisation_error(state.torn, state.conforming_displacement), float("nan")
+    return GoalError(value, nan, nan, nan, nan, nan, why, comm_of(state), _sizes(state), energy.own_cells)

@@ -1,0 +1,98 @@
+"""Scenes whose quantities are known on finer meshes, for estimates of their errors."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_contact import (
+    Body,
+    ContactPair,
+    Coulomb,
+    DistanceObstacle,
+    LinearState,
+    RigidPlane,
+    Scene,
+    Support,
+    Surface,
+    Traction,
+    solve_scene,
+)
+from fenics_contact.design import ContactForces
+from fenics_contact.gallery import rectangle, rectangle_lattice
+from fenics_contact.materials import PlaneStrain
+from fenics_contact.mesh import bisection_partition
+from fenics_contact.results import ContactResult
+
+RUBBER = PlaneStrain(1000.0, 0.3)
+FLOOR = RigidPlane((0.0, 0.0), (0.0, 1.0))
+#: Height of the waves of a floor.
+WAVE = 0.004
+
+
+def solved(scene: Scene, parts: int = 2, tolerance: float = 1e-9) -> LinearState:
+    cuts = {name: bisection_partition(body.mesh, parts) for name, body in scene.bodies.items()}
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=cuts, tolerance=tolerance)
+    assert isinstance(state, LinearState)
+    return state
+
+
+def resultant(*direction: float) -> ContactForces:
+    """The force on the slave of the first pair along a direction."""
+    d = np.array(direction)
+
+    def function(contact: ContactResult) -> tuple[float, np.ndarray, np.ndarray]:
+        points = contact.points
+        along = -np.einsum("nad,d->na", points.tangents, d)
+        return float((contact.force @ d).sum()), points.normal @ d, along
+
+    return ContactForces(function)
+
+
+def on_waves(cells: int) -> Scene:
+    """Half a period of a block that is pressed on a wavy floor until all of it touches: all is smooth."""
+
+    def distance(x: np.ndarray) -> np.ndarray:
+        return np.asarray(x[:, 1] + WAVE * (1.0 + np.cos(np.pi * x[:, 0])))
+
+    def gradient(x: np.ndarray) -> np.ndarray:
+        slope = np.column_stack([-WAVE * np.pi * np.sin(np.pi * x[:, 0]), np.ones(len(x))])
+        return np.asarray(slope / np.linalg.norm(slope, axis=1)[:, None])
+
+    mesh = rectangle((0.0, 0.0), (1.0, 1.0), (cells, cells))
+    sides = [Support("block", side, (0.0, None)) for side in ("x0", "x1")]
+    pair = ContactPair(Surface("block", "y0"), DistanceObstacle(distance, gradient))
+    top = Support("block", "y1", (0.0, -0.05))
+    return Scene({"block": Body(mesh, RUBBER)}, [*sides, top], contacts=[pair])
+
+
+def on_floor(cells: int) -> Scene:
+    """A block on a rough floor, pressed and dragged at its top: some nodes stick, others slip."""
+    mesh = rectangle_lattice([np.linspace(0.0, 2.0, 2 * cells + 1), np.linspace(0.0, 1.0, cells + 1)])
+    load = Traction("block", "y1", lambda x: np.column_stack([0.0 * x[:, 0] + 8.0, -20.0 - 10.0 * x[:, 0]]))
+    pair = ContactPair(Surface("block", "y0"), FLOOR, Coulomb(0.3))
+    side = Support("block", "x0", (0.0, None))
+    return Scene({"block": Body(mesh, RUBBER)}, [side], [load], contacts=[pair])
+
+
+def punched(cells: int) -> Scene:
+    """A narrow block pressed on a wide one, meshes that do not match."""
+    upper = rectangle_lattice([np.linspace(-1.0, 1.0, 4 * cells + 1), np.linspace(0.0, 1.0, 2 * cells + 1)])
+    lower = rectangle_lattice([np.linspace(-3.0, 3.0, 9 * cells + 1), np.linspace(-3.0, 0.0, 4 * cells + 1)])
+    pair = ContactPair(Surface("upper", "y0"), Surface("lower", "y1"))
+    assert pair.discretisation == "best"
+    supports = [Support("lower", "y0", (0.0, 0.0)), Support("upper", "y1", (0.0, -0.02))]
+    return Scene({"upper": Body(upper, RUBBER), "lower": Body(lower, RUBBER)}, supports, contacts=[pair])
+
+
+def curved(cells: int = 6) -> Scene:
+    """Two round blocks with meshes that do not match: facets leave gaps that the surfaces have not."""
+    upper = rectangle((0.0, 0.0), (1.0, 1.0), (cells, cells))
+    lower = rectangle((-0.2, -1.0), (1.3, 0.0), (2 * cells - 1, cells))
+    x, y = upper.points.T
+    upper = upper.moved(np.column_stack([x, y + 0.1 * x**2 * (1.0 - y)]))
+    x, y = lower.points.T
+    lower = lower.moved(np.column_stack([x, y - 0.1 * (x - 0.1) ** 2 * (1.0 + y)]))
+    pair = ContactPair(Surface("upper", "y0"), Surface("lower", "y1"), discretisation="node")
+    supports = [Support("lower", "y0", (0.0, 0.0)), Support("upper", "y1", (0.0, -0.03))]
+    return Scene({"upper": Body(upper, RUBBER), "lower": Body(lower, RUBBER)}, supports, contacts=[pair])

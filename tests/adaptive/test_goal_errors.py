@@ -1,0 +1,218 @@
+"""Errors of quantities by their adjoints, beside the true ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import (
+    Body,
+    ContactPair,
+    Coulomb,
+    LinearState,
+    Scene,
+    Status,
+    Support,
+    Surface,
+    solve_scene,
+)
+from fenics_contact._adaptive import goal_errors
+from fenics_contact._adaptive.goal_errors import GoalError, goal_error
+from fenics_contact.design import (
+    ContactArea,
+    LargestPressure,
+    LargestStress,
+    Movement,
+    Objective,
+    PressureNorm,
+    StrainEnergy,
+    TotalPotential,
+)
+from fenics_contact.design.adjoint import NOT_HELD
+from fenics_contact.errors import ConvergenceError, InvalidInputError
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import NeoHooke
+from tests.adaptive.goals import FLOOR, curved, on_floor, on_waves, punched, resultant, solved
+
+SCENES: dict[str, Callable[[int], Scene]] = {"waves": on_waves, "floor": on_floor, "punch": punched}
+#: Cells of their meshes, each half as wide as those before: errors are estimated on the first two.
+SIZES = {"waves": (4, 8, 16, 32), "floor": (4, 8, 16, 32), "punch": (1, 2, 4, 8)}
+
+
+@cache
+def state(scene: str, cells: int) -> LinearState:
+    return solved(SCENES[scene](cells))
+
+
+@cache
+def error(scene: str, cells: int, objective: Objective) -> GoalError:
+    return goal_error(state(scene, cells), objective)
+
+
+def effectivities(scene: str, objective: Objective) -> np.ndarray:
+    """Estimate by true error; the exact value follows from the last three, whose differences decrease."""
+    found = [error(scene, cells, objective) for cells in SIZES[scene]]
+    values = np.array([each.value for each in found])
+    before, last = np.diff(values)[-2:]
+    assert 0.1 < last / before < 0.5, "the values converge"
+    exact = values[-1] + last**2 / (before - last)
+    return np.array([each.total for each in found[:2]]) / (exact - values[:2])
+
+
+GOALS: list[tuple[str, Objective]] = [
+    ("waves", TotalPotential()),
+    ("waves", resultant(0.0, 1.0)),
+    ("waves", PressureNorm(p=4.0)),
+    ("waves", ContactArea()),
+    ("waves", LargestStress("block")),
+    ("waves", LargestPressure()),
+    ("floor", StrainEnergy()),
+    ("floor", Movement("block", "y1", (1.0, 0.0))),
+    ("floor", resultant(1.0, 0.0)),
+    ("punch", StrainEnergy()),
+    ("punch", resultant(0.0, 1.0)),
+]
+
+
+@pytest.mark.parametrize(
+    ("scene", "objective"), GOALS, ids=lambda x: x if isinstance(x, str) else type(x).__name__
+)
+def test_estimates_are_within_a_factor_of_two_of_the_errors(scene: str, objective: Objective) -> None:
+    found = effectivities(scene, objective)
+    assert np.all(found > 0.5), found
+    assert np.all(found < 2.0), found
+
+
+def test_cells_have_their_shares_in_what_the_parts_would_be_without_cancellation() -> None:
+    found = error("floor", 4, StrainEnergy())
+    shares = found.by_cell("block")
+    assert shares.shape == (32,)
+    assert np.all(shares > 0.0)
+    assert found.uncancelled == pytest.approx(shares.sum(), rel=1e-9), "a flat floor adds nothing"
+    assert abs(found.mesh) < found.uncancelled
+    with pytest.raises(InvalidInputError, match=r"body must be one of \['block'\], got 'floor'"):
+        found.by_cell("floor")
+
+
+def test_a_sum_of_quantities_has_the_sum_of_their_errors() -> None:
+    energy, way = StrainEnergy(), Movement("block", "y1", (1.0, 0.0))
+    both = error("floor", 4, 2.0 * energy - 3.0 * way)
+    for name in ("value", "mesh", "solver", "friction"):
+        parts = [getattr(error("floor", 4, each), name) for each in (energy, way)]
+        assert getattr(both, name) == pytest.approx(2.0 * parts[0] - 3.0 * parts[1], rel=1e-3, abs=1e-9)
+
+
+def test_an_error_is_printed_part_by_part() -> None:
+    lines = str(error("floor", 4, StrainEnergy())).splitlines()
+    assert [line.split()[0] for line in lines] == ["value", "mesh", "geometry", "solver", "friction", "total"]
+    assert lines[1].endswith("%)")
+
+
+@pytest.mark.parametrize("objective", [StrainEnergy(), resultant(1.0, 0.0)], ids=["energy", "friction"])
+def test_errors_of_the_solver_are_found(objective: Objective) -> None:
+    """Its residuals, and slip bounds that are those of other normal forces."""
+    loose = solved(on_floor(8), tolerance=3e-3)
+    assert loose.contact.count(Status.SLIP) > 0
+    found = goal_error(loose, objective)
+    missed = error("floor", 8, objective).value - found.value
+    assert abs(missed) > 1e-7 * abs(found.value)
+    assert found.solver + found.friction == pytest.approx(missed, rel=0.2)
+
+
+def test_slip_bounds_of_other_normal_forces_count_as_an_error_of_friction() -> None:
+    tight, share = state("floor", 8), 1e-3
+    rows = tight.rows
+    other = replace(rows, slip_bound=(1.0 - share) * rows.slip_bound)
+    # The bounds of the law are those of the forces; the state is given smaller ones.
+    wrong = replace(tight)
+    wrong.__dict__["rows"] = other
+    found = goal_error(wrong, resultant(1.0, 0.0))
+    less = solved(replace(on_floor(8), contacts=[replace(tight.scene.contacts[0], friction=Coulomb(0.2997))]))
+    change = error("floor", 8, resultant(1.0, 0.0)).value - goal_error(less, resultant(1.0, 0.0)).value
+    assert abs(change) > 1e-5
+    assert found.friction == pytest.approx(change, rel=0.1)
+
+
+def test_gaps_of_facets_count_as_an_error_of_the_geometry() -> None:
+    def scene(geometry: str) -> Scene:
+        made = curved()
+        return replace(made, contacts=[replace(made.contacts[0], geometry=geometry)])
+
+    faceted, true = (solved(scene(kind)) for kind in ("faceted", "best"))
+    force = resultant(0.0, 1.0)
+    found = goal_error(faceted, force)
+    change = goal_error(true, force).value - found.value
+    assert abs(change) > 1e-3 * abs(found.value)
+    assert found.geometry == pytest.approx(change, rel=0.3)
+    assert goal_error(true, force).geometry == pytest.approx(0.0, abs=0.1 * abs(change))
+
+
+def test_what_equilibrium_alone_determines_has_no_error() -> None:
+    found = error("floor", 4, resultant(0.0, 1.0))
+    assert found.value == pytest.approx(50.0 * 1.2)
+    assert abs(found.mesh) < 1e-9 * found.value
+
+
+def test_a_quantity_that_no_load_reaches_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match=r"one that the loads reach, but Movement\(body='block'"):
+        goal_error(state("floor", 4), Movement("block", "x0", (1.0, 0.0)))
+
+
+def test_without_an_adjoint_cells_have_their_shares_of_the_energy_norm(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def failing(*_: object, **__: object) -> None:
+        raise ConvergenceError(NOT_HELD)
+
+    monkeypatch.setattr(goal_errors, "adjoint_of", failing)
+    found = goal_error(state("floor", 4), StrainEnergy())
+    norm = state("floor", 4).estimate_errors(geometry=False)
+    assert np.isnan(found.total)
+    assert "needs a contact face that holds every body" in str(found)
+    np.testing.assert_allclose(found.by_cell("block"), norm.norm * norm.by_cell("block"))
+
+    def stuck(*_: object, **__: object) -> None:
+        raise ConvergenceError("the adjoint needs more iterations")
+
+    monkeypatch.setattr(goal_errors, "adjoint_of", stuck)
+    with pytest.raises(ConvergenceError, match="more iterations"):
+        goal_error(state("floor", 4), StrainEnergy())
+
+
+def test_large_deformations_are_refused() -> None:
+    mesh = rectangle((0.0, 0.0), (1.0, 1.0), (2, 2))
+    soft = Body(mesh, NeoHooke(1.0, 0.3))
+    top = Support("block", "y1", (0.0, -0.01))
+    scene = Scene({"block": soft}, [top], contacts=[ContactPair(Surface("block", "y0"), FLOOR)])
+    with pytest.raises(InvalidInputError, match="errors of quantities need small strains"):
+        goal_error(solve_scene(scene, MPI.COMM_SELF), StrainEnergy())
+
+
+ON_RANKS = """
+    import sys
+    from mpi4py import MPI
+    from fenics_contact import solve_scene
+    from fenics_contact._adaptive.goal_errors import goal_error
+    from fenics_contact.design import LargestPressure
+    from fenics_contact.mesh import bisection_partition
+    from tests.adaptive.goals import punched
+
+    scene = punched(1)
+    cuts = {name: bisection_partition(body.mesh, 2) for name, body in scene.bodies.items()}
+    state = solve_scene(scene, MPI.COMM_WORLD, partitions=cuts, tolerance=1e-10)
+    found = goal_error(state, LargestPressure(), tolerance=1e-8)
+    parts = [found.value, found.mesh, found.uncancelled, *found.by_cell("lower")]
+    if MPI.COMM_WORLD.rank == 0:
+        sys.stdout.write(" ".join(f"{part:.12e}" for part in parts))
+"""
+
+
+def test_one_and_two_ranks_estimate_alike(mpirun: Callable[..., str]) -> None:
+    one, two = (np.array(mpirun(ON_RANKS, ranks).split(), dtype=float) for ranks in (1, 2))
+    assert one[1] != 0.0
+    np.testing.assert_allclose(two, one, rtol=1e-5, atol=1e-9 * one[2])
