@@ -14,10 +14,10 @@ from fenics_contact._base.libraries import MPI, check_not_forked
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.followed_loads import FollowedLoads
+from fenics_contact._equilibrium.starts import CoarseStart, checked_start, first_guess, known_system
 from fenics_contact._equilibrium.static_admissibility import check_held
 from fenics_contact._equilibrium.stored import Stored, restored_solution, with_stored_slip
 from fenics_contact._equilibrium.warnings import ContactWarnings
-from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.plan import SolverKind, choose_solver
 from fenics_contact._scene.scene import LoadStep, Scene
@@ -43,55 +43,8 @@ if TYPE_CHECKING:
     from fenics_contact._equilibrium.balancing import Solve
     from fenics_contact._equilibrium.deformed import DeformedEquilibria
     from fenics_contact._large_deformations.load_steps import AutomaticSteps
+    from fenics_contact.mesh.refinement import Refinement
     from fenics_contact.results.deformed_state import AnyState
-
-
-def carried_over(old: DualSystem, solution: DualSolution, new: DualSystem) -> np.ndarray:
-    """Return a start for ``new``, owned: unchanged gluing forces, contact forces in the new frames.
-
-    Contact points are identified by pair and slave node; a new point starts open. Collective.
-    """
-    before, after = old.torn, new.torn
-    start = np.zeros(len(after.numbering.owned))
-    # Ties of a moved scene may have other points; gluing rows are unchanged.
-    same = before.n_equality == after.n_equality
-    gluing_old = before.numbering.owned < (before.n_equality if same else before.n_gluing)
-    gluing_new = after.numbering.owned < (after.n_equality if same else after.n_gluing)
-    start[gluing_new] = solution.multiplier[gluing_old]
-    normal = before.numbering.gather(solution.multiplier, before.normal_rows)
-    tau = before.numbering.gather(solution.multiplier, before.tangential_rows.ravel()).reshape(
-        -1, before.components - 1
-    )
-    match = _matches(before.points, after.points)
-    matched = match >= 0
-    values = np.zeros(after.points.count)
-    values[matched] = normal[match[matched]]
-    _put(new, start, after.normal_rows, values)
-    if len(after.frictional):
-        friction = np.zeros((before.points.count, before.components))
-        friction[before.frictional] = np.einsum("na,nad->nd", tau, before.points.tangents[before.frictional])
-        in_space = np.where(matched[:, None], friction[match], 0.0)[after.frictional]
-        turned = np.einsum("nad,nd->na", after.points.tangents[after.frictional], in_space)
-        if after.decomposition.axes is not None:  # tangents that supports hold are known up to rounding
-            turned[after.relations[2].held(after.decomposition.fixed).reshape(turned.shape)] = 0.0
-        _put(new, start, after.tangential_rows.ravel(), turned.ravel())
-    return start
-
-
-def _matches(before: ContactPoints, after: ContactPoints) -> np.ndarray:
-    """Return for each new point the old one of the same pair and slave node, −1 where there is none."""
-    if before.count == 0:
-        return np.full(after.count, -1)
-    width = int(max(before.slave.max(), after.slave.max(initial=0))) + 1
-    old, new = before.pair * width + before.slave, after.pair * width + after.slave
-    order = np.argsort(old)
-    index = np.minimum(np.searchsorted(old[order], new), before.count - 1)
-    return np.where(old[order[index]] == new, order[index], -1)
-
-
-def _put(system: DualSystem, vector: np.ndarray, rows: np.ndarray, values: np.ndarray) -> None:
-    position = system.torn.numbering.owned_index(rows)
-    vector[position[position >= 0]] = values[position >= 0]
 
 
 #: Largest relative residual of a scene without contact; its solution then equals that of a direct solver.
@@ -111,7 +64,7 @@ class LinearEquilibria:
         kind: SolverKind,
         tolerance: Tolerance,
         *,
-        start: State | None,
+        start: State | CoarseStart | None,
         before: State | None,
         known: State | None,
         design: bool,
@@ -119,7 +72,7 @@ class LinearEquilibria:
         """Compute the equilibrium of a scene. Collective.
 
         Args:
-            start: State whose multipliers come first, or None.
+            start: State whose multipliers come first, also one on coarser meshes, or None.
             before: State from which slip is measured, or None.
             known: State of which parts may be reused, or None.
 
@@ -153,9 +106,10 @@ class LinearEquilibria:
                     "whose whole motion is prescribed, and preloads by a shortening: prescribe the motion, "
                     "or load the wetted surfaces by Pressure"
                 )
-            return self._by_passes(torn, tolerance, solver, known or start, before)
+            return self._by_passes(torn, tolerance, solver, start, known, before)
         system = DualSystem(torn, self._timer, previous=reused)
-        first = _start_from(start, system)
+        with self._timer.phase("solve"):
+            first = first_guess(start, system)
         solve = solve_dual if reused is None else FollowedLoads(reused, self._timer).solve
         if not isinstance(tolerance, float):
             return self._balanced(system, solve, solver, tolerance, first)
@@ -168,6 +122,7 @@ class LinearEquilibria:
         torn: TornSystem,
         tolerance: Tolerance,
         solver: DualSolver,
+        start: State | CoarseStart | None,
         known: State | None,
         before: State | None,
     ) -> LinearState:
@@ -182,7 +137,8 @@ class LinearEquilibria:
             reused = known_system(last)
             system = DualSystem(system_of, self._timer, previous=reused)
             with self._timer.phase("solve"):
-                solution = solve_dual(system, solver.with_tolerance(finer), _start_from(last, system))
+                first = first_guess(last or start, system)
+                solution = solve_dual(system, solver.with_tolerance(finer), first)
             return self._state(system, solution, tolerance=wanted)
 
         def wetted(system_of: TornSystem, last: LinearState | None) -> LinearState:
@@ -270,20 +226,6 @@ class LinearEquilibria:
         rounds = solve_balanced(system, solve, solver, wanted, start, self._timer)
         state = self._state(system, rounds.solution, rounds.displacement, tolerance=wanted)
         return replace(state, known_errors=rounds.state_errors(state.energies.norm))
-
-
-def _start_from(state: State | None, system: DualSystem) -> np.ndarray | None:
-    """Return the multipliers of an earlier state on the rows of a system, None without any. Collective."""
-    old = known_system(state)
-    if state is None or old is None or not isinstance(state.solution, DualSolution):
-        return None
-    return carried_over(old, state.solution, system)
-
-
-def known_system(state: State | None) -> DualSystem | None:
-    """Return the dual system of a state, whose unchanged parts the next one reuses."""
-    system = state.system if isinstance(state, LinearState) else None
-    return system if isinstance(system, DualSystem) else None
 
 
 def default_solver(kind: SolverKind) -> DualSolver:
@@ -455,6 +397,7 @@ class ContactProblem:
         tolerance: Tolerance = None,
         design: bool = False,
         step: LoadStep | None = None,
+        refinements: Mapping[str, Refinement] | None = None,
     ) -> AnyState:
         """Compute an equilibrium. Collective.
 
@@ -469,12 +412,23 @@ class ContactProblem:
                 derivatives are wanted, which need the dual system and a number for default tolerance.
             step: The load step: its time, for obstacles that move and materials that creep, by default 1,
                 and its functions of time, of which a load that is followed in parts has the values between.
+            refinements: Body name -> refinement of the mesh that ``start`` has of it, where the scene has a
+                finer one: nested iteration, in which solutions take few products, as many on fine meshes as
+                on coarse ones. The partition and the number of ranks may be others.
 
         Raises:
-            InvalidInputError: If scene or partition cannot be used, or supports hold other components than
-                those of the scene that was solved first.
+            InvalidInputError: If scene or partition cannot be used, supports hold other components than
+                those of the scene that was solved first, or ``start`` is not on the meshes of the scene,
+                nor on those that the refinements lead from.
             InfeasibleError: If nothing holds some body against its load.
             ConvergenceError: If the solver does not reach its tolerance; the last solution stays unchanged.
+
+        Example:
+            >>> finer = refined(scene.bodies["block"].mesh, marked)  # doctest: +SKIP
+            >>> fine_body = replace(scene.bodies["block"], mesh=finer.mesh)  # doctest: +SKIP
+            >>> fine_scene = replace(scene, bodies={**scene.bodies, "block": fine_body})  # doctest: +SKIP
+            >>> problem = ContactProblem(fine_scene, comm)  # doctest: +SKIP
+            >>> fine = problem.solve(start=coarse, refinements={"block": finer})  # doctest: +SKIP
         """
         check_not_forked()
         scene = self.scene if scene is None else scene
@@ -495,9 +449,11 @@ class ContactProblem:
             else:
                 check_same_input(self.comm, scene, solver=self.solver, tolerance=wanted)
                 first = (self.state if start == "last" else start) or before
-                known = self._alike(scene, first)
+                with together(self.comm):
+                    guess = checked_start(scene, first, refinements)
+                known = self._alike(scene, first if guess is first else None)
                 state = self._linear(scene).solve(
-                    scene, kind, wanted, start=first, before=before, known=known, design=design
+                    scene, kind, wanted, start=guess, before=before, known=known, design=design
                 )
         self.state = state
         with self.timer.phase("state"):

@@ -423,10 +423,12 @@ class DualSystem:
 
     def reach(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """Return abs(B) abs(u), the size of the displacements at each row, owned, [length]. Collective."""
-        numbering = self.torn.numbering
-        force = self._Bt_interface @ numbering.to_local(multiplier)
-        moved = self._bent - self.inverse.flex(force) + self.kernel[self.inverse.interface] @ alpha
-        return numbering.to_owned(abs(self._B_interface) @ np.abs(moved))
+        moved = self.bent(multiplier) + self.kernel[self.inverse.interface] @ alpha
+        return self.torn.numbering.to_owned(abs(self._B_interface) @ np.abs(moved))
+
+    def bent(self, multiplier: np.ndarray) -> np.ndarray:
+        """Return K⁺(f − Bᵀλ) on the interface, (n_interface,), [length]; one product. Collective."""
+        return self._bent - self.inverse.flex(self._Bt_interface @ self.torn.numbering.to_local(multiplier))
 
     def force(self, multiplier: np.ndarray) -> np.ndarray:
         """Return Bᵀλ on this rank's torn dofs, [force]. Collective."""

@@ -249,6 +249,7 @@ class Safeguards:
         reduction: Factor on that ρ.
         longest_cycle: The longest cycle of active sets that is recognised.
         moves_held: Whether floating bodies are equilibrated also where the face holds them all.
+        balanced: Imbalance up to which an iterate counts as in equilibrium; steps from others are not cut.
     """
 
     shorten: Callable[[DualProblem, Iterate, Iterate, Residuals | None], Damped[Iterate]] = shorten
@@ -256,6 +257,7 @@ class Safeguards:
     moves_held: bool = True
     reduction: float = 0.3
     longest_cycle: int = 6
+    balanced: float = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -377,7 +379,11 @@ class FaceSteps:
         alpha = self._motions(solved, before, step)
         after = iterate_at(self.problem, self._relieved(solved, alpha, step), solved.product, alpha)
         mismatch = abs(after.residuals.size - solved.inner.measure) / (before.residuals.size or 1.0)
-        taken = self.safeguards.shorten(self.problem, before, after, state.before)
+        # Loads may not balance a start, whose residuals are then no measure: no part leads into equilibrium.
+        whole = before.residuals.coarse > self.safeguards.balanced
+        taken = Damped(after, 1.0)
+        if not whole:
+            taken = self.safeguards.shorten(self.problem, before, after, state.before)
         faces = (face, *state.faces[: self.safeguards.longest_cycle])
         following = FaceState(taken.point, step, faces, mismatch, before.residuals)
         return following, self._record(number, taken, solved, changed)

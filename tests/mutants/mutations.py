@@ -193,6 +193,13 @@ MUTATIONS = (
         ("tests/contact/test_resultants.py::test_supports_that_share_nodes_share_their_reaction",),
     ),
     Mutation(
+        "starts from coarser meshes glue against all contact forces",
+        "_equilibrium/starts.py",
+        "np.where(glued, 0.0, balanced - start)",
+        "np.where(glued, 0.0, balanced)",
+        ("tests/contact/test_nested_start.py::test_on_the_same_meshes_the_start_is_the_answer[tie beside]",),
+    ),
+    Mutation(
         "load steps forget the slip before",
         "_equilibrium/problem.py",
         "if before is not None:",

@@ -1,0 +1,232 @@
+"""First guesses of multipliers: from the state of a neighbouring load or geometry, or of coarser meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._pairing.points import ContactPoints
+from fenics_contact._scene.scene import Scene
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.dual import DualSystem
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.cell_types import CELL_TYPES, shape_values
+from fenics_contact.mesh.refinement import Refinement
+from fenics_contact.qp.solution import DualSolution
+from fenics_contact.results.linear_state import LinearState
+from fenics_contact.results.state import State
+
+
+def known_system(state: State | None) -> DualSystem | None:
+    """Return the dual system of a state, whose unchanged parts the next one reuses."""
+    system = state.system if isinstance(state, LinearState) else None
+    return system if isinstance(system, DualSystem) else None
+
+
+def checked_start(
+    scene: Scene, start: State | None, refinements: Mapping[str, Refinement] | None
+) -> State | CoarseStart | None:
+    """Return what multipliers are guessed from: a state on the meshes of a scene, or on coarser ones."""
+    if start is None:
+        if refinements is not None:
+            raise InvalidInputError(
+                "refinements need the state on the meshes that were refined, got none: give it by start="
+            )
+        return None
+    if refinements is not None:
+        coarse = CoarseStart(start, refinements)
+        coarse.check(scene)
+        return coarse
+    cells = [[body.mesh.cells.shape for body in each.bodies.values()] for each in (start.scene, scene)]
+    if cells[0] != cells[1]:
+        raise InvalidInputError(
+            f"start must be a state on the meshes of the scene, of {cells[1]} cells and nodes, got "
+            f"{cells[0]}: where they are refined give refinements=, else start=None"
+        )
+    return start
+
+
+def first_guess(start: State | CoarseStart | None, system: DualSystem) -> np.ndarray | None:
+    """Return the multipliers of an earlier state on the rows of a system, None without any. Collective."""
+    if isinstance(start, CoarseStart):
+        return start.multiplier(system)
+    old = known_system(start)
+    if start is None or old is None or not isinstance(start.solution, DualSolution):
+        return None
+    return carried_over(old, start.solution, system)
+
+
+def carried_over(old: DualSystem, solution: DualSolution, new: DualSystem) -> np.ndarray:
+    """Return a start for ``new``, owned: unchanged gluing forces, contact forces in the new frames.
+
+    Contact points are identified by pair and slave node; a new point starts open. Collective.
+    """
+    before, after = old.torn, new.torn
+    start = np.zeros(len(after.numbering.owned))
+    # Ties of a moved scene may have other points; gluing rows are unchanged.
+    same = before.n_equality == after.n_equality
+    gluing_old = before.numbering.owned < (before.n_equality if same else before.n_gluing)
+    gluing_new = after.numbering.owned < (after.n_equality if same else after.n_gluing)
+    start[gluing_new] = solution.multiplier[gluing_old]
+    normal = before.numbering.gather(solution.multiplier, before.normal_rows)
+    tau = before.numbering.gather(solution.multiplier, before.tangential_rows.ravel()).reshape(
+        -1, before.components - 1
+    )
+    match = _matches(before.points, after.points)
+    matched = match >= 0
+    values = np.zeros(after.points.count)
+    values[matched] = normal[match[matched]]
+    friction = np.zeros((before.points.count, before.components))
+    if len(before.frictional):
+        friction[before.frictional] = np.einsum("na,nad->nd", tau, before.points.tangents[before.frictional])
+    in_space = np.where(matched[:, None], friction[match], 0.0) if before.points.count else friction
+    _put_contact(after, start, values, in_space)
+    return start
+
+
+def _matches(before: ContactPoints, after: ContactPoints) -> np.ndarray:
+    """Return for each new point the old one of the same pair and slave node, −1 where there is none."""
+    if before.count == 0:
+        return np.full(after.count, -1)
+    width = int(max(before.slave.max(), after.slave.max(initial=0))) + 1
+    old, new = before.pair * width + before.slave, after.pair * width + after.slave
+    order = np.argsort(old)
+    index = np.minimum(np.searchsorted(old[order], new), before.count - 1)
+    return np.where(old[order[index]] == new, order[index], -1)
+
+
+def _put_contact(torn: TornSystem, vector: np.ndarray, normal: np.ndarray, friction: np.ndarray) -> None:
+    """Write contact forces into an owned vector.
+
+    `normal`: λ_N of every contact point, shape (n,); `friction`: τ as vectors in space, shape (n, dim).
+    """
+    _put(torn, vector, torn.normal_rows, normal)
+    if len(torn.frictional):
+        turned = np.einsum("nad,nd->na", torn.points.tangents[torn.frictional], friction[torn.frictional])
+        if torn.decomposition.axes is not None:  # tangents that supports hold are known up to rounding
+            turned[torn.relations[2].held(torn.decomposition.fixed).reshape(turned.shape)] = 0.0
+        _put(torn, vector, torn.tangential_rows.ravel(), turned.ravel())
+
+
+def _put(torn: TornSystem, vector: np.ndarray, rows: np.ndarray, values: np.ndarray) -> None:
+    position = torn.numbering.owned_index(rows)
+    vector[position[position >= 0]] = values[position >= 0]
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseStart:
+    """A state as start on meshes that were refined from its own, by nested iteration.
+
+    Displacements u and tractions of contact are interpolated. The gluing forces follow from those, by the
+    factor L = D⁻¹ B_Eᵀ (B_E D⁻¹ B_Eᵀ)⁻¹ of the preconditioner:
+
+        λ_E = Lᵀ (f̂ − S u − B_Cᵀ λ_C),
+
+    with the loads f̂ condensed on the interface and the Schur complements S. If u is the solution, so is λ_E;
+    else the error of λ is of the size of that of u, both in energy, whatever the number of subdomains.
+
+    Attributes:
+        state: The state on the coarse meshes.
+        refinements: Body name -> refinement of its mesh; bodies that are not named have kept theirs.
+
+    References:
+        R. E. Bank, T. Dupont: An optimal order process for solving finite element equations. Mathematics of
+        Computation 36 (1981) 35-51 (the start from the coarser mesh).
+    """
+
+    state: State
+    refinements: Mapping[str, Refinement]
+
+    def check(self, scene: Scene) -> None:
+        """Reject a start that does not fit the meshes of a scene."""
+        coarse = self.state.scene
+        fits = list(scene.bodies) == list(coarse.bodies) and set(self.refinements) <= set(scene.bodies)
+        for name, body in scene.bodies.items() if fits else ():
+            fits = fits and _leads_to(coarse.bodies[name].mesh, self.refinements.get(name), body.mesh)
+        if not fits:
+            raise InvalidInputError(
+                "refinements must lead from the meshes of start to those of the scene, got others, of "
+                f"{sorted(self.refinements)}: give those with which the scene was made, and the state on the "
+                "meshes before"
+            )
+
+    def multiplier(self, system: DualSystem) -> np.ndarray:
+        """Return the first guess on the rows of a system, owned; about one product. Collective."""
+        torn, problem = system.torn, system.problem
+        moved = self._displacement(torn)
+        start = np.zeros(len(torn.numbering.owned))
+        _put_contact(torn, start, *self._contact_forces(torn))
+        glued = torn.numbering.owned < torn.n_equality
+        if torn.give is not None:
+            soft = torn.give > 0.0
+            glued &= ~soft
+            start[soft] = -torn.closed(torn.right - torn.jump(moved))[soft] / torn.give[soft]
+        # In equilibrium, K⁺ yields a displacement whose forces S u are those of loads and multipliers.
+        left = problem.coarse.load - problem.coarse.apply(start)
+        balanced = start + problem.coarse.with_load(left).particular()
+        _, force = system.inverse.energy(system.bent(balanced) - moved[system.inverse.interface])
+        force += torn.force(np.where(glued, 0.0, balanced - start))[system.inverse.interface]
+        ties = np.flatnonzero(glued & (torn.numbering.owned >= torn.n_gluing))
+        entries = np.ones(len(ties)), (ties, np.arange(len(ties)))
+        lifting = system.preconditioner.lifting(sp.csr_matrix(entries, shape=(len(start), len(ties))))
+        return np.where(glued, balanced + lifting.multiplier(force), start)
+
+    def _displacement(self, torn: TornSystem) -> np.ndarray:
+        """Return the interpolated displacement on this rank's torn dofs. Collective."""
+        decomposition = torn.decomposition
+        scene = torn.scene
+        nodal = np.concatenate(
+            [self._to_fine(scene, name, self.state.gather_displacement(name)) for name in scene.body_names]
+        )
+        here, block = decomposition.held
+        result = np.zeros((decomposition.torn_size // torn.components, torn.components))
+        result[block] = nodal[decomposition.tearing.copy_node[here]]
+        return result.ravel()
+
+    def _contact_forces(self, torn: TornSystem) -> tuple[np.ndarray, np.ndarray]:
+        """Return normal forces, (n,), and friction in space, (n, dim), of interpolated tractions."""
+        points, contact, coarse = torn.points, self.state.contact, self.state.torn
+        pressing = contact.normal_force[:, None]
+        friction = pressing * contact.points.normal - contact.force
+        traction = np.hstack([pressing, friction]) / contact.area[:, None]
+        forces = np.zeros((points.count, 1 + torn.components))
+        for number, pair in enumerate(torn.scene.contacts):
+            mine, body = np.flatnonzero(points.pair == number), pair.slave.body
+            first, before = (each.decomposition.tearing.first_of(body) for each in (torn, coarse))
+            nodes, values = contact.points.of_surface(number, traction)
+            nodal = np.zeros((self.state.scene.bodies[body].mesh.n_nodes, traction.shape[1]))
+            nodal[nodes - before] = values
+            forces[mine] = self._to_fine(torn.scene, body, nodal)[points.slave[mine] - first]
+        forces *= points.area[:, None]
+        return np.maximum(forces[:, 0], 0.0), forces[:, 1:]
+
+    def _to_fine(self, scene: Scene, name: str, nodal: np.ndarray) -> np.ndarray:
+        """Return values at the nodes of a fine mesh for those at the nodes of the coarse one."""
+        if name not in self.refinements:
+            return nodal
+        refinement, coarse = self.refinements[name], self.state.scene.bodies[name].mesh
+        return interpolated(coarse, refinement, scene.bodies[name].mesh, nodal)
+
+
+def _leads_to(coarse: BodyMesh, refinement: Refinement | None, fine: BodyMesh) -> bool:
+    """Return whether a refinement may lead from one mesh to another; None: they are the same."""
+    if refinement is None:
+        return fine is coarse
+    covered = int(refinement.parents.max(initial=-1)) + 1
+    return fine.cells.shape == refinement.positions.shape[:2] and covered == coarse.n_cells
+
+
+def interpolated(coarse: BodyMesh, refinement: Refinement, fine: BodyMesh, nodal: np.ndarray) -> np.ndarray:
+    """Return values at the nodes of a fine mesh for those at the nodes of the coarse one, (n_nodes, ...).
+
+    The meshes are those of scenes, where sections may have cut what was refined as a whole: cells have the
+    same numbers, nodes have not.
+    """
+    _, first = np.unique(fine.cells, return_index=True)
+    cell, place = np.divmod(first, fine.cells.shape[1])
+    weights = shape_values(CELL_TYPES[coarse.cell_type], refinement.positions[cell, place])
+    return np.asarray(np.einsum("nv,nv...->n...", weights, nodal[coarse.cells[refinement.parents[cell]]]))
