@@ -74,8 +74,8 @@ class GoalError:
             where these are used, or all is flat. The rest of the boundary is not included.
         solver: By the residuals of the solver, with friction at its own slip bounds, to first order.
         friction: By slip bounds of the solver that are not those of its normal forces, to first order.
-        without_adjoint: Why there is no adjoint, in words; empty where there is one. All parts are then NaN,
-            and the shares of cells those of the energy norm.
+        without_adjoint: Why there is no adjoint, in words; empty where there is one. All parts are NaN
+            without one, and the shares of cells those of the energy norm.
     """
 
     value: float
@@ -150,7 +150,7 @@ def goal_error(
 
     Args:
         state: The equilibrium, of small strains and linear materials.
-        objective: The quantity.
+        objective: The quantity; one that has no adjoint gives the reason as its ``without_adjoint``.
         choice: Branch of weakly active points.
         tolerance: Relative residual of the adjoint.
 
@@ -171,6 +171,8 @@ def goal_error(
         forms = ShapeForms(comm, np.zeros(state.torn.decomposition.tearing.n_nodes, dtype=bool))
         with asking(comm):
             value = finite_value(objective.value(state, forms))
+            if why := getattr(objective, "without_adjoint", ""):
+                return _without_adjoint(linear, value, why)
             smooth = smoothed(objective, state, forms)
             partials = finite_partials(smooth.partials(state, forms))
         linearised = linearise_face(state, choice)

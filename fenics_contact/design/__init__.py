@@ -11,6 +11,7 @@ from fenics_contact.design.adjoint import Adjoint, WeakChoice
 from fenics_contact.design.design import MovedSurface
 from fenics_contact.design.memory import AdaptiveTolerance, DesignPoint
 from fenics_contact.design.motion import VolumeIntegral
+from fenics_contact.design.near import MovementNear, StressNear
 from fenics_contact.design.objective import Maximum, Objective, Partials, Weighable
 from fenics_contact.design.objectives import (
     ContactArea,
@@ -45,6 +46,7 @@ __all__ = [
     "Maximum",
     "MovedSurface",
     "Movement",
+    "MovementNear",
     "NonlinearConstraint",
     "NotConvergedError",
     "Objective",
@@ -55,6 +57,7 @@ __all__ = [
     "Remeshed",
     "Result",
     "StrainEnergy",
+    "StressNear",
     "TotalPotential",
     "VolumeIntegral",
     "WeakChoice",

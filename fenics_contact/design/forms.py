@@ -42,12 +42,14 @@ class Density:
     Attributes:
         integrand: Takes displacement, coordinates, stress and the constants (UFL), returns a UFL scalar.
         in_space: Whether the stress of plane bodies has the component normal to the plane, too.
+        degree: Degree of its quadrature on linear cells.
     """
 
     name: str
     integrand: Integrand
     constants: int = 0
     in_space: bool = False
+    degree: int = 2
 
 
 class ShapeForms:
@@ -151,7 +153,8 @@ class ShapeForms:
                 with user_code(f"the integrand of {density.name!r}"):
                     return density.integrand(u, x, stress_of(material, moved, constants, change), *own)
 
-            form, constants = integrate(materials, cell_type, write_density, volume_measure(cell_type, 2))
+            measure = volume_measure(cell_type, density.degree)
+            form, constants = integrate(materials, cell_type, write_density, measure)
             if by == "displacement":
                 form = ufl.derivative(form, u, ufl.TestFunction(_dolfinx.displacement_space(cell_type)))
             elif by == "shape":

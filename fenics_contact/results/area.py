@@ -14,6 +14,7 @@ from fenics_contact._scene.pairs import Surface, pair_number
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._surfaces.facets import filled_at_corners, filled_on_axis, nodal_areas
 from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.results.contact import Status
 from fenics_contact.results.state import State
 
 
@@ -41,7 +42,31 @@ def contact_area(state: State, pair: int | str = 0) -> float:
     References:
         Johnson, K. L.: Contact Mechanics. Cambridge University Press (1985), sections 3.2 and 5.1.
     """
-    surface, total = _slave_surface(state, pair), 0.0
+    contact = state.contact
+    return _area(state, _slave_surface(state, pair, contact.pressure * (contact.status > 0), contact.gap))
+
+
+def stick_area(state: State, pair: int | str = 0) -> float:
+    """Return the area in which the surfaces of a pair stick, in the plane the length, [length²] or [length].
+
+    As `contact_area`, with what friction could still transmit in place of the pressure, and slips and gaps in
+    place of gaps: at a distance d inside the rim of a zone that sticks (Ψ − ‖τ‖)/A is K √d, at a distance d
+    outside the slip is 4/3 K d^(3/2) / E* with the same K, in the plane; in space the slip is larger by up to
+    1/(1 − ν). Collective; raises as `contact_area` does.
+
+    References:
+        Johnson, K. L.: Contact Mechanics. Cambridge University Press (1985), section 7.2.
+    """
+    contact = state.contact
+    remaining = contact.slip_bound - np.linalg.norm(contact.friction_force, axis=1)
+    inside = np.maximum(remaining, 0.0) / contact.area * (contact.status == Status.STICK)
+    apart = np.linalg.norm(contact.slip, axis=1) + np.maximum(contact.gap, 0.0)
+    return _area(state, _slave_surface(state, pair, inside, apart))
+
+
+def _area(state: State, surface: _SlaveSurface) -> float:
+    """Return the area within the rim."""
+    total = 0.0
     for corners, weight in _simplices(surface.facets.shape[1]):
         facets = surface.facets[:, corners]
         edges = surface.places[facets[:, 1:]] - surface.places[facets[:, :1]]
@@ -74,7 +99,8 @@ def contact_width(state: State, direction: GivenVector, pair: int | str = 0) -> 
         >>> contact_width(state, (1, 0, 0), "tyre tread")  # doctest: +SKIP
     """
     along = np.array(unit_vector("the direction of a contact width", direction, state.scene.dim))
-    surface = _slave_surface(state, pair)
+    contact = state.contact
+    surface = _slave_surface(state, pair, contact.pressure * (contact.status > 0), contact.gap)
     ends = [surface.places[surface.closed] @ along]
     for corners, _ in _simplices(surface.facets.shape[1]):
         for first, second in combinations(corners, 2):
@@ -142,8 +168,11 @@ class _SlaveSurface:
         return share
 
 
-def _slave_surface(state: State, which: int | str) -> _SlaveSurface:
-    """Return the slave surface of a pair. Collective."""
+def _slave_surface(state: State, which: int | str, inside: np.ndarray, apart: np.ndarray) -> _SlaveSurface:
+    """Return the slave surface of a pair. Collective.
+
+    `inside`: pressure of all contact points that touch, zero at others, shape (n,); `apart`: their gaps.
+    """
     scene, contact = state.scene, state.contact
     pair = pair_number(scene.contacts, which)
     points, slave = contact.points, scene.contacts[pair].slave
@@ -154,8 +183,8 @@ def _slave_surface(state: State, which: int | str) -> _SlaveSurface:
     place = np.searchsorted(nodes, own)
     # Nodes without a contact point are open without a gap: neighbouring contact reaches up to them.
     pressure, spread = np.zeros(len(nodes)), np.zeros(len(nodes))
-    pressure[place] = (contact.pressure * (contact.status > 0))[point]
-    spread[place] = _modulus(state, pair) * np.maximum(contact.gap[point], 0.0)
+    pressure[place] = inside[point]
+    spread[place] = _modulus(state, pair) * np.maximum(apart[point], 0.0)
     whole = np.searchsorted(surface.nodes, scene.bodies[slave.body].mesh.surfaces[slave.name])
     hanging, fill = scene.bodies[slave.body].mesh.hanging, None
     if hanging is not None:

@@ -30,6 +30,7 @@ from fenics_contact.errors import ConvergenceError
 from fenics_contact.gallery import half_cylinder, hemisphere, rectangle
 from fenics_contact.materials import PlaneStrain
 from fenics_contact.qp import DualSolver, FaceNewton, Smalse
+from fenics_contact.results.area import stick_area
 from fenics_contact.study import Parameters
 from fenics_contact.study.scenes.cattaneo_mindlin import FRICTION, build, stick_half_width, theory, tractions
 from fenics_contact.study.study import Outcome
@@ -196,8 +197,10 @@ def test_stick_width_and_traction_converge_to_those_of_cattaneo_and_mindlin(
     assert np.all(table[0] > 0.01), "the coarsest mesh is too good to show convergence"
 
 
-def test_shear_changes_no_pressure_and_pressing_calls_for_no_friction() -> None:
-    pressed, pushed = (state.contact for state in sheared(8).states)
+def test_shear_changes_no_pressure_and_leaves_the_stick_width_of_theory() -> None:
+    states = sheared(8).states
+    pressed, pushed = (state.contact for state in states)
+    assert stick_area(states[-1]) == pytest.approx(2.0 * theory(states[-1]).stick, rel=5e-3)
     largest = pressed.pressure.max()
     tangential = np.abs(pressed.friction_force[:, 0]) / pressed.points.area
     assert np.abs(pushed.friction_force).sum() > 0.5 * FRICTION * pushed.normal_force.sum()
