@@ -41,6 +41,7 @@ from fenics_contact.errors import together
 from fenics_contact.materials.elastic import Material, Transverse
 from fenics_contact.materials.hyperelastic import Hyperelasticity, is_nonlinear
 from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.mesh.quality import cell_volumes
 
 if TYPE_CHECKING:
     from fenics_contact._fem.loads import FollowingPressure
@@ -228,17 +229,20 @@ def _checked_modulus(model: _Model) -> float:
 def cell_stiffness(scene: Scene, forms: FormLibrary) -> dict[str, np.ndarray]:
     """Return a typical nodal stiffness of every cell of every body, [force / length].
 
-    It is a material's stiffness on a unit cell, times the mean cell size of the body: within a body of one
-    material it is the same everywhere, of one of revolution in proportion to the radius.
+    It is a material's stiffness on a unit cell, times the mean cell size of the body, of one with hanging
+    nodes times the size of the cell: within a body of one material and cells of one size it is the same
+    everywhere, of one of revolution in proportion to the radius.
     """
     stiffness = {}
     for name, body in scene.bodies.items():
-        size = (body.mesh.volume / body.mesh.n_cells) ** (1.0 / scene.dim)
+        mesh = body.mesh
+        volume = mesh.volume / mesh.n_cells if mesh.hanging is None else cell_volumes(mesh.points, mesh.cells)
+        size = volume ** (1.0 / scene.dim)
         cell_type = body.cell_type
         moduli = np.array([forms.typical_modulus(material, cell_type) for material in body.materials])
         stiffness[name] = moduli[body.material_of_cells] * size ** (scene.dim - 2)
         if body.axisymmetric:
-            stiffness[name] *= body.mesh.points[body.mesh.cells, 0].mean(axis=1)
+            stiffness[name] *= mesh.points[mesh.cells, 0].mean(axis=1)
     return stiffness
 
 

@@ -36,8 +36,16 @@ from fenics_contact.pictures.canvas import (
     STRESS_MAP,
     Units,
 )
-from fenics_contact.pictures.section import cells_of, field_entries, is_plane, linear, linear_cells
+from fenics_contact.pictures.section import (
+    cells_of,
+    field_entries,
+    is_plane,
+    linear,
+    linear_cells,
+    without_seams,
+)
 from fenics_contact.pictures.states import chosen_scale
+from fenics_contact.results.multi_block import hanging_of
 from fenics_contact.results.revolved import check_turned, turned_around
 from fenics_contact.results.state import State
 
@@ -96,7 +104,8 @@ def body_entry(name: str, grid: pyvista.UnstructuredGrid, arrays: Arrays) -> dic
     into linear ones.
     """
     cells, pieces, dim = linear_cells(name, grid)
-    faces, owner = boundary_faces(cells, 3) if dim == 3 else (cells, np.arange(len(cells)))
+    whole = cells, np.arange(len(cells))
+    faces, owner = boundary_faces(cells, 3, hanging_of(grid)) if dim == 3 else whole
     quads = faces.shape[1] == 4
     triangles = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]]) if quads else faces
     edges, outline = _lines(np.asarray(grid.points), faces)
@@ -129,7 +138,7 @@ def _lines(points: np.ndarray, faces: np.ndarray, sharp: float = 30.0) -> tuple[
         else np.zeros((0, 2), dtype=np.int64)
         for lines in found
     )
-    return first, second
+    return first, without_seams(points, second)
 
 
 def colour_scales() -> dict[str, list[list[float | str]] | list[str] | str]:

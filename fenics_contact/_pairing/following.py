@@ -62,6 +62,11 @@ def on_masters(points: ContactPoints, scene: Scene, body: str, means: bool) -> C
     return replace(points, area=area).part(rest)
 
 
+def means_on_masters(points: ContactPoints, scene: Scene) -> ContactPoints:
+    """Return points that are means over surfaces, in terms of the nodes that do not hang."""
+    return replace(points, master=(points.own - points.jump @ _followed(scene)).tocsr())
+
+
 def _shares(leaving: np.ndarray, there: np.ndarray, count: int) -> sp.csr_matrix:
     """Return the weights by which points take over from those that leave, and keep their own, (n, n).
 

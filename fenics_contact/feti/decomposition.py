@@ -21,6 +21,7 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import Roller, ToolMotion
 from fenics_contact._scene.tools import with_tool_parts
 from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.feti.following import hanging_nodes
 from fenics_contact.feti.inverse import Condensations
 from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.subdomain import SubdomainMesh, cut_out
@@ -108,9 +109,11 @@ def tear(
         # One integer key per node and subdomain: unique keys are the copies, already in their order.
         every = (cells + node_offset[index]) * total + subdomain[:, None]
         unique, where = np.unique(every.ravel(), return_inverse=True)
-        weights = np.repeat(stiffness[name], cells.shape[1])
+        added = np.bincount(where.ravel(), np.repeat(stiffness[name], cells.shape[1]))
         keys.append(unique)
-        sums.append(np.bincount(where.ravel(), weights) / np.bincount(where.ravel()))
+        # Beside cells of another size the number of cells counts as well: a fifth fewer products.
+        even = scene.bodies[name].mesh.hanging is None
+        sums.append(added / (np.bincount(where.ravel()) if even else 2**scene.dim))
     key, stiff = np.concatenate(keys), np.concatenate(sums)
     multiplicity = np.bincount(key // total, minlength=int(node_offset[-1]))
     costs = _costs(key % total, multiplicity[key // total] > 1, total, scene.components)
@@ -200,17 +203,6 @@ def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
     along the axes of `prescribed_along`.
     """
     return prescribed_along(scene, tearing)[0]
-
-
-def hanging_nodes(scene: Scene, numbers: NodeNumbers) -> np.ndarray | None:
-    """Return the numbers of the hanging nodes of all bodies, shape (n,); None without any."""
-    meshes = {name: scene.bodies[name].mesh for name in numbers.body_names}
-    found = [
-        numbers.global_nodes(name, mesh.hanging.nodes)
-        for name, mesh in meshes.items()
-        if mesh.hanging is not None
-    ]
-    return np.concatenate(found) if found else None
 
 
 def prescribed_along(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, LocalAxes | None]:

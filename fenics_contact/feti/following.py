@@ -17,6 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._pairing.points import NodeNumbers
+from fenics_contact._scene.scene import Scene
 from fenics_contact.mesh.body_mesh import BodyMesh
 
 
@@ -62,3 +64,14 @@ class Following:
     def force(self, force: np.ndarray) -> np.ndarray:
         """Return Tᵀ f."""
         return np.asarray(self.means.T @ force)
+
+
+def hanging_nodes(scene: Scene, numbers: NodeNumbers) -> np.ndarray | None:
+    """Return the numbers of the hanging nodes of all bodies, shape (n,); None without any."""
+    meshes = {name: scene.bodies[name].mesh for name in numbers.body_names}
+    found = [
+        numbers.global_nodes(name, mesh.hanging.nodes)
+        for name, mesh in meshes.items()
+        if mesh.hanging is not None
+    ]
+    return np.concatenate(found) if found else None

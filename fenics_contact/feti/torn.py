@@ -116,6 +116,10 @@ def meeting_points(
     if scene.springs:
         with together(comm):
             ends = spring_points(scene, tearing)
+            if scene.has_hanging_nodes:
+                from fenics_contact._pairing.following import means_on_masters
+
+                ends = means_on_masters(ends, scene)
         ties = join_points([ties, ends], scene.components, tearing.n_nodes)
     return points, ties
 
@@ -577,7 +581,9 @@ def _joined(
 
 
 def meeting_at(
-    torn: TornSystem, points: ContactPoints, prescribed: np.ndarray,
+    torn: TornSystem,
+    points: ContactPoints,
+    prescribed: np.ndarray,
     further: Sequence[tuple[Rows, sp.csr_matrix]] = (),
 ) -> TornSystem:
     """Return a system with other contact points, those of bodies that have moved. Collective.

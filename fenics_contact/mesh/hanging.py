@@ -51,12 +51,23 @@ class HangingNodes:
         spread = sp.csr_matrix(chosen, shape=(n_nodes, len(self.nodes)))
         return (sp.diags(stays) + spread @ self.means(n_nodes)).tocsr()
 
+    def filled_in(self, values: np.ndarray, facets: np.ndarray, known: np.ndarray) -> np.ndarray:
+        """Return nodal values, those of hanging nodes of facets that are not known by their masters'.
+
+        `values`: shape (n_nodes, ...); `facets`: node numbers; `known`: numbers of nodes with values.
+        """
+        nodes, result = np.unique(facets), values.copy()
+        fill = self.filled(nodes, np.isin(nodes, known))
+        result[nodes] = (fill @ values[nodes].reshape(len(nodes), -1)).reshape(values[nodes].shape)
+        return result
+
     def filled(self, nodes: np.ndarray, known: np.ndarray) -> sp.csr_matrix:
         """Return what fills in values at hanging nodes among some nodes, shape (n_nodes, n_nodes).
 
-        `nodes`: numbers, ascending, with the masters of those that hang; `known`: marks of those with values.
+        `nodes`: numbers, ascending; `known`: marks of those with values, and of others that stay as they are.
+        So do those with masters that are not among the nodes.
         """
-        mine = np.isin(self.nodes, nodes[~known])
+        mine = np.isin(self.nodes, nodes[~known]) & np.isin(self.masters, nodes).all(axis=1)
         place = np.searchsorted(nodes, self.nodes[mine])
         masters = np.searchsorted(nodes, self.masters[mine])
         row = np.concatenate([np.delete(np.arange(len(nodes)), place), np.repeat(place, masters.shape[1])])

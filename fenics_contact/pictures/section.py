@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
+import scipy.sparse as sp
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.tri import Triangulation
+from scipy.spatial import cKDTree
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cell_types import cell_type_of
@@ -28,6 +30,7 @@ from fenics_contact.pictures.canvas import (
 )
 from fenics_contact.results.contact import ContactResult
 from fenics_contact.results.fields import STRESS_COMPONENTS
+from fenics_contact.results.multi_block import hanging_of
 from fenics_contact.results.state import State
 
 #: Drawn bodies by name.
@@ -97,7 +100,9 @@ def linear(name: str, body: pv.UnstructuredGrid) -> pv.UnstructuredGrid:
 
 def nodal(body: pv.UnstructuredGrid, name: str) -> np.ndarray:
     """Return a field on cells as the mean over the cells around each node, (n_nodes,)."""
-    return np.asarray(body.cell_data_to_point_data()[name])
+    values = np.array(body.cell_data_to_point_data()[name])
+    hanging = hanging_of(body)  # continuous across faces between small and large cells
+    return values if hanging is None else hanging.placed(values)
 
 
 def lengths(body: pv.UnstructuredGrid) -> np.ndarray:
@@ -271,8 +276,36 @@ def refined(points: np.ndarray, cells: np.ndarray, values: np.ndarray) -> tuple[
 
 def draw_outline(axes: Axes, points: np.ndarray, cells: np.ndarray, *, width: float = 1.2) -> None:
     """Draw the boundary of a plane body."""
-    edges, _ = boundary_faces(cells, 2)
+    edges = without_seams(points, boundary_faces(cells, 2)[0])
     axes.add_collection(LineCollection(points[edges], colors=INK, linewidths=width, capstyle="round"))
+
+
+def without_seams(points: np.ndarray, edges: np.ndarray, slight: float = 1e-3) -> np.ndarray:
+    """Return the edges of an outline without those between small and large cells, which lie inside.
+
+    On the edge of a large cell lie the ends of those of small ones.
+
+    `points`: coordinates, (n_points, dim); `edges`: their ends, (n, 2); `slight`: distance from an edge
+    relative to its length up to which a point lies on it.
+    """
+    first, last = points[edges[:, 0]], points[edges[:, 1]]
+    length, used = np.linalg.norm(last - first, axis=1), np.unique(edges)
+    found = cKDTree(points[used]).query_ball_point((first + last) / 2, (0.5 - slight) * length)
+    edge = np.repeat(np.arange(len(edges)), [len(near) for near in found])
+    node = used[np.concatenate([np.zeros(0, dtype=np.int64), *map(np.asarray, found)]).astype(np.int64)]
+    along = (last - first)[edge] / length[edge, None]
+    away = points[node] - first[edge]
+    away = away - np.einsum("nd,nd->n", away, along)[:, None] * along
+    on = np.linalg.norm(away, axis=1) <= slight * length[edge]
+    large = np.unique(edge[on])
+    if not len(large):
+        return edges
+    row = np.concatenate([edge[on], np.repeat(large, 2)])
+    column = np.concatenate([node[on], edges[large].ravel()])
+    there = sp.csr_matrix((np.ones(len(row)), (row, column)), shape=(len(edges), len(points)))
+    ends = np.ones(edges.size), (np.repeat(np.arange(len(edges)), 2), edges.ravel())
+    both = (sp.csr_matrix(ends, shape=there.shape) @ there.T).max(axis=1).toarray().ravel()
+    return edges[both < 2.0]
 
 
 def draw_cell_edges(axes: Axes, points: np.ndarray, cells: np.ndarray, frame: Frame) -> None:
@@ -429,9 +462,14 @@ def cut(bodies: Mapping[str, pv.DataSet], section: Section) -> dict[str, pv.Poly
 def section_layers(bodies: Bodies, section: Section, look: Mapping[str, Any]) -> list[Layer]:
     """Cut all bodies and draw the cut in colours."""
     layers = []
-    for face in cut(bodies, section).values():
+    for name, face in cut(bodies, section).items():
         if face.n_points:
             layers.append(Layer(face, {"lighting": False, **look}))
-            edge = face.extract_feature_edges(boundary_edges=True, feature_edges=False, manifold_edges=False)
+            hangs = hanging_of(bodies[name]) is not None
+            whole = face.clean(tolerance=1e-5) if hangs else face
+            edge = whole.extract_feature_edges(boundary_edges=True, feature_edges=False, manifold_edges=False)
+            if hangs:
+                kept = without_seams(np.asarray(edge.points), edge.lines.reshape(-1, 3)[:, 1:])
+                edge = pv.PolyData(edge.points, lines=np.insert(kept, 0, 2, axis=1).ravel())
             layers += [Layer(edge, {"color": c, "line_width": w, "lighting": False}) for c, w in _OUTLINE]
     return layers

@@ -239,6 +239,9 @@ def _patch(state: State, pair: int, reach: float | None, unrolling: Unrolling | 
     every, given = contact.points.of_surface(pair, contact.pressure)
     shown = np.isin(every, numbers)
     pressure[nodes[np.searchsorted(numbers, every[shown])]] = given[shown]
+    if mesh.hanging is not None:
+        of_points = every - state.torn.decomposition.tearing.first_of(slave.body)
+        pressure = mesh.hanging.filled_in(pressure, mesh.surfaces[slave.name], of_points)
     pressure = np.maximum(filled_at_corners(mesh.surfaces[slave.name], pressure)[node], 0.0)
     slip = contact.slip_in_space[chosen]
     return ContactPatch(

@@ -272,6 +272,7 @@ class GatheredFields:
             `contact_fields` returns, and ``nodal_stress``, ``nodal_principal_stress`` and
             ``nodal_von_mises``, averaged around each node within one material, [force / length²]. Where
             materials meet they are those of the material in which the von Mises stress is largest.
+            At hanging nodes all stresses are the means of their masters', so that fields are continuous.
         cells: Fields on cells: ``von_mises``, (n_cells,), ``stress``, the components xx, yy, zz, xy, yz, xz,
             (n_cells, 6), and ``principal_stress``, the largest first, (n_cells, 3), all means over the cell,
             [force / length²]; ``subdomain``, numbered over all bodies, (n_cells,) int.
@@ -311,9 +312,7 @@ def contact_fields(
             mesh = scene.bodies[body].mesh
             facets = mesh.surfaces[scene.contacts[pair].slave.name]
             if filled and mesh.hanging is not None:
-                on_surface = np.unique(facets)
-                known = np.isin(on_surface, nodes[own])
-                field[on_surface] = mesh.hanging.filled(on_surface, known) @ field[on_surface]
+                field = mesh.hanging.filled_in(field, facets, nodes[own])
             field = filled_at_corners(facets, field) if filled else field
             if filled and scene.axisymmetric and field.ndim == 1:  # slip is zero there
                 field = filled_on_axis(facets, field, scene.bodies[body].on_axis)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, together
+from fenics_contact.mesh.hanging import HangingNodes
 from fenics_contact.results.fields import GatheredFields, in_space
 
 if TYPE_CHECKING:
@@ -61,9 +62,25 @@ def multi_block(
 
 
 def body_grid(mesh: BodyMesh, points: np.ndarray) -> pyvista.UnstructuredGrid:
-    """Return the cells of a body on points in space, (n_nodes, 3), as pyvista's UnstructuredGrid."""
+    """Return the cells of a body on points in space, (n_nodes, 3), as pyvista's UnstructuredGrid.
+
+    If nodes hang, it has their numbers and their masters as fields of its own, ``hanging_nodes``, (n,), and
+    ``hanging_masters``, (n, 2 | 4).
+    """
     pv = _pyvista()
-    return pv.UnstructuredGrid({pv.CellType[_VTK_NAMES[mesh.cell_type]]: mesh.cells}, points)
+    grid = pv.UnstructuredGrid({pv.CellType[_VTK_NAMES[mesh.cell_type]]: mesh.cells}, points)
+    if mesh.hanging is not None:
+        grid.field_data["hanging_nodes"] = mesh.hanging.nodes
+        grid.field_data["hanging_masters"] = mesh.hanging.masters
+    return grid
+
+
+def hanging_of(grid: pyvista.DataSet) -> HangingNodes | None:
+    """Return the hanging nodes of a body on a grid from `body_grid`, levels left out; None without any."""
+    if "hanging_nodes" not in grid.field_data:
+        return None
+    nodes, masters = (np.asarray(grid.field_data[f"hanging_{key}"]) for key in ("nodes", "masters"))
+    return HangingNodes(nodes, masters, np.zeros(grid.n_cells, dtype=np.int64))
 
 
 def _pyvista() -> ModuleType:
