@@ -278,8 +278,6 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
     loose += sum(preload.is_free for preload in scene.preloads)
     each = next(iter(scene.bodies.values())).motions
     motions = 0 if direct else subdomains * each + loose
-    sizes = zip(scene.components * nodes, scene.components * shared, strict=True)
-    factors = sum(expected_bytes(int(size), int(interface)) for size, interface in sizes)
     return Plan(
         effects=effects,
         subdomains=subdomains,
@@ -290,12 +288,29 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
         fixed_point=EffectName.COULOMB in names,
         coarse_motions=motions,
         adjoint=sensitivity,
-        memory=factors + BYTES_PER_UNKNOWN * unknowns + 8.0 * motions**2,
+        memory=_memory(scene.components * nodes, scene.components * shared) + 8.0 * motions**2,
         contacts=tuple(pair_geometry(scene, pair) for pair in scene.contacts),
         ties=tuple(f"{tie.place}; {in_words(tie)}" for tie in scene.ties),
         unpaired=unpaired_bodies(scene),
         preloads=tuple(map(partial(_section_in_words, scene), scene.preloads)),
     )
+
+
+def expected_memory(scene: SceneParts, partitions: Mapping[str, np.ndarray]) -> float:
+    """Return the expected memory of all ranks together, [bytes], without that of the coarse problem."""
+    counts = [
+        _node_counts(body.mesh, partitions[name]) for name, body in scene.bodies.items() if name in partitions
+    ]
+    nodes, shared = (np.concatenate(column) for column in zip(*counts, strict=True))
+    return _memory(scene.components * nodes, scene.components * shared)
+
+
+def _memory(sizes: np.ndarray, interfaces: np.ndarray) -> float:
+    """Return the expected memory of subdomains with these numbers of unknowns and shared ones, [bytes]."""
+    factors = sum(
+        expected_bytes(int(size), int(shared)) for size, shared in zip(sizes, interfaces, strict=True)
+    )
+    return float(factors + BYTES_PER_UNKNOWN * sizes.sum())
 
 
 def _section_in_words(scene: SceneParts, preload: Preload) -> str:

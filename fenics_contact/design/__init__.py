@@ -25,6 +25,7 @@ from fenics_contact.design.objectives import (
     StrainEnergy,
     TotalPotential,
 )
+from fenics_contact.design.peak_pressure import PeakPressure
 from fenics_contact.design.remeshed import Remeshed
 from fenics_contact.design.several import LoadCases, LoadPath
 
@@ -51,6 +52,7 @@ __all__ = [
     "NotConvergedError",
     "Objective",
     "Partials",
+    "PeakPressure",
     "Pieced",
     "PressureNorm",
     "PressureUnevenness",

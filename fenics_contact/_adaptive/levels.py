@@ -1,0 +1,324 @@
+"""A quantity to the accuracy that is asked for: mesh after mesh, refined where it matters for the quantity."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from fenics_contact._adaptive.goal_errors import GoalError, goal_error
+from fenics_contact._adaptive.marking import bulk, pressing_cells
+from fenics_contact._adaptive.refined_scene import refine_scene
+from fenics_contact._base.checks import check_numbers, checked
+from fenics_contact._base.display import displayed
+from fenics_contact._base.libraries import MPI
+from fenics_contact._base.memory import available_memory
+from fenics_contact._base.progress import Task
+from fenics_contact._equilibrium.problem import ContactProblem
+from fenics_contact._scene.plan import expected_memory
+from fenics_contact._scene.scene import Scene
+from fenics_contact.design.objective import Objective
+from fenics_contact.errors import InvalidInputError, collectively, together
+from fenics_contact.errors.kinds import safe_log
+from fenics_contact.qp.solve import DualSolver
+from fenics_contact.results.forces import aligned
+from fenics_contact.results.resolution import CoarsePeak
+from fenics_contact.results.state import State
+
+_LOG = logging.getLogger(__name__)
+
+
+@displayed
+@dataclass(frozen=True)
+class Level:
+    """One mesh of the way to an accuracy.
+
+    Attributes:
+        cells: Number of cells of all bodies.
+        unknowns: Displacements of all nodes, those on supports included.
+        value: The quantity.
+        error: Estimate of its error, ≥ 0, in its unit.
+        products: Products of the dual solver with F.
+        seconds: Wall time of the level: its mesh, its state and the estimate.
+        predicted: What ``seconds`` was expected to be before the level began; NaN for the first.
+    """
+
+    cells: int
+    unknowns: int
+    value: float
+    error: float
+    products: int
+    seconds: float
+    predicted: float
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class AccurateResult:
+    """A quantity with its error, and the meshes on the way.
+
+    Attributes:
+        state: The state on the last mesh; its scene is ``state.scene``.
+        value: The quantity of this state.
+        error: Estimate of the error of ``value``, ≥ 0, in its unit.
+        wanted: Relative error that was asked for.
+        reached: Whether ``error`` is at most ``wanted`` times ``value``.
+        reason: Why the last mesh is the last, in words.
+        levels: All meshes, the coarsest first.
+    """
+
+    state: State
+    value: float
+    error: float
+    wanted: float
+    reached: bool
+    reason: str
+    levels: tuple[Level, ...]
+
+    @property
+    def relative_error(self) -> float:
+        """The error relative to the value."""
+        return _relative(self.error, self.value)
+
+    def __str__(self) -> str:
+        """Return a table with one line for each mesh, and how it ended."""
+        head = ("cells", "unknowns", "value", "error", "products", "seconds", "predicted")
+        rows: list[tuple[str, ...]] = [head]
+        for level in self.levels:
+            predicted = "" if np.isnan(level.predicted) else f"{level.predicted:.2f}"
+            error = f"{100 * _relative(level.error, level.value):.2g} %"
+            row = f"{level.cells}", f"{level.unknowns}", f"{level.value:.6g}", error, f"{level.products}"
+            rows.append((*row, f"{level.seconds:.2f}", predicted))
+        return "\n".join([*aligned(rows, 0), self.reason])
+
+
+def _relative(error: float, value: float) -> float:
+    if error == 0.0:
+        return 0.0
+    return error / abs(value) if value != 0.0 else float(np.inf)
+
+
+@dataclass(frozen=True)
+@checked()
+class Limits:
+    """What the way to an accuracy may cost; a mesh beyond it is not begun.
+
+    Attributes:
+        levels: Number of meshes, ≥ 1.
+        unknowns: Largest number of unknowns of a mesh, ≥ 1.
+        seconds: Largest wall time that a level may be expected to take, > 0, None for any.
+        memory: Memory of all ranks together, > 0, [bytes]; None for what the machine has left.
+
+    Raises:
+        InvalidInputError: If a limit is not positive.
+    """
+
+    levels: int = 20
+    unknowns: int = 100_000_000
+    seconds: float | None = None
+    memory: float | None = None
+
+    def __post_init__(self) -> None:
+        """Reject limits that allow nothing."""
+        for name in ("levels", "unknowns", "seconds", "memory"):
+            given = getattr(self, name)
+            if given is not None and not given > 0:
+                raise InvalidInputError(f"Limits.{name} must be above zero, got {given}: leave it out")
+
+
+@collectively("solve_to", lambda scene, quantity, relative_error, comm, **_: comm)
+def solve_to(
+    scene: Scene,
+    quantity: Objective,
+    relative_error: float,
+    comm: MPI.Comm,
+    *,
+    limits: Limits | None = None,
+    solver: DualSolver | None = None,
+) -> AccurateResult:
+    """Compute a quantity of an equilibrium to an accuracy, on meshes that are refined where it pays.
+
+    The scene is solved on its own mesh, the error of the quantity is estimated by its adjoint, the cells that
+    hold most of it are halved, and so on until the estimate is small enough. While the spot of a contact is
+    smaller than two cells the error counts as unknown, and the cells that press are halved. The estimate is
+    the larger of two: that of `goal_error`, and what the change from the last mesh to this one leaves if
+    errors go on to fall as their estimates have. Neither is a bound.
+
+    Args:
+        scene: The scene on a coarse mesh.
+        quantity: The quantity.
+        relative_error: Largest error of the quantity relative to it, between 0 and 1.
+        comm: Communicator over which the subdomains are spread.
+        limits: What may be spent.
+        solver: As for `fenics_contact.solve_scene`.
+
+    Returns:
+        The result on the last mesh; where the accuracy was not reached, it says so, and a warning.
+
+    Raises:
+        InvalidInputError: If the accuracy is not between 0 and 1, the quantity is none of the scene, or the
+            cells of its meshes cannot be refined.
+        InfeasibleError: If nothing holds some body against its load.
+        ConvergenceError: If the solver does not reach its tolerance on some mesh.
+
+    Example:
+        >>> result = solve_to(scene, PeakPressure(), 0.01, MPI.COMM_WORLD)  # doctest: +SKIP
+        >>> print(result)  # the levels, and why the last is the last  # doctest: +SKIP
+    """
+    with together(comm):
+        check_numbers(relative_error=relative_error)
+        if not 0.0 < relative_error < 1.0:
+            raise InvalidInputError(
+                f"relative_error must lie between 0 and 1, got {relative_error:g}: 0.01 asks for one percent"
+            )
+    way = _Way(quantity, relative_error, limits or Limits(), comm)
+    with Task("levels", most=way.limits.levels) as task:
+        problem: ContactProblem | None = ContactProblem(scene, comm, solver=solver)
+        while problem is not None:
+            level = way.add(problem)
+            words = f"{level.unknowns} unknowns, {level.value:.6g} ± {level.error:.2g}, {level.seconds:.1f} s"
+            task.step(len(way.levels), words=words)
+            problem = way.next_problem(problem)
+    result = way.result()
+    if not result.reached and comm.rank == 0:
+        safe_log(_LOG.warning, "the accuracy asked for was not reached: %s", result.reason)
+    return result
+
+
+class _Way:
+    """The levels so far."""
+
+    def __init__(self, quantity: Objective, wanted: float, limits: Limits, comm: MPI.Comm) -> None:
+        self.quantity, self.wanted, self.limits, self.comm = quantity, wanted, limits, comm
+        self.levels: list[Level] = []
+        self.reason = ""
+        self._sums: list[float] = []
+        self._began, self._predicted = perf_counter(), float("nan")
+
+    def add(self, problem: ContactProblem) -> Level:
+        """Solve on the next mesh and estimate its error. Collective."""
+        self._state = problem.solve()
+        self._doubted = doubted_pairs(self._state)
+        estimate = goal_error(self._state, self.quantity)
+        scene = self._state.scene
+        self._shares = {name: estimate.by_cell(name) for name in scene.bodies}
+        self._sums.append(float(sum(share.sum() for share in self._shares.values())))
+        level = Level(
+            cells=sum(body.mesh.n_cells for body in scene.bodies.values()),
+            unknowns=unknowns_of(scene),
+            value=estimate.value,
+            error=self._error(estimate),
+            products=self._state.solution.products,
+            seconds=self._spent(),
+            predicted=self._predicted,
+        )
+        self.levels.append(level)
+        return level
+
+    def _spent(self) -> float:
+        """Return the wall time since it was last asked for, that of the slowest rank. Collective."""
+        began, self._began = self._began, perf_counter()
+        return float(self.comm.allreduce(self._began - began, MPI.MAX))
+
+    def _error(self, estimate: GoalError) -> float:
+        """Return the larger of the adjoint's estimate and that by the change from the level before.
+
+        If errors fall by the ratio r from level to level as their estimates do, that of this level is r / (1
+        − r) times the change of the value.
+        """
+        if self._doubted:
+            return float("inf")
+        by_adjoint = self._sums[-1] if np.isnan(estimate.total) else abs(estimate.total)
+        if not self.levels or not self._sums[-2] > 0.0:
+            return by_adjoint
+        ratio = min(self._sums[-1] / self._sums[-2], 0.9)
+        by_change = abs(estimate.value - self.levels[-1].value) * ratio / (1.0 - ratio)
+        return max(by_adjoint, by_change)
+
+    def next_problem(self, problem: ContactProblem) -> ContactProblem | None:
+        """Return the problem on the next mesh, None if this one was the last; tells why. Collective."""
+        last, limits = self.levels[-1], self.limits
+        aim = self.wanted * abs(last.value)
+        if last.error <= aim:
+            self.reason = f"{_percent(last)} are reached, {100 * self.wanted:.3g} % were asked for"
+            return None
+        self.reason = self._singular()
+        if not self.reason and len(self.levels) == limits.levels:
+            self.reason = f"{_percent(last)} after {limits.levels} meshes, as many as limits.levels allows"
+        if self.reason:
+            return None
+        with together(self.comm):
+            scene = refine_scene(self._state.scene, self._marked(aim)).scene
+            partitions = scene.partition(self.comm.size)
+            needed, left = expected_memory(scene, partitions), limits.memory or available_memory()
+        unknowns = unknowns_of(scene)
+        self._predicted = last.seconds * (unknowns / last.unknowns) ** GROWTH
+        next_mesh = f"{_percent(last)}, and the next mesh of {unknowns} unknowns would"
+        if unknowns > limits.unknowns:
+            self.reason = f"{next_mesh} be larger than limits.unknowns allows, {limits.unknowns}"
+        elif limits.seconds is not None and self._predicted > limits.seconds:
+            self.reason = (
+                f"{next_mesh} take about {self._predicted:.2g} s, limits.seconds allows {limits.seconds:g}"
+            )
+        elif self.comm.bcast(left is not None and needed > left):
+            self.reason = f"{next_mesh} need about {needed / 1e9:.2g} GB, {(left or 0.0) / 1e9:.2g} are left"
+        return None if self.reason else problem.on(scene, partitions)
+
+    def _marked(self, aim: float) -> dict[str, np.ndarray]:
+        """Return the cells of each body to halve: so many that the next error is the one aimed at."""
+        share = UNRESOLVED
+        if not self._doubted:
+            share = float(np.clip((1.0 - SAFETY * aim / self.levels[-1].error) / (1.0 - HALVED), *SHARES))
+        marked = bulk(self._shares, share)
+        for name, cells in pressing_cells(self._state, self._doubted).items():
+            marked[name] = np.union1d(marked.get(name, cells), cells)
+        return marked
+
+    def _singular(self, changes: int = 3) -> str:
+        """Say so if the value has changed by more from mesh to mesh, always to the same side."""
+        known = [level.value for level in self.levels if np.isfinite(level.error)][-changes - 1 :]
+        steps = np.diff(known)
+        grows = len(steps) == changes and (np.sign(steps) == np.sign(steps[0])).all()
+        if not grows or not (np.abs(steps[1:]) >= np.abs(steps[:-1])).all():
+            return ""
+        return (
+            f"{_percent(self.levels[-1])}, and it grows without limit as cells get smaller, by more from mesh "
+            "to mesh, as stress does at sharp corners: ask for another quantity, or round the corner"
+        )
+
+    def result(self) -> AccurateResult:
+        """Return the result on the last mesh."""
+        last = self.levels[-1]
+        reached = last.error <= self.wanted * abs(last.value)
+        found = self._state, last.value, last.error, self.wanted, reached
+        return AccurateResult(*found, self.reason, tuple(self.levels))
+
+
+#: The cells with this share of the estimates are halved, too, while a contact is not resolved.
+UNRESOLVED = 0.2
+#: Bounds of the share of the estimates whose cells are halved at once.
+SHARES = 0.2, 0.8
+#: What halving leaves of the share of a cell.
+HALVED = 0.25
+#: Part of the error asked for that the next mesh aims at.
+SAFETY = 0.8
+#: Exponent of the time by which levels grow with their unknowns.
+GROWTH = 1.2
+
+
+def _percent(level: Level) -> str:
+    error = _relative(level.error, level.value)
+    return f"an error of {100 * error:.2g} %" if np.isfinite(error) else "an unknown error"
+
+
+def unknowns_of(scene: Scene) -> int:
+    """Return the number of displacements of all nodes."""
+    return scene.components * sum(body.mesh.n_nodes for body in scene.bodies.values())
+
+
+def doubted_pairs(state: State) -> list[int]:
+    """Return the numbers of the contact pairs whose spot is too small for its cells."""
+    places = {each.place for each in state.peak_doubts if isinstance(each, CoarsePeak)}
+    return [number for number, pair in enumerate(state.scene.contacts) if pair.place in places]
