@@ -134,10 +134,22 @@ class _Patches:
 
     def fits(self, nodes: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Yield for some nodes the nodes around and their weights in the fitted pressure."""
-        rings = 3 if self.slave.facets.shape[1] == 3 else 2
         for centre in nodes:  # a few nodes next to the peak
-            use = _rings(self.near, rings, int(centre))
+            use = self._around(int(centre))
             yield use, self._weights(int(centre), use)
+
+    def _around(self, centre: int, largest: float = 0.4) -> np.ndarray:
+        """Return the nodes up to three facets away, fewer where they cover more than a part of the contact.
+
+        Towards the edge of a contact pressures fall like no polynomial.
+        """
+        use = _rings(self.near, 1, centre)
+        for _ in range(1 if self.slave.facets.shape[1] != 3 else 2):
+            wider = np.unique(self.near[use].indices)
+            if self.area[wider].sum() > largest * self.area.sum():
+                break
+            use = wider
+        return use
 
     def _weights(self, centre: int, use: np.ndarray) -> np.ndarray:
         places = self.slave.points[self.node]
