@@ -1,4 +1,4 @@
-"""A quantity to the accuracy that is asked for: mesh after mesh, refined where it matters for the quantity."""
+"""A quantity to the accuracy that is asked for: mesh after mesh, refined where it matters for it."""
 
 from __future__ import annotations
 
@@ -137,6 +137,7 @@ def solve_to(
     *,
     limits: Limits | None = None,
     solver: DualSolver | None = None,
+    tolerance: float = 1e-6,
 ) -> AccurateResult:
     """Compute a quantity of an equilibrium to an accuracy, on meshes that are refined where it pays.
 
@@ -153,6 +154,8 @@ def solve_to(
         comm: Communicator over which the subdomains are spread.
         limits: What may be spent.
         solver: As for `fenics_contact.solve_scene`.
+        tolerance: Largest relative residual of each state. Looser ones save few products, but what is refined
+            then depends on the number of ranks.
 
     Returns:
         The result on the last mesh; where the accuracy was not reached, it says so, and a warning.
@@ -175,7 +178,7 @@ def solve_to(
             )
     way = _Way(quantity, relative_error, limits or Limits(), comm)
     with Task("levels", most=way.limits.levels) as task:
-        problem: ContactProblem | None = ContactProblem(scene, comm, solver=solver)
+        problem: ContactProblem | None = ContactProblem(scene, comm, solver=solver, tolerance=tolerance)
         while problem is not None:
             level = way.add(problem)
             words = f"{level.unknowns} unknowns, {level.value:.6g} ± {level.error:.2g}, {level.seconds:.1f} s"
@@ -237,8 +240,11 @@ class _Way:
         by_change = abs(estimate.value - self.levels[-1].value) * ratio / (1.0 - ratio)
         return max(by_adjoint, by_change)
 
-    def next_problem(self, problem: ContactProblem) -> ContactProblem | None:
-        """Return the problem on the next mesh, None if this one was the last; tells why. Collective."""
+    def next_problem(self, problem: ContactProblem, growth: float = 1.2) -> ContactProblem | None:
+        """Return the problem on the next mesh, None if this one was the last; tells why. Collective.
+
+        `growth`: exponent of the unknowns by which the time of a level grows.
+        """
         last, limits = self.levels[-1], self.limits
         aim = self.wanted * abs(last.value)
         if last.error <= aim:
@@ -254,7 +260,7 @@ class _Way:
             partitions = scene.partition(self.comm.size)
             needed, left = expected_memory(scene, partitions), limits.memory or available_memory()
         unknowns = unknowns_of(scene)
-        self._predicted = last.seconds * (unknowns / last.unknowns) ** GROWTH
+        self._predicted = last.seconds * (unknowns / last.unknowns) ** growth
         next_mesh = f"{_percent(last)}, and the next mesh of {unknowns} unknowns would"
         if unknowns > limits.unknowns:
             self.reason = f"{next_mesh} be larger than limits.unknowns allows, {limits.unknowns}"
@@ -266,15 +272,19 @@ class _Way:
             self.reason = f"{next_mesh} need about {needed / 1e9:.2g} GB, {(left or 0.0) / 1e9:.2g} are left"
         return None if self.reason else problem.on(scene, partitions)
 
-    def _marked(self, aim: float) -> dict[str, np.ndarray]:
-        """Return the cells of each body to halve: so many that the next error is the one aimed at."""
-        share = UNRESOLVED
-        if not self._doubted:
-            share = float(np.clip((1.0 - SAFETY * aim / self.levels[-1].error) / (1.0 - HALVED), *SHARES))
-        marked = bulk(self._shares, share)
-        for name, cells in pressing_cells(self._state, self._doubted).items():
-            marked[name] = np.union1d(marked.get(name, cells), cells)
-        return marked
+    def _marked(
+        self, aim: float, least: float = 0.2, most: float = 0.8, safety: float = 0.8, halved: float = 0.25
+    ) -> dict[str, np.ndarray]:
+        """Return the cells of each body to halve: so many that the next error is the one aimed at.
+
+        `aim`: the error asked for; `least`, `most`: bounds of the share of the estimates whose cells are
+        halved; `safety`: part of the error asked for that the next mesh aims at; `halved`: what halving
+        leaves of the share of a cell.
+        """
+        if self._doubted:  # what a single point presses follows from the load: its adjoint is rounding
+            return pressing_cells(self._state, self._doubted)
+        wanted = (1.0 - safety * aim / self.levels[-1].error) / (1.0 - halved)
+        return bulk(self._shares, min(max(wanted, least), most))
 
     def _singular(self, changes: int = 3) -> str:
         """Say so if the value has changed by more from mesh to mesh, always to the same side."""
@@ -284,8 +294,8 @@ class _Way:
         if not grows or not (np.abs(steps[1:]) >= np.abs(steps[:-1])).all():
             return ""
         return (
-            f"{_percent(self.levels[-1])}, and it grows without limit as cells get smaller, by more from mesh "
-            "to mesh, as stress does at sharp corners: ask for another quantity, or round the corner"
+            f"{_percent(self.levels[-1])}, and the value grows without limit as cells get smaller, by more "
+            "from mesh to mesh, as stress does at sharp corners: ask for another quantity or round the corner"
         )
 
     def result(self) -> AccurateResult:
@@ -294,18 +304,6 @@ class _Way:
         reached = last.error <= self.wanted * abs(last.value)
         found = self._state, last.value, last.error, self.wanted, reached
         return AccurateResult(*found, self.reason, tuple(self.levels))
-
-
-#: The cells with this share of the estimates are halved, too, while a contact is not resolved.
-UNRESOLVED = 0.2
-#: Bounds of the share of the estimates whose cells are halved at once.
-SHARES = 0.2, 0.8
-#: What halving leaves of the share of a cell.
-HALVED = 0.25
-#: Part of the error asked for that the next mesh aims at.
-SAFETY = 0.8
-#: Exponent of the time by which levels grow with their unknowns.
-GROWTH = 1.2
 
 
 def _percent(level: Level) -> str:

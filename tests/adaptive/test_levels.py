@@ -1,0 +1,164 @@
+"""A quantity to the accuracy that is asked for."""
+
+import logging
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import (
+    Body,
+    ContactPair,
+    RigidSphere,
+    Scene,
+    Support,
+    Surface,
+    Traction,
+    gallery,
+    theory,
+)
+from fenics_contact._adaptive.levels import AccurateResult, Limits, solve_to
+from fenics_contact.design import Movement, PeakPressure, TotalPotential
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials import PlaneStrain
+
+E, NU, RADIUS, FORCE = 2.1e5, 0.3, 10.0, 1000.0
+
+
+def pressed(n: int = 5) -> Scene:
+    """Half of a block on a cylinder, on a mesh that knows nothing of the contact: cells of 2 mm."""
+    mesh = gallery.rectangle((0.0, 0.0), (10.0, 10.0), (n, n), cell="triangle")
+    roll = RigidSphere((0.0, -RADIUS), RADIUS)
+    return Scene(
+        bodies={"block": Body(mesh, PlaneStrain(E, NU))},
+        supports=[Support("block", "x0", (0.0, None))],
+        loads=[Traction("block", "y1", (0.0, -FORCE / 20.0))],
+        contacts=[ContactPair(Surface("block", "y0"), roll)],
+    )
+
+
+@pytest.fixture(scope="module")
+def peak() -> AccurateResult:
+    return solve_to(pressed(), PeakPressure(), 0.01, MPI.COMM_SELF)
+
+
+def test_a_coarse_mesh_finds_the_peak_of_hertz(peak):
+    modulus = theory.contact_modulus(E, NU, np.inf, 0.0)
+    hertz = theory.hertz_line(FORCE, 1.0 / RADIUS, modulus).peak_pressure
+    assert peak.reached
+    assert peak.relative_error <= 0.01
+    assert peak.value == pytest.approx(hertz, rel=0.015)  # half a percent of it is the finite block
+    # A mesh as fine everywhere would have a hundred thousand unknowns.
+    assert peak.levels[-1].unknowns < 2000
+    assert peak.state.scene.bodies["block"].mesh.n_cells == peak.levels[-1].cells
+
+
+def test_unresolved_contacts_have_an_unknown_error(peak):
+    unknown = [np.isinf(level.error) for level in peak.levels]
+    assert unknown[0]
+    assert unknown == sorted(unknown, reverse=True)
+    assert not unknown[-1]
+    assert peak.levels[0].value < 0.7 * peak.value
+
+
+def test_the_levels_are_printed(peak):
+    lines = str(peak).splitlines()
+    assert lines[0].split() == ["cells", "unknowns", "value", "error", "products", "seconds", "predicted"]
+    assert len(lines) == len(peak.levels) + 2
+    assert lines[-1] == peak.reason
+    assert "1 % were asked for" in peak.reason
+
+
+def test_an_energy_costs_a_fraction_of_uniform_meshes():
+    found = solve_to(pressed(), TotalPotential(), 0.01, MPI.COMM_SELF)
+    finer = solve_to(pressed(), TotalPotential(), 0.001, MPI.COMM_SELF)
+    assert abs(found.value - finer.value) <= 0.01 * abs(finer.value)
+    assert found.levels[-1].unknowns < finer.levels[-1].unknowns
+
+
+def test_limits_stop_before_a_mesh_is_made(caplog):
+    with caplog.at_level(logging.WARNING):
+        few = solve_to(pressed(), PeakPressure(), 0.01, MPI.COMM_SELF, limits=Limits(levels=2))
+    assert not few.reached
+    assert len(few.levels) == 2
+    assert few.reason == "an unknown error after 2 meshes, as many as limits.levels allows"
+    assert f"not reached: {few.reason}" in caplog.text
+    for limits, words in (
+        (Limits(unknowns=80), r"would be larger than limits.unknowns allows, 80"),
+        (Limits(memory=1e4), r"would need about .* GB, 1e-05 are left"),
+        (Limits(seconds=1e-9), r"would take about .* s, limits.seconds allows 1e-09"),
+    ):
+        stopped = solve_to(pressed(), PeakPressure(), 0.01, MPI.COMM_SELF, limits=limits)
+        assert len(stopped.levels) == 1
+        assert not stopped.reached
+        assert re.search(words, stopped.reason)
+
+
+def test_a_stress_at_a_sharp_corner_grows_without_limit():
+    """The edge of a flat rigid punch: contact pressure is unbounded there."""
+    mesh = gallery.rectangle((0.0, 0.0), (2.0, 2.0), (2, 2), cell="triangle")
+    base = gallery.rectangle((0.0, -6.0), (6.0, 0.0), (6, 6), cell="triangle")
+    stiff = PlaneStrain(1e4 * E, NU)
+    scene = Scene(
+        bodies={"punch": Body(mesh, stiff), "base": Body(base, PlaneStrain(E, NU))},
+        supports=[
+            Support("punch", "x0", (0.0, None)),
+            Support("base", "x0", (0.0, None)),
+            Support("base", "y0", (0.0, 0.0)),
+        ],
+        loads=[Traction("punch", "y1", (0.0, -100.0))],
+        contacts=[ContactPair(Surface("base", "y1"), Surface("punch", "y0"))],
+    )
+    found = solve_to(scene, PeakPressure(), 0.01, MPI.COMM_SELF)
+    assert not found.reached
+    assert "grows without limit as cells get smaller" in found.reason
+
+
+@pytest.mark.parametrize("accuracy", [0.0, 1.0, -0.1, 2.0])
+def test_accuracies_between_nothing_and_all_are_wanted(accuracy):
+    with pytest.raises(InvalidInputError, match="relative_error must lie between 0 and 1"):
+        solve_to(pressed(), PeakPressure(), accuracy, MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize("name", ["levels", "unknowns", "seconds", "memory"])
+def test_limits_allow_something(name):
+    with pytest.raises(InvalidInputError, match=f"Limits.{name} must be above zero, got 0: leave it out"):
+        Limits(**{name: 0})
+
+
+def test_hexahedra_with_hanging_nodes_are_refined_alike():
+    mesh = gallery.rectangle((0.0, 0.0), (10.0, 10.0), (5, 5))
+    scene = pressed()
+    scene = replace(scene, bodies={"block": Body(mesh, PlaneStrain(E, NU))})
+    found = solve_to(scene, Movement("block", "y1", (0.0, 1.0)), 0.01, MPI.COMM_SELF)
+    assert found.reached
+
+
+def test_ranks_take_the_same_way(mpirun, tmp_path):
+    script = tmp_path / "levels.py"
+    script.write_text(
+        """
+import numpy as np
+from mpi4py import MPI
+from fenics_contact import (
+    Body, ContactPair, Coulomb, RigidSphere, Scene, Support, Surface, Traction, gallery
+)
+from fenics_contact._adaptive.levels import solve_to
+from fenics_contact.design import PeakPressure
+from fenics_contact.materials import PlaneStrain
+mesh = gallery.rectangle((0.0, 0.0), (10.0, 10.0), (5, 5), cell="triangle")
+scene = Scene(
+    bodies={"block": Body(mesh, PlaneStrain(2.1e5, 0.3))},
+    supports=[Support("block", "x0", (0.0, None))],
+    loads=[Traction("block", "y1", (0.0, -50.0))],
+    contacts=[ContactPair(Surface("block", "y0"), RigidSphere((0.0, -10.0), 10.0), Coulomb(0.2))],
+)
+found = solve_to(scene, PeakPressure(), 0.01, MPI.COMM_WORLD)
+assert found.reached
+if MPI.COMM_WORLD.rank == 0:
+    print([level.cells for level in found.levels], f"{found.value:.6g}")
+"""
+    )
+    assert len({mpirun(script, ranks).strip() for ranks in (1, 2, 4)}) == 1
