@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from fenics_contact._adaptive.goal_errors import GoalError, goal_error
 from fenics_contact._adaptive.marking import bulk, pressing_cells
+from fenics_contact._adaptive.quantities import quantity as named
 from fenics_contact._adaptive.refined_scene import refine_scene
 from fenics_contact._base.checks import check_numbers, checked
 from fenics_contact._base.display import displayed
@@ -22,6 +24,7 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact.design.objective import Objective
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.errors.kinds import safe_log
+from fenics_contact.mesh.refinement import Refinement
 from fenics_contact.qp.solve import DualSolver
 from fenics_contact.results.forces import aligned
 from fenics_contact.results.resolution import CoarsePeak
@@ -100,6 +103,7 @@ def _relative(error: float, value: float) -> float:
     return error / abs(value) if value != 0.0 else float(np.inf)
 
 
+@displayed
 @dataclass(frozen=True)
 @checked()
 class Limits:
@@ -131,7 +135,7 @@ class Limits:
 @collectively("solve_to", lambda scene, quantity, relative_error, comm, **_: comm)
 def solve_to(
     scene: Scene,
-    quantity: Objective,
+    quantity: Objective | str,
     relative_error: float,
     comm: MPI.Comm,
     *,
@@ -149,7 +153,7 @@ def solve_to(
 
     Args:
         scene: The scene on a coarse mesh.
-        quantity: The quantity.
+        quantity: The quantity: an objective, or a name that `quantity` knows.
         relative_error: Largest error of the quantity relative to it, between 0 and 1.
         comm: Communicator over which the subdomains are spread.
         limits: What may be spent.
@@ -167,7 +171,7 @@ def solve_to(
         ConvergenceError: If the solver does not reach its tolerance on some mesh.
 
     Example:
-        >>> result = solve_to(scene, PeakPressure(), 0.01, MPI.COMM_WORLD)  # doctest: +SKIP
+        >>> result = solve_to(scene, "peak_pressure", 0.01, MPI.COMM_WORLD)  # doctest: +SKIP
         >>> print(result)  # the levels, and why the last is the last  # doctest: +SKIP
     """
     with together(comm):
@@ -176,7 +180,8 @@ def solve_to(
             raise InvalidInputError(
                 f"relative_error must lie between 0 and 1, got {relative_error:g}: 0.01 asks for one percent"
             )
-    way = _Way(quantity, relative_error, limits or Limits(), comm)
+        objective = named(quantity, scene) if isinstance(quantity, str) else quantity
+    way = _Way(objective, relative_error, limits or Limits(), comm)
     with Task("levels", most=way.limits.levels) as task:
         problem: ContactProblem | None = ContactProblem(scene, comm, solver=solver, tolerance=tolerance)
         while problem is not None:
@@ -198,11 +203,16 @@ class _Way:
         self.levels: list[Level] = []
         self.reason = ""
         self._sums: list[float] = []
+        self._state: State
+        self._refinements: Mapping[str, Refinement] = {}
         self._began, self._predicted = perf_counter(), float("nan")
 
     def add(self, problem: ContactProblem) -> Level:
         """Solve on the next mesh and estimate its error. Collective."""
-        self._state = problem.solve()
+        if self.levels:
+            self._state = problem.solve(start=self._state, refinements=self._refinements)
+        else:
+            self._state = problem.solve()
         self._doubted = doubted_pairs(self._state)
         estimate = goal_error(self._state, self.quantity)
         scene = self._state.scene
@@ -234,7 +244,9 @@ class _Way:
         if self._doubted:
             return float("inf")
         by_adjoint = self._sums[-1] if np.isnan(estimate.total) else abs(estimate.total)
-        if not self.levels or not self._sums[-2] > 0.0:
+        if not self.levels:  # parts may cancel by chance, and nothing tells yet
+            return max(by_adjoint, self._sums[-1])
+        if not self._sums[-2] > 0.0:
             return by_adjoint
         ratio = min(self._sums[-1] / self._sums[-2], 0.9)
         by_change = abs(estimate.value - self.levels[-1].value) * ratio / (1.0 - ratio)
@@ -256,7 +268,8 @@ class _Way:
         if self.reason:
             return None
         with together(self.comm):
-            scene = refine_scene(self._state.scene, self._marked(aim)).scene
+            found = refine_scene(self._state.scene, self._marked(aim))
+            scene, self._refinements = found.scene, found.refinements
             partitions = scene.partition(self.comm.size)
             needed, left = expected_memory(scene, partitions), limits.memory or available_memory()
         unknowns = unknowns_of(scene)

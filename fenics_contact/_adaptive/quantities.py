@@ -16,12 +16,12 @@ from fenics_contact.design.objective import Objective
 from fenics_contact.design.objectives import (
     ContactArea,
     FrictionWork,
-    LargestPressure,
     LargestStress,
     Movement,
     StrainEnergy,
     TotalPotential,
 )
+from fenics_contact.design.peak_pressure import PeakPressure
 from fenics_contact.errors import InvalidInputError
 
 
@@ -119,7 +119,7 @@ def _stress(where: _Where) -> Objective:
 
 #: Name -> what it takes, and the quantity.
 QUANTITIES: dict[str, tuple[tuple[str, ...], Callable[[_Where], Objective]]] = {
-    "peak_pressure": (("surface",), lambda where: LargestPressure(where.pair())),
+    "peak_pressure": (("surface",), lambda where: PeakPressure(where.pair())),
     "contact_force": (("surface", "direction"), lambda where: PairForce(where.one_pair(), where.along())),
     "contact_area": (("surface",), lambda where: ContactArea(where.pair())),
     "stick_area": (("surface",), lambda where: StickArea(where.one_pair())),
@@ -149,7 +149,7 @@ def quantity(
     """Return a quantity by its name.
 
     ==================  ===================================================================================
-    ``peak_pressure``   Largest pressure of a pair, by default of all
+    ``peak_pressure``   `PeakPressure` of a pair, by default of all
     ``contact_force``   Force of a pair on its slave along a direction
     ``contact_area``    Effective area of a pair, see `ContactArea`, by default of all
     ``stick_area``      Area of a pair that sticks; without an estimate of its error

@@ -62,12 +62,14 @@ from fenics_contact import (
     TotalForce,
     Tresca,
     Ufl,
+    goal_error,
     minimize,
     solve_scene,
 )
 from fenics_contact._accuracy.certificate import certify
 from fenics_contact._accuracy.recovery import find_sites
 from fenics_contact._accuracy.state_errors import solver_errors
+from fenics_contact._adaptive.levels import AccurateResult, Level, Limits
 from fenics_contact._base.display import COLUMNS, LINES, displayed, in_lines
 from fenics_contact._optimize.problem import pose
 from fenics_contact.design import (
@@ -87,6 +89,7 @@ from fenics_contact.design import (
     Movement,
     MovementNear,
     NonlinearConstraint,
+    PeakPressure,
     PressureNorm,
     PressureUnevenness,
     Remeshed,
@@ -201,7 +204,9 @@ def objects() -> dict[str, Any]:
         StrainEnergy(), PressureNorm(), PressureUnevenness(), ContactArea(), FrictionWork(),
         LargestStress("block"), Movement("block", "z1", (1, 0, 0)),
         StressNear("block", (0, 0, 0), 1.0), MovementNear("block", (0, 0, 0), 1.0, direction=(1, 0, 0)),
-        Maximum((LargestPressure(),)),
+        Maximum((LargestPressure(),)), PeakPressure(), goal_error(state, StrainEnergy()),
+        AccurateResult(state, 1.0, 0.1, 0.01, False, "why", (Level(8, 81, 1.0, 0.1, 9, 0.1, np.nan),)),
+        Limits(levels=2),
         NewtonSteps(((0.1, 1e-3, 1e-7),)), TangentNewton(), AutomaticSteps(), DesignResponse(shape),
         SceneResponse(lambda load: scene, {"load": 1.0}, {"energy": lambda state: 0.0}, MPI.COMM_SELF),
         MovedSurface(shape.designs[0], scene.bodies["block"].mesh, np.zeros(shape.size)),
