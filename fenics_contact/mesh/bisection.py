@@ -7,7 +7,7 @@ References:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -56,18 +56,29 @@ def bisection_partition(mesh: BodyMesh, parts: int) -> np.ndarray:
     Raises:
         InvalidInputError: If there are fewer cells than parts, or the mesh consists of separate parts.
     """
+    return _bisected(mesh, parts, mesh.n_cells)
+
+
+def _bisected(mesh: BodyMesh, parts: int, usual: int, heavy: float = 3.0) -> np.ndarray:
+    """Return a partition into ``parts`` subdomains, and more where one has too many cells.
+
+    Where cells are refined near a point, subdomains of the same weight may have very different numbers of
+    cells. What has more than ``heavy`` times ``usual`` of them is cut on, into as many parts as are usual.
+    """
     check_parts(mesh, parts)
     if mesh.cuts:
-        return pieces(mesh, bisection_partition(closed(mesh), parts))
-    partition = np.zeros(mesh.n_cells, dtype=np.int64)
-    if parts > 1:
-        pending = [_whole(mesh, parts)]
-        while pending:
-            piece = pending.pop()
-            if piece.parts == 1:
-                partition[piece.cells] = piece.first
-            else:
-                pending += piece.halves()
+        return pieces(mesh, _bisected(closed(mesh), parts, usual, heavy))
+    partition, count = np.zeros(mesh.n_cells, dtype=np.int64), 0
+    pending = [_whole(mesh, parts)] if parts > 1 else []
+    while pending:
+        piece = pending.pop()
+        if piece.parts > 1:
+            pending += reversed(piece.halves())
+        elif len(piece.cells) > heavy * usual:
+            pending.append(piece.into(round(len(piece.cells) / usual)))
+        else:
+            partition[piece.cells] = count
+            count += 1
     return kept_together(mesh, merge_pieces(mesh, partition))
 
 
@@ -105,8 +116,11 @@ class _Piece:
     weights: np.ndarray
     pairs: np.ndarray
     areas: np.ndarray
-    first: int
     parts: int
+
+    def into(self, parts: int) -> _Piece:
+        """Return the piece that is to become another number of subdomains."""
+        return replace(self, parts=parts, weights=parts / self.weights.sum() * self.weights)
 
     def halves(self) -> tuple[_Piece, _Piece]:
         """Cut it in two by the cheapest cut."""
@@ -115,8 +129,8 @@ class _Piece:
         before = np.zeros(len(self.cells), dtype=bool)
         before[best.order[: best.cells]] = True
         return (
-            self._part(before, self.first, best.parts),
-            self._part(~before, self.first + best.parts, self.parts - best.parts),
+            self._part(before, best.parts),
+            self._part(~before, self.parts - best.parts),
         )
 
     def _best(self, between_layers: bool) -> _Cut | None:
@@ -163,7 +177,7 @@ class _Piece:
         begins, stops = (np.bincount(end, self.areas, minlength=len(order)) for end in ends.T)
         return np.asarray(np.cumsum(begins - stops)[:-1])
 
-    def _part(self, chosen: np.ndarray, first: int, parts: int) -> _Piece:
+    def _part(self, chosen: np.ndarray, parts: int) -> _Piece:
         """Return some of its cells as a piece, (n,) bool."""
         inside = chosen[self.pairs].all(axis=1)
         number = np.cumsum(chosen) - 1
@@ -174,7 +188,6 @@ class _Piece:
             self.weights[chosen],
             number[self.pairs[inside]],
             self.areas[inside],
-            first,
             parts,
         )
 
@@ -189,7 +202,7 @@ def _whole(mesh: BodyMesh, parts: int) -> _Piece:
     else:
         places = mesh.grid
     cells, weights = np.arange(mesh.n_cells), parts * cell_weights(mesh)
-    return _Piece(cells, places, mesh.grid is None, weights, *face_areas(mesh), 0, parts)
+    return _Piece(cells, places, mesh.grid is None, weights, *face_areas(mesh), parts)
 
 
 TARGET_NODES = {3: 700, 2: 1000}
@@ -241,8 +254,9 @@ def default_partition(
     """Cut a body into a number of subdomains suited to its size, and at least one for every rank.
 
     A number near the target that can be halved often is chosen: halves are similar, so that their matrices
-    share a pattern. The cuts are those of `bisection_partition`. Only a body with fewer cells than ranks has
-    fewer subdomains than there are ranks.
+    share a pattern. The cuts are those of `bisection_partition`; subdomains with three times the usual number
+    of cells, as where a mesh is refined near a point, are cut again. Only a body with fewer cells than ranks
+    has fewer subdomains than there are ranks.
 
     Returns (n_cells,) subdomain numbers, every subdomain connected through faces; the same on
     every rank.
@@ -250,7 +264,8 @@ def default_partition(
     check_count(ranks, "ranks")
     check_one_piece(mesh, body)
     target, least = target_parts(mesh, nodes), min(ranks, mesh.n_cells)
-    return bisection_partition(mesh, _often_halved(target, least, mesh.n_cells))
+    usual = -(-mesh.n_cells // target)
+    return _bisected(mesh, _often_halved(target, least, mesh.n_cells), usual)
 
 
 def _often_halved(target: int, least: int, most: int) -> int:

@@ -7,8 +7,9 @@ import pytest
 
 from fenics_contact import BodyMesh, box_partition
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block, hemisphere
-from fenics_contact.mesh import bisection_partition
+from fenics_contact.gallery import block, hemisphere, rectangle
+from fenics_contact.mesh import bisection_partition, refined
+from fenics_contact.mesh.bisection import default_partition, target_parts
 from fenics_contact.mesh.partition import check_face_connected, merge_pieces
 from tests.partition.counts import torn_node_counts
 
@@ -85,6 +86,19 @@ def test_bisection_cuts_an_unstructured_body() -> None:
     partition = bisection_partition(mesh, 7)
     check_face_connected(mesh, partition)
     assert np.unique(partition).tolist() == list(range(7))
+
+
+def test_where_cells_are_small_subdomains_are_cut_again() -> None:
+    mesh = rectangle((0.0, 0.0), (1.0, 1.0), (4, 4), "triangle")
+    for level in range(8):
+        centres = mesh.points[mesh.cells].mean(axis=1)
+        mesh = refined(mesh, np.linalg.norm(centres, axis=1) < 0.6**level).mesh
+    usual = mesh.n_cells / target_parts(mesh, nodes=40.0)
+    of_like_weight = bisection_partition(mesh, target_parts(mesh, nodes=40.0))
+    assert np.bincount(of_like_weight).max() > 4.0 * usual
+    partition = default_partition(mesh, nodes=40.0)
+    check_face_connected(mesh, partition)
+    assert np.bincount(partition).max() < 3.2 * usual
 
 
 def test_more_parts_than_cells_are_refused(brick: BodyMesh) -> None:
