@@ -88,22 +88,25 @@ class _Slave:
         return np.asarray(np.flatnonzero(chosen)[comm.rank :: comm.size])
 
 
-def between_nodes(state: LinearState, multiplier: np.ndarray) -> float:
+def between_nodes(state: LinearState, multiplier: np.ndarray, opening: float) -> float:
     """Return Σ ∫ ζ (g + n·(u_s − u_m) − r) over the slaves of all pairs. Collective.
 
     Contact holds at nodes, or as a mean: between them facets of one surface enter the other one, or leave
     gaps where the surfaces are curved. The function ζ interpolates forces per area, r the residuals at the
     contact points; the gap g and the normal n are those of the true surfaces in each point.
 
-    `multiplier`: forces ζ of an adjoint, owned.
+    `multiplier`: forces ζ of an adjoint, owned; `opening`: share of the gaps at open nodes that is not part
+    of r. The rim of the contact lies somewhere between closed and open nodes, and forces that do not vanish
+    there work on the gaps within it: half of them, on average.
     """
     torn, total = state.torn, 0.0
     pressing, residual = (
         torn.numbering.gather(x, torn.normal_rows) for x in (multiplier, state.rows.residual)
     )
+    missed = np.where(state.contact.normal_force > 0.0, residual, (1.0 - opening) * residual)
     for index, pair in enumerate(torn.scene.contacts):
         if not pair.within_body:
-            total += _of_pair(state, index, pair, pressing, residual)
+            total += _of_pair(state, index, pair, pressing, missed)
     return float(torn.decomposition.comm.allreduce(total))
 
 

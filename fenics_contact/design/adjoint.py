@@ -294,7 +294,8 @@ def solve_adjoint(
         raise ConvergenceError(NOT_HELD)
     flexed = system.inverse(partials.by_displacement)
     # Rows that supports alone determine have no force, whatever an objective makes of it.
-    by_multiplier = np.where(state.rows.between_supports, 0.0, partials.by_multiplier)
+    entries = system.torn.numbering.to_owned(np.asarray(abs(system.torn.B).sum(axis=1)).ravel())
+    by_multiplier = np.where(entries > 0.0, partials.by_multiplier, 0.0)
     right = linearised.moving.T @ (factor * (system.jump(flexed) - by_multiplier))
     load = np.asarray(problem.comm.allreduce(system.kernel.T @ partials.by_displacement))
     if partials.by_motion is not None:

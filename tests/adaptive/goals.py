@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from mpi4py import MPI
 
@@ -12,6 +14,7 @@ from fenics_contact import (
     DistanceObstacle,
     LinearState,
     RigidPlane,
+    RigidSphere,
     Scene,
     Support,
     Surface,
@@ -19,8 +22,8 @@ from fenics_contact import (
     solve_scene,
 )
 from fenics_contact.design import ContactForces
-from fenics_contact.gallery import rectangle, rectangle_lattice
-from fenics_contact.materials import PlaneStrain
+from fenics_contact.gallery import block, box_lattice, rectangle, rectangle_lattice
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import bisection_partition
 from fenics_contact.results import ContactResult
 
@@ -66,6 +69,16 @@ def on_waves(cells: int) -> Scene:
     return Scene({"block": Body(mesh, RUBBER)}, [*sides, top], contacts=[pair])
 
 
+def wavy(cells: int) -> Scene:
+    """The same with the wave on the block instead of the floor."""
+    scene = on_waves(cells)
+    mesh = scene.bodies["block"].mesh
+    x, y = mesh.points.T
+    moved = mesh.moved(np.column_stack([x, y + WAVE * (1.0 + np.cos(np.pi * x)) * (1.0 - y)]))
+    pair = ContactPair(Surface("block", "y0"), FLOOR)
+    return replace(scene, bodies={"block": Body(moved, RUBBER)}, contacts=[pair])
+
+
 def on_floor(cells: int) -> Scene:
     """A block on a rough floor, pressed and dragged at its top: some nodes stick, others slip."""
     mesh = rectangle_lattice([np.linspace(0.0, 2.0, 2 * cells + 1), np.linspace(0.0, 1.0, cells + 1)])
@@ -96,3 +109,22 @@ def curved(cells: int = 6) -> Scene:
     pair = ContactPair(Surface("upper", "y0"), Surface("lower", "y1"), discretisation="node")
     supports = [Support("lower", "y0", (0.0, 0.0)), Support("upper", "y1", (0.0, -0.03))]
     return Scene({"upper": Body(upper, RUBBER), "lower": Body(lower, RUBBER)}, supports, contacts=[pair])
+
+
+def on_floor_in_space() -> Scene:
+    """A block between two planes of symmetry on a rough floor: at its sides one tangent is held."""
+    mesh = block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (4, 2, 2))
+    load = Traction("block", "z1", lambda x: np.outer(1.0 + 0.3 * x[:, 0], [8.0, 0.0, -20.0]))
+    sides = [Support("block", "x0", (0.0, None, None)), Support("block", "y0", (None, 0.0, None))]
+    pair = ContactPair(Surface("block", "z0"), RigidPlane((0, 0, 0), (0, 0, 1)), Coulomb(0.3))
+    return Scene({"block": Body(mesh, IsotropicElasticity(1000.0, 0.3))}, sides, [load], contacts=[pair])
+
+
+def under_a_ball() -> Scene:
+    """A quarter of a body that is lifted against a rigid ball: 22 nodes touch."""
+    line = np.interp(np.arange(13) / 4.0, np.arange(4), [0.0, 1.5, 3.75, 9.0])
+    planes = [Support("body", "x0", (0.0, None, None)), Support("body", "y0", (None, 0.0, None))]
+    pair = ContactPair(Surface("body", "z1"), RigidSphere((0.0, 0.0, 50.0), 50.0))
+    body = Body(box_lattice([line, line, -line[::-1]]), IsotropicElasticity(1000.0, 0.3))
+    lifted = Support("body", "z0", (0.0, 0.0, 0.05))
+    return Scene({"body": body}, [*planes, lifted], contacts=[pair])
