@@ -6,6 +6,7 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from time import perf_counter
+from typing import cast
 
 import numpy as np
 
@@ -183,12 +184,14 @@ def solve_to(
         objective = named(quantity, scene) if isinstance(quantity, str) else quantity
     way = _Way(objective, relative_error, limits or Limits(), comm)
     with Task("levels", most=way.limits.levels) as task:
-        problem: ContactProblem | None = ContactProblem(scene, comm, solver=solver, tolerance=tolerance)
+        first = ContactProblem(scene, comm, solver=solver, tolerance=tolerance)
+        warnings, problem = first.hold_warnings(), cast("ContactProblem | None", first)
         while problem is not None:
             level = way.add(problem)
             words = f"{level.unknowns} unknowns, {level.value:.6g} ± {level.error:.2g}, {level.seconds:.1f} s"
             task.step(len(way.levels), words=words)
             problem = way.next_problem(problem)
+    warnings.tell()
     result = way.result()
     if not result.reached and comm.rank == 0:
         safe_log(_LOG.warning, "the accuracy asked for was not reached: %s", result.reason)
@@ -260,7 +263,7 @@ class _Way:
         last, limits = self.levels[-1], self.limits
         aim = self.wanted * abs(last.value)
         if last.error <= aim:
-            self.reason = f"{_percent(last)} are reached, {100 * self.wanted:.3g} % were asked for"
+            self.reason = f"{_percent(last)}, {100 * self.wanted:.3g} % were asked for"
             return None
         self.reason = self._singular()
         if not self.reason and len(self.levels) == limits.levels:

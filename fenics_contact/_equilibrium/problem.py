@@ -349,6 +349,11 @@ class ContactProblem:
         other._warnings = self._warnings
         return other
 
+    def hold_warnings(self) -> ContactWarnings:
+        """Let only the last state be warned of, when `ContactWarnings.tell` of the result asks for it."""
+        self._warnings = ContactWarnings(of_last=True)
+        return self._warnings
+
     def number(self, scene: Scene | None = None) -> float:
         """Return the tolerance as a number, for states that are differentiated or compared. Collective.
 

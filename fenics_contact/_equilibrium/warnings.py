@@ -39,11 +39,15 @@ _LOG = logging.getLogger(__name__)
 
 
 class ContactWarnings:
-    """Warnings about the states of a problem; each pair, body and two bodies are warned of once."""
+    """Warnings about the states of a problem; each pair, body and two bodies are warned of once.
 
-    def __init__(self) -> None:
+    `of_last`: whether only those about the last state count, and are logged when `tell` asks for them.
+    """
+
+    def __init__(self, *, of_last: bool = False) -> None:
         """Start without any."""
         self._given: set[Hashable] = set()
+        self._held: list[tuple[Callable[..., None], str]] | None = [] if of_last else None
         self._points: ContactPoints | None = None
         self._finer = np.zeros(0)
         self._rotations = dict[str, tuple[BodyMesh, float]]()
@@ -51,6 +55,9 @@ class ContactWarnings:
 
     def warn(self, state: State, *, design: bool = False) -> None:
         """Warn of what is doubtful about a state. Collective."""
+        if self._held is not None:
+            self._held.clear()
+            self._given.clear()
         if isinstance(state, LinearState):
             if design and self._points is not None:
                 return
@@ -72,8 +79,16 @@ class ContactWarnings:
 
     def _log(self, state: State, key: Hashable, words: str, log: Callable[..., None] | None = None) -> None:
         if key not in self._given and state.torn.decomposition.comm.rank == 0:
-            safe_log(log or _LOG.warning, "%s", words)
+            if self._held is None:
+                safe_log(log or _LOG.warning, "%s", words)
+            else:
+                self._held.append((log or _LOG.warning, words))
         self._given.add(key)
+
+    def tell(self) -> None:
+        """Log the warnings about the last state that were held back."""
+        for log, words in self._held or ():
+            safe_log(log, "%s", words)
 
     def _doubts(self, state: LinearState) -> tuple[list[tuple[int, str, str]], tuple[PeakDoubt, ...]]:
         """Return pair, kind and words of all doubts about a state, and those about peaks. Collective."""

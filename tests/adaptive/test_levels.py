@@ -78,6 +78,18 @@ def test_an_energy_costs_a_fraction_of_uniform_meshes():
     assert found.levels[-1].unknowns < finer.levels[-1].unknowns
 
 
+def test_warnings_are_those_of_the_last_mesh(caplog):
+    with caplog.at_level(logging.WARNING):
+        solve_to(pressed(), PeakPressure(), 0.05, MPI.COMM_SELF)
+    assert not caplog.records
+    with caplog.at_level(logging.WARNING):
+        solve_to(pressed(), PeakPressure(), 0.05, MPI.COMM_SELF, limits=Limits(levels=2))
+    assert [record.message.split(":")[0][:29] for record in caplog.records] == [
+        "the contact of block y0 on ri",
+        "the accuracy asked for was no",
+    ]
+
+
 def test_limits_stop_before_a_mesh_is_made(caplog):
     with caplog.at_level(logging.WARNING):
         few = solve_to(pressed(), PeakPressure(), 0.01, MPI.COMM_SELF, limits=Limits(levels=2))
