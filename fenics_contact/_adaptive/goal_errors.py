@@ -27,6 +27,7 @@ import numpy as np
 
 from fenics_contact._accuracy.discretisation import ErrorProducts, discretisation_error, error_products
 from fenics_contact._adaptive.contact_residuals import between_nodes, of_pressures
+from fenics_contact._adaptive.indicator import stress_indicator
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.progress import Task
@@ -51,7 +52,7 @@ from fenics_contact.design.objectives import (
 )
 from fenics_contact.design.sensitivity import adjoint_of
 from fenics_contact.errors import ConvergenceError, InvalidInputError, collectively
-from fenics_contact.results.linear_state import LinearState, as_linear
+from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State, comm_of
 
 #: Name of a body -> this rank's cells, and a value of each.
@@ -75,7 +76,8 @@ class GoalError:
         solver: By the residuals of the solver, with friction at its own slip bounds, to first order.
         friction: By slip bounds of the solver that are not those of its normal forces, to first order.
         without_adjoint: Why there is no adjoint, in words; empty where there is one. All parts are NaN
-            without one, and the shares of cells those of the energy norm.
+            without one, and the shares of cells those of the energy norm, or of nonlinear materials
+            `stress_indicator`.
     """
 
     value: float
@@ -149,14 +151,14 @@ def goal_error(
     the error is not included.
 
     Args:
-        state: The equilibrium, of small strains and linear materials.
+        state: The equilibrium; of nonlinear materials there is no adjoint.
         objective: The quantity; one that has no adjoint gives the reason as its ``without_adjoint``.
         choice: Branch of weakly active points.
         tolerance: Relative residual of the adjoint.
 
     Raises:
-        InvalidInputError: If materials are nonlinear, the state has no multipliers (see
-            `LinearState.dual`), or the quantity is zero and nothing that loads the bodies reaches it.
+        InvalidInputError: If the state has no multipliers (see `LinearState.dual`), or the quantity is zero
+            and nothing that loads the bodies reaches it.
         ConvergenceError: If the adjoint does not converge; not where some body can slide on the face of the
             state, see ``without_adjoint``.
 
@@ -165,12 +167,16 @@ def goal_error(
         >>> print(error)  # doctest: +SKIP
         >>> cells = error.by_cell("block")  # doctest: +SKIP
     """
-    linear, comm = as_linear(state, "errors of quantities"), comm_of(state)
+    comm = comm_of(state)
     with Task("error of a quantity"), one_thread(comm):
         # No node moves: derivatives by the shape are neither compiled nor evaluated.
         forms = ShapeForms(comm, np.zeros(state.torn.decomposition.tearing.n_nodes, dtype=bool))
         with asking(comm):
             value = finite_value(objective.value(state, forms))
+        if not isinstance(state, LinearState):
+            return _indicated(state, value)
+        linear = state
+        with asking(comm):
             if why := getattr(objective, "without_adjoint", ""):
                 return _without_adjoint(linear, value, why)
             smooth = smoothed(objective, state, forms)
@@ -281,6 +287,18 @@ def _by_friction(
     by_bound = bound_sensitivity(torn, partials.by_multiplier, adjoint.displacement, linearised)
     missed = torn.law.bound(rows.multiplier) - rows.slip_bound
     return float(comm_of(state).allreduce(float(by_bound[torn.owned_discs] @ missed)))
+
+
+def _indicated(state: State, value: float) -> GoalError:
+    """Return unknown parts, and an indicator by cell. Collective."""
+    why = "there is no adjoint of large deformations and nonlinear materials, compare states on two meshes"
+    comm, nan = comm_of(state), float("nan")
+    shares = {}
+    for name, body in state.scene.bodies.items():
+        indicator = stress_indicator(state, name)
+        cells = np.arange(body.mesh.n_cells if comm.rank == 0 else 0)  # each cell counts once
+        shares[name] = cells, indicator[cells]
+    return GoalError(value, nan, nan, nan, nan, nan, why, comm, _sizes(state), shares)
 
 
 def _without_adjoint(state: LinearState, value: float, why: str) -> GoalError:

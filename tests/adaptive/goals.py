@@ -21,7 +21,8 @@ from fenics_contact import (
     Traction,
     solve_scene,
 )
-from fenics_contact.design import ContactForces
+from fenics_contact._adaptive.goal_errors import goal_error
+from fenics_contact.design import ContactForces, LargestPressure
 from fenics_contact.gallery import block, box_lattice, rectangle, rectangle_lattice
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import bisection_partition
@@ -128,3 +129,12 @@ def under_a_ball() -> Scene:
     body = Body(box_lattice([line, line, -line[::-1]]), IsotropicElasticity(1000.0, 0.3))
     lifted = Support("body", "z0", (0.0, 0.0, 0.05))
     return Scene({"body": body}, [*planes, lifted], contacts=[pair])
+
+
+def parts_of(comm: MPI.Comm) -> np.ndarray:
+    """The largest pressure under a punch, its error and the shares of cells."""
+    scene = punched(1)
+    cuts = {name: bisection_partition(body.mesh, 2) for name, body in scene.bodies.items()}
+    state = solve_scene(scene, comm, partitions=cuts, tolerance=1e-10)
+    found = goal_error(state, LargestPressure(), tolerance=1e-8)
+    return np.array([found.value, found.mesh, found.uncancelled, *found.by_cell("lower")])
