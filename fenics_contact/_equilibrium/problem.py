@@ -350,7 +350,7 @@ class ContactProblem:
         return other
 
     def hold_warnings(self) -> ContactWarnings:
-        """Let only the last state be warned of, when `ContactWarnings.tell` of the result asks for it."""
+        """Let only the last state be warned of, when the `ContactWarnings` of the result are logged."""
         self._warnings = ContactWarnings(of_last=True)
         return self._warnings
 
