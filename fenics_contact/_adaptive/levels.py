@@ -213,9 +213,9 @@ class _Way:
     def add(self, problem: ContactProblem) -> Level:
         """Solve on the next mesh and estimate its error. Collective."""
         if self.levels:
-            self._state = problem.solve(start=self._state, refinements=self._refinements)
+            self._state = problem.solve(start=self._state, refinements=self._refinements, adjoint=True)
         else:
-            self._state = problem.solve()
+            self._state = problem.solve(adjoint=True)
         self._doubted = doubted_pairs(self._state)
         estimate = goal_error(self._state, self.quantity)
         scene = self._state.scene
@@ -246,12 +246,10 @@ class _Way:
         """
         if self._doubted:
             return float("inf")
-        by_adjoint = self._sums[-1] if np.isnan(estimate.total) else abs(estimate.total)
+        by_adjoint = 0.0 if estimate.without_adjoint else abs(estimate.total)
         if not self.levels:  # parts may cancel by chance, and nothing tells yet
-            return max(by_adjoint, self._sums[-1])
-        if not self._sums[-2] > 0.0:
-            return by_adjoint
-        ratio = min(self._sums[-1] / self._sums[-2], 0.9)
+            return float("inf") if estimate.without_adjoint else max(by_adjoint, self._sums[-1])
+        ratio = min(self._sums[-1] / self._sums[-2], 0.9) if self._sums[-2] > 0.0 else 0.0
         by_change = abs(estimate.value - self.levels[-1].value) * ratio / (1.0 - ratio)
         return max(by_adjoint, by_change)
 

@@ -403,6 +403,7 @@ class ContactProblem:
         design: bool = False,
         step: LoadStep | None = None,
         refinements: Mapping[str, Refinement] | None = None,
+        adjoint: bool = False,
     ) -> AnyState:
         """Compute an equilibrium. Collective.
 
@@ -420,6 +421,7 @@ class ContactProblem:
             refinements: Body name -> refinement of the mesh that ``start`` has of it, where the scene has a
                 finer one: nested iteration, in which solutions take few products, as many on fine meshes as
                 on coarse ones. The partition and the number of ranks may be others.
+            adjoint: Whether adjoints are wanted, as for errors of quantities, which need the dual system.
 
         Raises:
             InvalidInputError: If scene or partition cannot be used, supports hold other components than
@@ -443,7 +445,7 @@ class ContactProblem:
             wanted = checked_tolerance(self.tolerance if tolerance is None else tolerance)
         if scene.preloads:
             scene = replace(scene, preloads=held_at(scene, _lengths_after(before, scene)))
-        kind = self._kind(scene, sensitivity=design)
+        kind = self._kind(scene, sensitivity=design or adjoint)
         _dolfinx.warn_if_untested(self.comm.rank)  # once PETSc has started on the ranks that solve
         with one_thread(self.comm):
             if kind is SolverKind.TANGENT_NEWTON:

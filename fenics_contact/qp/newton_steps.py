@@ -250,6 +250,7 @@ class Safeguards:
         longest_cycle: The longest cycle of active sets that is recognised.
         moves_held: Whether floating bodies are equilibrated also where the face holds them all.
         balanced: Imbalance up to which an iterate counts as in equilibrium; steps from others are not cut.
+        stuck: Part of a step after which the next one is not cut on the same face.
     """
 
     shorten: Callable[[DualProblem, Iterate, Iterate, Residuals | None], Damped[Iterate]] = shorten
@@ -258,6 +259,7 @@ class Safeguards:
     reduction: float = 0.3
     longest_cycle: int = 6
     balanced: float = 1e-6
+    stuck: float = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,6 +271,7 @@ class FaceState:
         mismatch: Difference of the last residual from the one that its face predicted, relative to the
             residual before it.
         before: Residuals before the last step, None before the first.
+        fraction: Part of the last step that was taken.
     """
 
     iterate: Iterate
@@ -276,6 +279,7 @@ class FaceState:
     faces: tuple[Face, ...] = ()
     mismatch: float = 1.0
     before: Residuals | None = None
+    fraction: float = 1.0
 
     def stall(self, comm: MPI.Comm) -> str:
         """Describe why the last steps made no progress: a cycling or a stationary active set. Collective."""
@@ -380,12 +384,14 @@ class FaceSteps:
         after = iterate_at(self.problem, self._relieved(solved, alpha, step), solved.product, alpha)
         mismatch = abs(after.residuals.size - solved.inner.measure) / (before.residuals.size or 1.0)
         # Loads may not balance a start, whose residuals are then no measure: no part leads into equilibrium.
-        whole = before.residuals.coarse > self.safeguards.balanced
+        # Nor does a second short step on the same face: where two faces meet, each step aims beyond it.
+        stuck = state.fraction <= self.safeguards.stuck and changed == 0
+        whole = stuck or before.residuals.coarse > self.safeguards.balanced
         taken = Damped(after, 1.0)
         if not whole:
             taken = self.safeguards.shorten(self.problem, before, after, state.before)
         faces = (face, *state.faces[: self.safeguards.longest_cycle])
-        following = FaceState(taken.point, step, faces, mismatch, before.residuals)
+        following = FaceState(taken.point, step, faces, mismatch, before.residuals, taken.fraction)
         return following, self._record(number, taken, solved, changed)
 
     def _next_face(self, state: FaceState) -> tuple[Vector, Face]:

@@ -11,18 +11,22 @@ from mpi4py import MPI
 from fenics_contact import (
     Body,
     ContactPair,
+    Coulomb,
     RigidSphere,
     Scene,
     Support,
     Surface,
+    Tie,
+    TotalForce,
     Traction,
     gallery,
+    quantity,
     theory,
 )
 from fenics_contact._adaptive.levels import AccurateResult, Limits, solve_to
 from fenics_contact.design import Movement, PeakPressure, TotalPotential
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.materials import PlaneStrain
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 
 E, NU, RADIUS, FORCE = 2.1e5, 0.3, 10.0, 1000.0
 
@@ -76,6 +80,58 @@ def test_an_energy_costs_a_fraction_of_uniform_meshes():
     finer = solve_to(pressed(), TotalPotential(), 0.001, MPI.COMM_SELF)
     assert abs(found.value - finer.value) <= 0.01 * abs(finer.value)
     assert found.levels[-1].unknowns < finer.levels[-1].unknowns
+
+
+def test_a_quantity_without_adjoint_has_the_error_that_changes_tell():
+    scene = pressed()
+    pair = replace(scene.contacts[0], friction=Coulomb(0.5))
+    found = solve_to(replace(scene, contacts=[pair]), "stick_area", 0.1, MPI.COMM_SELF)
+    assert np.isinf(found.levels[0].error)
+    last, before = found.levels[-1], found.levels[-2]
+    assert 0.0 < last.error <= 0.1 * last.value
+    assert last.error <= 9.0 * abs(last.value - before.value) + 1e-12
+
+
+@pytest.mark.parametrize("cell", ["triangle", "quadrilateral"])
+def test_a_body_without_contact_is_refined_at_its_corners(cell):
+    mesh = gallery.rectangle((0.0, 0.0), (2.0, 1.0), (5, 3), cell=cell)
+    scene = Scene(
+        bodies={"beam": Body(mesh, PlaneStrain(E, NU))},
+        supports=[Support("beam", "x0")],
+        loads=[Traction("beam", "y1", (0.0, -10.0))],
+    )
+    tip = Movement("beam", "x1", (0.0, 1.0))
+    found = solve_to(scene, tip, 0.02, MPI.COMM_SELF)
+    finer = solve_to(scene, tip, 0.003, MPI.COMM_SELF)
+    assert abs(found.value - finer.value) <= 0.02 * abs(finer.value)
+    final = finer.state.scene.bodies["beam"].mesh
+    sizes = np.ptp(final.points[final.cells], axis=1).max(axis=1)
+    corner = np.linalg.norm(final.points[final.cells].mean(axis=1), axis=1).argmin()
+    assert sizes[corner] < 0.5 * sizes.max()
+
+
+def test_a_start_near_a_kink_of_friction_takes_few_products():
+    """Between two faces short steps made no way, and a rescue of 300 products followed."""
+    steel = IsotropicElasticity(E, NU)
+    parts = {
+        "floor": gallery.block((0, 0, 0), (3, 3, 1), (3, 3, 1)),
+        "slab": gallery.block((0, 0, 1), (3, 3, 2), (5, 5, 3)),
+        "rib": gallery.block((0, 0, 2), (3, 1, 3), (3, 1, 1)),
+    }
+    scene = Scene(
+        bodies={name: Body(mesh, steel) for name, mesh in parts.items()},
+        supports=[
+            Support("floor", "z0"),
+            Support("slab", "x0", (0.0, None, None)),
+            Support("slab", "y0", (None, 0.0, None)),
+        ],
+        loads=[TotalForce("rib", "z1", (0.0, 0.0, -500.0))],
+        contacts=[ContactPair(Surface("slab", "z0"), Surface("floor", "z1"), Coulomb(0.3))],
+        ties=[Tie(Surface("rib", "z0"), Surface("slab", "z1"))],
+    )
+    stress = quantity("stress", scene, body="slab", at=(1.5, 0.5, 1.5))
+    found = solve_to(scene, stress, 0.02, MPI.COMM_SELF, limits=Limits(levels=2))
+    assert found.levels[-1].products < 100
 
 
 def test_warnings_are_those_of_the_last_mesh(caplog):
@@ -159,7 +215,7 @@ from fenics_contact import (
 )
 from fenics_contact._adaptive.levels import solve_to
 from fenics_contact.design import PeakPressure
-from fenics_contact.materials import PlaneStrain
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 mesh = gallery.rectangle((0.0, 0.0), (10.0, 10.0), (5, 5), cell="triangle")
 scene = Scene(
     bodies={"block": Body(mesh, PlaneStrain(2.1e5, 0.3))},
