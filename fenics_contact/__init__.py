@@ -18,7 +18,7 @@ Values of loads: SampledField, read_field, Ufl
 Equilibrium: solve_scene, solve_steps, ContactProblem, LoadSequence, AutomaticSteps, TangentNewton,
     FixedPoint, Tolerance
 
-To an accuracy: solve_to, Limits, AccurateResult, quantity, goal_error, GoalError
+To an accuracy: solve_to, Limits, Level, AccurateResult, quantity, goal_error, GoalError
 
 Results: State, LinearState, DeformedState, NewtonSteps, Status, contact_area,
     contact_width
@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from fenics_contact._adaptive.goal_errors import GoalError as GoalError
     from fenics_contact._adaptive.goal_errors import goal_error as goal_error
     from fenics_contact._adaptive.levels import AccurateResult as AccurateResult
+    from fenics_contact._adaptive.levels import Level as Level
     from fenics_contact._adaptive.levels import Limits as Limits
     from fenics_contact._adaptive.levels import solve_to as solve_to
     from fenics_contact._adaptive.quantities import quantity as quantity

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from time import perf_counter
 from typing import cast
@@ -24,7 +24,7 @@ from fenics_contact._scene.plan import expected_memory
 from fenics_contact._scene.scene import Scene
 from fenics_contact.design.objective import Objective
 from fenics_contact.errors import InvalidInputError, collectively, together
-from fenics_contact.errors.kinds import safe_log
+from fenics_contact.errors.kinds import safe_log, user_code
 from fenics_contact.mesh.refinement import Refinement
 from fenics_contact.qp.solve import DualSolver
 from fenics_contact.results.forces import aligned
@@ -56,6 +56,15 @@ class Level:
     products: int
     seconds: float
     predicted: float
+
+    @property
+    def in_words(self) -> tuple[str, ...]:
+        """All numbers in the order of the attributes, the error relative to the value."""
+        relative = _relative(self.error, self.value)
+        error = f"{100 * relative:.2g} %" if np.isfinite(relative) else "unknown"
+        predicted = "" if np.isnan(self.predicted) else f"{self.predicted:.2f}"
+        numbers = f"{self.cells}", f"{self.unknowns}", f"{self.value:.6g}", error, f"{self.products}"
+        return (*numbers, f"{self.seconds:.2f}", predicted)
 
 
 @displayed
@@ -89,12 +98,7 @@ class AccurateResult:
     def __str__(self) -> str:
         """Return a table with one line for each mesh, and how it ended."""
         head = ("cells", "unknowns", "value", "error", "products", "seconds", "predicted")
-        rows: list[tuple[str, ...]] = [head]
-        for level in self.levels:
-            predicted = "" if np.isnan(level.predicted) else f"{level.predicted:.2f}"
-            error = f"{100 * _relative(level.error, level.value):.2g} %"
-            row = f"{level.cells}", f"{level.unknowns}", f"{level.value:.6g}", error, f"{level.products}"
-            rows.append((*row, f"{level.seconds:.2f}", predicted))
+        rows: list[tuple[str, ...]] = [head, *(level.in_words for level in self.levels)]
         return "\n".join([*aligned(rows, 0), self.reason])
 
 
@@ -143,6 +147,7 @@ def solve_to(
     limits: Limits | None = None,
     solver: DualSolver | None = None,
     tolerance: float = 1e-6,
+    callback: Callable[[Level], None] | None = None,
 ) -> AccurateResult:
     """Compute a quantity of an equilibrium to an accuracy, on meshes that are refined where it pays.
 
@@ -161,6 +166,7 @@ def solve_to(
         solver: As for `fenics_contact.solve_scene`.
         tolerance: Largest relative residual of each state. Looser ones save few products, but what is refined
             then depends on the number of ranks.
+        callback: Called on all ranks with every level once it is done.
 
     Returns:
         The result on the last mesh; where the accuracy was not reached, it says so, and a warning.
@@ -190,6 +196,9 @@ def solve_to(
             level = way.add(problem)
             words = f"{level.unknowns} unknowns, {level.value:.6g} ± {level.error:.2g}, {level.seconds:.1f} s"
             task.step(len(way.levels), words=words)
+            if callback is not None:
+                with user_code("solve_to callback"):
+                    callback(level)
             problem = way.next_problem(problem)
     warnings.tell()
     result = way.result()

@@ -62,7 +62,8 @@ MEANING = {
     ExitCode.OK: "it did what was asked for",
     ExitCode.FAILED: "something else went wrong, for instance a full disk",
     ExitCode.WRONG_INPUT: "wrong input: an option, a scene file, a file that is not there",
-    ExitCode.NOT_CONVERGED: "a solver or the optimiser stopped before its tolerance was met",
+    ExitCode.NOT_CONVERGED: "a solver or the optimiser stopped before its tolerance was met, or an accuracy "
+    "was not reached",
     ExitCode.NO_EQUILIBRIUM: "no equilibrium: nothing holds some body against its load",
     ExitCode.MISSING: "a library is missing or too old",
     ExitCode.INTERRUPTED: "interrupted from the keyboard",

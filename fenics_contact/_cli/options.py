@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -24,10 +25,12 @@ def scene_command(
     *,
     check: Callable[[SceneFile], None] = lambda file: None,
     sensitivity: bool = False,
+    accurate: bool = False,
 ) -> Command:
     """Return the command that reads a scene file, checks it, prints its plan and computes.
 
-    ``compute`` takes whether to resume, and whether to draw; its docstring is that of the command.
+    ``compute`` takes whether to resume, and whether to draw; its docstring is that of the command;
+    ``accurate``: whether it has the options that ask for an accuracy.
     """
 
     def command(
@@ -59,6 +62,24 @@ def scene_command(
                 show_default=False,
             ),
         ] = None,
+        accuracy: Annotated[
+            str | None,
+            typer.Option(
+                "--accuracy",
+                metavar="1%",
+                help="Refine the meshes until a quantity has this relative error, as 1% or 0.01.",
+                show_default=False,
+            ),
+        ] = None,
+        of: Annotated[
+            str | None,
+            typer.Option(
+                "--of",
+                metavar="QUANTITY",
+                help="The quantity of --accuracy by its name, by default the file's or peak_pressure.",
+                show_default=False,
+            ),
+        ] = None,
         pictures: Annotated[
             bool, typer.Option("--pictures/--no-pictures", help="Draw the pictures that the file requests.")
         ] = True,
@@ -87,7 +108,8 @@ def scene_command(
     ) -> None:
         console = console_of(context)
         with show_progress(console.comm):
-            file = _read(console, scene, output, tolerance, settings, python)
+            overrides = [*(settings or ()), *_asked(accuracy, of)]
+            file = _read(console, scene, output, tolerance, overrides, python)
             check(file)
             _show_plan(console, file, sensitivity=sensitivity)
             console.write()
@@ -97,7 +119,31 @@ def scene_command(
                 compute(console, file, resume, pictures)
 
     command.__doc__ = compute.__doc__
+    if not accurate:
+        whole = inspect.signature(command, eval_str=True)
+        kept = [each for name, each in whole.parameters.items() if name not in ("accuracy", "of")]
+        command.__signature__ = whole.replace(parameters=kept)  # type: ignore[attr-defined]
     return command
+
+
+def _asked(accuracy: str | None, of: str | None) -> list[str]:
+    """Return the keys of a scene file that ask for an accuracy."""
+    asked = []
+    if accuracy is not None:
+        share = accuracy.strip().removesuffix("%")
+        try:
+            error = float(share) / (100.0 if share != accuracy.strip() else 1.0)
+        except ValueError:
+            error = float("nan")
+        if not 0.0 < error < 1.0:
+            raise InvalidInputError(
+                f"--accuracy must lie between 0 and 1, or 0% and 100%, got {accuracy!r}: 1% or 0.01 asks for "
+                "one percent"
+            )
+        asked.append(f"accuracy.relative_error={error!r}")
+    if of is not None:
+        asked.append(f"accuracy.quantity={json.dumps(of, ensure_ascii=False)}")
+    return asked
 
 
 def _read(
@@ -105,11 +151,10 @@ def _read(
     scene: Path,
     output: Path | None,
     tolerance: str | None,
-    settings: list[str] | None,
+    overrides: list[str],
     python: bool,
 ) -> SceneFile:
     """Read a scene file with the values that options override. Collective."""
-    overrides = list(settings or ())
     if tolerance is not None:
         overrides.append(f"solver.tolerance={tolerance}")
     if output is not None:
@@ -138,6 +183,8 @@ def _show_plan(console: Console, file: SceneFile, *, sensitivity: bool) -> None:
     rows = {line[:15].strip(): line[16:] for line in str(plan).splitlines()}
     if file.steps and not sensitivity:
         rows["load steps"] = str(len(file.steps))
+    if file.document.accuracy is not None and not sensitivity:
+        rows["accuracy"] = file.document.accuracy.in_words
     console.write(f"{file.title}: {file.source.name} on {console.ranks}")
     console.write(facts(rows))
 

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import typer
 
+from fenics_contact._adaptive.levels import AccurateResult, Level
 from fenics_contact._cli.console import (
     Console,
+    ExitCode,
     facts,
     forces_table,
     state_facts,
@@ -29,6 +31,8 @@ from fenics_contact.results.state import State
 
 #: Largest number of load steps with maps of the status.
 MAPS = 6
+#: A line of the table of meshes.
+LEVEL = "{:>9s} {:>9s} {:>12s} {:>8s} {:>8s} {:>8s} {:>8s}"
 
 
 def add_to(app: typer.Typer) -> None:
@@ -39,16 +43,24 @@ def add_to(app: typer.Typer) -> None:
 def _run(console: Console, file: SceneFile, resume: bool | None, pictures: bool) -> None:
     """Compute the equilibrium of a scene file, or its load steps."""
     with only_run_in(file.folder, console.comm):
-        states = _through_steps(console, file, resume) if file.steps else _at_once(console, file)
+        accurate = None
+        if file.document.accuracy is not None:
+            accurate = _to_accuracy(console, file)
+            states = {file.title: accurate.state}
+        else:
+            states = _through_steps(console, file, resume) if file.steps else _at_once(console, file)
         gallery = Gallery()
         if pictures and file.document.output.drawn and can_draw(console, file, gallery):
             draw_state(console, file, states, gallery)
     names = ", ".join(["result.json", *_files(file), *(path.name for path in gallery.drawn)])
     console.write(f"results in {file.folder}/: {names}")
     gallery.require_all()
+    if accurate is not None and not accurate.reached:
+        console.write(f"the accuracy was not reached: {accurate.reason}")
+        raise typer.Exit(int(ExitCode.NOT_CONVERGED))
 
 
-run = scene_command(_run)
+run = scene_command(_run, check=SceneFile.check_accuracy, accurate=True)
 
 
 def _files(file: SceneFile) -> list[str]:
@@ -72,7 +84,21 @@ def _at_once(console: Console, file: SceneFile) -> dict[str, State]:
     return {file.title: state}
 
 
-def _write(file: SceneFile, state: State) -> None:
+def _to_accuracy(console: Console, file: SceneFile) -> AccurateResult:
+    """Solve on finer and finer meshes, print a line for each, and write the files. Collective."""
+    console.write(LEVEL.format("cells", "unknowns", "value", "error", "products", "seconds", "expected"))
+
+    def show(level: Level) -> None:
+        console.write(LEVEL.format(*level.in_words))
+
+    result = file.solve_to(show)
+    console.write(f"{result.reason}\n")
+    _show(console, file, result.state)
+    _write(file, result.state, result)
+    return result
+
+
+def _write(file: SceneFile, state: State, accurate: AccurateResult | None = None) -> None:
     """Write the files of a scene without load steps. Collective."""
     kinds = file.document.output.files
     if "vtu" in kinds:
@@ -83,7 +109,8 @@ def _write(file: SceneFile, state: State) -> None:
         StepTable(file.folder / "steps.csv", file.comm).add(state, file.title)
         if file.scene.contacts:
             write_contact_table(state, file.folder / "contact.csv")
-    write_result(state, file.folder, more=_origin(file), errors=state.known_errors is not None)
+    known = state.known_errors is not None
+    write_result(state, file.folder, more=_origin(file), errors=known, accuracy=accurate)
 
 
 @contextmanager

@@ -431,11 +431,12 @@ class ContactProblem:
             ConvergenceError: If the solver does not reach its tolerance; the last solution stays unchanged.
 
         Example:
-            >>> finer = refined(scene.bodies["block"].mesh, marked)  # doctest: +SKIP
+            >>> coarse = solve_scene(scene, comm)  # doctest: +SKIP
+            >>> finer = refined(scene.bodies["block"].mesh, [0, 1])  # doctest: +SKIP
             >>> fine_body = replace(scene.bodies["block"], mesh=finer.mesh)  # doctest: +SKIP
             >>> fine_scene = replace(scene, bodies={**scene.bodies, "block": fine_body})  # doctest: +SKIP
-            >>> problem = ContactProblem(fine_scene, comm)  # doctest: +SKIP
-            >>> fine = problem.solve(start=coarse, refinements={"block": finer})  # doctest: +SKIP
+            >>> fine = ContactProblem(fine_scene, comm)  # doctest: +SKIP
+            >>> state = fine.solve(start=coarse, refinements={"block": finer})  # doctest: +SKIP
         """
         check_not_forked()
         scene = self.scene if scene is None else scene

@@ -14,7 +14,7 @@ function curve(id, x, y, words) {
     {
       margin: { l: 70, r: 10, t: 10, b: 80 },
       legend: { orientation: "h", y: -0.28 },
-      xaxis: { title: { text: words.x } },
+      xaxis: { title: { text: words.x }, type: words.logx ? "log" : "linear" },
       yaxis: {
         title: { text: words.y },
         type: words.log ? "log" : "linear",
@@ -42,7 +42,7 @@ function curve(id, x, y, words) {
               xanchor: "left",
               y: Math.log10(words.line),
               yanchor: "bottom",
-              text: "tolerance",
+              text: words.limit,
               showarrow: false,
             },
           ]
@@ -53,11 +53,27 @@ function curve(id, x, y, words) {
 }
 
 async function curves() {
-  const { residuals, evaluations, tolerance } = page.history,
+  const { residuals, evaluations, levels, tolerance } = page.history,
     steps = residuals.products || [];
-  $("curves").hidden = !steps.length && !evaluations.value;
+  $("curves").hidden = !steps.length && !evaluations.value && !levels.error;
+  $("by-unknowns").hidden = $("by-seconds").hidden = !levels.error;
   $("history").hidden = !steps.length;
   $("objective").hidden = !evaluations.value;
+  for (const [id, x] of levels.error ? [["by-unknowns", "unknowns"], ["by-seconds", "seconds"]] : [])
+    await curve(
+      id,
+      levels[x],
+      { error: levels.error },
+      {
+        x: x === "seconds" ? "seconds of all meshes up to this one" : "unknowns of the mesh",
+        y: "estimated relative error",
+        log: true,
+        logx: true,
+        line: levels.wanted,
+        limit: "asked for",
+        step: 1,
+      },
+    );
   if (steps.length) {
     const { natural, gluing, coarse } = residuals,
       limit = typeof tolerance === "number" ? tolerance : null;
@@ -72,6 +88,7 @@ async function curves() {
         y: "relative residual",
         log: true,
         line: limit,
+        limit: "tolerance",
         step,
       },
     );

@@ -164,6 +164,7 @@ def sections(record: Record, units: Units) -> str:
     """Return the tables of a result as HTML, each under its heading, of the entries in the record."""
     parts = {
         "Summary": _rows(_summary(record, units)),
+        "Accuracy": _meshes(record),
         "Contact": _contact(record, units),
         "Load steps": _steps(record, units),
         "Rigid surfaces": _rows(_motions(record, units)),
@@ -644,12 +645,43 @@ def _first(fields: list[dict[str, Any]], name: str) -> int:
 
 
 def _history(record: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the curves of the page: residuals, and the objective of an optimisation."""
+    """Return the curves of the page: residuals, errors of meshes, and the objective of an optimisation."""
     evaluations = (record.get("optimisation") or {}).get("history") or {}
     return {
         "residuals": record.get("residual_history") or {},
         "tolerance": (record.get("solver") or {}).get("tolerance"),
+        "levels": _levels(record),
         "evaluations": {
             name: evaluations[name] for name in ("evaluations", "value", "best") if name in evaluations
         },
     }
+
+
+def _levels(record: Mapping[str, Any]) -> dict[str, Any]:
+    """Return unknowns, seconds so far and relative errors of the meshes of a quantity, if there is one."""
+    accuracy = record.get("accuracy") or {}
+    levels = accuracy.get("levels") or {}
+    if not levels:
+        return {}
+    errors = [
+        None if error is None or not value else error / abs(value)
+        for error, value in zip(levels["error"], levels["value"], strict=True)
+    ]
+    seconds = np.cumsum(levels["seconds"]).tolist()
+    return {
+        "unknowns": levels["unknowns"], "seconds": seconds, "error": errors, "wanted": accuracy["wanted"]
+    }  # fmt: skip
+
+
+def _meshes(record: Record) -> str:
+    """Return the meshes of a quantity that was computed to an accuracy."""
+    accuracy, curves = record.get("accuracy") or {}, _levels(record)
+    if not curves:
+        return ""
+    levels = accuracy["levels"]
+    shares = ["unknown" if error is None else f"{100 * error:.2g} %" for error in curves["error"]]
+    head = ("cells", "unknowns", "value", "estimated error", "products", "seconds")
+    columns = [levels[name] for name in ("cells", "unknowns", "value", "products", "seconds")]
+    columns.insert(3, shares)
+    table = _table(head, list(zip(*columns, strict=True)), words=0)
+    return f"{table}<p>{escape(accuracy['reason'])}</p>"

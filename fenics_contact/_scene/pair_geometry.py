@@ -254,7 +254,7 @@ class PairGeometry:
         if self.wider > much:
             return (
                 f"facets of the master are {self.wider:.2g} times as wide as the slave's, and the pressure "
-                "is only as fine as these: refine the master"
+                "is only as fine as these: refine the master, as solve_to does"
             )
         if self.by_nodes and self.wider < 1.0 / much:
             return (

@@ -15,6 +15,7 @@ from fenics_contact._scene.body import Body
 from fenics_contact._scene.plan import choose_solver
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact._scene_file.accuracy import AccuracyPart
 from fenics_contact._scene_file.bodies import AnyMaterial, Mesh
 from fenics_contact._scene_file.design import DesignPart, check_formulas
 from fenics_contact._scene_file.model import (
@@ -442,6 +443,9 @@ class Document(Part):
     springs: list[SpringPart] = Field([], description="springs between surfaces")
     steps: list[StepPart] = Field([], description="load steps; without them all acts at once")
     solver: SolverPart = Field(SolverPart(), description="how it is solved")
+    accuracy: AccuracyPart | None = Field(
+        None, description="a quantity and its largest error, to which meshes are refined"
+    )
     output: OutputPart = Field(OutputPart(), description="what is written, and where")
     design: DesignPart | None = Field(None, description="a shape optimisation, for `fenics-contact optimize`")
 
@@ -451,6 +455,8 @@ def references(document: Document) -> Iterator[tuple[Keys, str]]:
     for name, material in document.materials.items():
         if is_reference(material.model):
             yield ("materials", name, "model"), material.model
+    if document.accuracy is not None and is_reference(document.accuracy.quantity):
+        yield ("accuracy", "quantity"), document.accuracy.quantity
     for path, part in branches(document.design, ("design",)):
         objective = getattr(part, "objective", None) if isinstance(part, Part) else None
         if isinstance(objective, str) and is_reference(objective):

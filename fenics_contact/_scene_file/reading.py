@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from pydantic import BaseModel
 
+from fenics_contact._adaptive.levels import AccurateResult, Level, solve_to
+from fenics_contact._adaptive.quantities import quantity
 from fenics_contact._base.checkpoint import Checkpoint
 from fenics_contact._base.checks import require_file
 from fenics_contact._equilibrium.problem import ContactProblem
@@ -26,6 +28,7 @@ from fenics_contact._scene.fields import read_field
 from fenics_contact._scene.pairs import pressures_of
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.supports import ToolMotion
+from fenics_contact._scene_file.accuracy import not_refined
 from fenics_contact._scene_file.bodies import Shaped
 from fenics_contact._scene_file.design import (
     DesignPart,
@@ -472,6 +475,56 @@ class SceneFile:
         `checkpoint`: file from which an interrupted history continues, or None.
         """
         return LoadSequence(self.problem, checkpoint=checkpoint, count=len(self.steps))
+
+    def check_accuracy(self) -> None:
+        """Refuse an accuracy of what the scene does not have or refined meshes cannot keep. Collective."""
+        asked = self.document.accuracy
+        if asked is None:
+            return
+        with self._at("accuracy"):
+            asked.made()
+        wrong = [
+            self.source.mistake(path, f"{written(path)} does not go with [accuracy]: {words}")
+            for path, words in not_refined(self.document)
+        ]
+        if self.scene.is_nonlinear:
+            words = "accuracy must be asked of linear materials with small strains, got others: leave it out"
+            wrong.append(self.source.mistake(("accuracy",), words))
+        if wrong:
+            raise SceneFileError(self.source.name, wrong)
+        _ = self.quantity
+
+    @cached_property
+    def quantity(self) -> Objective:
+        """The quantity of [accuracy]. Collective on first use."""
+        asked = self.document.accuracy
+        assert asked is not None
+        with self._at("accuracy"), together(self.comm):
+            if is_reference(asked.quantity):
+                return _objective(asked.quantity, self.source)
+            return quantity(asked.quantity, self.scene, **asked.where)
+
+    def solve_to(self, callback: Callable[[Level], None] | None = None) -> AccurateResult:
+        """Compute the quantity of [accuracy] as accurately as it asks for. Collective.
+
+        `callback`: called with every level once it is done.
+        """
+        asked = self.document.accuracy
+        assert asked is not None
+        with self._at("solver"):
+            solver = self.document.solver.chosen(self.scene, self.partitions)
+        with self._at("accuracy"):
+            limits = asked.made()
+        return solve_to(
+            self.scene,
+            self.quantity,
+            asked.relative_error,
+            self.comm,
+            limits=limits,
+            solver=solver,
+            callback=callback,
+            **({"tolerance": given} if isinstance(given := self.document.solver.tolerance, float) else {}),
+        )
 
     def require_design(self) -> None:
         """Reject a file without an optimisation."""

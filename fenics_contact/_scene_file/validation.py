@@ -68,8 +68,9 @@ def _references(document: Document) -> Iterator[tuple[Path, str, str]]:
         if isinstance(made_of, str):
             yield ("bodies", name, "material"), made_of, "a material"
     for path, part in branches(document):
-        if isinstance(part, Part) and hasattr(part, "body"):
-            yield (*path, "body"), part.body, "a body"
+        named = getattr(part, "body", None) if isinstance(part, Part) else None
+        if named is not None:
+            yield (*path, "body"), named, "a body"
     cuts = document.solver.subdomains
     for name in cuts if isinstance(cuts, Mapping) else ():
         yield ("solver", "subdomains", name), name, "a body"
@@ -86,7 +87,7 @@ def _references(document: Document) -> Iterator[tuple[Path, str, str]]:
 def surface_parts(document: Document) -> Iterator[tuple[Path, Any]]:
     """Yield every part that names a surface of a body's mesh, with its path."""
     for path, part in branches(document):
-        if isinstance(part, Part) and hasattr(part, "surface") and path[0] != "design":
+        if isinstance(part, Part) and hasattr(part, "surface") and path[0] not in ("design", "accuracy"):
             yield path, part
 
 

@@ -44,6 +44,7 @@ from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
     from fenics_contact._accuracy.state_errors import StateErrors
+    from fenics_contact._adaptive.levels import AccurateResult
     from fenics_contact._optimize.result import Result
     from fenics_contact.design.problem import ShapeProblem
     from fenics_contact.design.several import JointProblem
@@ -267,6 +268,7 @@ def write_result(
     name: str = "result",
     more: Mapping[str, Any] | None = None,
     errors: bool = False,
+    accuracy: AccurateResult | None = None,
 ) -> Path:
     """Write a state, how it was computed and with which software. Collective.
 
@@ -303,6 +305,8 @@ and the part of ``friction`` in each of the contacts likewise, and of ``preloads
 point ``about`` |
     | ``tools`` | of each rigid tool by name ``displacement``, ``rotation``, and ``force`` and ``moment`` of \
 contact on it |
+    | ``accuracy`` | where a quantity was computed to one: ``value``, ``error``, ``wanted`` (relative), \
+``reached``, ``reason``, and of ``levels`` a list for each attribute of `Level`; None for an unknown error |
     | ``more`` | further results of the caller |
 
     Entries may be added without a new version; changing or removing one requires a new version.
@@ -314,6 +318,7 @@ contact on it |
         more: Further results: numbers, text, arrays, by name.
         errors: Whether to estimate the state's errors, see `LinearState.estimate_errors` for the cost; else
             those known already are written: a balanced solve has all but that of the geometry.
+        accuracy: What `solve_to` returned, whose state it is.
 
     Returns:
         The file; `read_result` reads it.
@@ -327,7 +332,10 @@ contact on it |
     comm = state.torn.decomposition.comm
     with together(comm):
         target = checked_name(folder, name, ".json")
-    return write_json(target, result_record(state, more=more, errors=errors), comm=comm)
+    record = result_record(state, more=more, errors=errors)
+    if accuracy is not None:
+        record["accuracy"] = _accuracy(accuracy)
+    return write_json(target, record, comm=comm)
 
 
 @collectively("result_record", lambda state, *_, **__: state.torn.decomposition.comm)
@@ -514,6 +522,15 @@ def _errors(errors: StateErrors) -> dict[str, Any]:
         "peak_pressure_by_geometry": readable(errors.peak_by_geometry),
         "by_body": readable(errors.by_body),
     }
+
+
+def _accuracy(result: AccurateResult) -> dict[str, Any]:
+    names = list(vars(result.levels[0]))
+    levels = {name: [readable(getattr(level, name)) for level in result.levels] for name in names}
+    kept = {
+        name: readable(getattr(result, name)) for name in ("value", "error", "wanted", "reached", "reason")
+    }
+    return {**kept, "levels": levels}
 
 
 def _objective(problem: ShapeProblem | JointProblem, initial: float, final: float) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from fenics_contact.pictures import _libraries  # noqa: F401
 from fenics_contact.pictures.canvas import Picture, Units
 from fenics_contact.pictures.curves import plot_curves
 from fenics_contact.pictures.designs import plot_before_after, plot_control_net, plot_convergence
+from fenics_contact.pictures.levels import plot_levels, plot_meshes
 from fenics_contact.pictures.states import (
     plot_contact_pressure,
     plot_contact_status,
@@ -42,5 +43,7 @@ __all__ = [
     "plot_decomposition",
     "plot_error",
     "plot_field",
+    "plot_levels",
+    "plot_meshes",
     "plot_stress",
 ]

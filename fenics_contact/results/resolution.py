@@ -9,6 +9,8 @@ from fenics_contact._base.display import counted
 
 #: By how much the largest pressure may be off, by the edges of facets from its point to the next open one.
 OFF = {1: "by a half or more", 2: "by a tenth"}
+#: What refines meshes until the largest pressure is good enough.
+CALL = "solve_to(scene, 'peak_pressure', 0.02, comm)"
 
 
 @dataclass(frozen=True)
@@ -38,14 +40,14 @@ class CoarsePeak:
         return (
             f"the contact of {self.place} is too small for its cells: {points}, and it ends within "
             f"{cells} of the largest pressure, which may be off {OFF[self.cells]}; four cells on the half "
-            "width of a contact have it to about a percent: refine the meshes there"
+            f"width of a contact have it to about a percent: refine the meshes there, as {CALL} does"
         )
 
     def __str__(self) -> str:
         """Return it in one line."""
         return (
             f"may be off {OFF[self.cells]}, {self.place} touch within {counted(self.cells, 'cell')} of it: "
-            "refine the meshes there"
+            f"{CALL} refines the meshes there"
         )
 
 

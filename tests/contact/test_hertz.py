@@ -246,7 +246,8 @@ def test_balls_are_told_likewise(caplog: pytest.LogCaptureFixture) -> None:
     assert words == (
         "the contact of upper z0 on rigid plane is too small for its cells: 4 points press, and it ends "
         "within 2 cells of the largest pressure, which may be off by a tenth; four cells on the half width "
-        "of a contact have it to about a percent: refine the meshes there"
+        "of a contact have it to about a percent: refine the meshes there, as solve_to(scene, "
+        "'peak_pressure', 0.02, comm) does"
     )
 
 

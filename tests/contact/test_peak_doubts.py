@@ -11,7 +11,7 @@ from mpi4py import MPI
 from fenics_contact import solve_scene
 from fenics_contact._equilibrium.peaks import unmatched_nodes
 from fenics_contact.results.linear_state import LinearState
-from fenics_contact.results.resolution import CoarsePeak, UnmatchedNodes, in_words
+from fenics_contact.results.resolution import CALL, CoarsePeak, UnmatchedNodes, in_words
 from tests.contact.round_bodies import CELL, pressed
 
 PLACE = "upper y0 on lower y1"
@@ -42,7 +42,7 @@ def test_cells_to_the_edge_are_those_of_the_coarser_surface(
 def test_the_line_of_a_coarse_peak() -> None:
     state, error = found(1.5, 0.75)
     (doubt,) = state.peak_doubts
-    words = f"may be off by a tenth, {PLACE} touch within 2 cells of it: refine the meshes there"
+    words = f"may be off by a tenth, {PLACE} touch within 2 cells of it: {CALL} refines the meshes there"
     assert str(doubt) == words
     assert f"\n  peak pressure    {words}\n" in str(state)
     assert 0.01 < error < 0.23
@@ -65,7 +65,7 @@ def test_contact_by_nodes_wavers_where_meshes_do_not_match() -> None:
 
 def test_one_line_for_several_pairs() -> None:
     doubts = [CoarsePeak("a", 3, 1), UnmatchedNodes("b"), UnmatchedNodes("c")]
-    words = "may be off by a half or more, a touch within 1 cell of it: refine the meshes there"
+    words = f"may be off by a half or more, a touch within 1 cell of it: {CALL} refines the meshes there"
     assert in_words(doubts[:1]) == words
     assert in_words(doubts) == f"{words}; likewise 2 further pairs"
 

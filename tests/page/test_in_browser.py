@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import Status, result_page, write_result
+from fenics_contact import AccurateResult, Level, Status, result_page, write_result
 from fenics_contact.output import ResultSeries
 from tests.page.browser import CHROMIUM, DRIVER, MISSING, Browser, browser
 from tests.viz.plane_states import flat_pad, plane_block, tall_pad
@@ -54,7 +54,9 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "peak_pressure",
     )
     steps = {"number": [0, 1], "name": ["first", "second"], **{name: [123.456, 65.4321] for name in numbers}}
-    write_result(state, folder, more={"title": "Two blocks", "steps": steps})
+    levels = [Level(9 * k, 30 * k, 2.0, error, 7, 0.5, 0.4) for k, error in ((1, np.inf), (2, 0.2), (4, 0.1))]
+    accurate = AccurateResult(state, 2.0, 0.1, 0.01, False, "as far as it goes", tuple(levels))
+    write_result(state, folder, more={"title": "Two blocks", "steps": steps}, accuracy=accurate)
     result_page(folder, folder / "space.html")
     result_page(plane_block(), folder / "plane.html")
     return {name: folder / f"{name}.html" for name in ("space", "plane")}
@@ -229,6 +231,18 @@ def test_bodies_can_be_left_out(chromium: Browser, pages: dict[str, Path]) -> No
     chromium.run("document.querySelector('#bodies input').click()")
     chromium.wait("return Number(document.getElementById('view').dataset.drawn) > 1")
     assert 0 < len(drawn(chromium)["skin"][0]) < before
+
+
+def test_errors_of_meshes_are_drawn_where_there_are_some(chromium: Browser, pages: dict[str, Path]) -> None:
+    drawn_of = "return document.getElementById(arguments[0]).data?.map(({x, y}) => [x, y]) ?? null"
+    chromium.open(pages["space"])
+    chromium.wait("return document.querySelectorAll('#by-seconds .trace').length === 1")
+    assert chromium.run(drawn_of, "by-unknowns") == [[[30, 60, 120], [None, 0.1, 0.05]]]
+    assert chromium.run(drawn_of, "by-seconds") == [[[0.5, 1.0, 1.5], [None, 0.1, 0.05]]]
+    require_no_trouble(chromium, pages["space"])
+    chromium.open(pages["plane"])
+    chromium.wait("return document.querySelectorAll('#history .trace').length === 3")
+    assert chromium.run(drawn_of, "by-unknowns") is None
 
 
 def test_a_page_that_was_cut_says_so(chromium: Browser, pages: dict[str, Path], tmp_path: Path) -> None:

@@ -404,3 +404,22 @@ RANKS = """
 @pytest.mark.slow
 def test_of_two_ranks_one_writes_the_page(mpirun: Callable[..., str], tmp_path: Path) -> None:
     assert mpirun(RANKS, 2, tmp_path).strip() == "(True, True) (False, True) page.html"
+
+
+def test_meshes_of_an_accuracy_are_there_to_draw(tmp_path: Path) -> None:
+    state = touching_blocks()
+    write_vtu(state, tmp_path)
+    record = result_record(state)
+    assert content(result_page(state).html)[0]["history"]["levels"] == {}
+    levels = {
+        "cells": [10, 40], "unknowns": [30, 90], "value": [-2.0, -4.0], "error": [None, 0.1],
+        "products": [7, 9], "seconds": [0.5, 0.25], "predicted": [None, 0.3],
+    }  # fmt: skip
+    record["accuracy"] = {"wanted": 0.05, "reason": "reached, 1 < 2", "levels": levels}
+    (tmp_path / "result.json").write_text(json.dumps(record, default=np.ndarray.tolist))
+    page = str(result_page(tmp_path).html)
+    history = content(page)[0]["history"]["levels"]
+    assert history == {"unknowns": [30, 90], "seconds": [0.5, 0.75], "error": [None, 0.025], "wanted": 0.05}
+    table = page[page.index("<h2>Accuracy</h2>") :].split("</section>")[0]
+    assert "<p>reached, 1 &lt; 2</p>" in table
+    assert [word in table for word in (">unknown<", ">2.5 %<", ">40<", ">−4<")] == [True] * 4
