@@ -73,12 +73,18 @@ class _Slave:
         self.nodes = torn.decomposition.tearing.global_nodes(pair.slave.body, self.surface.nodes)
         self.mine = np.flatnonzero(torn.points.pair == index)
         self.place = np.searchsorted(self.nodes, torn.points.slave[self.mine])
+        hanging = torn.scene.bodies[pair.slave.body].mesh.hanging
+        known = np.isin(np.arange(len(self.nodes)), self.place)
+        self._fill = None if hanging is None else hanging.filled(self.surface.nodes, known)
 
     def at_nodes(self, values: np.ndarray) -> np.ndarray:
-        """Return values of all contact points at the nodes of the surface, zero at others, (n_nodes, ...)."""
+        """Return values of all contact points at the nodes of the surface, zero at others, (n_nodes, ...).
+
+        At hanging nodes they are the means of their masters.
+        """
         result = np.zeros((len(self.nodes), *values.shape[1:]))
         result[self.place] = values[self.mine]
-        return result
+        return result if self._fill is None else np.asarray(self._fill @ result)
 
     def facets(self, state: LinearState, weight: np.ndarray) -> np.ndarray:
         """Return this rank's share of the facets all of whose nodes have points, and one of them a weight."""

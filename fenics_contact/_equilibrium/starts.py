@@ -200,6 +200,9 @@ class CoarseStart:
             nodes, values = contact.points.of_surface(number, traction)
             nodal = np.zeros((self.state.scene.bodies[body].mesh.n_nodes, traction.shape[1]))
             nodal[nodes - before] = values
+            mesh = self.state.scene.bodies[body].mesh
+            if mesh.hanging is not None:
+                nodal = mesh.hanging.filled_in(nodal, mesh.surfaces[pair.slave.name], nodes - before)
             forces[mine] = self._to_fine(torn.scene, body, nodal)[points.slave[mine] - first]
         forces *= points.area[:, None]
         return np.maximum(forces[:, 0], 0.0), forces[:, 1:]

@@ -156,8 +156,9 @@ class ContactPoints:
             order = np.lexsort((jump.indices, row))
             row = row[order]
             return row, jump.indices[order], jump.data[order], directions[row]
-        parts, back = (self.own[which], -self.master[which]), np.einsum(
-            "nde,nd->ne", self.turns[which], directions
+        parts, back = (
+            (self.own[which], -self.master[which]),
+            np.einsum("nde,nd->ne", self.turns[which], directions),
         )
         rows = [np.repeat(np.arange(len(which)), np.diff(part.indptr)) for part in parts]
         along = np.concatenate([directions[rows[0]], back[rows[1]]])

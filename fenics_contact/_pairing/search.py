@@ -94,11 +94,19 @@ def closable_gaps(
     """
     weight = coupling.weight
     nodes = np.flatnonzero(np.bincount(weight.indices, minlength=weight.shape[1]))
+    if master.followed is not None:
+        nodes = np.union1d(nodes, master.followed[nodes].indices)
     here = shared_projection(slave, coupling.node, master, comm)
     there = shared_projection(master, nodes, slave, comm)
     there = replace(there, point=nodes[there.point], lost=nodes[there.lost])
     own, opposite = np.full(len(coupling.node), np.nan), np.full(weight.shape[1], np.nan)
     own[here.point], opposite[there.point] = here.gap, there.gap
+    if slave.followed is not None:  # displacements can close the mean of their masters' gaps there
+        every = np.full(len(slave.nodes), np.nan)
+        every[coupling.node] = own
+        own = (slave.followed @ every)[coupling.node]
+    if master.followed is not None:
+        opposite = master.followed @ opposite
     lost = abs(weight) @ np.isnan(opposite).astype(np.float64) > 0
     opposite = np.nan_to_num(opposite)
     across = np.where(lost, own, weight @ opposite)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -302,12 +303,15 @@ class Relief:
         rest: Corrections of the cubics at the midpoints of the edges, from each corner to the next, and in
             the middle, shape (n_facets, corners + 1); in the plane at the midpoint, (n_facets, 1), [length].
         flattened: Number of facets left flat, as the surface over them would fold.
+        offsets: Height at the corners of facets, which is zero but at hanging nodes, shape (n_facets,
+            corners), [length]; None without any.
     """
 
     normals: np.ndarray
     corners: np.ndarray
     rest: np.ndarray
     flattened: int = 0
+    offsets: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -332,6 +336,8 @@ class FacetedSurface:
             are whole.
         axisymmetric: Whether it is that of a body of revolution, half of its section.
         planes: Unit normals of the planes of symmetry, shape (n_planes, dim); None: they are the axes.
+        followed: What makes values at hanging nodes the means of their masters', shape (n, n); None without
+            any.
     """
 
     nodes: np.ndarray
@@ -344,6 +350,7 @@ class FacetedSurface:
     whole: np.ndarray | None = None
     axisymmetric: bool = False
     planes: np.ndarray | None = None
+    followed: sp.csr_matrix | None = None
 
     def within(self, vectors: np.ndarray, mirrored: np.ndarray) -> np.ndarray:
         """Return vectors without their components across planes of symmetry, both (n, dim), (n, n_planes)."""
@@ -528,9 +535,16 @@ def heights(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> He
         return Heights(np.zeros(len(facet)), np.zeros(local.shape), np.zeros(shape))
     slope, d_slope, rest, d_rest = height_functions(local, surface.corners)
     at_corners = slopes(surface, facet)
+    if relief.offsets is not None:
+        ends = relief.offsets[facet]
+        at_corners = at_corners - edges_at_corners(ends[..., None])[..., 0]
     value = np.einsum("nke,nke->n", slope, at_corners) + np.einsum("nm,nm->n", rest, relief.rest[facet])
     by_local = np.einsum("nkea,nke->na", d_slope, at_corners)
     by_local += np.einsum("nma,nm->na", d_rest, relief.rest[facet])
+    if relief.offsets is not None:
+        functions, gradients = shape_functions(local, surface.corners)
+        value += np.einsum("nk,nk->n", functions, ends)
+        by_local += np.einsum("nka,nk->na", gradients, ends)
     return Heights(value, by_local, slope)
 
 

@@ -346,6 +346,9 @@ def true_surface(
     marks = np.zeros(mesh.points.shape, dtype=bool) if mirrored is None else mirrored
     surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks, planes)
     surface = _with_areas(surface, mesh, name, axisymmetric)
+    if mesh.hanging is not None:
+        none = np.zeros(len(surface.nodes), dtype=bool)
+        surface = replace(surface, followed=mesh.hanging.filled(surface.nodes, none))
     order = 2
     if finer:
         order, geometry = (2 if geometry == "faceted" else 3), "best"
@@ -377,7 +380,8 @@ def _relief(
     order: int,
 ) -> Relief | None:
     surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], *mirrors)
-    raised = reconstructed(surface, order) if shape is None else by_shape(surface, shape)
+    hangs = None if mesh.hanging is None else np.isin(surface.nodes, mesh.hanging.nodes)
+    raised = reconstructed(surface, order) if shape is None else by_shape(surface, shape, hangs)
     return None if is_flat(raised) else raised.relief
 
 
@@ -387,17 +391,23 @@ def is_flat(surface: FacetedSurface) -> bool:
     assert relief is not None
     edges = np.linalg.norm(edges_at_corners(surface.points[surface.facets]), axis=3)
     limit = FLAT * edges.min() + computed_rounding(surface.points)
-    bends = np.abs(slopes(surface, np.arange(len(surface.facets)))).max(), np.abs(relief.rest).max()
+    bends = [np.abs(slopes(surface, np.arange(len(surface.facets)))).max(), np.abs(relief.rest).max()]
+    if relief.offsets is not None:
+        bends.append(np.abs(relief.offsets).max())
     return bool(max(bends) <= limit and np.abs(relief.normals).max() <= limit / edges.min())
 
 
-def by_shape(surface: FacetedSurface, shape: SurfaceShape, sharp: float = 0.02) -> FacetedSurface:
+def by_shape(
+    surface: FacetedSurface, shape: SurfaceShape, hangs: np.ndarray | None = None, sharp: float = 0.02
+) -> FacetedSurface:
     """Return a surface with the relief of the shape on which its nodes lie.
 
-    Nodes slightly off the shape are not moved; the heights between them are relative to them. Where several
-    shapes meet in a crease, or one its mirror image, each facet uses its own.
+    Nodes slightly off the shape are not moved; the heights between them are relative to them, but for hanging
+    nodes, which lie on larger facets. Where several shapes meet in a crease, or one its mirror image, each
+    facet uses its own.
 
-    `shape`: the shape; `sharp`: largest angle in radians between the normals of shapes that meet smoothly.
+    `shape`: the shape; `hangs`: marks of hanging nodes, shape (n,), None without any; `sharp`: largest angle
+    in radians between the normals of shapes that meet smoothly.
     """
     parts = _parts(shape, surface.points[surface.facets].mean(axis=1))
     corners = np.zeros((*surface.facets.shape, surface.dim))
@@ -415,7 +425,7 @@ def by_shape(surface: FacetedSurface, shape: SurfaceShape, sharp: float = 0.02) 
     normals[creased] = surface.averaged[creased]
     smooth = ~creased[surface.facets]
     corners[smooth] = normals[surface.facets[smooth]]
-    return _fitted_shapes(surface, parts, normals, corners)
+    return _fitted_shapes(surface, parts, normals, corners, hangs)
 
 
 def _parts(shape: SurfaceShape, middles: np.ndarray) -> list[tuple[SurfaceShape, np.ndarray]]:
@@ -435,6 +445,7 @@ def _fitted_shapes(
     parts: list[tuple[SurfaceShape, np.ndarray]],
     normals: np.ndarray,
     corners: np.ndarray,
+    hangs: np.ndarray | None,
 ) -> FacetedSurface:
     """Return a surface with the normals of nodes and of corners, and the heights of parts over it."""
     samples = sample_points(surface.corners)
@@ -448,6 +459,11 @@ def _fitted_shapes(
         _height_over_parts(fitted.points[nodes[:, k]], fitted.normals[nodes[:, k]], parts)
         for k in range(surface.corners)
     ]
+    if hangs is not None and hangs.any():
+        own = np.where(hangs[nodes], np.stack(off_nodes, axis=1), 0.0)
+        off_nodes = [off - offset for off, offset in zip(off_nodes, own.T, strict=True)]
+        relief = replace(relief, offsets=own)
+        fitted = replace(surface, relief=relief)
     # The middle last: its correction is relative to that of the midpoints of the edges.
     for number, sample in enumerate(samples):
         local = np.broadcast_to(sample, (count, len(sample)))

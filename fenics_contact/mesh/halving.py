@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from fenics_contact.mesh.body_mesh import BodyMesh, check_jacobians
 from fenics_contact.mesh.cell_types import HEXAHEDRON27, QUADRILATERAL9, CellType
-from fenics_contact.mesh.faces import match_faces, number_faces
+from fenics_contact.mesh.drawn_along import drawn_along
+from fenics_contact.mesh.faces import boundary_faces, match_faces, number_faces
 from fenics_contact.mesh.hanging import HangingNodes
 from fenics_contact.mesh.quadratic import put_on_shapes
+from fenics_contact.mesh.quality import thickness
 
 _HALVED = {2: QUADRILATERAL9, 3: HEXAHEDRON27}
 """Quadratic cells, whose nodes are those of the halved linear ones, and whose pieces are their parts."""
@@ -17,7 +21,9 @@ _HALVED = {2: QUADRILATERAL9, 3: HEXAHEDRON27}
 def halved(mesh: BodyMesh, chosen: np.ndarray) -> tuple[BodyMesh, np.ndarray, np.ndarray]:
     """Halve linear quadrilaterals or hexahedra in every direction, and what is two levels larger beside them.
 
-    Cells that share a point differ by one level at most, so that no master of a hanging node hangs.
+    Cells that share a point differ by one level at most, so that no master of a hanging node hangs. Where a
+    surface is so curved that cells between nodes on its shape and hanging nodes on its facets are inverted,
+    the larger cells beside them are halved, too.
 
     `chosen`: numbers of the marked cells.
 
@@ -25,25 +31,66 @@ def halved(mesh: BodyMesh, chosen: np.ndarray) -> tuple[BodyMesh, np.ndarray, np
     node of each cell lies, (n_cells, nodes of a cell, dim).
     """
     kind = _HALVED[mesh.dim]
-    levels = np.zeros(mesh.n_cells, dtype=np.int64) if mesh.hanging is None else mesh.hanging.levels
-    split = _balanced(mesh, kind, levels, chosen)
-    large, small = np.flatnonzero(split), np.flatnonzero(~split)
-    between, number = _new_nodes(mesh, kind, large)
-    nodes = np.column_stack([mesh.cells[large], number])
-    parents = np.concatenate([small, np.repeat(large, len(kind.pieces))])
-    order = np.argsort(parents, kind="stable")
-    cells = np.concatenate([mesh.cells[small], nodes[:, kind.pieces].reshape(-1, len(kind.vertices))])[order]
-    places = kind.nodes[kind.pieces], kind.vertices[None]
-    positions = np.concatenate(
-        [np.tile(places[1], (len(small), 1, 1)), np.tile(places[0], (len(large), 1, 1))]
+    while True:
+        parts = _Parts.of(mesh, kind, chosen)
+        more = parts.beside_inverted(kind)
+        if not len(more):
+            break
+        chosen = np.union1d(chosen, more)
+    remedy = "mark more cells along curved surfaces, or leave their shapes away"
+    check_jacobians(parts.points, parts.cells, remedy)
+    regions = {name: np.flatnonzero(np.isin(parts.parents, inside)) for name, inside in mesh.regions.items()}
+    fine = BodyMesh(
+        parts.points, parts.cells, parts.surfaces, None, regions, shapes=mesh.shapes, hanging=parts.hanging
     )
-    hanging = _still_hanging(mesh, kind, cells, between, (levels + split)[parents[order]])
-    surfaces = _parts_of_surfaces(mesh, kind, large, nodes)
-    points = _placed(mesh, kind, between, nodes, surfaces, hanging)
-    check_jacobians(points, cells, "mark more cells along curved surfaces, or leave their shapes away")
-    regions = {name: np.flatnonzero(np.isin(parents[order], inside)) for name, inside in mesh.regions.items()}
-    fine = BodyMesh(points, cells, surfaces, None, regions, shapes=mesh.shapes, hanging=hanging)
-    return fine, parents[order], positions[order]
+    return fine, parts.parents, parts.positions
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """Cells of which some were halved.
+
+    Attributes:
+        split: Whether each coarse cell was.
+    """
+
+    points: np.ndarray
+    cells: np.ndarray
+    surfaces: dict[str, np.ndarray]
+    hanging: HangingNodes | None
+    parents: np.ndarray
+    positions: np.ndarray
+    split: np.ndarray
+
+    @classmethod
+    def of(cls, mesh: BodyMesh, kind: CellType, chosen: np.ndarray) -> _Parts:
+        """Halve chosen cells, and those that are two levels larger beside them."""
+        levels = np.zeros(mesh.n_cells, dtype=np.int64) if mesh.hanging is None else mesh.hanging.levels
+        split = _balanced(mesh, kind, levels, chosen)
+        large, small = np.flatnonzero(split), np.flatnonzero(~split)
+        between, number = _new_nodes(mesh, kind, large)
+        nodes, count = np.column_stack([mesh.cells[large], number]), len(kind.vertices)
+        parents = np.concatenate([small, np.repeat(large, len(kind.pieces))])
+        order = np.argsort(parents, kind="stable")
+        parents = parents[order]
+        cells = np.concatenate([mesh.cells[small], nodes[:, kind.pieces].reshape(-1, count)])[order]
+        whole, halves = np.tile(kind.vertices, (len(small), 1, 1)), kind.nodes[kind.pieces]
+        positions = np.concatenate([whole, np.tile(halves, (len(large), 1, 1))])[order]
+        hanging = _still_hanging(mesh, kind, cells, between, (levels + split)[parents])
+        surfaces = _parts_of_surfaces(mesh, kind, large, nodes)
+        points = _placed(mesh, kind, between, (nodes, cells), surfaces, hanging)
+        return cls(points, cells, surfaces, hanging, parents, positions, split)
+
+    def beside_inverted(self, kind: CellType) -> np.ndarray:
+        """Return the coarse cells that were not halved on which nodes of inverted cells hang."""
+        inverted = thickness(self.points, self.cells) <= 0.0
+        if self.hanging is None or not inverted.any():
+            return np.zeros(0, dtype=np.int64)
+        mine = np.isin(self.hanging.nodes, self.cells[inverted])
+        there = _entities(kind, self.cells)
+        which = match_faces(there.reshape(-1, there.shape[2]), self.hanging.masters[mine])
+        parents = self.parents[np.flatnonzero(which >= 0) // there.shape[1]]
+        return np.unique(parents[~self.split[parents]])
 
 
 def _entities(kind: CellType, cells: np.ndarray) -> np.ndarray:
@@ -148,14 +195,17 @@ def _placed(
     mesh: BodyMesh,
     kind: CellType,
     between: np.ndarray,
-    nodes: np.ndarray,
+    numbers: tuple[np.ndarray, np.ndarray],
     surfaces: dict[str, np.ndarray],
     hanging: HangingNodes | None,
 ) -> np.ndarray:
     """Return coordinates: new nodes and those that hang no more lie on the shapes of their surfaces.
 
-    Nodes that hang lie at the mean of their masters.
+    New nodes around them follow, see `drawn_along`; nodes that hang lie at the mean of their masters.
+
+    `numbers`: all nodes of the halved cells, and the refined cells.
     """
+    nodes, cells = numbers
     n_old, count = mesh.n_nodes, mesh.n_nodes + len(between) + len(nodes)
     moves = np.zeros(count, dtype=bool)
     moves[n_old:] = True
@@ -168,5 +218,9 @@ def _placed(
     points[n_old : n_old + len(between)] = points[between].mean(axis=1)
     points[nodes[:, -1]] = points[nodes[:, : len(kind.vertices)]].mean(axis=1)
     moves[:n_old] = False
-    put_on_shapes(points, surfaces, mesh.shapes, moves)
+    straight = points.copy()
+    placed = put_on_shapes(points, surfaces, mesh.shapes, moves)
+    if not np.array_equal(points, straight):
+        outside, _ = boundary_faces(cells, mesh.dim, hanging)
+        points = straight + drawn_along(points - straight, placed, straight, cells, outside, ~moves)
     return points if hanging is None else hanging.placed(points)

@@ -19,10 +19,12 @@ from fenics_contact import (
     contact_area,
     solve_scene,
 )
+from fenics_contact._pairing.search import find_contact_points
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
 from fenics_contact.mesh import refined
 from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.shapes import Sphere
 
 
 def halved(mesh: BodyMesh, low: tuple[float, float, float], high: tuple[float, float, float]) -> BodyMesh:
@@ -83,3 +85,33 @@ def test_by_nodes_the_areas_of_hanging_nodes_go_to_their_masters() -> None:
     assert (contact.pressure > 0.5).all()
     assert contact.normal_force.sum() == pytest.approx(1.0, rel=1e-9)
     assert state.balance().imbalance < 1e-9
+
+
+def fitted(cells: int, upper: bool) -> BodyMesh:
+    """Return a block whose upper or lower side lies on one ball, and knows it."""
+    mesh = block((-1.0, -1.0, 0.0), (1.0, 1.0, 1.0), (cells, cells, 2))
+    points = mesh.points.copy()
+    there = 4.0 - np.sqrt(16.0 - (points[:, :2] ** 2).sum(axis=1))
+    points[:, 2] = there + (1.0 - there) * points[:, 2] if upper else (1.0 + there) * points[:, 2] - 1.0
+    shape = {"z0" if upper else "z1": Sphere((0.0, 0.0, 4.0), 4.0, hollow=not upper)}
+    return BodyMesh(points, mesh.cells, mesh.surfaces, shapes=shape)
+
+
+@pytest.mark.parametrize("kind", ["node", "mortar"])
+def test_gaps_at_hanging_nodes_are_those_of_true_shapes(kind: str) -> None:
+    """A ball in a socket of its size touches it everywhere, where facets of two sizes are far apart."""
+    low = halved(fitted(5, False), (0.1, -1.0, -0.5), (1.0, 1.0, 0.5))
+    high = halved(fitted(6, True), (-1.0, 0.1, -0.5), (1.0, 1.0, 0.5))
+    for mesh, side in ((low, "z1"), (high, "z0")):
+        hanging = np.intersect1d(mesh.hanging.nodes, mesh.surfaces[side])
+        assert (np.abs(np.linalg.norm(mesh.points[hanging] - [0.0, 0.0, 4.0], axis=1) - 4.0) > 3e-3).all()
+    bodies = {
+        "low": Body(low, IsotropicElasticity(1e3, 0.3)),
+        "high": Body(high, IsotropicElasticity(1e3, 0.3)),
+    }
+    scene = Scene(bodies, [Support("low", "z0")], [], [ContactPair(*SIDES, discretisation=kind)])  # type: ignore[arg-type]
+    points = find_contact_points(scene, np.zeros((len(scene.points), 3), dtype=bool))
+    place = scene.points[points.slave]
+    inside = np.abs(place[:, :2]).max(axis=1) < 0.6
+    assert inside.sum() > 10
+    assert np.abs(points.gap[inside]).max() < 2e-6

@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from fenics_contact import gallery
+from fenics_contact._surfaces.facets import heights, shape_functions
+from fenics_contact._surfaces.projection import interpolated_normal
+from fenics_contact._surfaces.true_surface import true_surface
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import bisection_partition, quadratic, refined
+from fenics_contact.mesh import bisection_partition, quadratic, refined, scaled_jacobian
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES, shape_values
 from fenics_contact.mesh.cuts import cut_between
@@ -30,6 +34,14 @@ def straight(dim: int) -> BodyMesh:
     left = mesh.points[mesh.cells].mean(axis=1)[:, 0] < 0.9
     parts = {"left": np.flatnonzero(left), "right": np.flatnonzero(~left)}
     return BodyMesh(mesh.points, mesh.cells, mesh.surfaces, None, parts)
+
+
+def domed() -> BodyMesh:
+    """Return a box with a top that lies on a ball, and knows it."""
+    mesh = straight(3)
+    points = mesh.points.copy()
+    points[:, 2] *= np.sqrt(25.0 - ((points[:, :2] - 0.5) ** 2).sum(axis=1)) - 4.0
+    return BodyMesh(points, mesh.cells, mesh.surfaces, shapes={"z1": Sphere((0.5, 0.5, -4.0), 5.0)})
 
 
 def near(mesh: BodyMesh, reach: float) -> np.ndarray:
@@ -119,11 +131,7 @@ def test_fields_are_carried_by_positions_in_parents(fine: BodyMesh) -> None:
 
 
 def test_new_nodes_lie_on_true_shapes_and_hanging_ones_on_facets() -> None:
-    mesh = straight(3)
-    points = mesh.points.copy()
-    across = ((points[:, :2] - 0.5) ** 2).sum(axis=1)
-    points[:, 2] *= np.sqrt(25.0 - across) - 4.0
-    mesh = BodyMesh(points, mesh.cells, mesh.surfaces, shapes={"z1": Sphere((0.5, 0.5, -4.0), 5.0)})
+    mesh = domed()
     once = refined(mesh, mesh.points[mesh.cells].mean(axis=1)[:, 0] > 1.0).mesh
     assert once.hanging is not None
     whole = refined(once, np.flatnonzero(once.hanging.levels == 0)).mesh
@@ -140,6 +148,44 @@ def test_new_nodes_lie_on_true_shapes_and_hanging_ones_on_facets() -> None:
     assert len(off(whole)) == 0
     assert once.shapes == whole.shapes == mesh.shapes
     assert (once.off_shapes["z1"] < 1e-9).all()
+
+
+def test_cells_beside_curved_surfaces_keep_their_form() -> None:
+    """Of a coarse link the rim of the surface with a shape lies in the middle of a smooth boundary."""
+    link = gallery.two_links(gallery.LinkShape(n_around=18, n_a=4, n_b=6, grading=1.0)).first.mesh
+    for marks in (np.arange(link.n_cells), np.flatnonzero(link.points[link.cells].mean(axis=1)[:, 1] < -3.0)):
+        fine = refined(link, marks).mesh
+        assert scaled_jacobian(fine.points, fine.cells).min() > 0.1
+    # Plane sides stay plane.
+    mesh = domed()
+    fine = refined(mesh, np.arange(0, mesh.n_cells, 2)).mesh
+    for side, (axis, place) in {"x0": (0, 0.0), "y1": (1, 1.0), "z0": (2, 0.0)}.items():
+        nodes = np.setdiff1d(fine.surfaces[side], fine.surfaces["z1"])
+        np.testing.assert_allclose(fine.points[nodes][:, axis], place, atol=1e-12)
+
+
+def test_the_surface_in_contact_is_the_shape_also_at_hanging_nodes() -> None:
+    mesh = domed()
+    fine = refined(mesh, mesh.points[mesh.cells].mean(axis=1)[:, 0] > 1.0).mesh
+    surface = true_surface(fine, "z1", "best")
+    local = np.random.default_rng(0).uniform(-1.0, 1.0, (10 * len(surface.facets), 2))
+    facet = np.repeat(np.arange(len(surface.facets)), 10)
+    values, _ = shape_functions(local, 4)
+    places = np.einsum("nk,nkd->nd", values, surface.points[surface.facets[facet]])
+    normals, _ = interpolated_normal(values, surface.normals[surface.facets[facet]])
+    over = places + heights(surface, facet, local).value[:, None] * normals
+    hangs = np.isin(surface.nodes[surface.facets[facet]], fine.hanging.nodes).any(axis=1)
+
+    def off(points: np.ndarray) -> float:
+        return float(np.abs(np.linalg.norm(points - [0.5, 0.5, -4.0], axis=1) - 5.0).max())
+
+    assert off(places[hangs]) > 1e-3
+    assert off(over[hangs]) < 1e-8
+    assert off(over) < 1e-8
+    step = 1e-6 * np.eye(2)
+    for axis in (0, 1):
+        change = heights(surface, facet, local + step[axis]).value - heights(surface, facet, local).value
+        np.testing.assert_allclose(change / 1e-6, heights(surface, facet, local).by_local[:, axis], atol=1e-7)
 
 
 def test_hanging_nodes_follow_when_a_mesh_is_moved(fine: BodyMesh) -> None:
