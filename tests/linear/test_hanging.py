@@ -9,9 +9,12 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import Body, Scene, Support, Traction, solve_scene
+from fenics_contact.design.adjoint import WeakChoice, linearise_face, solve_adjoint
+from fenics_contact.design.objective import Partials
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
 from fenics_contact.mesh import bisection_partition, refined
+from fenics_contact.results.linear_state import LinearState
 from tests.linear import monolithic
 from tests.linear.graded import displacement_on, graded, pulled, striped
 
@@ -50,6 +53,26 @@ def test_the_displacement_is_that_of_a_monolithic_solve(subdomains: int) -> None
     # Forces of a support are those of its masters, and balance the load.
     np.testing.assert_allclose(state.reactions()[0].force, [-0.3, -0.2, -1.0], rtol=1e-9)
     assert state.balance().imbalance < 1e-9
+
+
+def test_adjoints_of_displacements_of_hanging_nodes_are_those_of_their_masters() -> None:
+    """The work of the load on the adjoint is the quantity, as all is linear and supports are at rest."""
+    mesh = graded(3)
+    body = Body(mesh, IsotropicElasticity(100.0, 0.3))
+    scene = Scene({"bar": body}, [Support("bar", "x0")], [Traction("bar", "x1", (0.3, 0.2, 1.0))])
+    partition = {"bar": bisection_partition(mesh, 5)}
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=partition, tolerance=1e-11)
+    assert isinstance(state, LinearState)
+    moved = state.torn_displacement.reshape(-1, 3)
+    hangs = np.isin(np.concatenate([each.mesh.nodes for each in state.torn.subdomains]), mesh.hanging.nodes)
+    wanted = np.where(hangs[:, None], [1.0, -2.0, 3.0], 0.0).ravel()
+    value = float(wanted @ moved.ravel())
+    partials = Partials.of(state, value, by_displacement=wanted)
+    adjoint = solve_adjoint(state, partials, linearise_face(state, WeakChoice.RELEASED))
+    assert abs(value) > 1e-3
+    assert state.torn.load @ adjoint.displacement == pytest.approx(value, rel=1e-7)
+    followed = state.torn.decomposition.following @ adjoint.displacement
+    np.testing.assert_allclose(adjoint.displacement, followed, atol=1e-9 * np.abs(followed).max())
 
 
 def test_large_strains_are_even_as_well() -> None:
