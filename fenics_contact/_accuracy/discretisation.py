@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 import ufl
@@ -198,6 +199,10 @@ def energy_on_subdomain(
     return np.asarray(energies[_dolfinx.cell_dofs(of_cells).ravel()])
 
 
+#: Name of a body -> cells of this rank, and a value of each.
+OfCells: TypeAlias = Mapping[str, tuple[np.ndarray, np.ndarray]]
+
+
 @displayed
 @dataclass(frozen=True, eq=False)
 class DiscretisationError:
@@ -212,7 +217,7 @@ class DiscretisationError:
     by_body: Mapping[str, float]
     _comm: MPI.Comm = field(repr=False)
     _sizes: Mapping[str, int] = field(repr=False)
-    _own: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(repr=False)
+    _own: OfCells = field(repr=False)
 
     @property
     def own_cells(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -227,14 +232,22 @@ class DiscretisationError:
         Raises:
             InvalidInputError: If there is no such body.
         """
-        if body not in self._sizes:
-            raise InvalidInputError(
-                f"body must be one of {sorted(self._sizes)}, got {body!r}: take a name of the scene"
-            )
-        values = np.zeros(self._sizes[body])
-        cells, parts = self.own_cells[body]
-        values[cells] = parts
-        return np.asarray(self._comm.allreduce(values))
+        return of_every_cell(self._comm, self._sizes, self.own_cells, body)
+
+
+def of_every_cell(comm: MPI.Comm, sizes: Mapping[str, int], own: OfCells, body: str) -> np.ndarray:
+    """Return the values of all cells of a body, shape (n_cells,), replicated. Collective.
+
+    `sizes`: numbers of cells of all bodies; `own`: this rank's cells and their values.
+    """
+    if body not in sizes:
+        raise InvalidInputError(
+            f"body must be one of {sorted(sizes)}, got {body!r}: take a name of the scene"
+        )
+    values = np.zeros(sizes[body])
+    cells, known = own[body]
+    values[cells] = known
+    return np.asarray(comm.allreduce(values))
 
 
 def discretisation_error(torn: TornSystem, displacement: np.ndarray) -> DiscretisationError:
@@ -322,9 +335,9 @@ class ErrorProducts:
         product: ∫ C e₁ : e₂.
     """
 
-    first: Mapping[str, tuple[np.ndarray, np.ndarray]]
-    second: Mapping[str, tuple[np.ndarray, np.ndarray]]
-    product: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    first: OfCells
+    second: OfCells
+    product: OfCells
 
 
 def error_products(torn: TornSystem, first: np.ndarray, second: np.ndarray) -> ErrorProducts:

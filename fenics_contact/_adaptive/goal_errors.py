@@ -25,7 +25,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fenics_contact._accuracy.discretisation import ErrorProducts, discretisation_error, error_products
+from fenics_contact._accuracy.discretisation import (
+    ErrorProducts,
+    OfCells,
+    discretisation_error,
+    error_products,
+    of_every_cell,
+)
 from fenics_contact._adaptive.contact_residuals import between_nodes, of_pressures
 from fenics_contact._adaptive.indicator import stress_indicator
 from fenics_contact._base.display import displayed
@@ -54,9 +60,6 @@ from fenics_contact.design.sensitivity import adjoint_of
 from fenics_contact.errors import ConvergenceError, InvalidInputError, collectively
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State, comm_of
-
-#: Name of a body -> this rank's cells, and a value of each.
-OfCells = Mapping[str, tuple[np.ndarray, np.ndarray]]
 
 
 @displayed
@@ -105,14 +108,7 @@ class GoalError:
         Raises:
             InvalidInputError: If there is no such body.
         """
-        if body not in self._sizes:
-            raise InvalidInputError(
-                f"body must be one of {sorted(self._sizes)}, got {body!r}: take a name of the scene"
-            )
-        values = np.zeros(self._sizes[body])
-        cells, own = self._own[body]
-        values[cells] = own
-        return np.asarray(self._comm.allreduce(values))
+        return of_every_cell(self._comm, self._sizes, self._own, body)
 
     @property
     def in_words(self) -> dict[str, str]:
