@@ -24,6 +24,7 @@ from fenics_contact import (
     theory,
 )
 from fenics_contact._adaptive.levels import AccurateResult, Limits, solve_to
+from fenics_contact._base.memory import available_memory
 from fenics_contact.design import Movement, PeakPressure, TotalPotential
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
@@ -162,6 +163,15 @@ def test_limits_stop_before_a_mesh_is_made(caplog):
         assert len(stopped.levels) == 1
         assert not stopped.reached
         assert re.search(words, stopped.reason)
+
+
+def test_the_memory_that_is_left_is_that_of_the_table(tmp_path):
+    table = tmp_path / "meminfo"
+    table.write_text("MemTotal:       2000 kB\nMemAvailable:   1500 kB\n")
+    assert available_memory(table) == 1500 * 1024
+    table.write_text("MemTotal:       2000 kB\n")
+    assert available_memory(table) is None
+    assert available_memory(tmp_path / "none") is None
 
 
 def test_a_stress_at_a_sharp_corner_grows_without_limit():
