@@ -62,6 +62,7 @@ class AccuracyPart(Part):
 NOT_REFINED = {
     ("steps",): "load steps have a history on their meshes: leave [[steps]] out, or [accuracy]",
     ("solver", "subdomains"): "every mesh is cut anew: leave it out",
+    ("solver", "newton"): "loads are followed in parts of the default size: leave it out",
 }
 
 

@@ -487,9 +487,6 @@ class SceneFile:
             self.source.mistake(path, f"{written(path)} does not go with [accuracy]: {words}")
             for path, words in not_refined(self.document)
         ]
-        if self.scene.is_nonlinear:
-            words = "accuracy must be asked of linear materials with small strains, got others: leave it out"
-            wrong.append(self.source.mistake(("accuracy",), words))
         if wrong:
             raise SceneFileError(self.source.name, wrong)
         _ = self.quantity

@@ -37,7 +37,7 @@ DEMOS: dict[str, tuple[dict[str, float | list[float]], set[str]]] = {
     ),
     "hertz_sphere": (
         {"peak_pressure": 7277.51, "radius": 0.991468},
-        {"stress", "pressure", "curve", "error"},
+        {"stress", "pressure", "curve", "error", "meshes"},
     ),
     "bolted_joint": (
         {

@@ -116,15 +116,12 @@ def test_what_cannot_be_asked_for_is_named(accuracy: dict[str, Any], message: st
         asking(**accuracy).check_accuracy()
 
 
-RUBBER = {"model": "st_venant_kirchhoff", "young_modulus": 1.0, "poisson_ratio": 0.3}
-
-
 @pytest.mark.parametrize(
     ("data", "message"),
     [
         (tomllib.loads(STEPS), r"steps does not go with \[accuracy\]: load steps have a history"),
         ({**ROLLER, "solver": {"subdomains": 4}}, r"solver.subdomains does not .* every mesh is cut anew"),
-        ({**ROLLER, "materials": {"steel": RUBBER}}, "accuracy must be asked of linear materials with small"),
+        ({**ROLLER, "solver": {"newton": {"first": 0.5}}}, r"solver.newton does not .* of the default size"),
     ],
 )
 def test_what_refined_meshes_cannot_keep_is_refused(data: dict[str, Any], message: str) -> None:
