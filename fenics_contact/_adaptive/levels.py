@@ -20,6 +20,8 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._base.memory import available_memory
 from fenics_contact._base.progress import Task
 from fenics_contact._equilibrium.problem import ContactProblem
+from fenics_contact._equilibrium.warnings import is_without_shape
+from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.plan import expected_memory
 from fenics_contact._scene.scene import Scene
 from fenics_contact.design.objective import Objective
@@ -201,6 +203,14 @@ def solve_to(
                     callback(level)
             problem = way.next_problem(problem)
     warnings.tell()
+    faceted = faceted_surfaces(scene)
+    if faceted and comm.rank == 0 and len(way.levels) > 1:
+        safe_log(
+            _LOG.warning,
+            "%s is curved, but its mesh knows no true shape: its facets were refined as facets, and the "
+            "quantity is that of a body with facets; give the mesh shapes, or read it from CAD",
+            " and ".join(faceted),
+        )
     result = way.result()
     if not result.reached and comm.rank == 0:
         safe_log(_LOG.warning, "the accuracy asked for was not reached: %s", result.reason)
@@ -316,9 +326,14 @@ class _Way:
         grows = len(steps) == changes and (np.sign(steps) == np.sign(steps[0])).all()
         if not grows or not (np.abs(steps[1:]) >= np.abs(steps[:-1])).all():
             return ""
+        faceted = faceted_surfaces(self._state.scene)
+        corners, remedy = "as stress does at sharp corners", "round the corner"
+        if faceted:
+            corners += f", which {faceted[0]} has between its facets, as its mesh knows no true shape"
+            remedy = "give the mesh shapes"
         return (
             f"{_percent(self.levels[-1])}, and the value grows without limit as cells get smaller, by more "
-            "from mesh to mesh, as stress does at sharp corners: ask for another quantity or round the corner"
+            f"from mesh to mesh, {corners}: ask for another quantity or {remedy}"
         )
 
     def result(self) -> AccurateResult:
@@ -337,6 +352,16 @@ def _percent(level: Level) -> str:
 def unknowns_of(scene: Scene) -> int:
     """Return the number of displacements of all nodes."""
     return scene.components * sum(body.mesh.n_nodes for body in scene.bodies.values())
+
+
+def faceted_surfaces(scene: Scene) -> list[str]:
+    """Return in words the curved surfaces of contacts that are refined as facets: their shape is unknown."""
+    return [
+        f"{side.body} {side.name}"
+        for pair in scene.contacts
+        for side in (pair.slave, pair.master)
+        if isinstance(side, Surface) and is_without_shape(scene, side, pair)
+    ]
 
 
 def doubted_pairs(state: State) -> list[int]:

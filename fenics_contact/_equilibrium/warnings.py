@@ -325,10 +325,11 @@ def _is_approximate(scene: Scene, pair: ContactPair) -> bool:
         return False
     # Slave nodes lie on their surface; mortar contact also uses what is between them.
     sides = (pair.master, pair.slave) if pair.by_mortar else (pair.master,)
-    return any(_is_curved(scene, side, pair) for side in sides)
+    return any(is_without_shape(scene, side, pair) for side in sides)
 
 
-def _is_curved(scene: Scene, side: Surface, pair: ContactPair) -> bool:
+def is_without_shape(scene: Scene, side: Surface, pair: ContactPair) -> bool:
+    """Return whether a surface of a pair is curved, and its true shape unknown or not used."""
     shapes = scene.bodies[side.body].mesh.origin.shapes
     known = pair.geometry == "best" and side.name in shapes
     return not known and surface_of(scene, side, "reconstructed").relief is not None

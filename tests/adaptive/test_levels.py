@@ -12,6 +12,7 @@ from fenics_contact import (
     Body,
     ContactPair,
     Coulomb,
+    RigidPlane,
     RigidSphere,
     Scene,
     Support,
@@ -27,6 +28,7 @@ from fenics_contact._adaptive.levels import AccurateResult, Limits, solve_to
 from fenics_contact._base.memory import available_memory
 from fenics_contact.design import Movement, PeakPressure, TotalPotential
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery.blocks import split_quadrilaterals
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 
 E, NU, RADIUS, FORCE = 2.1e5, 0.3, 10.0, 1000.0
@@ -163,6 +165,24 @@ def test_limits_stop_before_a_mesh_is_made(caplog):
         assert len(stopped.levels) == 1
         assert not stopped.reached
         assert re.search(words, stopped.reason)
+
+
+def test_facets_are_refined_as_facets_and_that_is_told(caplog):
+    mesh = split_quadrilaterals(gallery.half_disc(10.0, 3, grading=1.0))
+    scene = Scene(
+        bodies={"roll": Body(mesh, PlaneStrain(E, NU))},
+        supports=[Support("roll", "x0", (0.0, None))],
+        loads=[Traction("roll", "top", (0.0, -100.0))],
+        contacts=[ContactPair(Surface("roll", "contact"), RigidPlane((0, 0), (0, 1)))],
+    )
+    told = "roll contact is curved, but its mesh knows no true shape: its facets were refined as facets"
+    with caplog.at_level(logging.WARNING):
+        solve_to(scene, TotalPotential(), 0.05, MPI.COMM_SELF)
+    assert told not in caplog.text
+    bare = {"roll": replace(scene.bodies["roll"], mesh=mesh.with_shapes({}))}
+    with caplog.at_level(logging.WARNING):
+        solve_to(replace(scene, bodies=bare), TotalPotential(), 0.05, MPI.COMM_SELF)
+    assert told in caplog.text
 
 
 def test_the_memory_that_is_left_is_that_of_the_table(tmp_path):
