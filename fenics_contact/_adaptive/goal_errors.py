@@ -58,6 +58,7 @@ from fenics_contact.design.objectives import (
 )
 from fenics_contact.design.sensitivity import adjoint_of
 from fenics_contact.errors import ConvergenceError, InvalidInputError, collectively
+from fenics_contact.qp.krylov import Stop
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State, comm_of
 
@@ -181,8 +182,9 @@ def goal_error(
         try:
             adjoint, of_solver, partials = adjoint_of(linear, partials, linearised, tolerance)
         except ConvergenceError as error:
-            if str(error) != NOT_HELD:
+            if str(error) != NOT_HELD and Stop.NO_CURVATURE.value not in str(error):
                 raise
+            _require_reached(state, objective, (value,), partials, 0.01 * tolerance)
             return _without_adjoint(linear, value, str(error))
         products = error_products(state.torn, linear.conforming_displacement, adjoint.displacement)
         weight = energy_weight(smooth)
@@ -247,12 +249,12 @@ def _sizes(state: State) -> dict[str, int]:
 
 
 def _require_reached(
-    state: State, objective: Objective, found: tuple[float, float], partials: Partials, least: float
+    state: State, objective: Objective, found: tuple[float, ...], partials: Partials, least: float
 ) -> None:
     """Reject a quantity that is zero with all its parts, and has no error. Collective.
 
-    `found`: the quantity, and its error if no parts cancel; `least`: what is small relative to the sizes of
-    the displacements and forces on which it depends.
+    `found`: the quantity, and its error if no parts cancel where it is known; `least`: what is small relative
+    to the sizes of the displacements and forces on which it depends.
     """
     comm, fields = comm_of(state), (state.torn_displacement, state.rows.multiplier)
     largest = [comm.allreduce(float(np.abs(x).max(initial=0.0)), op=MPI.MAX) for x in fields]
@@ -260,9 +262,10 @@ def _require_reached(
     sums = [comm.allreduce(float(np.abs(x).sum())) for x in slopes]
     if max(map(abs, found)) <= least * float(np.dot(largest, sums)):
         raise InvalidInputError(
-            f"the error of a quantity needs one that the loads reach, but {objective!r} is zero and stays "
-            "zero on every mesh: it is measured where supports hold the body, where no load is transmitted, "
-            "or along a direction in which nothing acts; choose another place or direction"
+            f"the error of a quantity needs one that the loads reach, but {objective!r} is zero on this mesh: "
+            "it is measured where supports hold the body, where no load is transmitted, or along a direction "
+            "in which nothing acts; choose another place or direction, or a finer mesh if surfaces touch on "
+            "that one"
         )
 
 

@@ -154,10 +154,12 @@ def solve_to(
     """Compute a quantity of an equilibrium to an accuracy, on meshes that are refined where it pays.
 
     The scene is solved on its own mesh, the error of the quantity is estimated by its adjoint, the cells that
-    hold most of it are halved, and so on until the estimate is small enough. While the spot of a contact is
-    smaller than two cells the error counts as unknown, and the cells that press are halved. The estimate is
-    the larger of two: that of `goal_error`, and what the change from the last mesh to this one leaves if
-    errors go on to fall as their estimates have. Neither is a bound.
+    hold most of it are halved, and so on until the estimate is small enough. On the first two meshes the
+    error counts as unknown, and while the spot of a contact is smaller than two cells or has but one facet's
+    nodes, the cells that press are halved. The estimate is the larger of two: twice that of `goal_error`, and
+    what the changes between the last three meshes leave if errors go on to fall as they have. Neither is a
+    bound: of random scenes with at most 1500 unknowns in the plane and 3000 in space, about nine in ten had
+    the value on two further halvings of all cells, extrapolated, within it.
 
     Args:
         scene: The scene on a coarse mesh.
@@ -257,20 +259,24 @@ class _Way:
         began, self._began = self._began, perf_counter()
         return float(self.comm.allreduce(self._began - began, MPI.MAX))
 
-    def _error(self, estimate: GoalError) -> float:
-        """Return the larger of the adjoint's estimate and that by the change from the level before.
+    def _error(
+        self, estimate: GoalError, safety: float = 2.0, least: float = 0.5, most: float = 0.9
+    ) -> float:
+        """Return the larger of the adjoint's estimate and that by the changes from mesh to mesh.
 
-        If errors fall by the ratio r from level to level as their estimates do, that of this level is r / (1
-        − r) times the change of the value.
+        If errors fall by the ratio r from mesh to mesh, that of this one is r / (1 − r) times the last
+        change; r is that of the estimates, or of the last two changes if that is larger. A change that is
+        small by chance counts as a third of the one before; less than three meshes tell nothing of either.
+        `safety`: factor of the adjoint's estimate, parts of which cancel; `least`, `most`: bounds of r.
         """
-        if self._doubted:
+        steps = np.abs(np.diff([*(level.value for level in self.levels[-2:]), estimate.value]))
+        if self._doubted or len(steps) < 2:
             return float("inf")
-        by_adjoint = 0.0 if estimate.without_adjoint else abs(estimate.total)
-        if not self.levels:  # parts may cancel by chance, and nothing tells yet
-            return float("inf") if estimate.without_adjoint else max(by_adjoint, self._sums[-1])
-        ratio = min(self._sums[-1] / self._sums[-2], 0.9) if self._sums[-2] > 0.0 else 0.0
-        by_change = abs(estimate.value - self.levels[-1].value) * ratio / (1.0 - ratio)
-        return max(by_adjoint, by_change)
+        before, last = map(float, steps)
+        ratios = [self._sums[-1] / self._sums[-2] if self._sums[-2] > 0.0 else 0.0, least]
+        ratio = min(max(*ratios, last / before if before > 0.0 else 0.0), most)
+        by_change = max(last, before / 3.0) * ratio / (1.0 - ratio)
+        return by_change if estimate.without_adjoint else max(safety * abs(estimate.total), by_change)
 
     def next_problem(self, problem: ContactProblem, growth: float = 1.2) -> ContactProblem | None:
         """Return the problem on the next mesh, None if this one was the last; tells why. Collective.
@@ -279,6 +285,12 @@ class _Way:
         """
         last, limits = self.levels[-1], self.limits
         aim = self.wanted * abs(last.value)
+        if last.value == 0.0:
+            self.reason = (
+                "the quantity is zero on this mesh, and no error is small relative to that: ask for another "
+                "one, or start on a finer mesh if surfaces touch on that"
+            )
+            return None
         if last.error <= aim:
             self.reason = f"{_percent(last)}, {100 * self.wanted:.3g} % were asked for"
             return None
@@ -365,6 +377,9 @@ def faceted_surfaces(scene: Scene) -> list[str]:
 
 
 def doubted_pairs(state: State) -> list[int]:
-    """Return the numbers of the contact pairs whose spot is too small for its cells."""
+    """Return the numbers of the contact pairs whose spot is too small for its cells, or but one facet."""
     places = {each.place for each in state.peak_doubts if isinstance(each, CoarsePeak)}
-    return [number for number, pair in enumerate(state.scene.contacts) if pair.place in places]
+    closed = state.contact.points.pair[state.contact.normal_force > 0.0]
+    pressing = np.bincount(closed, minlength=len(state.scene.contacts))
+    few = (pressing > 0) & (pressing <= 2 ** (state.scene.dim - 1))
+    return [n for n, pair in enumerate(state.scene.contacts) if few[n] or pair.place in places]

@@ -42,6 +42,7 @@ from fenics_contact.design.adjoint import NOT_HELD
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import NeoHooke
+from fenics_contact.qp.krylov import Stop
 from tests.adaptive.goals import (
     curved,
     on_floor,
@@ -218,6 +219,12 @@ def test_without_an_adjoint_cells_have_their_shares_of_the_energy_norm(
     assert np.isnan(found.total)
     assert "needs a contact face that holds every body" in str(found)
     np.testing.assert_allclose(found.by_cell("block"), norm.norm * norm.by_cell("block"))
+
+    def singular(*_: object, **__: object) -> None:
+        raise ConvergenceError(f"the adjoint stopped ({Stop.NO_CURVATURE.value})")
+
+    monkeypatch.setattr(goal_errors, "adjoint_of", singular)
+    assert "singular on this face" in goal_error(state("floor", 4), StrainEnergy()).without_adjoint
 
     def stuck(*_: object, **__: object) -> None:
         raise ConvergenceError("the adjoint needs more iterations")

@@ -53,6 +53,7 @@ class Verdict:
         detail: Message of an error, or what is wrong.
         seconds: How long it took.
         products: Products with the dual operator, 0 where there was no answer.
+        share: Error relative to what an interval allows, of judgements of intervals.
     """
 
     seed: int
@@ -61,6 +62,7 @@ class Verdict:
     detail: str = ""
     seconds: float = 0.0
     products: int = 0
+    share: float = 0.0
 
     def written(self) -> dict[str, Any]:
         """Return plain values."""

@@ -18,14 +18,18 @@ from typing import IO
 
 from fenics_contact import clean_environment
 from tests.random_scenes.deformed_judge import judge_history
+from tests.random_scenes.intervals import judge_interval
 from tests.random_scenes.judge import Outcome, Verdict, judge, judge_revolved
 
 ROOT = Path(__file__).parents[2]
 #: A process that waits and computes nothing hangs, too, if it does so for this many times the limit.
 PATIENCE = 40.0
 Judge = Callable[[int], Verdict]
-#: Scenes of small strain and linear materials, those of revolution, and histories of large deformations.
-JUDGES: dict[str, Judge] = {"linear": judge, "revolved": judge_revolved, "deformed": judge_history}
+#: Scenes of small strain and linear materials, those of revolution, and histories of large deformations;
+#: intervals of quantities.
+JUDGES: dict[str, Judge] = {
+    "linear": judge, "revolved": judge_revolved, "deformed": judge_history, "intervals": judge_interval,
+}  # fmt: skip
 #: Begins the lines that a worker writes; libraries may write others.
 MARK = "verdict: "
 
@@ -184,6 +188,9 @@ def table(verdicts: Sequence[Verdict]) -> str:
     seconds = sorted(verdict.seconds for verdict in verdicts)
     if products:
         lines.append(f"products: median {products[len(products) // 2]}, largest {products[-1]}")
+    shares = sorted(verdict.share for verdict in verdicts if verdict.share > 0.0)
+    if shares:
+        lines.append(f"errors relative to intervals: median {shares[len(shares) // 2]:.2g}")
     if seconds:
         lines.append(f"seconds: median {seconds[len(seconds) // 2]:.2f}, largest {seconds[-1]:.1f}")
     return "\n".join(lines)
