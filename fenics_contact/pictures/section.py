@@ -288,6 +288,7 @@ def without_seams(points: np.ndarray, edges: np.ndarray, slight: float = 1e-3) -
     `points`: coordinates, (n_points, dim); `edges`: their ends, (n, 2); `slight`: distance from an edge
     relative to its length up to which a point lies on it.
     """
+    edges = edges[(points[edges[:, 0]] != points[edges[:, 1]]).any(axis=1)]  # on an axis some are points
     first, last = points[edges[:, 0]], points[edges[:, 1]]
     length, used = np.linalg.norm(last - first, axis=1), np.unique(edges)
     found = cKDTree(points[used]).query_ball_point((first + last) / 2, (0.5 - slight) * length)

@@ -23,6 +23,7 @@ from fenics_contact import (
     Traction,
     gallery,
     quantity,
+    solve_scene,
     theory,
 )
 from fenics_contact._adaptive.levels import AccurateResult, Level, Limits, _Way, doubted_pairs, solve_to
