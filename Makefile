@@ -27,7 +27,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos notebooks test test-core test-slow test-hard test-claims mutants docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces study-large lint setup setup-demo
+.PHONY: help demo demos notebooks test test-core test-slow test-hard test-claims mutants docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces study-adaptive study-large lint setup setup-demo
 
 help: ## Show this list
 	@echo "Targets:"
@@ -95,6 +95,9 @@ study-optimisers: $(prepare) ## Compare SciPy's optimisers with the bundle metho
 
 study-surfaces: $(prepare) ## Compare facets, reconstructed and true surfaces with theory; docs/studies/
 	$(python) -m benchmarks true_surfaces $(if $(filter quick,$(BENCH)),--quick)
+
+study-adaptive: $(prepare) ## Refine meshes where it pays, and everywhere; docs/studies/
+	$(python) -m benchmarks adaptive $(if $(filter quick,$(BENCH)),--quick)
 
 study-large: $(prepare) ## Solve published problems of plasticity and large deformations; docs/studies/
 	$(python) -m benchmarks large_deformations $(if $(filter quick,$(BENCH)),--quick)

@@ -20,6 +20,7 @@ from fenics_contact.study.runner import Store, fingerprint, measure_all
 #: Study -> module that defines it as ``study``.
 STUDIES = {
     "speed": "benchmarks.speed",
+    "adaptive": "benchmarks.adaptive.report",
     "constants": "benchmarks.constants.report",
     "effects": "benchmarks.effects",
     "large_deformations": "benchmarks.large_deformations.report",
