@@ -46,7 +46,8 @@ def order(case: dict[str, Any], way: str, quantity: str, largest: float = 0.05) 
 
     NaN if these are fewer than three.
     """
-    unknowns, found = np.array([mesh["unknowns"] for mesh in case[way][quantity]]), errors(case, way, quantity)
+    unknowns = np.array([mesh["unknowns"] for mesh in case[way][quantity]])
+    found = errors(case, way, quantity)
     small = np.array(found) <= largest
     if small.sum() < 3:
         return float("nan")

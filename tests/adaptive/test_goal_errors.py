@@ -203,7 +203,7 @@ def test_friction_and_reactions_balance_with_their_errors_where_tangents_are_hel
 
 
 def test_a_quantity_that_no_load_reaches_is_refused() -> None:
-    with pytest.raises(InvalidInputError, match=r"a quantity needs loads that reach it, but Movement\(body='block'"):
+    with pytest.raises(InvalidInputError, match=r"needs loads that reach it, but Movement\(body='block'"):
         goal_error(state("floor", 4), Movement("block", "x0", (1.0, 0.0)))
 
 
