@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.mesh.body_mesh import BodyMesh, check_jacobians
+from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import HEXAHEDRON27, QUADRILATERAL9, CellType
 from fenics_contact.mesh.drawn_along import drawn_along
 from fenics_contact.mesh.faces import boundary_faces, match_faces, number_faces
@@ -18,7 +18,7 @@ _HALVED = {2: QUADRILATERAL9, 3: HEXAHEDRON27}
 """Quadratic cells, whose nodes are those of the halved linear ones, and whose pieces are their parts."""
 
 
-def halved(mesh: BodyMesh, chosen: np.ndarray) -> tuple[BodyMesh, np.ndarray, np.ndarray]:
+def halved(mesh: BodyMesh, chosen: np.ndarray) -> Parts:
     """Halve linear quadrilaterals or hexahedra in every direction, and what is two levels larger beside them.
 
     Cells that share a point differ by one level at most, so that no master of a hanging node hangs. Where a
@@ -26,31 +26,23 @@ def halved(mesh: BodyMesh, chosen: np.ndarray) -> tuple[BodyMesh, np.ndarray, np
     the larger cells beside them are halved, too.
 
     `chosen`: numbers of the marked cells.
-
-    Returns the refined mesh; the parent of each cell, ascending, (n_cells,); and where in its parent each
-    node of each cell lies, (n_cells, nodes of a cell, dim).
     """
     kind = _HALVED[mesh.dim]
     while True:
-        parts = _Parts.of(mesh, kind, chosen)
+        parts = Parts.of(mesh, kind, chosen)
         more = parts.beside_inverted(kind)
         if not len(more):
-            break
+            return parts
         chosen = np.union1d(chosen, more)
-    remedy = "mark more cells along curved surfaces, or leave their shapes away"
-    check_jacobians(parts.points, parts.cells, remedy)
-    regions = {name: np.flatnonzero(np.isin(parts.parents, inside)) for name, inside in mesh.regions.items()}
-    fine = BodyMesh(
-        parts.points, parts.cells, parts.surfaces, None, regions, shapes=mesh.shapes, hanging=parts.hanging
-    )
-    return fine, parts.parents, parts.positions
 
 
 @dataclass(frozen=True, eq=False)
-class _Parts:
+class Parts:
     """Cells of which some were halved.
 
     Attributes:
+        parents: The coarse cell of each, ascending, shape (n_cells,).
+        positions: Where in its parent each node of each cell lies, shape (n_cells, nodes of a cell, dim).
         split: Whether each coarse cell was.
     """
 
@@ -63,7 +55,7 @@ class _Parts:
     split: np.ndarray
 
     @classmethod
-    def of(cls, mesh: BodyMesh, kind: CellType, chosen: np.ndarray) -> _Parts:
+    def of(cls, mesh: BodyMesh, kind: CellType, chosen: np.ndarray) -> Parts:
         """Halve chosen cells, and those that are two levels larger beside them."""
         levels = np.zeros(mesh.n_cells, dtype=np.int64) if mesh.hanging is None else mesh.hanging.levels
         split = _balanced(mesh, kind, levels, chosen)

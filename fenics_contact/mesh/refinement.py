@@ -16,6 +16,7 @@ from fenics_contact.mesh.body_mesh import BodyMesh, check_jacobians
 from fenics_contact.mesh.cell_types import CELL_TYPES, CellType, shape_values
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
 from fenics_contact.mesh.halving import halved
+from fenics_contact.mesh.hanging import HangingNodes
 from fenics_contact.mesh.quadratic import put_on_shapes, with_more_nodes
 
 _LINEAR = {2: CELL_TYPES["triangle"], 3: CELL_TYPES["tetrahedron"]}
@@ -70,7 +71,9 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
     chosen = _checked_marks(mesh, marked)
     kind, linear = CELL_TYPES[mesh.cell_type], _LINEAR[mesh.dim]
     if not kind.is_simplex:
-        return Refinement(*halved(mesh, chosen))
+        parts = halved(mesh, chosen)
+        found = parts.points, parts.cells, parts.surfaces
+        return _checked(mesh, found, parts.hanging, parts.parents, parts.positions)
     vertices, inverse = np.unique(mesh.cells[:, : mesh.dim + 1], return_inverse=True)
     skeleton = inverse.reshape(-1, mesh.dim + 1)
     ends, cells = _identified(mesh.points[vertices], skeleton, linear, chosen)
@@ -83,9 +86,24 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
     points[: len(vertices)] = mesh.points[vertices]
     surfaces = _carried_surfaces(mesh, ends, cells, vertices)
     put_on_shapes(points, surfaces, mesh.shapes, np.arange(len(points)) >= len(vertices))
+    return _checked(mesh, (points, cells, surfaces), None, parents, positions)
+
+
+def _checked(
+    mesh: BodyMesh,
+    found: tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]],
+    hanging: HangingNodes | None,
+    parents: np.ndarray,
+    positions: np.ndarray,
+) -> Refinement:
+    """Return the refinement with regions and shapes of the coarse mesh, unless a cell is inverted.
+
+    `found`: coordinates, cells and surfaces.
+    """
+    points, cells, surfaces = found
     check_jacobians(points, cells, "mark more cells along curved surfaces, or leave their shapes away")
     regions = {name: np.flatnonzero(np.isin(parents, inside)) for name, inside in mesh.regions.items()}
-    fine = BodyMesh(points, cells, surfaces, None, regions, shapes=mesh.shapes)
+    fine = BodyMesh(points, cells, surfaces, None, regions, shapes=mesh.shapes, hanging=hanging)
     return Refinement(fine, parents, positions)
 
 
