@@ -15,6 +15,7 @@ from fenics_contact.design.forms import ShapeForms
 from fenics_contact.design.objective import Partials, Weighable, require_linear
 from fenics_contact.design.objectives import on_rows, require_pair
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.averages import at_copies
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.results.area import stick_area
 from fenics_contact.results.forces import support_shares
@@ -90,7 +91,7 @@ class SupportForce(Weighable):
         held = self._held(state)
         normal = -np.einsum("nd,nd->n", torn.points.normal, torn.points.relative(held))
         tangential = np.einsum("nad,nd->na", torn.points.tangents, torn.points.relative(held))
-        by_multiplier = on_rows(state, normal, tangential) - torn.jump(_torn(torn, held))
+        by_multiplier = on_rows(state, normal, tangential) - torn.jump(at_copies(torn.decomposition, held))
         return Partials.of(state, value, by_multiplier=by_multiplier + _of_ties(torn, held))
 
     def _numbers(self, state: State) -> list[int]:
@@ -123,14 +124,6 @@ class SupportForce(Weighable):
             total += part
         every = np.arange(len(total))
         return np.asarray(total - free_part(total, every, decomposition.fixed, decomposition.axes))
-
-
-def _torn(torn: TornSystem, field: np.ndarray) -> np.ndarray:
-    """Return a field of all nodes, (n_nodes, dim), at their copies on this rank, shape (torn_size,)."""
-    here, block = torn.decomposition.held
-    result = np.zeros((torn.decomposition.torn_size // torn.components, torn.components))
-    result[block] = field[torn.decomposition.tearing.copy_node[here]]
-    return result.ravel()
 
 
 def _of_ties(torn: TornSystem, held: np.ndarray) -> np.ndarray:

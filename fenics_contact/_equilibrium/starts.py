@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.averages import at_copies
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -177,15 +178,11 @@ class CoarseStart:
 
     def _displacement(self, torn: TornSystem) -> np.ndarray:
         """Return the interpolated displacement on this rank's torn dofs. Collective."""
-        decomposition = torn.decomposition
         scene = torn.scene
         nodal = np.concatenate(
             [self._to_fine(scene, name, self.state.gather_displacement(name)) for name in scene.body_names]
         )
-        here, block = decomposition.held
-        result = np.zeros((decomposition.torn_size // torn.components, torn.components))
-        result[block] = nodal[decomposition.tearing.copy_node[here]]
-        return result.ravel()
+        return at_copies(torn.decomposition, nodal)
 
     def _contact_forces(self, torn: TornSystem) -> tuple[np.ndarray, np.ndarray]:
         """Return normal forces, (n,), and friction in space, (n, dim), of interpolated tractions."""

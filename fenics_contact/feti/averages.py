@@ -59,6 +59,14 @@ def nodal_mean_transposed(decomposition: Decomposition, nodes: np.ndarray, value
     return result.ravel()
 
 
+def at_copies(decomposition: Decomposition, values: np.ndarray) -> np.ndarray:
+    """Return a field of all nodes, (n_nodes, dim), at their copies on this rank, shape (torn_size,)."""
+    here, block = decomposition.held
+    result = np.zeros((decomposition.torn_size // values.shape[1], values.shape[1]))
+    result[block] = values[decomposition.tearing.copy_node[here]]
+    return result.ravel()
+
+
 def nodal_sum(decomposition: Decomposition, force: np.ndarray) -> np.ndarray:
     """Return the sum of a torn force over all copies of each node, on all ranks. Collective.
 
