@@ -24,8 +24,7 @@ TOLERANCE = 1e-6
 
 def value_of(state: State, objective: Objective) -> float:
     """Return a quantity of a state; no node moves."""
-    nodes = state.torn.decomposition.tearing.n_nodes
-    return float(objective.value(state, ShapeForms(MPI.COMM_SELF, np.zeros(nodes, dtype=bool))))
+    return float(objective.value(state, ShapeForms.at_rest(state.torn)))
 
 
 def adaptive(scene: Scene, objective: Objective, accuracy: float, unknowns: int) -> AccurateResult:

@@ -167,7 +167,7 @@ def goal_error(
     comm = comm_of(state)
     with Task("error of a quantity"), one_thread(comm):
         # No node moves: derivatives by the shape are neither compiled nor evaluated.
-        forms = ShapeForms(comm, np.zeros(state.torn.decomposition.tearing.n_nodes, dtype=bool))
+        forms = ShapeForms.at_rest(state.torn)
         with asking(comm):
             value = finite_value(objective.value(state, forms))
         if not isinstance(state, LinearState):

@@ -67,6 +67,12 @@ class ShapeForms:
         self.moving = moving
         self._templates = Templates(comm)
 
+    @classmethod
+    def at_rest(cls, torn: TornSystem) -> ShapeForms:
+        """Return those of a design that moves no node, for values and derivatives by forces alone."""
+        decomposition = torn.decomposition
+        return cls(decomposition.comm, np.zeros(decomposition.tearing.n_nodes, dtype=bool))
+
     @property
     def nothing_moves(self) -> bool:
         """Whether no derivative by nodes is needed, so that none need be compiled."""

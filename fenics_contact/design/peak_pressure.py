@@ -53,7 +53,7 @@ class PeakPressure(Weighable):
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
         """Return the derivatives by forces; raises as `value` does, and for a design that moves nodes."""
-        if forms.moving is None or forms.moving.any():
+        if not forms.nothing_moves:
             raise InvalidInputError(
                 "PeakPressure has no derivative by the shape: take LargestPressure or PressureNorm"
             )

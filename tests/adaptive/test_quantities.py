@@ -151,7 +151,7 @@ def state(name: str) -> LinearState:
 
 
 def without_shape(state: LinearState) -> ShapeForms:
-    return ShapeForms(MPI.COMM_SELF, np.zeros(state.torn.decomposition.tearing.n_nodes, dtype=bool))
+    return ShapeForms.at_rest(state.torn)
 
 
 @pytest.mark.parametrize(("name", "force"), FORCES)
