@@ -269,8 +269,7 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
     effects = effects_of(scene)
     partitions = {name: pieces(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
     names = {effect.name for effect in effects}
-    counts = [_node_counts(body.mesh, partitions[name]) for name, body in scene.bodies.items()]
-    nodes, shared = (np.concatenate(column) for column in zip(*counts, strict=True))
+    nodes, shared = _nodes_of_subdomains(scene, partitions)
     subdomains, unknowns = len(nodes), scene.components * int(nodes.sum())
     solver = choose_solver(scene, subdomains, sensitivity=sensitivity)
     direct = solver is SolverKind.DIRECT
@@ -298,11 +297,19 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
 
 def expected_memory(scene: SceneParts, partitions: Mapping[str, np.ndarray]) -> float:
     """Return the expected memory of all ranks together, [bytes], without that of the coarse problem."""
+    nodes, shared = _nodes_of_subdomains(scene, partitions)
+    return _memory(scene.components * nodes, scene.components * shared)
+
+
+def _nodes_of_subdomains(
+    scene: SceneParts, partitions: Mapping[str, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the numbers of nodes, and of shared ones, of the subdomains of all bodies with a partition."""
     counts = [
         _node_counts(body.mesh, partitions[name]) for name, body in scene.bodies.items() if name in partitions
     ]
     nodes, shared = (np.concatenate(column) for column in zip(*counts, strict=True))
-    return _memory(scene.components * nodes, scene.components * shared)
+    return nodes, shared
 
 
 def _memory(sizes: np.ndarray, interfaces: np.ndarray) -> float:
