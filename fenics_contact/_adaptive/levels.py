@@ -158,8 +158,9 @@ def solve_to(
     error counts as unknown, and while the spot of a contact is smaller than two cells or has but one facet's
     nodes, the cells that press are halved. The estimate is the larger of two: twice that of `goal_error`, and
     what the changes between the last three meshes leave if errors go on to fall as they have. Neither is a
-    bound: of random scenes with at most 1500 unknowns in the plane and 3000 in space, about nine in ten had
-    the value on two further halvings of all cells, extrapolated, within it.
+    bound: on random scenes that were not used to choose them, with at most 1500 unknowns in the plane and
+    3000 in space, the value on up to two further halvings of all cells, extrapolated, was within it in 19 of
+    23.
 
     Args:
         scene: The scene on a coarse mesh.
@@ -205,8 +206,8 @@ def solve_to(
                     callback(level)
             problem = way.next_problem(problem)
     warnings.tell()
-    faceted = faceted_surfaces(scene)
-    if faceted and comm.rank == 0 and len(way.levels) > 1:
+    faceted = faceted_surfaces(scene) if len(way.levels) > 1 else []
+    if faceted and comm.rank == 0:
         safe_log(
             _LOG.warning,
             "%s is curved, but its mesh knows no true shape: its facets were refined as facets, and the "

@@ -35,8 +35,8 @@ def refine_scene(scene: Scene, marked: Mapping[str, ArrayLike]) -> SceneRefineme
 
     Args:
         scene: The scene.
-        marked: Body name -> marked cells, see `fenics_contact.mesh.refined`; those that are not named, or
-            have no marked cells, keep their mesh.
+        marked: Body name -> marked cells, see `fenics_contact.mesh.refined`; those that are not named
+            keep their mesh.
 
     Raises:
         InvalidInputError: If there is no such body, its cells cannot be refined, or one of its surfaces is
