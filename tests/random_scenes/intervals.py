@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import time
-import traceback
 from collections.abc import Iterator
 
 import numpy as np
@@ -20,7 +19,7 @@ from fenics_contact.design.objective import Objective
 from fenics_contact.errors import ConvergenceError, FenicsContactError
 from fenics_contact.results.state import State
 from tests.random_scenes.generator import sample
-from tests.random_scenes.judge import Outcome, Verdict
+from tests.random_scenes.judge import Outcome, Verdict, placed
 
 QUANTITIES = (
     "peak_pressure", "contact_force", "displacement", "potential", "contact_area", "reaction", "friction_work"
@@ -62,9 +61,7 @@ def _ended(seed: int, state: State, words: list[str]) -> tuple[Outcome, str, flo
     except FenicsContactError as error:
         return Outcome.REFUSED, f"{type(error).__name__}: {error}", 0.0, 0
     except Exception as error:  # whatever comes from inside is what is looked for
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        where = f"{place.filename.rsplit('/', 2)[-1]}:{place.lineno}"
-        return Outcome.TRACEBACK, f"{type(error).__name__}: {error} ({where})", 0.0, 0
+        return Outcome.TRACEBACK, placed(error), 0.0, 0
     reference, doubt = extrapolated(values)
     off = abs(found.value - reference)
     steps = " ".join(f"{level.value:.6g}±{level.error:.2g}" for level in found.levels)
@@ -129,8 +126,7 @@ def finer(found: AccurateResult, wanted: Objective, most: int = 2) -> Iterator[f
         if unknowns_of(scene) > FINEST[scene.dim]:
             return
         state = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-6).solve()
-        forms = ShapeForms(MPI.COMM_SELF, np.zeros(state.torn.decomposition.tearing.n_nodes, dtype=bool))
-        yield wanted.value(state, forms)
+        yield wanted.value(state, ShapeForms.at_rest(state.torn))
 
 
 def _all_cells(scene: Scene) -> dict[str, np.ndarray]:

@@ -87,6 +87,13 @@ def judge_revolved(seed: int) -> Verdict:
     return judge(seed, revolved)
 
 
+def placed(error: Exception) -> str:
+    """Return an error in words with the line that raised it."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{place.filename.rsplit('/', 2)[-1]}:{place.lineno}"
+    return f"{type(error).__name__}: {error} ({where})"
+
+
 def _ended(made: Sample) -> tuple[Outcome, str, int]:
     try:
         state = solve_scene(made.scene, MPI.COMM_SELF, partitions=made.cut, tolerance=made.tolerance)
@@ -97,8 +104,6 @@ def _ended(made: Sample) -> tuple[Outcome, str, int]:
         reason = f"{type(error).__name__}: {error}"
         return (Outcome.WRONG, f"{objection}; {reason}", 0) if objection else (Outcome.REFUSED, reason, 0)
     except Exception as error:  # whatever comes from inside is what is looked for
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        where = f"{place.filename.rsplit('/', 2)[-1]}:{place.lineno}"
-        return Outcome.TRACEBACK, f"{type(error).__name__}: {error} ({where})", 0
+        return Outcome.TRACEBACK, placed(error), 0
     found = complaints(state, made)
     return (Outcome.WRONG if found else Outcome.SOLVED), "; ".join(found), state.solution.products
