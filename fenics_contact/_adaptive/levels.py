@@ -20,10 +20,9 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._base.memory import available_memory
 from fenics_contact._base.progress import Task
 from fenics_contact._equilibrium.problem import ContactProblem
-from fenics_contact._equilibrium.warnings import is_without_shape
-from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.plan import expected_memory
 from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.true_shapes import sides_without_shape
 from fenics_contact.design.objective import Objective
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.errors.kinds import safe_log, user_code
@@ -372,8 +371,7 @@ def faceted_surfaces(scene: Scene) -> list[str]:
     return [
         f"{side.body} {side.name}"
         for pair in scene.contacts
-        for side in (pair.slave, pair.master)
-        if isinstance(side, Surface) and is_without_shape(scene, side, pair)
+        for side in sides_without_shape(scene, pair)
     ]
 
 

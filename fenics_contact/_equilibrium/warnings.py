@@ -309,30 +309,12 @@ def _words_of_overlap(pair: ContactPair, overlap: float, moved: float) -> str:
 
 def _finer_gap(torn: TornSystem) -> np.ndarray:
     """Return gaps between surfaces that are known better, [length]; the same where none are. Collective."""
-    if not any(_is_approximate(torn.scene, pair) for pair in torn.scene.contacts):
-        return torn.points.gap
     try:
         return torn.finer_gap()
     except InvalidInputError as error:
         if torn.decomposition.comm.rank == 0:
             safe_log(_LOG.info, "the error of the facets is not known: %s", error)
         return torn.points.gap
-
-
-def _is_approximate(scene: Scene, pair: ContactPair) -> bool:
-    """Return whether gaps are measured between curved surfaces that are only known by their nodes."""
-    if not isinstance(pair.master, Surface):
-        return False
-    # Slave nodes lie on their surface; mortar contact also uses what is between them.
-    sides = (pair.master, pair.slave) if pair.by_mortar else (pair.master,)
-    return any(is_without_shape(scene, side, pair) for side in sides)
-
-
-def is_without_shape(scene: Scene, side: Surface, pair: ContactPair) -> bool:
-    """Return whether a surface of a pair is curved, and its true shape unknown or not used."""
-    shapes = scene.bodies[side.body].mesh.origin.shapes
-    known = pair.geometry == "best" and side.name in shapes
-    return not known and surface_of(scene, side, "reconstructed").relief is not None
 
 
 def _passing_nodes(state: State, number: int, moved: float) -> list[tuple[int, str, str]]:

@@ -27,6 +27,7 @@ from fenics_contact._pairing.points import (
 )
 from fenics_contact._pairing.search import find_contact_points, find_tied_points
 from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.true_shapes import is_approximate
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.averages import nodal_mean_at
@@ -362,10 +363,14 @@ class TornSystem:
     def finer_gap(self) -> np.ndarray:
         """Return the gaps between surfaces known better than those used, see `true_surface`. Collective.
 
+        Flat surfaces, and curved ones whose true shapes are used, are not searched again.
+
         Returns:
             Shape (n_contact,), [length]; the gap itself where no better surface is known.
         """
         decomposition, points = self.decomposition, self.points
+        if not any(is_approximate(self.scene, pair) for pair in self.scene.contacts):
+            return points.gap
         tearing, comm = decomposition.tearing, decomposition.comm
         fixed, axes = decomposition.fixed, decomposition.axes
         finer = find_contact_points(self.scene, fixed, comm, axes=axes, finer=True)
