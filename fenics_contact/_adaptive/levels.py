@@ -198,12 +198,11 @@ def solve_to(
         warnings, problem = first.hold_warnings(), cast("ContactProblem | None", first)
         while problem is not None:
             level = way.add(problem)
-            words = f"{level.unknowns} unknowns, {level.value:.6g} ± {level.error:.2g}, {level.seconds:.1f} s"
-            task.step(len(way.levels), words=words)
             if callback is not None:
                 with user_code("solve_to callback"):
                     callback(level)
             problem = way.next_problem(problem)
+            task.step(len(way.levels), words=way.progress(problem))
     warnings.tell()
     faceted = faceted_surfaces(scene) if len(way.levels) > 1 else []
     if faceted and comm.rank == 0:
@@ -347,6 +346,14 @@ class _Way:
             f"{_percent(self.levels[-1])}, and the value grows without limit as cells get smaller, by more "
             f"from mesh to mesh, {corners}: ask for another quantity or {remedy}"
         )
+
+    def progress(self, coming: ContactProblem | None) -> str:
+        """Return the last mesh in words, and before the next one begins what is expected of it."""
+        last = self.levels[-1]
+        words = f"{last.unknowns} unknowns, {last.value:.6g} ± {last.error:.2g}, {last.seconds:.2g} s"
+        if coming is None:
+            return words
+        return f"{words}; next: {unknowns_of(coming.scene)} unknowns, about {self._predicted:.2g} s"
 
     def result(self) -> AccurateResult:
         """Return the result on the last mesh."""

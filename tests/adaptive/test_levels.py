@@ -28,6 +28,7 @@ from fenics_contact import (
 )
 from fenics_contact._adaptive.levels import AccurateResult, Level, Limits, _Way, doubted_pairs, solve_to
 from fenics_contact._base.memory import available_memory
+from fenics_contact._base.progress import Kind
 from fenics_contact.design import Movement, PeakPressure, TotalPotential
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery.blocks import split_quadrilaterals
@@ -181,6 +182,22 @@ def test_a_start_near_a_kink_of_friction_takes_few_products():
     stress = quantity("stress", scene, body="slab", at=(1.5, 0.5, 1.5))
     found = solve_to(scene, stress, 0.02, MPI.COMM_SELF, limits=Limits(levels=2))
     assert found.levels[-1].products < 100
+
+
+def test_progress_says_what_the_next_mesh_will_cost_before_it_begins(caplog):
+    with caplog.at_level(logging.DEBUG, logger="fenics_contact.progress"):
+        found = solve_to(pressed(), PeakPressure(), 0.05, MPI.COMM_SELF, limits=Limits(levels=3))
+    events = [getattr(record, "progress", None) for record in caplog.records]
+    steps = [k for k, each in enumerate(events) if each and each.what == "levels" and each.kind is Kind.STEP]
+    assert len(steps) == len(found.levels) == 3
+    for place, level, coming in zip(steps, found.levels, found.levels[1:], strict=False):
+        assert events[place].words.startswith(f"{level.unknowns} unknowns, {level.value:.6g} ± ")
+        assert events[place].words.endswith(
+            f"; next: {coming.unknowns} unknowns, about {coming.predicted:.2g} s"
+        )
+    assert "next" not in events[steps[-1]].words
+    begun = [k for k, each in enumerate(events) if each and each.kind is Kind.BEGIN and k > steps[0]]
+    assert begun  # the work of the second mesh begins after it was predicted
 
 
 def test_warnings_are_those_of_the_last_mesh(caplog):
