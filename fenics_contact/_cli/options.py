@@ -114,7 +114,8 @@ def scene_command(
             _show_plan(console, file, sensitivity=sensitivity)
             console.write()
             if dry_run:
-                _show_outputs(console, file, draws=pictures)
+                refines = accurate and file.document.accuracy is not None
+                _show_outputs(console, file, draws=pictures, meshes=refines)
             else:
                 compute(console, file, resume, pictures)
 
@@ -189,10 +190,11 @@ def _show_plan(console: Console, file: SceneFile, *, sensitivity: bool) -> None:
     console.write(facts(rows))
 
 
-def _show_outputs(console: Console, file: SceneFile, *, draws: bool) -> None:
-    """Report what a run would write."""
+def _show_outputs(console: Console, file: SceneFile, *, draws: bool, meshes: bool) -> None:
+    """Report what a run would write; meshes: whether these are drawn with the pictures of the file."""
     output = file.document.output
-    pictures = f", pictures of {', '.join(output.drawn)}" if draws and output.drawn else ""
+    drawn = [*output.drawn, *(["meshes"] if output.drawn and meshes else [])]
+    pictures = f", pictures of {', '.join(drawn)}" if draws and drawn else ""
     kinds = f", {', '.join(output.files)} files" if output.files else ""
     shapes = (
         f", {', '.join(output.design)} files of the design" if file.document.design and output.design else ""

@@ -19,7 +19,7 @@ from fenics_contact._cli.console import (
     step_table,
 )
 from fenics_contact._cli.options import checkpoint_of, forget, resumable, scene_command
-from fenics_contact._cli.view import Gallery, can_draw, draw_state
+from fenics_contact._cli.view import Gallery, can_draw, draw_meshes, draw_state
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact.errors import LoadStepError
 from fenics_contact.output.files import only_run_in
@@ -52,6 +52,8 @@ def _run(console: Console, file: SceneFile, resume: bool | None, pictures: bool)
         gallery = Gallery()
         if pictures and file.document.output.drawn and can_draw(console, file, gallery):
             draw_state(console, file, states, gallery)
+            if accurate is not None:
+                draw_meshes(file, file.scene, accurate.state.scene, gallery)
     names = ", ".join(["result.json", *_files(file), *(path.name for path in gallery.drawn)])
     console.write(f"results in {file.folder}/: {names}")
     gallery.require_all()

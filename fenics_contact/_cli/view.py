@@ -14,6 +14,7 @@ from rich.table import Table
 
 from fenics_contact._base.requirements import require_extra
 from fenics_contact._cli.console import Console, console_of, facts, forces_table
+from fenics_contact._scene.scene import Scene
 from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact._scene_file.source import suggestion
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, agree, together
@@ -90,6 +91,15 @@ def draw_state(
             gallery.missing.append(path.name)
         else:
             gallery.drawn.append(path)
+
+
+def draw_meshes(file: SceneFile, first: Scene, last: Scene, gallery: Gallery) -> None:
+    """Draw the meshes on which the way to an accuracy began and ended. Collective."""
+    from fenics_contact.pictures.levels import plot_meshes
+
+    path = file.folder / "meshes.png"
+    plot_meshes({"first": first, "last": last}, path, title=file.title, comm=file.comm)
+    gallery.drawn.append(path)
 
 
 def _draw_field(state: State, name: str, words: dict[str, Any], path: Path) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 from mpi4py import MPI
 
 from fenics_contact import _cli as cli
@@ -43,6 +44,19 @@ def test_every_mesh_is_a_line_and_in_the_result(
     assert accuracy["wanted"] == 0.3
     assert accuracy["value"] == levels["value"][-1]
     assert accuracy["error"] == levels["error"][-1] < 0.3 * accuracy["value"]
+
+
+def test_first_and_last_mesh_are_drawn_without_being_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = "run", ROLLER, "-o", tmp_path, "--accuracy", "30%"
+    assert run(*command, "--dry-run") == 0
+    assert "pictures of stress, meshes\n" in capsys.readouterr().out
+    assert run(*command) == 0
+    assert "stress.png, meshes.png\n" in capsys.readouterr().out
+    image = imread(tmp_path / "meshes.png")[..., :3]
+    left, right = np.split(image[len(image) // 2 :].mean(axis=2) < 0.5, 2, axis=1)
+    assert right.sum() > 1.2 * left.sum() > 0  # the last mesh has more lines
 
 
 def test_an_accuracy_that_is_not_reached_is_no_success(
