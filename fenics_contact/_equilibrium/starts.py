@@ -108,8 +108,10 @@ def _put_contact(torn: TornSystem, vector: np.ndarray, normal: np.ndarray, frict
     _put(torn, vector, torn.normal_rows, normal)
     if len(torn.frictional):
         turned = np.einsum("nad,nd->na", torn.points.tangents[torn.frictional], friction[torn.frictional])
-        if torn.decomposition.axes is not None:  # tangents that supports hold are known up to rounding
-            turned[torn.relations[2].held(torn.decomposition.fixed).reshape(turned.shape)] = 0.0
+        # Along tangents that supports hold at rest friction is rounding, which would turn slipping discs.
+        slips = torn.relations[2]
+        still = slips.held(torn.decomposition.fixed) & slips.resting
+        turned[still.reshape(turned.shape)] = 0.0
         _put(torn, vector, torn.tangential_rows.ravel(), turned.ravel())
 
 

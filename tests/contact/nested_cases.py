@@ -1,4 +1,4 @@
-"""Scenes of triangles whose states start those on finer meshes, and what ranks print of one."""
+"""Scenes of simplices whose states start those on finer meshes, and what ranks print of one."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from fenics_contact import (
     LinearClosure,
     Preload,
     RigidPlane,
+    RigidSphere,
     RigidSurface,
     Roller,
     Scene,
@@ -33,7 +34,7 @@ from fenics_contact import (
 )
 from fenics_contact._adaptive.refined_scene import SceneRefinement, refine_scene
 from fenics_contact.gallery.blocks import split_quadrilaterals
-from fenics_contact.materials import PlaneStrain
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import bisection_partition, quadratic
 from tests.axisymmetry.revolved import twisted_fit
 
@@ -133,6 +134,15 @@ def bent_alone() -> Scene:
     return Scene({"bar": Body(bar, SOFT)}, [Support("bar", "x0")], [Traction("bar", "x1", (0.0, -1.0))])
 
 
+def quarter_on_ball() -> Scene:
+    """A quarter of a block on a rigid ball: on planes of symmetry friction has one free direction."""
+    block = gallery.block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (2, 2, 2), "tetrahedron")
+    held = [Support("block", "x0", (0.0, None, None)), Support("block", "y0", (None, 0.0, None))]
+    ball = ContactPair(Surface("block", "z0"), RigidSphere((0.0, 0.0, -10.0), 10.0), Coulomb(0.05))
+    bodies = {"block": Body(block, IsotropicElasticity(1e3, 0.3))}
+    return Scene(bodies, held, [TotalForce("block", "z1", (0.0, 0.0, -300.0))], [ball])
+
+
 def outside(points: np.ndarray) -> np.ndarray:
     """Mark places away from the middle."""
     return np.abs(points[:, 0]) > 1.5
@@ -153,6 +163,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "preload": drawn_together,
     "twist": lambda: twisted_fit("triangle", 2, "mortar", 1e-3),
     "alone": bent_alone,
+    "quarter": quarter_on_ball,
 }
 
 
@@ -161,7 +172,7 @@ def cut(scene: Scene, parts: int) -> dict[str, np.ndarray]:
     return {name: bisection_partition(body.mesh, parts) for name, body in scene.bodies.items()}
 
 
-def refined_near(scene: Scene, place: tuple[float, float], reach: float) -> SceneRefinement:
+def refined_near(scene: Scene, place: tuple[float, ...], reach: float) -> SceneRefinement:
     """Refine near a place, and the first body alone if that is all that is near."""
     marked = {}
     for name, body in scene.bodies.items():
