@@ -202,6 +202,12 @@ def goal_error(
     )  # fmt: skip
 
 
+def value_of(state: State, objective: Objective) -> float:
+    """Return a quantity of a state; no node moves. Collective."""
+    with asking(comm_of(state)):
+        return finite_value(objective.value(state, ShapeForms.at_rest(state.torn)))
+
+
 def smoothed(objective: Objective, state: State, forms: ShapeForms, spots: int = 3) -> Objective:
     """Return an objective with the same value at a state, whose adjoint the mesh resolves. Collective.
 

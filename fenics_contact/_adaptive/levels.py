@@ -10,10 +10,11 @@ from typing import cast
 
 import numpy as np
 
-from fenics_contact._adaptive.goal_errors import GoalError, goal_error
-from fenics_contact._adaptive.marking import bulk, pressing_cells
+from fenics_contact._adaptive.goal_errors import GoalError, goal_error, value_of
+from fenics_contact._adaptive.marking import bulk
 from fenics_contact._adaptive.quantities import quantity as named
-from fenics_contact._adaptive.refined_scene import refine_scene
+from fenics_contact._adaptive.refined_scene import SceneRefinement, refine_scene
+from fenics_contact._adaptive.small_spots import doubted_pairs, refined_at_spots
 from fenics_contact._base.checks import check_numbers, checked
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
@@ -29,7 +30,6 @@ from fenics_contact.errors.kinds import safe_log, user_code
 from fenics_contact.mesh.refinement import Refinement
 from fenics_contact.qp.solve import DualSolver
 from fenics_contact.results.forces import aligned
-from fenics_contact.results.resolution import CoarsePeak
 from fenics_contact.results.state import State
 
 _LOG = logging.getLogger(__name__)
@@ -154,12 +154,13 @@ def solve_to(
 
     The scene is solved on its own mesh, the error of the quantity is estimated by its adjoint, the cells that
     hold most of it are halved, and so on until the estimate is small enough. On the first two meshes the
-    error counts as unknown, and while the spot of a contact is smaller than two cells or has but one facet's
-    nodes, the cells that press are halved. The estimate is the larger of two: twice that of `goal_error`, and
-    what the changes between the last three meshes leave if errors go on to fall as they have. Neither is a
-    bound: on random scenes that were not used to choose them, with at most 1500 unknowns in the plane and
-    3000 in space, the value on up to two further halvings of all cells, extrapolated, was within it in 19 of
-    23.
+    error counts as unknown. While the spot of a contact is smaller than two cells or has but one facet's
+    nodes, there is no estimate, and the cells there are halved: until two lie across its half width by
+    Hertz's theory, or once where that does not hold. The estimate is the larger of two: twice that of
+    `goal_error`, and what the changes between the last three meshes leave if errors go on to fall as they
+    have. Neither is a bound: on random scenes that were not used to choose them, with at most 1500 unknowns
+    in the plane and 3000 in space, the value on up to two further halvings of all cells, extrapolated, was
+    within it in 19 of 23.
 
     Args:
         scene: The scene on a coarse mesh.
@@ -236,22 +237,30 @@ class _Way:
             self._state = problem.solve(start=self._state, refinements=self._refinements, adjoint=True)
         else:
             self._state = problem.solve(adjoint=True)
-        self._doubted = doubted_pairs(self._state)
-        estimate = goal_error(self._state, self.quantity)
-        scene = self._state.scene
-        self._shares = {name: estimate.by_cell(name) for name in scene.bodies}
-        self._sums.append(float(sum(share.sum() for share in self._shares.values())))
+        self._doubted, scene = doubted_pairs(self._state), self._state.scene
+        value, error = self._estimated()
         level = Level(
             cells=sum(body.mesh.n_cells for body in scene.bodies.values()),
             unknowns=unknowns_of(scene),
-            value=estimate.value,
-            error=self._error(estimate),
+            value=value,
+            error=error,
             products=self._state.solution.products,
             seconds=self._spent(),
             predicted=self._predicted,
         )
         self.levels.append(level)
         return level
+
+    def _estimated(self) -> tuple[float, float]:
+        """Return the quantity and its error, unknown where a spot is too small for its cells. Collective."""
+        value = value_of(self._state, self.quantity) if self._doubted else 0.0
+        if value != 0.0:  # what a single point presses follows from the load: its adjoint is rounding
+            self._sums.append(float("nan"))
+            return value, float("inf")
+        estimate = goal_error(self._state, self.quantity)
+        self._shares = {name: estimate.by_cell(name) for name in self._state.scene.bodies}
+        self._sums.append(float(sum(share.sum() for share in self._shares.values())))
+        return estimate.value, self._error(estimate)
 
     def _spent(self) -> float:
         """Return the wall time since it was last asked for, that of the slowest rank. Collective."""
@@ -299,7 +308,7 @@ class _Way:
         if self.reason:
             return None
         with together(self.comm):
-            found = refine_scene(self._state.scene, self._marked(aim))
+            found = self._refined(aim)
             scene, self._refinements = found.scene, found.refinements
             partitions = scene.partition(self.comm.size)
             needed, left = expected_memory(scene, partitions), limits.memory or available_memory()
@@ -316,26 +325,32 @@ class _Way:
             self.reason = f"{next_mesh} need about {needed / 1e9:.2g} GB, {(left or 0.0) / 1e9:.2g} are left"
         return None if self.reason else problem.on(scene, partitions)
 
-    def _marked(
+    def _refined(
         self, aim: float, least: float = 0.2, most: float = 0.8, safety: float = 0.8, halved: float = 0.25
-    ) -> dict[str, np.ndarray]:
-        """Return the cells of each body to halve: so many that the next error is the one aimed at.
+    ) -> SceneRefinement:
+        """Return the next meshes: so many cells are halved that the next error is the one aimed at.
 
         `aim`: the error asked for; `least`, `most`: bounds of the share of the estimates whose cells are
         halved; `safety`: part of the error asked for that the next mesh aims at; `halved`: what halving
         leaves of the share of a cell.
         """
-        if self._doubted:  # what a single point presses follows from the load: its adjoint is rounding
-            return pressing_cells(self._state, self._doubted)
+        if self._doubted:
+            return refined_at_spots(self._state, self._doubted)
         wanted = (1.0 - safety * aim / self.levels[-1].error) / (1.0 - halved)
-        return bulk(self._shares, min(max(wanted, least), most))
+        return refine_scene(self._state.scene, bulk(self._shares, min(max(wanted, least), most)))
 
     def _singular(self, changes: int = 3) -> str:
-        """Say so if the value has changed by more from mesh to mesh, always to the same side."""
-        known = [level.value for level in self.levels if np.isfinite(level.error)][-changes - 1 :]
-        steps = np.diff(known)
-        grows = len(steps) == changes and (np.sign(steps) == np.sign(steps[0])).all()
-        if not grows or not (np.abs(steps[1:]) >= np.abs(steps[:-1])).all():
+        """Say so if the value has changed by more from mesh to mesh, always to the same side.
+
+        Changes count by the growth of the mesh: one that is hardly refined changes it little.
+        """
+        known = [level for level in self.levels if np.isfinite(level.error)][-changes - 1 :]
+        steps = np.diff([level.value for level in known])
+        growths = np.diff(np.log([level.unknowns for level in known]))
+        if len(steps) < changes or not (np.sign(steps) == np.sign(steps[0])).all():
+            return ""
+        rates = np.abs(steps) / growths
+        if not (rates[1:] >= rates[:-1]).all():
             return ""
         faceted = faceted_surfaces(self._state.scene)
         corners, remedy = "as stress does at sharp corners", "round the corner"
@@ -376,16 +391,5 @@ def unknowns_of(scene: Scene) -> int:
 def faceted_surfaces(scene: Scene) -> list[str]:
     """Return in words the curved surfaces of contacts that are refined as facets: their shape is unknown."""
     return [
-        f"{side.body} {side.name}"
-        for pair in scene.contacts
-        for side in sides_without_shape(scene, pair)
+        f"{side.body} {side.name}" for pair in scene.contacts for side in sides_without_shape(scene, pair)
     ]
-
-
-def doubted_pairs(state: State) -> list[int]:
-    """Return the numbers of the contact pairs whose spot is too small for its cells, or but one facet."""
-    places = {each.place for each in state.peak_doubts if isinstance(each, CoarsePeak)}
-    closed = state.contact.points.pair[state.contact.normal_force > 0.0]
-    pressing = np.bincount(closed, minlength=len(state.scene.contacts))
-    few = (pressing > 0) & (pressing <= 2 ** (state.scene.dim - 1))
-    return [n for n, pair in enumerate(state.scene.contacts) if few[n] or pair.place in places]

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
-
-from fenics_contact._pairing.points import NodeNumbers
-from fenics_contact.results.state import State
 
 
 def bulk(shares: Mapping[str, np.ndarray], fraction: float) -> dict[str, np.ndarray]:
@@ -31,22 +28,3 @@ def bulk(shares: Mapping[str, np.ndarray], fraction: float) -> dict[str, np.ndar
     threshold = every[last] * (1.0 - 1e-9)
     marked = {name: np.flatnonzero((share >= threshold) & (share > 0.0)) for name, share in shares.items()}
     return {name: cells for name, cells in marked.items() if len(cells)}
-
-
-def pressing_cells(state: State, pairs: Sequence[int]) -> dict[str, np.ndarray]:
-    """Return the cells of both surfaces of some contact pairs that have nodes where the pairs press.
-
-    Returns:
-        Body name -> ascending numbers of cells, of bodies that have some.
-    """
-    contact, numbers = state.contact, NodeNumbers.of(state.scene)
-    mine = np.isin(contact.points.pair, pairs) & (contact.normal_force > 0.0)
-    pressing = np.zeros(numbers.n_nodes, dtype=bool)
-    pressing[contact.points.slave[mine]] = True
-    pressing[contact.points.master[mine].indices] = True
-    found = {}
-    for name, body in state.scene.bodies.items():
-        cells = np.flatnonzero(pressing[body.mesh.cells + numbers.first_of(name)].any(axis=1))
-        if len(cells):
-            found[name] = cells
-    return found

@@ -27,6 +27,16 @@ class SceneRefinement:
     scene: Scene
     refinements: Mapping[str, Refinement]
 
+    def after(self, first: SceneRefinement) -> SceneRefinement:
+        """Return the scene with refinements that lead from the meshes before another refinement.
+
+        `first`: the one whose scene this one refines.
+        """
+        both = dict(first.refinements)
+        for name, found in self.refinements.items():
+            both[name] = found.after(both[name]) if name in both else found
+        return SceneRefinement(self.scene, both)
+
 
 def refine_scene(scene: Scene, marked: Mapping[str, ArrayLike]) -> SceneRefinement:
     """Refine the meshes of some bodies; supports, loads and pairs are those of the same surfaces.

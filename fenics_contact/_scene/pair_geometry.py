@@ -127,7 +127,21 @@ def _constants(body: Body) -> tuple[float, float] | None:
     return min(constants)
 
 
-def hertz_approach(
+@dataclass(frozen=True)
+class HertzSpot:
+    """What Hertz's theory says of a contact.
+
+    Attributes:
+        half_width: Half its smallest width, [length].
+        approach: How far the bodies come closer, [length]. Along a line, where that depends on the whole
+            bodies, it is the depth κ a²/2 by which they would overlap undeformed.
+    """
+
+    half_width: float
+    approach: float
+
+
+def hertz_spot(
     force: float,
     modulus: float,
     place: np.ndarray,
@@ -135,12 +149,11 @@ def hertz_approach(
     gap: np.ndarray,
     flat: float = 1e-6,
     radius: float | None = None,
-) -> float | None:
-    """Return how far two bodies come closer by Hertz's theory; None where it does not hold, [length].
+) -> HertzSpot | None:
+    """Return the contact of two bodies by Hertz's theory; None where it does not hold.
 
     The relative curvatures are those of a quadratic polynomial through the gaps around the smallest one; the
-    theory holds if they are positive and the contact is smaller than the surfaces. Along a line, where the
-    approach depends on the whole bodies, it is the depth κ a²/2 by which they would overlap undeformed.
+    theory holds if they are positive and the contact is smaller than the surfaces.
 
     `force`: force that presses the bodies together, [force], in the plane [force / length]; `modulus`: E*,
     [force / length²]; `place`: coordinates of the nodes of one surface that face the other, shape (n, dim),
@@ -159,10 +172,26 @@ def hertz_approach(
     if high * size <= flat or low < -LINE * high:
         return None
     if len(curvatures) == 1 or low <= LINE * high:
-        line = hertz_line(force / (1.0 if len(curvatures) == 1 else reach[0]), high, modulus)
-        return float(high * line.half_width**2 / 2) if line.half_width < size else None
-    point = hertz_point(force, (low, high), modulus)
-    return point.approach if max(point.semi_axes) < size else None
+        half_width = hertz_line(force / (1.0 if len(curvatures) == 1 else reach[0]), high, modulus).half_width
+        spot, widest = HertzSpot(half_width, float(high * half_width**2 / 2)), half_width
+    else:
+        point = hertz_point(force, (low, high), modulus)
+        spot, widest = HertzSpot(min(point.semi_axes), point.approach), max(point.semi_axes)
+    return spot if widest < size else None
+
+
+def whole_force(
+    scene: SceneParts, slave: FacetedSurface, node: int, force: float
+) -> tuple[float, float | None]:
+    """Return the force of a contact beyond planes of symmetry, and its radius on bodies of revolution.
+
+    `node`: of the slave, in the middle of the contact; `force`: that of the scene, [force].
+    """
+    mirrored = slave.mirrored[node]
+    if scene.axisymmetric:
+        return force, 0.0 if mirrored.any() else float(slave.points[node, 0])
+    # Each plane of symmetry through the contact halves the force.
+    return force * 2.0 ** np.count_nonzero(mirrored), None
 
 
 def _relative_curvatures(
@@ -361,12 +390,10 @@ def _approach(scene: SceneParts, pair: ContactPair, slave: FacetedSurface, met: 
     sizes = [displacement_along(scene, normal)]
     force, modulus = force_along(scene, normal), modulus_of(scene, pair)
     if force is not None and modulus is not None:
-        # Each plane of symmetry through the contact halves the force.
-        whole, radius = force * 2.0 ** np.count_nonzero(slave.mirrored[node]), None
-        if scene.axisymmetric:
-            whole, radius = force, 0.0 if slave.mirrored[node].any() else float(slave.points[node, 0])
+        whole, radius = whole_force(scene, slave, int(node), force)
         places = slave.points[met.node]
-        sizes.append(hertz_approach(whole, modulus, places, met.normal, met.gap, radius=radius) or 0.0)
+        spot = hertz_spot(whole, modulus, places, met.normal, met.gap, radius=radius)
+        sizes.append(spot.approach if spot else 0.0)
     return max(sizes) or None
 
 

@@ -38,6 +38,17 @@ class Refinement:
     parents: np.ndarray
     positions: np.ndarray
 
+    def after(self, first: Refinement) -> Refinement:
+        """Return the refinement that leads from the mesh before another one to this mesh.
+
+        `first`: the one whose mesh this one refines.
+        """
+        kind = CELL_TYPES[self.mesh.cell_type]
+        values = shape_values(kind, self.positions.reshape(-1, self.mesh.dim))
+        values = values.reshape(*self.positions.shape[:2], -1)
+        positions = np.einsum("ckn,cni->cki", values, first.positions[self.parents])
+        return Refinement(self.mesh, first.parents[self.parents], positions)
+
 
 def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
     """Halve some cells, and as many others as the mesh needs.

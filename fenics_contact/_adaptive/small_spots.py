@@ -1,0 +1,109 @@
+"""Spots of contact that are smaller than the cells around them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fenics_contact._adaptive.refined_scene import SceneRefinement, refine_scene
+from fenics_contact._pairing.points import NodeNumbers
+from fenics_contact._scene.pair_geometry import hertz_spot, modulus_of, whole_force
+from fenics_contact._scene.pairs import Surface
+from fenics_contact._scene.parts import surface_of
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.results.resolution import CoarsePeak
+from fenics_contact.results.state import State
+
+
+def doubted_pairs(state: State) -> list[int]:
+    """Return the numbers of the contact pairs whose spot is too small for its cells, or but one facet."""
+    places = {each.place for each in state.peak_doubts if isinstance(each, CoarsePeak)}
+    closed = state.contact.points.pair[state.contact.normal_force > 0.0]
+    pressing = np.bincount(closed, minlength=len(state.scene.contacts))
+    few = (pressing > 0) & (pressing <= 2 ** (state.scene.dim - 1))
+    return [n for n, pair in enumerate(state.scene.contacts) if few[n] or pair.place in places]
+
+
+def refined_at_spots(
+    state: State, pairs: Sequence[int], across: float = 2.0, most: int = 8
+) -> SceneRefinement:
+    """Halve the cells at the spots of some contact pairs until a spot is wider than they are.
+
+    Where but one facet presses and Hertz's theory gives the size of the spot under the force that it
+    transmits, cells are halved until so many lie across its half width; else once.
+
+    Args:
+        state: The state on the meshes to refine.
+        pairs: Numbers of the pairs.
+        across: Number of cells.
+        most: How often cells are halved at most.
+    """
+    spots = [_Spot.of(state, number) for number in pairs]
+    found = SceneRefinement(state.scene, {})
+    for again in range(most):
+        marked: dict[str, np.ndarray] = {}
+        for spot in spots:
+            wide = spot.half_width / across if again else 0.0
+            for name in spot.bodies:
+                cells = spot.near(found.scene.bodies[name].mesh, wide if wide or not again else np.inf)
+                marked[name] = np.union1d(marked.get(name, cells), cells)
+        marked = {name: cells for name, cells in marked.items() if len(cells)}
+        if not marked:
+            break
+        found = refine_scene(found.scene, marked).after(found)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Spot:
+    """Where a pair presses.
+
+    Attributes:
+        bodies: Names of the bodies whose cells meet there.
+        points: Places of the points that press, shape (n, dim), [length].
+        half_width: Half the width of the spot, zero where it is not known, [length].
+    """
+
+    bodies: tuple[str, ...]
+    points: np.ndarray
+    half_width: float
+
+    @classmethod
+    def of(cls, state: State, number: int) -> _Spot:
+        """Return the spot of a pair."""
+        contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
+        mine, first = contact.on_pair(number), NodeNumbers.of(scene).first_of(pair.slave.body)
+        places = scene.bodies[pair.slave.body].mesh.points[contact.points.slave[mine] - first]
+        sides = [pair.slave, *([pair.master] if isinstance(pair.master, Surface) else [])]
+        pressing = contact.normal_force[mine] > 0.0
+        bodies = tuple(dict.fromkeys(side.body for side in sides))
+        return cls(bodies, places[pressing], _half_width(state, number, places))
+
+    def near(self, mesh: BodyMesh, wide: float) -> np.ndarray:
+        """Return the cells that may reach the spot and are wider than some length."""
+        corners = mesh.points[mesh.cells]
+        middle = corners.mean(axis=1)
+        reach = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+        away, _ = cKDTree(self.points).query(middle)
+        width = 2.0 * reach / np.sqrt(mesh.dim)  # the edge of squares and cubes
+        return np.flatnonzero((away <= reach + self.half_width) & (width > wide))
+
+
+def _half_width(state: State, number: int, places: np.ndarray) -> float:
+    """Return half the width by Hertz's theory of a pair of which one facet presses at most; zero if unknown.
+
+    `places`: places of the points of the pair, shape (n, dim), [length].
+    """
+    contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
+    mine, modulus = contact.on_pair(number), modulus_of(scene, pair)
+    force = contact.normal_force[mine]
+    if modulus is None or np.count_nonzero(force) > 2 ** (scene.dim - 1):
+        return 0.0
+    slave, points = surface_of(scene, pair.slave, "faceted"), contact.points
+    node = points.slave[mine[np.argmax(force)]] - NodeNumbers.of(scene).first_of(pair.slave.body)
+    whole, radius = whole_force(scene, slave, int(np.searchsorted(slave.nodes, node)), float(force.sum()))
+    spot = hertz_spot(whole, modulus, places, points.normal[mine], points.gap[mine], radius=radius)
+    return spot.half_width if spot else 0.0
