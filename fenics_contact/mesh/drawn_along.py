@@ -3,88 +3,66 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix, diags, identity
+from scipy.sparse import coo_matrix, csr_matrix, diags
 
 from fenics_contact.mesh.cell_types import cell_type_of
-from fenics_contact.mesh.faces import corners_of, vector_areas
+from fenics_contact.mesh.hanging import HangingNodes
 
 
 def drawn_along(
     moved: np.ndarray,
-    placed: np.ndarray,
+    free: np.ndarray,
     straight: np.ndarray,
     cells: np.ndarray,
-    boundary: np.ndarray,
-    still: np.ndarray,
+    along: np.ndarray,
+    hanging: HangingNodes | None = None,
     iterations: int = 100,
 ) -> np.ndarray:
-    """Return displacements of all new nodes for those of the nodes that were put on shapes.
+    """Return displacements of all nodes for those of the nodes that were put on shapes.
 
-    Each is the mean of those of the new nodes around it: between two old layers of cells along a curved
-    surface all of a new layer moves. Nodes of plane parts of the boundary stay in these, those of gently
-    curved ones without a shape are free. Conjugate gradients: each iteration reaches one layer further.
+    They minimise Σ |dᵢ − dⱼ|² / lᵢⱼ² over the edges of cells with lengths l: along the short edges of thin
+    layers all of these move, and with it what is as near to the surface as its new nodes are to each other.
+    Conjugate gradients: each iteration reaches one layer further.
 
-    `moved`: displacements, shape (n_nodes, dim); `placed`: marks of nodes on shapes; `straight`: coordinates
-    with all nodes on facets; `cells`: node numbers of linear cells; `boundary`: their outer faces; `still`:
-    marks of old and of hanging nodes, which stay and do not count.
+    `moved`: displacements, shape (n_nodes, dim); `free`: marks of the nodes that follow, all others keep
+    theirs; `straight`: coordinates without displacements; `cells`: node numbers of linear cells; `along`:
+    projections onto the directions in which nodes may move, shape (n_nodes, dim, dim); `hanging`: nodes that
+    follow their masters.
     """
-    free = ~still & ~placed
-    joined = _joined(cells, straight.shape[1], ~still)[free]
-    along = _directions(straight, boundary)[free]
-    scale = 1.0 / np.sqrt(np.maximum(np.asarray(joined.sum(axis=1)), 1.0))
-    inside = diags(scale.ravel())
-    inside = identity(len(along)) - inside @ joined[:, free] @ inside
+    joined = _joined(cells, straight)
+    if hanging is not None:
+        follow = hanging.followed(len(straight))
+        joined = csr_matrix(follow.T @ joined @ follow)
+    joined, along = joined[free], along[free]
+    scale = 1.0 / np.sqrt(joined[:, free].diagonal())[:, None]
+    inside = diags(scale.ravel()) @ joined[:, free] @ diags(scale.ravel())
 
     def within(vectors: np.ndarray) -> np.ndarray:
         return np.asarray(np.einsum("nde,ne->nd", along, vectors))
 
-    left = within(scale * (joined @ moved))
+    start = np.where(free[:, None], 0.0, moved)
+    left = within(-scale * (joined @ start))
     found, step, size = np.zeros_like(left), left.copy(), float(np.sum(left**2))
+    least = 1e-12 * size
     for _ in range(iterations):
-        if size <= 1e-10 * np.sum(moved**2):
+        if size <= least:
             break
         product = within(inside @ step)
         length = size / np.sum(step * product)
         found, left, before = found + length * step, left - length * product, size
         size = float(np.sum(left**2))
         step = left + size / before * step
-    result = moved.copy()
-    result[free] = scale * found
-    return result
+    start[free] = scale * found
+    return start
 
 
-def _joined(cells: np.ndarray, dim: int, new: np.ndarray) -> csr_matrix:
-    """Return which new nodes share an edge of a cell, shape (n_nodes, n_nodes)."""
-    kind = cell_type_of(cells, dim)
+def _joined(cells: np.ndarray, points: np.ndarray) -> csr_matrix:
+    """Return the Laplacian of edges of cells with weights 1 / l², shape (n_nodes, n_nodes)."""
+    kind = cell_type_of(cells, points.shape[1])
     ends = np.array([[v, far] for v, around in enumerate(kind.edges) for far in around if v < far])
-    edges = np.unique(np.sort(cells[:, ends].reshape(-1, 2), axis=1), axis=0)
-    edges = edges[new[edges].all(axis=1)]
-    matrix = coo_matrix((np.ones(len(edges)), tuple(edges.T)), shape=2 * (len(new),)).tocsr()
-    return csr_matrix(matrix + matrix.T)
-
-
-def _directions(points: np.ndarray, boundary: np.ndarray, gentle: float = 0.12) -> np.ndarray:
-    """Return projections onto the directions in which nodes of a boundary may move, (n_nodes, dim, dim).
-
-    `gentle`: share of the squares of normals across their mean up to which a boundary is gently curved: they
-    differ by less than about 40 degrees.
-    """
-    count, dim = points.shape
-    areas = vector_areas(points, boundary)
-    normals = areas / np.linalg.norm(areas, axis=1)[:, None]
-    corners = corners_of(boundary, dim)
-    squares = np.zeros((count, dim, dim))
-    np.add.at(squares, corners, np.einsum("nd,ne->nde", normals, normals)[:, None])
-    around = np.zeros_like(squares)
-    np.add.at(around, corners, squares[corners].sum(axis=1)[:, None])
-    there = np.unique(corners)
-    result = np.tile(np.eye(dim), (count, 1, 1))
-    (own, axes), (wider, _) = (np.linalg.eigh(_shares(each[there])) for each in (squares, around))
-    curved = [(values[:, -2] > 1e-8) & (values[:, :-1].sum(axis=1) < gentle) for values in (own, wider)]
-    held = (own > 0.1) & ~(curved[0] | curved[1])[:, None]
-    result[there] -= np.einsum("nda,na,nea->nde", axes, held.astype(float), axes)
-    return result
-
-
-def _shares(squares: np.ndarray) -> np.ndarray:
-    return np.asarray(squares / np.trace(squares, axis1=1, axis2=2)[:, None, None])
+    both = np.sort(cells[:, ends].reshape(-1, 2), axis=1)
+    edges = np.divmod(np.unique(both[:, 0] * len(points) + both[:, 1]), len(points))
+    weight = 1.0 / np.sum((points[edges[0]] - points[edges[1]]) ** 2, axis=1)
+    matrix = coo_matrix((weight, edges), shape=2 * (len(points),)).tocsr()
+    matrix = matrix + matrix.T
+    return csr_matrix(diags(np.asarray(matrix.sum(axis=1)).ravel()) - matrix)

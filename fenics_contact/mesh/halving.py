@@ -8,10 +8,9 @@ import numpy as np
 
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import HEXAHEDRON27, QUADRILATERAL9, CellType
-from fenics_contact.mesh.drawn_along import drawn_along
-from fenics_contact.mesh.faces import boundary_faces, match_faces, number_faces
+from fenics_contact.mesh.faces import match_faces, number_faces
 from fenics_contact.mesh.hanging import HangingNodes
-from fenics_contact.mesh.quadratic import put_on_shapes
+from fenics_contact.mesh.on_shapes import on_shapes
 from fenics_contact.mesh.quality import thickness
 
 _HALVED = {2: QUADRILATERAL9, 3: HEXAHEDRON27}
@@ -193,7 +192,7 @@ def _placed(
 ) -> np.ndarray:
     """Return coordinates: new nodes and those that hang no more lie on the shapes of their surfaces.
 
-    New nodes around them follow, see `drawn_along`; nodes that hang lie at the mean of their masters.
+    Others around them follow, see `drawn_along`; nodes that hang lie at the mean of their masters.
 
     `numbers`: all nodes of the halved cells, and the refined cells.
     """
@@ -206,13 +205,6 @@ def _placed(
     if hanging is not None:
         moves[hanging.nodes] = False
     points = np.concatenate([mesh.points, np.empty((count - n_old, mesh.dim))])
-    put_on_shapes(points, mesh.surfaces, mesh.shapes, moves)
     points[n_old : n_old + len(between)] = points[between].mean(axis=1)
     points[nodes[:, -1]] = points[nodes[:, : len(kind.vertices)]].mean(axis=1)
-    moves[:n_old] = False
-    straight = points.copy()
-    placed = put_on_shapes(points, surfaces, mesh.shapes, moves)
-    if not np.array_equal(points, straight):
-        outside, _ = boundary_faces(cells, mesh.dim, hanging)
-        points = straight + drawn_along(points - straight, placed, straight, cells, outside, ~moves)
-    return points if hanging is None else hanging.placed(points)
+    return on_shapes(points, cells, surfaces, mesh.shapes, moves, hanging)

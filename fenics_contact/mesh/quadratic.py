@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
@@ -19,7 +17,7 @@ from fenics_contact.mesh.cell_types import (
 )
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
 from fenics_contact.mesh.hanging import require_none
-from fenics_contact.shapes.simple import SurfaceShape, closest_points
+from fenics_contact.mesh.on_shapes import put_on_shapes
 
 _QUADRATIC = {cell.vertices.shape: cell for cell in (TRIANGLE6, QUADRILATERAL9, TETRAHEDRON10, HEXAHEDRON27)}
 
@@ -56,30 +54,13 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
         name: boundary[match_faces(facets, corners_of(boundary, mesh.dim))]
         for name, facets in mesh.surfaces.items()
     }
-    placed = put_on_shapes(points, surfaces, mesh.shapes, np.arange(len(points)) >= mesh.n_nodes)
+    points, placed, _ = put_on_shapes(
+        points, cells, surfaces, mesh.shapes, np.arange(len(points)) >= mesh.n_nodes
+    )
     if placed.any():
         _follow(points, cells, kind, placed)
     check_jacobians(points, cells, "refine the mesh along its curved surfaces, or leave their shapes away")
     return BodyMesh(points, cells, surfaces, mesh.grid, mesh.regions, mesh.coincident_nodes, mesh.shapes)
-
-
-def put_on_shapes(
-    points: np.ndarray,
-    surfaces: Mapping[str, np.ndarray],
-    shapes: Mapping[str, SurfaceShape],
-    movable: np.ndarray,
-) -> np.ndarray:
-    """Move nodes of surfaces, where they are marked as movable, to the closest points of the shapes.
-
-    Returns which nodes these are, shape (n_nodes,).
-    """
-    placed = np.zeros(len(points), dtype=bool)
-    for name, shape in shapes.items():
-        own = np.unique(surfaces[name])
-        own = own[movable[own]]
-        points[own] = closest_points(shape, points[own])
-        placed[own] = True
-    return placed
 
 
 def with_more_nodes(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,8 +18,11 @@ from fenics_contact.mesh.cell_types import CELL_TYPES, CellType, shape_values
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
 from fenics_contact.mesh.halving import halved
 from fenics_contact.mesh.hanging import HangingNodes
-from fenics_contact.mesh.quadratic import put_on_shapes, with_more_nodes
+from fenics_contact.mesh.on_shapes import on_shapes
+from fenics_contact.mesh.quadratic import with_more_nodes
+from fenics_contact.mesh.quality import thickness
 
+_Found: TypeAlias = tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]
 _LINEAR = {2: CELL_TYPES["triangle"], 3: CELL_TYPES["tetrahedron"]}
 
 
@@ -59,8 +63,10 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
     direction into 4 or 8; nodes in the middle of edges and faces of larger cells hang (`BodyMesh.hanging`),
     and others are halved only so that cells that share a point differ by one level.
 
-    New nodes on surfaces whose shape the mesh carries lie on the shape, those of quadratic cells else on the
-    curved facets; hanging nodes lie on the larger facet. Surfaces and regions are carried to the new cells; a
+    New nodes on surfaces whose shape the mesh carries lie on the shape, those between two shapes or beside a
+    plane on both, those of quadratic cells else on the curved facets; hanging nodes lie on the larger facet.
+    Other new nodes are drawn along, and where a surface leaves its facets by so much that cells would still
+    be inverted, more cells are halved around them. Surfaces and regions are carried to the new cells; a
     structured grid is lost.
 
     Args:
@@ -69,7 +75,7 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
 
     Raises:
         InvalidInputError: If the cells are of another type, no such cells exist, the mesh has nodes that
-            coincide, or new nodes move so far onto a shape that a cell is inverted.
+            coincide, or a shape crosses another side of the body, so that cells are inverted.
 
     Example:
         >>> from fenics_contact.gallery import rectangle
@@ -80,11 +86,21 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
         (True, 2.0)
     """
     chosen = _checked_marks(mesh, marked)
-    kind, linear = CELL_TYPES[mesh.cell_type], _LINEAR[mesh.dim]
-    if not kind.is_simplex:
+    if not CELL_TYPES[mesh.cell_type].is_simplex:
         parts = halved(mesh, chosen)
         found = parts.points, parts.cells, parts.surfaces
         return _checked(mesh, found, parts.hanging, parts.parents, parts.positions)
+    while True:
+        found, parents, positions = _halved_simplices(mesh, chosen)
+        more = _around_inverted(mesh, found, parents)
+        if not more.any():
+            return _checked(mesh, found, None, parents, positions)
+        chosen = np.union1d(chosen, np.flatnonzero(more))
+
+
+def _halved_simplices(mesh: BodyMesh, chosen: np.ndarray) -> tuple[_Found, np.ndarray, np.ndarray]:
+    """Return coordinates, cells and surfaces; the parent of each cell; positions of its nodes in that."""
+    kind, linear = CELL_TYPES[mesh.cell_type], _LINEAR[mesh.dim]
     vertices, inverse = np.unique(mesh.cells[:, : mesh.dim + 1], return_inverse=True)
     skeleton = inverse.reshape(-1, mesh.dim + 1)
     ends, cells = _identified(mesh.points[vertices], skeleton, linear, chosen)
@@ -96,13 +112,23 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
     points = _mapped(mesh, kind, parents, positions, cells, len(points))
     points[: len(vertices)] = mesh.points[vertices]
     surfaces = _carried_surfaces(mesh, ends, cells, vertices)
-    put_on_shapes(points, surfaces, mesh.shapes, np.arange(len(points)) >= len(vertices))
-    return _checked(mesh, (points, cells, surfaces), None, parents, positions)
+    points = on_shapes(points, cells, surfaces, mesh.shapes, np.arange(len(points)) >= len(vertices))
+    return (points, cells, surfaces), parents, positions
+
+
+def _around_inverted(mesh: BodyMesh, found: _Found, parents: np.ndarray) -> np.ndarray:
+    """Mark the coarse cells that share a vertex with that of an inverted one and are not wholly halved.
+
+    Where a surface leaves its facets by more than the thickness of the cells behind, all have to follow.
+    """
+    inverted = parents[thickness(*found[:2]) <= 0.0]
+    near = np.isin(mesh.cells[:, : mesh.dim + 1], mesh.cells[inverted]).any(axis=1)
+    return np.asarray(near & (np.bincount(parents, minlength=mesh.n_cells) < 2**mesh.dim))
 
 
 def _checked(
     mesh: BodyMesh,
-    found: tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]],
+    found: _Found,
     hanging: HangingNodes | None,
     parents: np.ndarray,
     positions: np.ndarray,
@@ -112,7 +138,8 @@ def _checked(
     `found`: coordinates, cells and surfaces.
     """
     points, cells, surfaces = found
-    check_jacobians(points, cells, "mark more cells along curved surfaces, or leave their shapes away")
+    remedy = "see whether shapes of surfaces cross each other or other sides of the body, or leave them away"
+    check_jacobians(points, cells, remedy)
     regions = {name: np.flatnonzero(np.isin(parents, inside)) for name, inside in mesh.regions.items()}
     fine = BodyMesh(points, cells, surfaces, None, regions, shapes=mesh.shapes, hanging=hanging)
     return Refinement(fine, parents, positions)

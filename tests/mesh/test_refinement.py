@@ -173,8 +173,3 @@ def test_what_cannot_be_refined_is_refused() -> None:
     cracked = BodyMesh(mesh.points, mesh.cells, mesh.surfaces, coincident_nodes=True)
     with pytest.raises(InvalidInputError, match="without coincident nodes"):
         refined(cracked, [0])
-    thin = disc(2.0, 3, hole=1.99)
-    halves = thin.cells[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
-    layer = BodyMesh(thin.points, halves, thin.surfaces, shapes={"inner": thin.shapes["inner"]})
-    with pytest.raises(InvalidInputError, match="mark more cells along curved surfaces"):
-        refined(layer, np.arange(layer.n_cells))
