@@ -133,7 +133,9 @@ def split_hexahedra(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> BodyM
         name: orient(cells, _split_facets(facets, boundary)) for name, facets in mesh.surfaces.items()
     }
     regions = repeated_regions(mesh, KUHN_TETRAHEDRA.shape[0])
-    return BodyMesh(mesh.points, cells, surfaces, grid, regions, mesh.coincident_nodes, mesh.shapes)
+    return BodyMesh(
+        mesh.points, cells, surfaces, grid, regions, mesh.coincident_nodes, mesh.shapes
+    ).with_chart(mesh.chart)
 
 
 def _split_cells(cells: np.ndarray, mirrored: np.ndarray | None) -> np.ndarray:
@@ -437,7 +439,9 @@ def split_quadrilaterals(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> 
     triangles = cells[:, CELL_TYPES["quadrilateral"].simplices].reshape(-1, 3)
     grid = None if mesh.grid is None else np.repeat(mesh.grid, 2, axis=0)
     regions = repeated_regions(mesh, 2)
-    return BodyMesh(mesh.points, triangles, mesh.surfaces, grid, regions, mesh.coincident_nodes, mesh.shapes)
+    return BodyMesh(
+        mesh.points, triangles, mesh.surfaces, grid, regions, mesh.coincident_nodes, mesh.shapes
+    ).with_chart(mesh.chart)
 
 
 def growing_ticks(length: float, first: float, ratio: float) -> np.ndarray:

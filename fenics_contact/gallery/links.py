@@ -14,15 +14,17 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery.blocks import require_room, split_hexahedra, structured_cells
 from fenics_contact.gallery.ring import (
     LinkShape,
+    SweptSection,
     crown_facets,
     crown_indices,
     crown_shapes,
     drawn_together,
-    ring_lattice,
     stations,
 )
 from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.chart import Chart
 from fenics_contact.mesh.faces import orient
+from fenics_contact.shapes.parametric import tensor_grid
 
 
 @displayed
@@ -96,8 +98,9 @@ def chain_link(shape: LinkShape | None = None) -> Link:
     surfaces = {
         name: orient(cells, crown_facets(shape, far)) for name, far in (("contact", False), ("grip", True))
     }
-    points = ring_lattice(shape).reshape(-1, 3)
-    mesh = BodyMesh(points, cells, surfaces, grid, shapes=crown_shapes(shape))
+    lattice = tensor_grid([np.arange(shape.n_around), np.arange(shape.n_a + 1), np.arange(shape.n_b + 1)])
+    chart = Chart(SweptSection(shape), lattice, period=shape.n_around)
+    mesh = BodyMesh(chart.points(), cells, surfaces, grid, shapes=crown_shapes(shape), chart=chart)
     if shape.cell == "tetrahedron":
         mesh = split_hexahedra(mesh, _mirrored(grid, shape))
     return Link(shape, mesh, _crown(shape))
@@ -116,16 +119,16 @@ def _mirrored(grid: np.ndarray, shape: LinkShape) -> np.ndarray:
 
 def _crown(shape: LinkShape) -> DesignSurface:
     around, spacing = crown_indices(shape), shape.spacing
-    _, outward = stations(shape)
-    _, normals = shape.section.inner_arc(shape.n_b, spacing.across)
-    across = np.array([0.0, 1.0, 0.0])
-    directions = normals[None, :, :1] * outward[around][:, None] + normals[None, :, 1:] * across
     counts = (around.size, shape.n_b + 1)
-    ticks = [
-        drawn_together(np.linspace(0.0, 1.0, count), 0.5, strength)
+    along, wire = (
+        drawn_together(np.linspace(-1.0, 1.0, count), strength)
         for count, strength in zip(counts, (spacing.along, spacing.across), strict=True)
-    ]
-    s, t = np.meshgrid(*ticks, indexing="ij")
+    )
+    _, outward = stations(shape, around)
+    _, normals = shape.section.inner_arc(wire)
+    across = np.array([0.0, 1.0, 0.0])
+    directions = normals[None, :, :1] * outward[:, None] + normals[None, :, 1:] * across
+    s, t = np.meshgrid(0.5 + 0.5 * along, 0.5 + 0.5 * wire, indexing="ij")
     nodes = around[:, None] * (shape.n_a + 1) * (shape.n_b + 1) + np.arange(shape.n_b + 1)
     parameters = np.column_stack([s.ravel(), t.ravel()])
     return DesignSurface(nodes.ravel(), parameters, directions.reshape(-1, 3), counts)

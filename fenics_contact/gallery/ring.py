@@ -54,18 +54,11 @@ class Spacing:
     through: float = 0.0
 
 
-def drawn_together(places: np.ndarray, spot: float, strength: float) -> np.ndarray:
-    """Concentrate points of an interval towards its middle or its start.
-
-    `places`: ascending points, (n,), from the start of the interval, or symmetric about its middle, to its
-    end.
-
-    Returns points, (n,), with the same ends.
-    """
+def drawn_together(places: np.ndarray, strength: float) -> np.ndarray:
+    """Concentrate points of [−1, 1] towards 0; the ends stay."""
     if strength == 0.0:
         return places
-    reach = places[-1] - spot
-    return np.asarray(spot + reach * np.sinh(strength * (places - spot) / reach) / np.sinh(strength))
+    return np.asarray(np.sinh(strength * places) / np.sinh(strength))
 
 
 def strength_for(smallest: float) -> float:
@@ -138,40 +131,36 @@ class WireSection:
         segment = self.half_angle - np.sin(2.0 * self.half_angle) / 2.0
         return float(4.0 * c_a * c_b + 2.0 * segment * (self.crown_radius**2 + self.flank_radius**2))
 
-    def inner_arc(self, n: int, strength: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Divide the arc on the ring's inside.
+    def inner_arc(self, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return points (a, b) of the arc on the ring's inside, and unit normals out of the section.
 
-        Returns points (a, b), from negative to positive b, and unit normals out of the section, both (n + 1,
-        2).
+        `along`: places from −1 at negative b to 1, shape (n,); both results have shape (n, 2).
         """
-        angle = drawn_together(np.linspace(-self.half_angle, self.half_angle, n + 1), 0.0, strength)
+        angle = self.half_angle * along
         normals = np.column_stack([-np.cos(angle), np.sin(angle)])
         centre = np.array([self.crown_radius - self.thickness / 2.0, 0.0])
         return centre + self.crown_radius * normals, normals
 
-    def flank_arc(self, n: int, strength: float = 0.0) -> np.ndarray:
-        """Divide the arc at positive b, from the inner to the outer side; (n + 1, 2)."""
-        start = -self.half_angle
-        angle = drawn_together(np.linspace(start, self.half_angle, n + 1), start, strength)
+    def flank_arc(self, along: np.ndarray) -> np.ndarray:
+        """Return points of the arc at positive b; `along`: from −1 on the inner side to 1, as `inner_arc`."""
+        angle = self.half_angle * along
         outward = np.column_stack([np.sin(angle), np.cos(angle)])
         return np.array([0.0, self.width / 2.0 - self.flank_radius]) + self.flank_radius * outward
 
-    def lattice(self, n_a: int, n_b: int, through: float = 0.0, across: float = 0.0) -> np.ndarray:
-        """Fill the section by transfinite interpolation between its four arcs.
+    def points(self, through: np.ndarray, across: np.ndarray) -> np.ndarray:
+        """Return points (a, b) of the section by transfinite interpolation between its four arcs, (n, 2).
 
-        Returns points (a, b), (n_a + 1, n_b + 1, 2).
+        `through`, `across`: places along a and b from −1 to 1, shape (n,) each.
 
         References:
             Gordon and Hall, Construction of curvilinear co-ordinate systems and applications to mesh
             generation, Int. J. Numer. Meth. Engng 7 (1973), 461-477.
         """
-        inner, _ = self.inner_arc(n_b, across)
-        right = self.flank_arc(n_a, through)
-        outer, left = inner * [-1.0, 1.0], right * [1.0, -1.0]
-        u = drawn_together(np.linspace(0.0, 1.0, n_a + 1), 0.0, through)[:, None, None]
-        v = drawn_together(np.linspace(0.0, 1.0, n_b + 1), 0.5, across)[None, :, None]
-        corners = (1 - u) * ((1 - v) * inner[0] + v * inner[-1]) + u * ((1 - v) * outer[0] + v * outer[-1])
-        return (1 - u) * inner + u * outer + (1 - v) * left[:, None] + v * right[:, None] - corners
+        (inner, _), right = self.inner_arc(across), self.flank_arc(through)
+        u, v = 0.5 + 0.5 * through[:, None], 0.5 + 0.5 * across[:, None]
+        linear = np.column_stack([through, across]) * self.corner
+        sides = (1 - u) * inner + u * inner * [-1.0, 1.0] + (1 - v) * right * [1.0, -1.0] + v * right
+        return np.asarray(sides - linear)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -293,39 +282,43 @@ def crown_start(shape: LinkShape) -> int:
     return shape.n_around // 16 - shape.spacing.quarter
 
 
-def stations(shape: LinkShape) -> tuple[np.ndarray, np.ndarray]:
+def stations(shape: LinkShape, around: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Place the section around the ring.
 
-    Returns points of the wire's centre line, (n_around, 3), and the unit direction a of the section there,
-    (n_around, 3).
+    `around`: places, in numbers of cells from node 0, shape (n,).
+
+    Returns points of the wire's centre line, (n, 3), and the unit direction a of the section there, (n, 3).
     """
-    spacing = shape.spacing
+    spacing, half = shape.spacing, shape.n_around // 2
     turning, n_leg = 2 * spacing.quarter, spacing.leg
-    angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, turning + 1)
-    half_turn = drawn_together(angles, 0.0, spacing.along)[:-1]
-    leg = np.linspace(0.0, shape.straight, n_leg, endpoint=False)
     # Crown, leg, far crown, leg: direction a rotates in the crowns only, the centre moves along the legs
     # only.
-    turn = np.concatenate([half_turn, np.full(n_leg, np.pi / 2.0)])
-    turn = np.concatenate([turn, turn + np.pi])
-    moved = np.concatenate([np.zeros(turning), leg, np.full(turning, shape.straight), shape.straight - leg])
-    centre = np.zeros((shape.n_around, 3))
-    centre[:, 0] = -shape.inner_radius - moved
-    outward = np.column_stack([np.cos(turn), np.zeros(shape.n_around), np.sin(turn)])
-    line = centre + shape.centre_radius * outward
-    start = crown_start(shape)
-    return np.roll(line, start, axis=0), np.roll(outward, start, axis=0)
+    back, place = np.divmod(np.mod(around - crown_start(shape), shape.n_around), half)
+    turn = drawn_together(np.minimum(place, turning) / spacing.quarter - 1.0, spacing.along)
+    turn = np.pi / 2.0 * turn + np.pi * back
+    moved = shape.straight * np.abs(back - np.maximum(place - turning, 0.0) / n_leg)
+    outward = np.column_stack([np.cos(turn), np.zeros(len(around)), np.sin(turn)])
+    line = shape.centre_radius * outward
+    line[:, 0] -= shape.inner_radius + moved
+    return line, outward
 
 
-def ring_lattice(shape: LinkShape) -> np.ndarray:
-    """Sweep the section's lattice around the ring; points, (n_around, n_a + 1, n_b + 1, 3)."""
-    spacing = shape.spacing
-    line, outward = stations(shape)
-    section = shape.section.lattice(shape.n_a, shape.n_b, spacing.through, spacing.across)
-    across = np.array([0.0, 1.0, 0.0])
-    return np.asarray(
-        line[:, None, None] + section[..., :1] * outward[:, None, None] + section[..., 1:] * across
-    )
+@dataclass(frozen=True)
+class SweptSection:
+    """The map of lattice coordinates of a link, counted in cells, to the section swept around the ring."""
+
+    shape: LinkShape
+
+    def __call__(self, lattice: np.ndarray) -> np.ndarray:
+        """Return points of the link, (around, a, b) in rows -> (x, y, z)."""
+        shape, spacing = self.shape, self.shape.spacing
+        line, outward = stations(shape, lattice[:, 0])
+        across = drawn_together(2.0 * lattice[:, 2] / shape.n_b - 1.0, spacing.across)
+        through = 2.0 * drawn_together(lattice[:, 1] / shape.n_a, spacing.through) - 1.0
+        a, b = shape.section.points(through, across).T
+        points = line + a[:, None] * outward
+        points[:, 1] += b
+        return points
 
 
 def crown_indices(shape: LinkShape, far: bool = False) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from fenics_contact.mesh.bisection import bisection_partition
 from fenics_contact.mesh.cell_types import CellType
+from fenics_contact.mesh.chart import Chart
 from fenics_contact.mesh.faces import boundary_faces, merge_duplicate_nodes
 from fenics_contact.mesh.quadratic import quadratic
 from fenics_contact.mesh.quadratic_nodes import in_vtk_order
@@ -10,6 +11,7 @@ from fenics_contact.mesh.refinement import Refinement, refined
 
 __all__ = [
     "CellType",
+    "Chart",
     "Refinement",
     "bisection_partition",
     "boundary_faces",

@@ -16,6 +16,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import quality
 from fenics_contact.mesh.cell_types import cell_type_of
+from fenics_contact.mesh.chart import Chart, check_chart
 from fenics_contact.mesh.faces import (
     boundary_faces,
     check_no_coincident_nodes,
@@ -309,12 +310,14 @@ class BodyMesh:
             uses it for gaps and normals. Other surfaces are reconstructed from their nodes.
         hanging: The nodes of small cells in the middle of edges and faces of larger ones, which `refined`
             makes; by default none.
+        chart: The map whose images the nodes are, which `refined` and `quadratic` follow, as of chain links;
+            by default none.
 
     Raises:
         InvalidInputError: If an array has the wrong shape or type, a coordinate is not finite, a node
             number is out of range or unused, a cell is inverted, nodes coincide, a facet is not an outward
-            boundary face or is listed twice, the regions overlap or leave out a cell, or a surface does not
-            lie on its shape.
+            boundary face or is listed twice, the regions overlap or leave out a cell, a surface does not lie
+            on its shape, or nodes are not the images of their chart.
 
     Example:
         A square of two triangles with a named lower edge.
@@ -333,6 +336,7 @@ class BodyMesh:
     coincident_nodes: bool = False
     shapes: Mapping[str, SurfaceShape] = field(default_factory=dict)
     hanging: HangingNodes | None = None
+    chart: Chart | None = None
     _origin: BodyMesh | None = field(default=None, init=False, repr=False)
     _off_shapes: Mapping[str, np.ndarray] = field(default_factory=dict, init=False, repr=False)
     _cuts: Mapping[Hashable, Cut] = field(default_factory=dict, init=False, repr=False)
@@ -361,6 +365,8 @@ class BodyMesh:
             check_hanging(self.hanging, points, len(cells))
         self._set(surfaces=checked_surfaces(self.surfaces, cells, *points.shape, hanging=self.hanging))
         self._set(_off_shapes=self._checked_shapes(self.shapes))
+        if self.chart is not None:
+            check_chart(self.chart, points)
 
     def _set(self, **values: object) -> None:
         for name, value in values.items():
@@ -444,6 +450,12 @@ class BodyMesh:
         """
         return self._cuts
 
+    def with_chart(self, chart: Chart | None) -> BodyMesh:
+        """Return the mesh with a chart of which some nodes need not be images, such as hanging ones."""
+        result = copy(self)
+        result._set(chart=chart)
+        return result
+
     def with_shapes(self, shapes: Mapping[str, SurfaceShape]) -> BodyMesh:
         """Return the mesh with exactly these shapes of its surfaces.
 
@@ -470,15 +482,16 @@ class BodyMesh:
         shift = tuple(float(component) for component in translation)
         shapes = {name: placed(shape, rotation, shift, scale) for name, shape in self.shapes.items()}
         origin = self._origin and self._origin.placed(rotation, translation, scale)
-        result._set(shapes=shapes, _origin=origin)
+        chart = self.chart and self.chart.placed(rotation, translation, scale)
+        result._set(shapes=shapes, chart=chart, _origin=origin)
         return result
 
     def moved(self, points: np.ndarray) -> BodyMesh:
         """Return the same mesh at new coordinates.
 
         Cells, surfaces, grid and regions are shared with this mesh and not checked again, nor is coincidence
-        of nodes. Its shapes are kept if the mesh is only scaled, rotated and shifted; a deformed mesh has
-        none.
+        of nodes. Its shapes and chart are kept if the mesh is only scaled, rotated and shifted; a deformed
+        mesh has none.
 
         Args:
             points: New coordinates, (n_nodes, 3 | 2); of a mesh with `cuts` those before it was cut will do.
@@ -491,14 +504,14 @@ class BodyMesh:
             InvalidInputError: If the shape is wrong, a coordinate is not finite or a cell is inverted.
         """
         result = self._at(points)
-        motion = similarity(self.points, result.points) if self.shapes else None
+        motion = similarity(self.points, result.points) if self.shapes or self.chart else None
         if motion is not None:
             return self.placed(*motion)
-        result._set(shapes={}, _origin=None, _off_shapes={})
+        result._set(shapes={}, chart=None, _origin=None, _off_shapes={})
         return result
 
     def reshaped(self, points: np.ndarray) -> BodyMesh:
-        """Return the mesh at slightly different coordinates, as `moved`; its shapes follow the nodes.
+        """Return the mesh at slightly different coordinates, as `moved`; shapes and chart follow the nodes.
 
         The offset of a surface from its facets, and of its normals from theirs, is unchanged, so that gaps
         are smooth functions of the coordinates.
@@ -507,7 +520,7 @@ class BodyMesh:
             points: New coordinates, (n_nodes, 3 | 2).
         """
         result = self._at(points)
-        result._set(_origin=self.origin)
+        result._set(chart=None, _origin=self.origin)
         return result
 
     def reshaped_from(self, points: np.ndarray, shapes: Mapping[str, SurfaceShape]) -> BodyMesh:
@@ -522,6 +535,7 @@ class BodyMesh:
         origin, result = copy(self), copy(self)
         for mesh in (origin, result):
             mesh.__dict__.pop("linear", None)
+            mesh._set(chart=None)
         origin._set(points=checked_points(points, self.points.shape))
         result._set(_origin=origin.with_shapes(shapes))
         return result

@@ -50,7 +50,8 @@ def cut_between(mesh: BodyMesh, name: Hashable, before: np.ndarray, behind: np.n
     number = match_faces(corners_of(between, mesh.dim), corners_of(facets, mesh.dim))
     cut = Cut(np.column_stack([renumbered[shared], shared]), facets[number])
     origin = None if mesh.origin is mesh else cut_between(mesh.origin, name, before, behind)
-    result._set(_cuts={**mesh.cuts, name: cut}, _origin=origin)
+    chart = mesh.chart and mesh.chart.extended([shared[:, None]])
+    result._set(_cuts={**mesh.cuts, name: cut}, _origin=origin, chart=chart)
     return result
 
 
@@ -77,9 +78,14 @@ def sewn(mesh: BodyMesh) -> BodyMesh:
     node = _before_cuts(mesh)
     kept = mesh.n_nodes - sum(len(cut.pairs) for cut in mesh.cuts.values())
     surfaces = {name: node[facets] for name, facets in mesh.surfaces.items()}
-    return BodyMesh(
+    result = BodyMesh(
         mesh.points[:kept], node[mesh.cells], surfaces, mesh.grid, mesh.regions, shapes=mesh.shapes
     )
+    result._set(
+        chart=mesh.chart and mesh.chart.of(np.arange(kept)[:, None]),
+        _origin=None if mesh.origin is mesh else sewn(mesh.origin),
+    )
+    return result
 
 
 def pieces(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:

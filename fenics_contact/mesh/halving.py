@@ -8,6 +8,7 @@ import numpy as np
 
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import HEXAHEDRON27, QUADRILATERAL9, CellType
+from fenics_contact.mesh.chart import Chart
 from fenics_contact.mesh.faces import match_faces, number_faces
 from fenics_contact.mesh.hanging import HangingNodes
 from fenics_contact.mesh.on_shapes import on_shapes
@@ -49,6 +50,7 @@ class Parts:
     cells: np.ndarray
     surfaces: dict[str, np.ndarray]
     hanging: HangingNodes | None
+    chart: Chart | None
     parents: np.ndarray
     positions: np.ndarray
     split: np.ndarray
@@ -69,8 +71,12 @@ class Parts:
         positions = np.concatenate([whole, np.tile(halves, (len(large), 1, 1))])[order]
         hanging = _still_hanging(mesh, kind, cells, between, (levels + split)[parents])
         surfaces = _parts_of_surfaces(mesh, kind, large, nodes)
-        points = _placed(mesh, kind, between, (nodes, cells), surfaces, hanging)
-        return cls(points, cells, surfaces, hanging, parents, positions, split)
+        chart = mesh.chart and mesh.chart.extended([between, mesh.cells[large]])
+        if chart is None:
+            points = _placed(mesh, kind, between, (nodes, cells), surfaces, hanging)
+        else:
+            points = _mapped(mesh, chart, hanging)
+        return cls(points, cells, surfaces, hanging, chart, parents, positions, split)
 
     def beside_inverted(self, kind: CellType) -> np.ndarray:
         """Return the coarse cells that were not halved on which nodes of inverted cells hang."""
@@ -180,6 +186,16 @@ def _parts_of_surfaces(
         parts = faces[of_face[of_face >= 0]][:, kind.face_pieces].reshape(-1, corners)
         result[name] = np.concatenate([facets[of_face < 0], parts])
     return result
+
+
+def _mapped(mesh: BodyMesh, chart: Chart, hanging: HangingNodes | None) -> np.ndarray:
+    """Return coordinates: new nodes and those that hang no more are the images of a chart."""
+    points = chart.points()
+    stays = np.ones(mesh.n_nodes, dtype=bool)
+    if mesh.hanging is not None:
+        stays[mesh.hanging.nodes] = False
+    points[: mesh.n_nodes][stays] = mesh.points[stays]
+    return points if hanging is None else hanging.placed(points)
 
 
 def _placed(

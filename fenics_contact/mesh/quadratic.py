@@ -15,6 +15,7 @@ from fenics_contact.mesh.cell_types import (
     cell_type_of,
     shape_values,
 )
+from fenics_contact.mesh.chart import kept_valid
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
 from fenics_contact.mesh.hanging import require_none
 from fenics_contact.mesh.on_shapes import put_on_shapes
@@ -26,8 +27,8 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
     """Return the mesh with quadratic cells.
 
     The new nodes are the midpoints of edges, faces and cells; on surfaces whose shape the mesh carries, the
-    closest points of the shape. Displacements, and such surfaces, become piecewise quadratic. The numbers of
-    the old nodes, cells and facets are unchanged.
+    closest points of the shape, and of a mesh with a `Chart` the images by it. Displacements, and such
+    surfaces, become piecewise quadratic. The numbers of the old nodes, cells and facets are unchanged.
 
     Args:
         mesh: Linear cells of any type.
@@ -48,37 +49,48 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
         raise InvalidInputError(f"quadratic needs linear cells, got {linear.plural}: use the mesh as it is")
     require_none(mesh.hanging, "quadratic", "refine everywhere, or take more linear cells")
     kind = _QUADRATIC[linear.vertices.shape]
-    points, cells = with_more_nodes(mesh.points, mesh.cells, linear, kind)
+    groups, cells = with_more_nodes(mesh.n_nodes, mesh.cells, linear, kind)
+    points = np.concatenate([mesh.points, *(mesh.points[each].mean(axis=1) for each in groups)])
     boundary, _ = boundary_faces(cells, mesh.dim)
     surfaces = {
         name: boundary[match_faces(facets, corners_of(boundary, mesh.dim))]
         for name, facets in mesh.surfaces.items()
     }
-    points, placed, _ = put_on_shapes(
-        points, cells, surfaces, mesh.shapes, np.arange(len(points)) >= mesh.n_nodes
-    )
-    if placed.any():
-        _follow(points, cells, kind, placed)
+    chart = mesh.chart and mesh.chart.extended(groups)
+    if chart is None:
+        new = np.arange(len(points)) >= mesh.n_nodes
+        points, placed, _ = put_on_shapes(points, cells, surfaces, mesh.shapes, new)
+        if placed.any():
+            _follow(points, cells, kind, placed)
+    else:
+        images = np.concatenate([mesh.points, chart.points(mesh.n_nodes)])
+        points = kept_valid(images, points, cells, (surfaces[name] for name in mesh.shapes))
     check_jacobians(points, cells, "refine the mesh along its curved surfaces, or leave their shapes away")
-    return BodyMesh(points, cells, surfaces, mesh.grid, mesh.regions, mesh.coincident_nodes, mesh.shapes)
+    result = BodyMesh(points, cells, surfaces, mesh.grid, mesh.regions, mesh.coincident_nodes, mesh.shapes)
+    return result.with_chart(chart)
 
 
 def with_more_nodes(
-    points: np.ndarray, cells: np.ndarray, linear: CellType, kind: CellType
-) -> tuple[np.ndarray, np.ndarray]:
-    """Add a node at the mean of the vertices around it, once for all cells that share it."""
+    count: int, cells: np.ndarray, linear: CellType, kind: CellType
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """Number the nodes in the middle of vertices, once for all cells that share them, after `count` nodes.
+
+    Returns the vertices around them, groups of shape (n, k) in the order of the numbers, and the cells.
+    """
     # The vertices whose linear shape functions are not zero there.
     weights = shape_values(linear, kind.nodes[len(linear.nodes) :])
     parents = [np.flatnonzero(values > 0.1) for values in weights]
     result = np.concatenate([cells, np.empty((len(cells), len(parents)), dtype=np.int64)], axis=1)
-    for count in sorted({len(around) for around in parents}):
-        columns = [index for index, around in enumerate(parents) if len(around) == count]
-        groups = np.sort(cells[:, [parents[index] for index in columns]], axis=2)
-        unique, number = np.unique(groups.reshape(-1, count), axis=0, return_inverse=True)
+    groups: list[np.ndarray] = []
+    for size in sorted({len(around) for around in parents}):
+        columns = [index for index, around in enumerate(parents) if len(around) == size]
+        around = np.sort(cells[:, [parents[index] for index in columns]], axis=2)
+        unique, number = np.unique(around.reshape(-1, size), axis=0, return_inverse=True)
         where = len(cells[0]) + np.array(columns)
-        result[:, where] = number.reshape(len(cells), -1) + len(points)
-        points = np.concatenate([points, points[unique].mean(axis=1)])
-    return points, result
+        result[:, where] = number.reshape(len(cells), -1) + count
+        groups.append(unique)
+        count += len(unique)
+    return groups, result
 
 
 def _follow(points: np.ndarray, cells: np.ndarray, kind: CellType, placed: np.ndarray) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -15,6 +15,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh, check_jacobians
 from fenics_contact.mesh.cell_types import CELL_TYPES, CellType, shape_values
+from fenics_contact.mesh.chart import Chart, kept_valid
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
 from fenics_contact.mesh.halving import halved
 from fenics_contact.mesh.hanging import HangingNodes
@@ -22,7 +23,7 @@ from fenics_contact.mesh.on_shapes import on_shapes
 from fenics_contact.mesh.quadratic import with_more_nodes
 from fenics_contact.mesh.quality import thickness
 
-_Found: TypeAlias = tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]
+_Found: TypeAlias = tuple[np.ndarray, np.ndarray, dict[str, np.ndarray], Chart | None]
 _LINEAR = {2: CELL_TYPES["triangle"], 3: CELL_TYPES["tetrahedron"]}
 
 
@@ -66,7 +67,8 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
     New nodes on surfaces whose shape the mesh carries lie on the shape, those between two shapes or beside a
     plane on both, those of quadratic cells else on the curved facets; hanging nodes lie on the larger facet.
     Other new nodes are drawn along, and where a surface leaves its facets by so much that cells would still
-    be inverted, more cells are halved around them. Surfaces and regions are carried to the new cells; a
+    be inverted, more cells are halved around them. All new nodes of a mesh with a `Chart` are images by it.
+    Surfaces and regions are carried to the new cells; a
     structured grid is lost.
 
     Args:
@@ -86,34 +88,38 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
         (True, 2.0)
     """
     chosen = _checked_marks(mesh, marked)
+    if mesh.origin is not mesh:
+        return _reshaped(mesh, refined(mesh.origin, chosen))
     if not CELL_TYPES[mesh.cell_type].is_simplex:
         parts = halved(mesh, chosen)
-        found = parts.points, parts.cells, parts.surfaces
+        found = parts.points, parts.cells, parts.surfaces, parts.chart
         return _checked(mesh, found, parts.hanging, parts.parents, parts.positions)
     while True:
         found, parents, positions = _halved_simplices(mesh, chosen)
         more = _around_inverted(mesh, found, parents)
-        if not more.any():
+        if mesh.chart is not None or not more.any():
             return _checked(mesh, found, None, parents, positions)
         chosen = np.union1d(chosen, np.flatnonzero(more))
 
 
 def _halved_simplices(mesh: BodyMesh, chosen: np.ndarray) -> tuple[_Found, np.ndarray, np.ndarray]:
-    """Return coordinates, cells and surfaces; the parent of each cell; positions of its nodes in that."""
+    """Return what was found, see `_checked`; the parent of each cell; positions of its nodes in that."""
     kind, linear = CELL_TYPES[mesh.cell_type], _LINEAR[mesh.dim]
     vertices, inverse = np.unique(mesh.cells[:, : mesh.dim + 1], return_inverse=True)
     skeleton = inverse.reshape(-1, mesh.dim + 1)
     ends, cells = _identified(mesh.points[vertices], skeleton, linear, chosen)
     parents, places, cells = _placed_in_parents(ends, cells, skeleton, linear)
-    points = mesh.points[vertices[ends]].mean(axis=1)
+    groups: list[np.ndarray] = []
     if kind.order == 2:
-        points, cells = with_more_nodes(points, cells, linear, kind)
+        groups, cells = with_more_nodes(len(ends), cells, linear, kind)
     positions = np.einsum("kv,cvi->cki", shape_values(linear, kind.nodes), places)
-    points = _mapped(mesh, kind, parents, positions, cells, len(points))
-    points[: len(vertices)] = mesh.points[vertices]
     surfaces = _carried_surfaces(mesh, ends, cells, vertices)
-    points = on_shapes(points, cells, surfaces, mesh.shapes, np.arange(len(points)) >= len(vertices))
-    return (points, cells, surfaces), parents, positions
+    chart = mesh.chart and mesh.chart.of(vertices[ends]).extended(groups)
+    points = _mapped(mesh.points, mesh, parents, positions, cells) if chart is None else chart.points()
+    points[: len(vertices)] = mesh.points[vertices]
+    if chart is None:
+        points = on_shapes(points, cells, surfaces, mesh.shapes, np.arange(len(points)) >= len(vertices))
+    return (points, cells, surfaces, chart), parents, positions
 
 
 def _around_inverted(mesh: BodyMesh, found: _Found, parents: np.ndarray) -> np.ndarray:
@@ -135,14 +141,17 @@ def _checked(
 ) -> Refinement:
     """Return the refinement with regions and shapes of the coarse mesh, unless a cell is inverted.
 
-    `found`: coordinates, cells and surfaces.
+    `found`: coordinates, cells, surfaces and chart.
     """
-    points, cells, surfaces = found
+    points, cells, surfaces, chart = found
+    if chart is not None:
+        straight = _mapped(mesh.points, mesh, parents, positions, cells)
+        points = kept_valid(points, straight, cells, (surfaces[name] for name in mesh.shapes), hanging)
     remedy = "see whether shapes of surfaces cross each other or other sides of the body, or leave them away"
     check_jacobians(points, cells, remedy)
     regions = {name: np.flatnonzero(np.isin(parents, inside)) for name, inside in mesh.regions.items()}
     fine = BodyMesh(points, cells, surfaces, None, regions, shapes=mesh.shapes, hanging=hanging)
-    return Refinement(fine, parents, positions)
+    return Refinement(fine.with_chart(chart), parents, positions)
 
 
 def _checked_marks(mesh: BodyMesh, marked: ArrayLike) -> np.ndarray:
@@ -214,13 +223,24 @@ def _spanned(ends: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def _mapped(
-    mesh: BodyMesh, kind: CellType, parents: np.ndarray, positions: np.ndarray, cells: np.ndarray, count: int
+    values: np.ndarray, mesh: BodyMesh, parents: np.ndarray, positions: np.ndarray, cells: np.ndarray
 ) -> np.ndarray:
-    """Return the coordinates of the fine nodes, where the maps of the coarse cells take them."""
-    points = np.empty((count, mesh.dim))
-    values = shape_values(kind, positions.reshape(-1, mesh.dim)).reshape(*cells.shape, -1)
-    points[cells] = np.einsum("ckn,cni->cki", values, mesh.points[mesh.cells[parents]])
-    return points
+    """Return values at the fine nodes, interpolated in the coarse cells; coordinates on curved ones.
+
+    `values`: at the coarse nodes, shape (n_nodes, dim); `cells`: the fine ones.
+    """
+    result = np.empty((int(cells.max()) + 1, mesh.dim))
+    weights = shape_values(CELL_TYPES[mesh.cell_type], positions.reshape(-1, mesh.dim))
+    weights = weights.reshape(*cells.shape, -1)
+    result[cells] = np.einsum("ckn,cni->cki", weights, values[mesh.cells[parents]])
+    return result
+
+
+def _reshaped(mesh: BodyMesh, before: Refinement) -> Refinement:
+    """Return the refinement of a mesh before it was reshaped, moved as its coarse nodes have been."""
+    moved = mesh.points - mesh.origin.points
+    moved = _mapped(moved, mesh, before.parents, before.positions, before.mesh.cells)
+    return replace(before, mesh=before.mesh.reshaped(before.mesh.points + moved))
 
 
 def _carried_surfaces(

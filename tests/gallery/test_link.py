@@ -371,14 +371,13 @@ def test_a_grading_out_of_bounds_is_refused(grading: float) -> None:
         LinkShape(grading=grading)
 
 
-def test_places_are_drawn_to_the_spot_and_ends_stay() -> None:
-    places = np.linspace(2.0, 6.0, 9)
-    middle, start = drawn_together(places, 4.0, 2.0), drawn_together(places, 2.0, 2.0)
-    assert middle[[0, 4, 8]] == pytest.approx([2.0, 4.0, 6.0])
-    assert start[[0, 8]] == pytest.approx([2.0, 6.0])
-    assert np.diff(middle)[[3, 4]] == pytest.approx(2.0 * np.sinh(0.5) / np.sinh(2.0))
-    assert np.all(np.diff(start, 2) > 0.0)
-    assert drawn_together(places, 4.0, 0.0) is places
+def test_places_are_drawn_to_the_middle_and_ends_stay() -> None:
+    places = np.linspace(-1.0, 1.0, 9)
+    drawn = drawn_together(places, 2.0)
+    assert drawn[[0, 4, 8]] == pytest.approx([-1.0, 0.0, 1.0])
+    assert np.diff(drawn)[[3, 4]] == pytest.approx(np.sinh(0.5) / np.sinh(2.0))
+    assert np.all(np.diff(drawn[4:], 2) > 0.0)
+    assert drawn_together(places, 0.0) is places
 
 
 # Two links are interlocked and touch at their crowns, or the reason why not is given.

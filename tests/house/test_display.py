@@ -114,7 +114,7 @@ from fenics_contact.materials import (
     PlaneStress,
     StVenantKirchhoff,
 )
-from fenics_contact.mesh import refined
+from fenics_contact.mesh import Chart, refined
 from fenics_contact.mesh.cell_types import CELL_TYPES
 from fenics_contact.qp import FaceNewton
 from fenics_contact.results import (
@@ -179,6 +179,7 @@ def objects() -> dict[str, Any]:
         Preload("block", Section((0, 0, 0.5), (0, 0, 1))),
         Preloads({"block": drawn}), drawn, SpringForces({"rod": sprung}), sprung,
         RigidMotion(Surface("block", "z1"), np.zeros(3), np.ones(3), np.arange(3.0)),
+        Chart(lambda x: x, np.zeros((60, 3))),
         limits, BundleTrust(), refined(rectangle((0, 0), (1, 1), (2, 2), "triangle"), [0]),
         minimize(bowl, np.ones(60), constraints=NonlinearConstraint(bowl, 90.0, name="size")),
         NonlinearConstraint(bowl, 90.0), Checkpoint("run.npz"), search,
