@@ -240,7 +240,7 @@ class _Way:
         self._doubted, scene = doubted_pairs(self._state), self._state.scene
         value, error = self._estimated()
         level = Level(
-            cells=sum(body.mesh.n_cells for body in scene.bodies.values()),
+            cells=cells_of(scene),
             unknowns=unknowns_of(scene),
             value=value,
             error=error,
@@ -326,18 +326,34 @@ class _Way:
         return None if self.reason else problem.on(scene, partitions)
 
     def _refined(
-        self, aim: float, least: float = 0.2, most: float = 0.8, safety: float = 0.8, halved: float = 0.25
+        self,
+        aim: float,
+        least: float = 0.2,
+        most: float = 0.8,
+        safety: float = 0.8,
+        halved: float = 0.25,
+        growth: float = 3.0,
+        tries: int = 3,
     ) -> SceneRefinement:
         """Return the next meshes: so many cells are halved that the next error is the one aimed at.
 
         `aim`: the error asked for; `least`, `most`: bounds of the share of the estimates whose cells are
         halved; `safety`: part of the error asked for that the next mesh aims at; `halved`: what halving
-        leaves of the share of a cell.
+        leaves of the share of a cell; `growth`: largest factor by which the number of cells may grow, so
+        that the last mesh is not much larger than it must be; `tries`: meshes that are made for that.
         """
         if self._doubted:
             return refined_at_spots(self._state, self._doubted)
         wanted = (1.0 - safety * aim / self.levels[-1].error) / (1.0 - halved)
-        return refine_scene(self._state.scene, bulk(self._shares, min(max(wanted, least), most)))
+        share = min((growth - 1.0) / (2.0**self._state.scene.dim - 1.0), 1.0)
+        for _ in range(tries):
+            marked = bulk(self._shares, min(max(wanted, least), most), share)
+            found = refine_scene(self._state.scene, marked)
+            grown = cells_of(found.scene) / self.levels[-1].cells
+            if grown <= growth:
+                break
+            share *= (growth - 1.0) / (grown - 1.0)  # meshes need others to be halved, too
+        return found
 
     def _singular(self, changes: int = 3) -> str:
         """Say so if the value has changed by more from mesh to mesh, always to the same side.
@@ -381,6 +397,11 @@ class _Way:
 def _percent(level: Level) -> str:
     error = _relative(level.error, level.value)
     return f"an error of {100 * error:.2g} %" if np.isfinite(error) else "an unknown error"
+
+
+def cells_of(scene: Scene) -> int:
+    """Return the number of cells of all bodies."""
+    return sum(body.mesh.n_cells for body in scene.bodies.values())
 
 
 def unknowns_of(scene: Scene) -> int:

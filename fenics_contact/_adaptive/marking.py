@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 
-def bulk(shares: Mapping[str, np.ndarray], fraction: float) -> dict[str, np.ndarray]:
+def bulk(shares: Mapping[str, np.ndarray], fraction: float, most: float = 1.0) -> dict[str, np.ndarray]:
     """Return the fewest cells of all bodies that hold a fraction of the sum of their shares of an error.
 
     Cells with equal shares are all taken or none, so that the numbering of cells and rounding decide nothing.
@@ -17,13 +17,14 @@ def bulk(shares: Mapping[str, np.ndarray], fraction: float) -> dict[str, np.ndar
     Args:
         shares: Body name -> share of each cell, ≥ 0, shape (n_cells,).
         fraction: Fraction of the sum, between 0 and 1.
+        most: Largest part of the cells to mark, between 0 and 1, up to ties.
 
     Returns:
         Body name -> ascending numbers of marked cells, of bodies that have some.
     """
     every = np.sort(np.concatenate(list(shares.values())))[::-1]
     held = np.cumsum(every)
-    last = min(int(np.searchsorted(held, fraction * held[-1])), len(every) - 1)
+    last = min(int(np.searchsorted(held, fraction * held[-1])), max(int(most * len(every)), 1) - 1)
     # Shares that differ by rounding are equal.
     threshold = every[last] * (1.0 - 1e-9)
     marked = {name: np.flatnonzero((share >= threshold) & (share > 0.0)) for name, share in shares.items()}

@@ -3,6 +3,7 @@
 import logging
 import re
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -104,6 +105,18 @@ def test_a_small_change_after_a_large_one_is_taken_for_chance():
     assert way._error(estimate) == pytest.approx(4.0)
     estimate.value = 103.0  # errors that fall by 6 / 9 leave 2 / (1 − 2 / 3) of it
     assert way._error(estimate) == pytest.approx(12.0)
+
+
+def test_meshes_grow_by_a_factor_of_about_three():
+    mesh = gallery.block((0, 0, 0), (1, 1, 1), (2, 2, 2), cell="tetrahedron")
+    scene = Scene(
+        bodies={"block": Body(mesh, IsotropicElasticity(E, NU))},
+        supports=[Support("block", "x0")],
+        loads=[TotalForce("block", "x1", (0.0, 0.0, -1.0))],
+    )
+    found = solve_to(scene, TotalPotential(), 1e-6, MPI.COMM_SELF, limits=Limits(levels=4))
+    cells = [level.cells for level in found.levels]
+    assert max(after / before for before, after in pairwise(cells)) < 4.0  # six times if nothing bounds it
 
 
 def test_a_quantity_of_zero_has_no_relative_error():

@@ -68,3 +68,6 @@ def test_the_fewest_cells_with_a_fraction_of_the_error_are_marked():
     # Of two equal shares both or none.
     assert {name: list(cells) for name, cells in bulk(shares, 0.6).items()} == {"a": [0], "b": [0, 1]}
     assert {name: list(cells) for name, cells in bulk(shares, 1.0).items()} == {"a": [0, 1], "b": [0, 1]}
+    # At most two of five cells, and with them those with equal shares.
+    assert {name: list(cells) for name, cells in bulk(shares, 1.0, 0.4).items()} == {"a": [0], "b": [0, 1]}
+    assert {name: list(cells) for name, cells in bulk(shares, 1.0, 0.1).items()} == {"a": [0]}
