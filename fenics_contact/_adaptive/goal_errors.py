@@ -21,7 +21,7 @@ References:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -144,8 +144,9 @@ def goal_error(
     Costs one adjoint, about as many products as a step of the solver, and the recovery of two gradients.
 
     The adjoint of the largest pressure is that of `PressureNorm` with an exponent such that three nodes
-    count, or nine in space: that of a single node is not resolved by the mesh. What earlier load steps add to
-    the error is not included.
+    count, or nine in space: that of a single node is not resolved by the mesh. Along motions that nothing
+    resists (`State.unheld`) a quantity is that of bodies which stay on average over their volume. What
+    earlier load steps add to the error is not included.
 
     Args:
         state: The equilibrium; of nonlinear materials there is no adjoint.
@@ -178,6 +179,9 @@ def goal_error(
                 return _without_adjoint(linear, value, why)
             smooth = smoothed(objective, state, forms)
             partials = finite_partials(smooth.partials(state, forms))
+        # A state has no mean motion where nothing resists it, and the load of its adjoint none either.
+        at_rest = linear.dual.at_rest_transposed(partials.by_displacement)
+        partials = replace(partials, by_displacement=at_rest)
         linearised = linearise_face(state, choice)
         try:
             adjoint, of_solver, partials = adjoint_of(linear, partials, linearised, tolerance)

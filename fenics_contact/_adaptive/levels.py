@@ -213,6 +213,12 @@ def solve_to(
             "quantity is that of a body with facets; give the mesh shapes, or read it from CAD",
             " and ".join(faceted),
         )
+    if way.without_adjoint and comm.rank == 0:
+        safe_log(
+            _LOG.warning,
+            "the error is judged by the changes between the last three meshes alone: %s",
+            way.without_adjoint,
+        )
     result = way.result()
     if not result.reached and comm.rank == 0:
         safe_log(_LOG.warning, "the accuracy asked for was not reached: %s", result.reason)
@@ -225,7 +231,7 @@ class _Way:
     def __init__(self, quantity: Objective, wanted: float, limits: Limits, comm: MPI.Comm) -> None:
         self.quantity, self.wanted, self.limits, self.comm = quantity, wanted, limits, comm
         self.levels: list[Level] = []
-        self.reason = ""
+        self.reason = self.without_adjoint = ""
         self._sums: list[float] = []
         self._state: State
         self._refinements: Mapping[str, Refinement] = {}
@@ -258,6 +264,7 @@ class _Way:
             self._sums.append(float("nan"))
             return value, float("inf")
         estimate = goal_error(self._state, self.quantity)
+        self.without_adjoint = estimate.without_adjoint
         self._shares = {name: estimate.by_cell(name) for name in self._state.scene.bodies}
         self._sums.append(float(sum(share.sum() for share in self._shares.values())))
         return estimate.value, self._error(estimate)

@@ -20,6 +20,7 @@ from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.inverse import Condensations, LocalKind, TornInverse, kernel_matrix
 from fenics_contact.feti.kernel_basis import whole_motions
 from fenics_contact.feti.torn import TornSystem
+from fenics_contact.mesh.quality import node_volumes
 from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.problem import DualProblem, Scaling
 from fenics_contact.qp.reductions import global_sum
@@ -450,7 +451,8 @@ class DualSystem:
     def displacement(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """Return u = K⁺(f − Bᵀλ) + R α on this rank's torn dofs, [length]. Collective.
 
-        u contains no unresisted motion: its least-squares fit over the nodes is removed.
+        u contains no unresisted motion: its least-squares fit over the volume is removed, with the share
+        of each node, so that what remains does not depend on where a mesh is fine.
         """
         displacement = self.inverse(self.torn.load - self.force(multiplier)) + self.kernel @ alpha
         return self._at_rest(displacement)
@@ -459,13 +461,34 @@ class DualSystem:
         """Remove the unresisted motions from a torn displacement. Collective."""
         if self.unheld.shape[1] == 0:
             return displacement
+        weighted, gram = self._fit()
+        sums = self.torn.numbering.comm.allreduce(weighted @ displacement)
+        return displacement - self.unheld @ np.linalg.solve(gram, sums)
+
+    def at_rest_transposed(self, gradient: np.ndarray) -> np.ndarray:
+        """Return the derivative of a function of displacements with no unresisted motions. Collective.
+
+        `gradient`: that of the same function where these are not removed, this rank's part, (torn_size,).
+        """
+        if self.unheld.shape[1] == 0:
+            return gradient
+        weighted, gram = self._fit()
+        sums = self.torn.numbering.comm.allreduce(self.unheld.T @ gradient)
+        return gradient - weighted.T @ np.linalg.solve(gram, sums)
+
+    def _fit(self) -> tuple[sp.csr_matrix, np.ndarray]:
+        """Return Rᵀ W of this rank and Rᵀ W R of all, W the volume of each node's share. Collective.
+
+        R are the unresisted motions; (k, torn_size) and (k, k).
+        """
         tearing, here = self.torn.decomposition.tearing, self.torn.decomposition.copy_block
-        weight = np.empty(len(displacement) // tearing.components)
-        weight[here[here >= 0]] = 1.0 / tearing.multiplicity[tearing.copy_node[here >= 0]]
-        weighted = self.unheld.T @ sp.diags(np.repeat(weight, tearing.components))
-        sums = np.column_stack([(weighted @ self.unheld).toarray(), weighted @ displacement])
-        sums = self.torn.numbering.comm.allreduce(sums)
-        return displacement - self.unheld @ np.linalg.solve(sums[:, :-1], sums[:, -1])
+        meshes = (self.torn.scene.bodies[name].mesh for name in tearing.body_names)
+        volumes = [node_volumes(mesh.points, mesh.cells) for mesh in meshes]
+        share = np.concatenate(volumes) / tearing.multiplicity
+        weight = np.empty(self.unheld.shape[0] // tearing.components)
+        weight[here[here >= 0]] = share[tearing.copy_node[here >= 0]]
+        weighted = (self.unheld.T @ sp.diags(np.repeat(weight, tearing.components))).tocsr()
+        return weighted, self.torn.numbering.comm.allreduce((weighted @ self.unheld).toarray())
 
     def sewn(self, residual: np.ndarray) -> np.ndarray:
         """Return the interface displacement that makes copies agree and satisfies supports. Collective.

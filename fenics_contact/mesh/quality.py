@@ -123,6 +123,12 @@ def volume(points: np.ndarray, cells: np.ndarray) -> float:
     return float(cell_volumes(points, cells).sum())
 
 
+def node_volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Return the share of each node in the volume (area), that of a cell being shared evenly, (n_nodes,)."""
+    shares = np.repeat(cell_volumes(points, cells) / cells.shape[1], cells.shape[1])
+    return np.bincount(cells.ravel(), shares, len(points))
+
+
 def thickness(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Return the smallest Jacobian of every cell over the area (length) of its bounding box's diagonal.
 

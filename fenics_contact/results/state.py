@@ -282,7 +282,10 @@ class State(ABC):
 
     @property
     def unheld(self) -> tuple[UnheldMotion, ...]:
-        """Rigid motions that nothing resists and nothing loads; the bodies stay. Collective on first use."""
+        """Rigid motions that nothing resists and nothing loads. Collective on first use.
+
+        Along these the bodies stay where they are, on average over their volume.
+        """
         return ()
 
     @property

@@ -21,6 +21,7 @@ from fenics_contact import (
     Status,
     Support,
     Surface,
+    Traction,
     solve_scene,
 )
 from fenics_contact._adaptive import goal_errors
@@ -38,10 +39,11 @@ from fenics_contact.design import (
     StrainEnergy,
     TotalPotential,
 )
-from fenics_contact.design.adjoint import NOT_HELD
+from fenics_contact.design.adjoint import NOT_HELD, WeakChoice, linearise_face, solve_adjoint
+from fenics_contact.design.forms import ShapeForms
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.gallery import rectangle
-from fenics_contact.materials import NeoHooke
+from fenics_contact.materials import NeoHooke, PlaneStrain
 from fenics_contact.qp.krylov import Stop
 from tests.adaptive.goals import (
     curved,
@@ -205,6 +207,31 @@ def test_friction_and_reactions_balance_with_their_errors_where_tangents_are_hel
 def test_a_quantity_that_no_load_reaches_is_refused() -> None:
     with pytest.raises(InvalidInputError, match=r"needs loads that reach it, but Movement\(body='block'"):
         goal_error(state("floor", 4), Movement("block", "x0", (1.0, 0.0)))
+
+
+def squeezed(cells: int) -> Scene:
+    """A block pressed unevenly on a floor without friction: nothing holds or pushes it along the floor."""
+    body = Body(rectangle((0.0, 0.0), (2.0, 1.0), (2 * cells, cells)), PlaneStrain(1.0, 0.3))
+    load = Traction("block", "y1", lambda x: np.column_stack([0.0 * x[:, 0], -0.01 * x[:, 0]]))
+    floor = RigidPlane((0.0, 0.0), (0.0, 1.0))
+    return Scene({"block": body}, loads=[load], contacts=[ContactPair(Surface("block", "y0"), floor)])
+
+
+def test_a_quantity_along_a_motion_that_nothing_resists_has_an_adjoint() -> None:
+    """The state is the one without a mean motion, and the quantity is what it is there."""
+    bulge, state_of = Movement("block", "x1", (1.0, 0.0)), {n: solved(squeezed(n)) for n in (2, 4, 32)}
+    assert len(state_of[2].unheld) == 1
+    exact = goal_error(state_of[32], bulge).value
+    for cells in (2, 4):
+        found = goal_error(state_of[cells], bulge)
+        assert found.total == pytest.approx(exact - found.value, rel=0.1)
+        assert abs(found.total) > 1e-3 * exact
+    with pytest.raises(ConvergenceError, match="changes along a rigid motion"):
+        solve_adjoint(
+            state_of[2],
+            bulge.partials(state_of[2], ShapeForms.at_rest(state_of[2].torn)),
+            linearise_face(state_of[2], WeakChoice.RELEASED),
+        )
 
 
 def test_without_an_adjoint_cells_have_their_shares_of_the_energy_norm(

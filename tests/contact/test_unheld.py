@@ -39,6 +39,8 @@ from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.gallery import block, half_disc, rectangle
 from fenics_contact.materials import IsotropicElasticity, J2Plasticity, Material, NeoHooke, PlaneStrain
+from fenics_contact.mesh import refined
+from fenics_contact.mesh.quality import node_volumes
 from fenics_contact.qp import FaceNewton, Smalse
 from tests.contact.gallery import block_on_plane, two_blocks
 from tests.contact.press_fits import Disc, press_fit
@@ -54,8 +56,10 @@ def cube_on_floor(n: int) -> Scene:
 
 
 def left_of(state: State, body: str, motion: np.ndarray) -> float:
-    """Return how far a body went along a motion of its nodes, relative to how far it went at all."""
-    moved = state.gather_displacement(body)
+    """Return how far a body went along a motion of its volume, relative to how far it went at all."""
+    moved, mesh = state.gather_displacement(body), state.scene.bodies[body].mesh
+    share = np.sqrt(node_volumes(mesh.points, mesh.cells))[:, None]
+    moved, motion = share * moved, share * motion
     return float(abs((moved * motion).sum() / np.linalg.norm(motion)) / np.linalg.norm(moved))
 
 
@@ -76,6 +80,21 @@ def test_partition_and_solver_do_not_move_it(parts: int, solver: FaceNewton | Sm
     state = solve_scene(scene, MPI.COMM_SELF, partitions=cut(scene, parts), solver=solver)
 
     exact = 1e-3 * np.array([0.3, 0.3, -1.0]) * (scene.bodies["cube"].mesh.points - [0.0, 0.5, 0.0])
+    np.testing.assert_allclose(state.gather_displacement("cube"), exact, atol=1e-8)
+
+
+@pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
+def test_where_its_mesh_is_fine_does_not_move_it(cell: str) -> None:
+    """Means over the nodes would: most of them are near one side."""
+    scene = cube_on_floor(3)
+    mesh = block((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (3, 3, 3), cell)
+    near = mesh.points[mesh.cells].mean(axis=1)[:, 1] > 0.6
+    fine = refined(mesh, near).mesh
+    assert fine.points[:, 1].mean() > 0.6
+    scene = replace(scene, bodies={"cube": replace(scene.bodies["cube"], mesh=fine)})
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-9)
+
+    exact = 1e-3 * np.array([0.3, 0.3, -1.0]) * (fine.points - [0.0, 0.5, 0.0])
     np.testing.assert_allclose(state.gather_displacement("cube"), exact, atol=1e-8)
 
 
