@@ -81,7 +81,8 @@ class LinearEquilibria:
             ConvergenceError: If the solver does not reach its tolerance.
         """
         with self._timer.phase("assemble"):
-            torn = self._torn(scene, known, overlap=design)
+            # What the facets of a coarse mesh explained, a finer one has kept: a warning names it.
+            torn = self._torn(scene, known, overlap=design or isinstance(start, CoarseStart))
             if before is not None:
                 origin = before.torn.slip_origin(before.torn_displacement, before.solution.multiplier)
                 torn = torn.with_slip_from(*origin)
@@ -420,7 +421,8 @@ class ContactProblem:
                 and its functions of time, of which a load that is followed in parts has the values between.
             refinements: Body name -> refinement of the mesh that ``start`` has of it, where the scene has a
                 finer one: nested iteration, in which solutions take few products, as many on fine meshes as
-                on coarse ones. The partition and the number of ranks may be others.
+                on coarse ones. The partition and the number of ranks may be others. An overlap that the
+                facets of the coarse meshes explained is accepted.
             adjoint: Whether adjoints are wanted, as for errors of quantities, which need the dual system.
 
         Raises:
@@ -452,7 +454,7 @@ class ContactProblem:
             if kind is SolverKind.TANGENT_NEWTON:
                 self._require_no_dual_solver()
                 state: AnyState = self._deformed(scene).solve(
-                    scene, before, wanted, time, step, overlap=design
+                    scene, before, wanted, time, step, overlap=design or refinements is not None
                 )
             else:
                 check_same_input(self.comm, scene, solver=self.solver, tolerance=wanted)

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import ContactProblem, Status
+from fenics_contact import Body, ContactPair, ContactProblem, Scene, Status, Support, Surface
+from fenics_contact._adaptive.refined_scene import refine_scene
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import PlaneStrain
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.results.linear_state import LinearState
 from tests.contact import nested_cases
@@ -97,6 +100,28 @@ def test_ranks_start_alike(ranks: int, mpirun: Callable[..., str]) -> None:
     one, several = (np.array(mpirun(script, count).split(), dtype=float) for count in (1, ranks))
     assert one[0] == several[0] > 0
     np.testing.assert_allclose(several, one, rtol=1e-6)
+
+
+def test_an_overlap_that_facets_of_the_coarse_mesh_explained_is_kept(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    steel = PlaneStrain(1.0, 0.3)
+    low, top = rectangle((0.0, 0.0), (2.0, 1.0), (3, 1)), rectangle((0.0, 0.94), (2.0, 2.0), (2, 1))
+    scene = Scene(
+        {"low": Body(low, steel), "top": Body(top, steel)},
+        [Support("low", "y0"), Support("top", "y1")],
+        contacts=[ContactPair(Surface("top", "y0"), Surface("low", "y1"))],
+    )
+    coarse = ContactProblem(scene, SELF).solve()
+    fine = refine_scene(scene, {"low": [0, 1, 2], "top": [0, 1]})
+    with pytest.raises(InvalidInputError, match=r"must not overlap at the start: .* 0\.06 inside"):
+        ContactProblem(fine.scene, SELF).solve()
+    caplog.clear()
+    state = ContactProblem(fine.scene, SELF).solve(start=coarse, refinements=fine.refinements)
+    assert "overlap by up to 0.06 before they are loaded" in caplog.text
+    uneven = np.ptp(coarse.contact.pressure) + np.ptp(state.contact.pressure)
+    assert uneven < 0.05
+    assert state.contact.pressure.mean() == pytest.approx(coarse.contact.pressure.mean(), rel=0.05)
 
 
 def test_starts_that_do_not_fit_are_refused() -> None:
