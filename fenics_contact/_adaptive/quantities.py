@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact._adaptive.resultants import PairForce, StickArea, SupportForce
+from fenics_contact._adaptive.resultants import PairForce, StickArea, SupportForce, TouchingArea
 from fenics_contact._scene.pairs import pair_number
 from fenics_contact._scene.scene import Scene
 from fenics_contact.design.near import MovementNear, StressNear
@@ -121,7 +121,8 @@ def _stress(where: _Where) -> Objective:
 QUANTITIES: dict[str, tuple[tuple[str, ...], Callable[[_Where], Objective]]] = {
     "peak_pressure": (("surface",), lambda where: PeakPressure(where.pair())),
     "contact_force": (("surface", "direction"), lambda where: PairForce(where.one_pair(), where.along())),
-    "contact_area": (("surface",), lambda where: ContactArea(where.pair())),
+    "contact_area": (("surface",), lambda where: TouchingArea(where.pair())),
+    "effective_area": (("surface",), lambda where: ContactArea(where.pair())),
     "stick_area": (("surface",), lambda where: StickArea(where.one_pair())),
     "friction_work": (("surface",), lambda where: FrictionWork(where.pair())),
     "reaction": (
@@ -151,8 +152,9 @@ def quantity(
     ==================  ===================================================================================
     ``peak_pressure``   `PeakPressure` of a pair, by default of all
     ``contact_force``   Force of a pair on its slave along a direction
-    ``contact_area``    Effective area of a pair, see `ContactArea`, by default of all
-    ``stick_area``      Area of a pair that sticks; without an estimate of its error
+    ``contact_area``    Area in which a pair touches, by default all; without an adjoint
+    ``effective_area``  Smooth effective area of a pair, see `ContactArea`, by default of all
+    ``stick_area``      Area of a pair that sticks; without an adjoint
     ``friction_work``   Work of friction of a pair, by default of all
     ``reaction``        Force of the supports of a surface along a direction
     ``displacement``    Mean along a direction, of a surface, or near a place of a body

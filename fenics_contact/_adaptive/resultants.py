@@ -17,7 +17,7 @@ from fenics_contact.design.objectives import on_rows, require_pair
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import at_copies
 from fenics_contact.feti.torn import TornSystem
-from fenics_contact.results.area import stick_area
+from fenics_contact.results.area import contact_area, stick_area
 from fenics_contact.results.forces import support_shares
 from fenics_contact.results.state import State
 
@@ -145,9 +145,45 @@ def _require_fixed_shape(objective: object, forms: ShapeForms) -> None:
         )
 
 
+class _AreaOfStatuses(Weighable):
+    """An area that changes by the statuses of points, not smoothly: it has no derivatives."""
+
+    #: Why there is no adjoint.
+    without_adjoint: ClassVar[str] = "an area changes by the statuses of points, not smoothly"
+    #: What has derivatives in its place, in words.
+    instead: ClassVar[str]
+
+    def partials(self, state: State, forms: ShapeForms) -> NoReturn:
+        """Raise InvalidInputError."""
+        raise InvalidInputError(
+            f"{type(self).__name__} has no derivatives: {self.without_adjoint}; take {self.instead}"
+        )
+
+
 @dataclass(frozen=True)
 @checked()
-class StickArea(Weighable):
+class TouchingArea(_AreaOfStatuses):
+    """J, the area in which surfaces touch, see `fenics_contact.contact_area`; no derivatives.
+
+    Attributes:
+        pair: Number of the contact pair in the scene; None for the sum of all.
+    """
+
+    pair: int | None = None
+
+    instead: ClassVar[str] = "ContactArea, an effective area that is smooth"
+
+    def value(self, state: State, forms: ShapeForms) -> float:
+        """Return the area. Collective."""
+        if self.pair is not None:
+            require_pair(state.scene, "TouchingArea", self.pair)
+        every = range(len(state.scene.contacts)) if self.pair is None else [self.pair]
+        return sum(contact_area(state, number) for number in every)
+
+
+@dataclass(frozen=True)
+@checked()
+class StickArea(_AreaOfStatuses):
     """J, the area of a pair that sticks, see `fenics_contact.results.area.stick_area`; no derivatives.
 
     Attributes:
@@ -156,8 +192,7 @@ class StickArea(Weighable):
 
     pair: int
 
-    #: Why there is no adjoint.
-    without_adjoint: ClassVar[str] = "the area that sticks changes by the statuses of points, not smoothly"
+    instead: ClassVar[str] = "FrictionWork, which tends to zero as slip does"
 
     def value(self, state: State, forms: ShapeForms) -> float:
         """Return the area. Collective; raises InvalidInputError if the pair has no friction."""
@@ -166,13 +201,6 @@ class StickArea(Weighable):
         if not state.scene.contacts[self.pair].has_friction:
             raise InvalidInputError(
                 f"StickArea needs friction, contact pair {self.pair} has none: give it Coulomb or Tresca "
-                "friction, or take ContactArea"
+                "friction, or take TouchingArea"
             )
         return stick_area(state, self.pair)
-
-    def partials(self, state: State, forms: ShapeForms) -> NoReturn:
-        """Raise InvalidInputError."""
-        raise InvalidInputError(
-            f"StickArea has no derivatives: {self.without_adjoint}; take FrictionWork, which tends to zero "
-            "as slip does"
-        )

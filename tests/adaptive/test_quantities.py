@@ -10,10 +10,21 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import Body, LinearState, RigidPlane, Scene, Status, Support, Surface, Tie, Traction
+from fenics_contact import (
+    Body,
+    LinearState,
+    RigidPlane,
+    Scene,
+    Status,
+    Support,
+    Surface,
+    Tie,
+    Traction,
+    contact_area,
+)
 from fenics_contact._adaptive.goal_errors import goal_error
 from fenics_contact._adaptive.quantities import QUANTITIES, quantity
-from fenics_contact._adaptive.resultants import PairForce, StickArea, SupportForce
+from fenics_contact._adaptive.resultants import PairForce, StickArea, SupportForce, TouchingArea
 from fenics_contact.design import (
     ContactArea,
     FrictionWork,
@@ -37,7 +48,8 @@ KNOWN: list[tuple[str, Scene, dict[str, Any], Objective]] = [
     ("peak_pressure", FLOOR, {}, PeakPressure()),
     ("peak_pressure", PUNCH, {"surface": "upper y0"}, PeakPressure(0)),
     ("contact_force", FLOOR, {"direction": (0, 1)}, PairForce(0, (0.0, 1.0))),
-    ("contact_area", PUNCH, {"surface": "upper y0 on lower y1"}, ContactArea(0)),
+    ("contact_area", PUNCH, {"surface": "upper y0 on lower y1"}, TouchingArea(0)),
+    ("effective_area", PUNCH, {}, ContactArea()),
     ("stick_area", FLOOR, {}, StickArea(0)),
     ("friction_work", FLOOR, {}, FrictionWork()),
     (
@@ -210,9 +222,22 @@ def test_the_area_that_sticks_has_no_adjoint() -> None:
     area = contact.area[contact.status == Status.STICK].sum()
     assert found.value == pytest.approx(area, abs=0.2)
     assert 0.0 < found.value < 2.0
-    assert found.without_adjoint.startswith("the area that sticks changes by the statuses")
+    assert found.without_adjoint.startswith("an area changes by the statuses")
     assert np.all(found.by_cell("block") > 0.0)
     with pytest.raises(InvalidInputError, match="StickArea has no derivatives"):
         StickArea(0).partials(here, without_shape(here))
     with pytest.raises(InvalidInputError, match="StickArea needs friction, contact pair 0 has none"):
         goal_error(solved(on_waves(4)), StickArea(0))
+
+
+def test_the_area_that_touches_is_that_of_results() -> None:
+    here = solved(on_waves(6))
+    found = goal_error(here, TouchingArea())
+    assert found.value == contact_area(here)
+    assert 0.0 < found.value < ContactArea().value(here, without_shape(here)) * 1.5
+    assert found.value == goal_error(here, TouchingArea(0)).value
+    assert found.without_adjoint.startswith("an area changes by the statuses")
+    with pytest.raises(InvalidInputError, match=r"TouchingArea has no derivatives.*take ContactArea"):
+        TouchingArea().partials(here, without_shape(here))
+    with pytest.raises(InvalidInputError, match=r"TouchingArea.pair must be the number of a contact pair"):
+        TouchingArea(3).value(here, without_shape(here))

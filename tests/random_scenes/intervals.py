@@ -22,7 +22,8 @@ from tests.random_scenes.generator import sample
 from tests.random_scenes.judge import Outcome, Verdict, placed
 
 QUANTITIES = (
-    "peak_pressure", "contact_force", "displacement", "potential", "contact_area", "reaction", "friction_work"
+    "peak_pressure", "contact_force", "displacement", "potential", "effective_area", "reaction",
+    "friction_work",
 )  # fmt: skip
 ACCURACY = 0.02
 #: Unknowns of the last mesh of `solve_to`, and of the last uniform one.
@@ -82,7 +83,7 @@ def chosen(seed: int, state: State) -> tuple[str, Objective]:
     for name in (*QUANTITIES, *QUANTITIES)[seed % len(QUANTITIES) :]:
         contacts, laws = bool(scene.contacts), [pair.has_friction for pair in scene.contacts]
         needed = {
-            "peak_pressure": contacts, "contact_force": contacts, "contact_area": contacts,
+            "peak_pressure": contacts, "contact_force": contacts, "effective_area": contacts,
             "reaction": bool(scene.supports), "friction_work": any(laws),
         }  # fmt: skip
         if needed.get(name, True):
