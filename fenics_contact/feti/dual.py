@@ -172,7 +172,16 @@ class _ContactBlock:
     @cached_property
     def _factor(self) -> Factor:
         """Factors, on first use."""
-        return _regularised(self._matrix)
+        return _regularised(self._matrix, self._sizes)
+
+    @cached_property
+    def _sizes(self) -> np.ndarray:
+        """Diagonal of the block; on the offset of a slipping disc that of the disc, of which it may be 0."""
+        diagonal = self._gram.diagonal()
+        if self._basis is None:
+            return diagonal
+        columns = self._basis.tocsc()
+        return np.maximum.reduceat(diagonal[columns.indices], columns.indptr[:-1])
 
     @classmethod
     def of_rows(
@@ -221,7 +230,7 @@ class _ContactBlock:
         if self._size == 0:
             return None
         right = self._gathered(x)
-        part = _dependent_part(self._matrix, self._factor, right)
+        part = _dependent_part(self._matrix, self._factor, right, self._sizes)
         # Beside their rows, slipping discs feel the stiffness of their circle, and depend on nothing.
         alone = np.ones(self._size, dtype=bool)
         if part is not None and self._basis is not None:
@@ -230,8 +239,9 @@ class _ContactBlock:
             soft = self._soft if self._transposed is None else self._transposed @ self._soft != 0.0
             alone &= ~soft
         if part is not None and not alone.all():
-            matrix = self._matrix[alone][:, alone].tocsr()
-            part = _dependent_part(matrix, _regularised(matrix), right[alone]) if alone.any() else None
+            matrix, sizes = self._matrix[alone][:, alone].tocsr(), self._sizes[alone]
+            factor = _regularised(matrix, sizes) if alone.any() else None
+            part = None if factor is None else _dependent_part(matrix, factor, right[alone], sizes)
         if part is None:
             return None
         excess, force, number = (np.full(self._size, empty) for empty in (0.0, 0.0, -1))
@@ -256,26 +266,27 @@ class _ContactBlock:
         return np.asarray(rows[self._place])
 
 
-def _regularised(matrix: sp.csr_matrix) -> Factor:
-    """Factor A + ε diag A; rows that supports alone determine are empty and become those of the identity."""
-    diagonal = matrix.diagonal()
-    share = np.where(diagonal > 0.0, REGULARISATION * diagonal, 1.0)
+def _regularised(matrix: sp.csr_matrix, sizes: np.ndarray) -> Factor:
+    """Factor A + ε D; rows that supports alone determine are empty and become those of the identity.
+
+    `sizes`: D, at least the diagonal of A, shape (n,).
+    """
+    share = np.where(sizes > 0.0, REGULARISATION * sizes, 1.0)
     return Factor((matrix + sp.diags(share)).tocsr())
 
 
 def _dependent_part(
-    matrix: sp.csr_matrix, regularised: Factor, right: np.ndarray
+    matrix: sp.csr_matrix, regularised: Factor, right: np.ndarray, diagonal: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Return z = D N (Nᵀ D N)⁻¹ Nᵀ x with A N = 0 and D = diag A, D⁻¹ z, and coupled rows; None for zero.
+    """Return z = D N (Nᵀ D N)⁻¹ Nᵀ x with A N = 0, D⁻¹ z, and coupled rows; None for zero.
 
     T = ε D (A + ε D)⁻¹ keeps D N and multiplies the rest by ε / (ε + its eigenvalues).
 
-    `matrix`: A, positive semidefinite, shape (n, n); `right`: x, shape (n,).
+    `matrix`: A, positive semidefinite, shape (n, n); `right`: x, shape (n,); `diagonal`: D, shape (n,).
 
     Returns both vectors, shape (n,), and the number of the block of A that a row belongs to, −1 where z is
     zero.
     """
-    diagonal = matrix.diagonal()
     left = np.where(diagonal > 0.0, right, 0.0)
     least, force = ROUNDING * np.abs(left).max(), np.zeros(len(left))
     for _ in range(30):

@@ -115,6 +115,13 @@ class Face:
         return replace(self, soft=replace(self.soft, offset=np.zeros_like(self.soft.offset)))
 
     @cached_property
+    def offset_stiffness(self) -> Vector:
+        """ρ/(1 + ρκ) on the offsets of slipping discs, else 0, shape (n_face,)."""
+        result, sliding = np.zeros(self.n_face), self._sliding
+        result[self.n_face - len(sliding) :] = 1.0 / (self.overshoot * self.flexibility)[sliding]
+        return result
+
+    @cached_property
     def softness(self) -> Vector | float:
         """What a preconditioner adds where a compliance exceeds F, shape (n_face,); zero without any."""
         if self.soft is None:

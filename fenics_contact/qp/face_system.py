@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from fenics_contact._base.libraries import MPI
 from fenics_contact.qp.coarse import CoarseSpace, SquareInverse, gram_matrix, invert_square
 from fenics_contact.qp.face import Face
-from fenics_contact.qp.problem import DualProblem, FacePreconditioner, Operator
+from fenics_contact.qp.problem import DualProblem, FacePreconditioner, Operator, ShiftedOperator
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
 
@@ -24,6 +24,7 @@ class FaceSystem:
         operator: F, owned to owned, collective.
         preconditioner: Approximation of F⁻¹, owned to owned, or None.
         patience: Iterations without progress after which an inner solver gives up.
+        spring: 1/ρ of the discs is the diagonal of F divided by this, as for springs of proximal points.
     """
 
     comm: MPI.Comm
@@ -32,6 +33,7 @@ class FaceSystem:
     coarse: CoarseSpace
     preconditioner: Operator | None = None
     patience: int = 60
+    spring: float = 1.0
 
     def image(self, y: Vector, full: Vector) -> Vector:
         """Return A y, shape (n_face,), for y on the face and full = F Z y, owned."""
@@ -41,12 +43,14 @@ class FaceSystem:
         """Apply D Zᵀ M Z D, where D = (1 + ρκ)^-½ accounts for the curvature of the discs. Collective.
 
         Compliances κ far beyond F, and those of rows that supports alone determine, add their own inverses.
+        Offsets of slipping discs add ρ D²: where rows depend on each other or supports hold a tangent, no
+        force on the rows deforms anything, M is zero, and κ alone is left.
         """
         damping, soft = self.face.damping, self.face.softness * residual
         if self.preconditioner is None:
             return damping**2 * residual + soft
         solved = self.face.restrict(self.preconditioner(self.face.prolong(damping * residual)))
-        return damping * solved + soft
+        return damping * solved + soft + self.face.offset_stiffness / self.spring * residual
 
     def gradient(self, multiplier: Vector, flexed: Vector) -> Vector:
         """Return Zᵀ(F λ − d) + κ y, shape (n_face,), for λ on the face and flexed = F λ − d."""
@@ -100,7 +104,8 @@ class FaceSystems:
         preconditioner = problem.preconditioner
         if isinstance(preconditioner, FacePreconditioner):
             preconditioner = preconditioner.on_face(face.restriction)
-        return FaceSystem(problem.comm, face, self._operator, restricted, preconditioner)
+        spring = self._operator.stiffness if isinstance(self._operator, ShiftedOperator) else 1.0
+        return FaceSystem(problem.comm, face, self._operator, restricted, preconditioner, spring=spring)
 
 
 @dataclass(frozen=True, eq=False)

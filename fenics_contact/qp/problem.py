@@ -302,9 +302,9 @@ class CountedOperator:
 class ShiftedOperator:
     """x ↦ F x + D x with D diagonal; it counts the products of F."""
 
-    def __init__(self, operator: CountedOperator, shift: Vector) -> None:
-        """Add ``shift``, the diagonal of D, shape (n_owned,), to F."""
-        self._operator, self._shift = operator, shift
+    def __init__(self, operator: CountedOperator, shift: Vector, stiffness: float = 1.0) -> None:
+        """Add ``shift``, the diagonal of D, (n_owned,), to F; ``stiffness`` is diag F / D on contact rows."""
+        self._operator, self._shift, self.stiffness = operator, shift, stiffness
 
     def __call__(self, x: Vector) -> Vector:
         """Apply F + D to an owned vector and count. Collective."""

@@ -58,7 +58,7 @@ class ProximalPoint:
         shift = np.zeros(layout.size)
         shift[layout.contact] = 1.0 / (stiffness * contact_step(layout, problem.diagonal)[layout.contact])
         diagonal = np.where(shift > 0.0, shift, problem.diagonal)
-        springs = ShiftedOperator(operator, shift)
+        springs = ShiftedOperator(operator, shift, stiffness)
         shifted = replace(problem, operator=springs, diagonal=diagonal, friction=None)
         return cls(problem, shifted, springs, stiffness, shift)
 

@@ -128,7 +128,8 @@ def test_what_remains_after_the_correction_is_of_second_order(name: str) -> None
     left = np.array([miss.left for miss in misses(name)])
     assert np.median(left) < 0.005
     assert np.mean(left > 0.1) < 0.2
-    assert left.max() < 1.0
+    # An error may vanish by chance, the claimed one does not.
+    assert max(abs(miss.after / miss.claimed) for miss in misses(name)) < 0.5
 
 
 @pytest.mark.parametrize("name", CASES)
