@@ -11,8 +11,9 @@ from fenics_contact.mesh.cell_types import HEXAHEDRON27, QUADRILATERAL9, CellTyp
 from fenics_contact.mesh.chart import Chart
 from fenics_contact.mesh.faces import match_faces, number_faces
 from fenics_contact.mesh.hanging import HangingNodes
-from fenics_contact.mesh.on_shapes import on_shapes
+from fenics_contact.mesh.on_shapes import on_shapes, with_parts
 from fenics_contact.mesh.quality import thickness
+from fenics_contact.shapes.simple import SurfaceShape
 
 _HALVED = {2: QUADRILATERAL9, 3: HEXAHEDRON27}
 """Quadratic cells, whose nodes are those of the halved linear ones, and whose pieces are their parts."""
@@ -70,13 +71,15 @@ class Parts:
         whole, halves = np.tile(kind.vertices, (len(small), 1, 1)), kind.nodes[kind.pieces]
         positions = np.concatenate([whole, np.tile(halves, (len(large), 1, 1))])[order]
         hanging = _still_hanging(mesh, kind, cells, between, (levels + split)[parents])
-        surfaces = _parts_of_surfaces(mesh, kind, large, nodes)
+        joined, shapes = with_parts(mesh)
+        surfaces = _parts_of_surfaces(joined, kind, nodes)
         chart = mesh.chart and mesh.chart.extended([between, mesh.cells[large]])
         if chart is None:
-            points = _placed(mesh, kind, between, (nodes, cells), surfaces, hanging)
+            points = _placed(mesh, between, (nodes, cells), surfaces, shapes, hanging)
         else:
             points = _mapped(mesh, chart, hanging)
-        return cls(points, cells, surfaces, hanging, chart, parents, positions, split)
+        named = {name: surfaces[name] for name in mesh.surfaces}
+        return cls(points, cells, named, hanging, chart, parents, positions, split)
 
     def beside_inverted(self, kind: CellType) -> np.ndarray:
         """Return the coarse cells that were not halved on which nodes of inverted cells hang."""
@@ -169,7 +172,7 @@ def _still_hanging(
 
 
 def _parts_of_surfaces(
-    mesh: BodyMesh, kind: CellType, large: np.ndarray, nodes: np.ndarray
+    surfaces: dict[str, np.ndarray], kind: CellType, nodes: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Return the facets of the surfaces, those of halved cells replaced by their parts.
 
@@ -178,7 +181,7 @@ def _parts_of_surfaces(
     faces = nodes[:, kind.faces].reshape(-1, kind.faces.shape[1])
     corners = 2 ** (kind.dim - 1)
     result = {}
-    for name, facets in mesh.surfaces.items():
+    for name, facets in surfaces.items():
         both = number_faces(np.concatenate([facets, faces[:, :corners]]))
         place = np.full(both.max(initial=-1) + 1, -1)
         place[both[len(facets) :]] = np.arange(len(faces))
@@ -200,10 +203,10 @@ def _mapped(mesh: BodyMesh, chart: Chart, hanging: HangingNodes | None) -> np.nd
 
 def _placed(
     mesh: BodyMesh,
-    kind: CellType,
     between: np.ndarray,
     numbers: tuple[np.ndarray, np.ndarray],
     surfaces: dict[str, np.ndarray],
+    shapes: dict[str, SurfaceShape],
     hanging: HangingNodes | None,
 ) -> np.ndarray:
     """Return coordinates: new nodes and those that hang no more lie on the shapes of their surfaces.
@@ -222,5 +225,5 @@ def _placed(
         moves[hanging.nodes] = False
     points = np.concatenate([mesh.points, np.empty((count - n_old, mesh.dim))])
     points[n_old : n_old + len(between)] = points[between].mean(axis=1)
-    points[nodes[:, -1]] = points[nodes[:, : len(kind.vertices)]].mean(axis=1)
-    return on_shapes(points, cells, surfaces, mesh.shapes, moves, hanging)
+    points[nodes[:, -1]] = points[nodes[:, : 2**mesh.dim]].mean(axis=1)
+    return on_shapes(points, cells, surfaces, shapes, moves, hanging)

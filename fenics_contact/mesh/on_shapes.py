@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import FACET_TYPES, cell_type_of
 from fenics_contact.mesh.drawn_along import drawn_along
 from fenics_contact.mesh.faces import boundary_faces, match_faces, vector_areas
@@ -47,6 +48,7 @@ def put_on_shapes(
     """Return coordinates with movable nodes of surfaces on their shapes.
 
     A node of several shapes is put on all of them, one beside a plane part of the boundary stays in that.
+    Joined shapes are given by their parts, see `with_parts`.
 
     Returns coordinates, which nodes lie on shapes, shape (n_nodes,), and projections onto the directions in
     which other nodes of the boundary may move, shape (n_nodes, dim, dim); arguments as for `on_shapes`.
@@ -58,7 +60,7 @@ def put_on_shapes(
     shaped = np.concatenate([surfaces[name] for name in shapes])
     boundary = boundary[match_faces(boundary, shaped) < 0]
     along = _directions(points, _linear_pieces(boundary, dim))
-    parts = list(_parts(points, surfaces, shapes, movable))
+    parts = list(_facets_of(surfaces, shapes, movable))
     nodes = np.unique(np.concatenate([each.ravel() for _, each in parts]))
     nodes, found = nodes[movable[nodes]], points.copy()
     member = np.column_stack([np.isin(nodes, each) for _, each in parts])
@@ -75,25 +77,61 @@ def _linear_pieces(facets: np.ndarray, dim: int) -> np.ndarray:
     return facets[:, pieces].reshape(-1, pieces.shape[1])
 
 
-def _parts(
-    points: np.ndarray,
-    surfaces: Mapping[str, np.ndarray],
-    shapes: Mapping[str, SurfaceShape],
-    movable: np.ndarray,
+def _facets_of(
+    surfaces: Mapping[str, np.ndarray], shapes: Mapping[str, SurfaceShape], movable: np.ndarray
 ) -> Iterator[tuple[SurfaceShape, np.ndarray]]:
-    """Yield each shape, those of joined ones by themselves, and its facets with a movable node."""
-    facets_of: dict[int, tuple[SurfaceShape, list[np.ndarray]]] = {}
+    """Yield each shape once, with the facets of its surfaces that have a movable node."""
+    by_shape: dict[int, tuple[SurfaceShape, list[np.ndarray]]] = {}
     for name, shape in shapes.items():
         facets = surfaces[name][movable[surfaces[name]].any(axis=1)]
-        several: Sequence[SurfaceShape] = shape.shapes if isinstance(shape, Joined) else [shape]
-        part = np.zeros(len(facets), dtype=np.int64)
-        if isinstance(shape, Joined) and len(facets):
-            part = shape.nearest(points[facets].mean(axis=1))
-        for number, each in enumerate(several):
-            facets_of.setdefault(id(each), (each, []))[1].append(facets[part == number])
-    for each, lists in facets_of.values():
-        if sum(map(len, lists)):
-            yield each, np.concatenate(lists)
+        if len(facets):
+            by_shape.setdefault(id(shape), (shape, []))[1].append(facets)
+    for shape, several in by_shape.values():
+        yield shape, np.concatenate(several)
+
+
+def with_parts(
+    mesh: BodyMesh,
+) -> tuple[dict[str, np.ndarray], dict[str, SurfaceShape]]:
+    """Return the surfaces of a mesh and their shapes, a joined shape replaced by surfaces of its parts.
+
+    Names of these have a null character, which others have not.
+    """
+    surfaces, shapes = dict(mesh.surfaces), {}
+    for name, shape in mesh.shapes.items():
+        if not isinstance(shape, Joined):
+            shapes[name] = shape
+            continue
+        part = _part_of(shape, mesh, mesh.surfaces[name])
+        for number in np.unique(part):
+            surfaces[f"{name}\0{number}"] = mesh.surfaces[name][part == number]
+            shapes[f"{name}\0{number}"] = shape.shapes[number]
+    return surfaces, shapes
+
+
+def _part_of(shape: Joined, mesh: BodyMesh, facets: np.ndarray, off: float = 1e-3) -> np.ndarray:
+    """Return the part of a joined shape on which each facet lies with all its nodes, shape (n_facets,).
+
+    Of several the one whose normal and place are those of its middle: near a ridge the middle of a coarse
+    facet may be nearer to the part beyond it.
+
+    `off`: distance of nodes from their shape, relative to the size of the facet.
+    """
+    points, parts = mesh.points[facets], shape.shapes
+    size = np.linalg.norm(np.ptp(points, axis=1), axis=1)[:, None]
+    stays = np.ones(facets.shape, dtype=bool)
+    if mesh.hanging is not None:
+        stays = ~np.isin(facets, mesh.hanging.nodes)
+    flat, middle, areas = points.reshape(-1, mesh.dim), points.mean(axis=1), vector_areas(mesh.points, facets)
+    away, badness = np.empty((2, len(facets), len(parts)))
+    for number, each in enumerate(parts):
+        far = np.abs(evaluate_shape(each, "distance", flat)).reshape(facets.shape)
+        away[:, number] = np.where(stays, far, 0.0).max(axis=1)
+        leans = np.einsum("nd,nd->n", evaluate_shape(each, "normals", middle), areas)
+        beyond = np.abs(evaluate_shape(each, "distance", middle)) / size[:, 0]
+        badness[:, number] = beyond - leans / np.linalg.norm(areas, axis=1)
+    on = away <= away.min(axis=1, keepdims=True) + off * size
+    return np.asarray(np.where(on, badness, np.inf).argmin(axis=1))
 
 
 def _onto(

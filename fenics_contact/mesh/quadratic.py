@@ -18,7 +18,7 @@ from fenics_contact.mesh.cell_types import (
 from fenics_contact.mesh.chart import kept_valid
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
 from fenics_contact.mesh.hanging import require_none
-from fenics_contact.mesh.on_shapes import put_on_shapes
+from fenics_contact.mesh.on_shapes import put_on_shapes, with_parts
 
 _QUADRATIC = {cell.vertices.shape: cell for cell in (TRIANGLE6, QUADRILATERAL9, TETRAHEDRON10, HEXAHEDRON27)}
 
@@ -52,14 +52,15 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
     groups, cells = with_more_nodes(mesh.n_nodes, mesh.cells, linear, kind)
     points = np.concatenate([mesh.points, *(mesh.points[each].mean(axis=1) for each in groups)])
     boundary, _ = boundary_faces(cells, mesh.dim)
-    surfaces = {
-        name: boundary[match_faces(facets, corners_of(boundary, mesh.dim))]
-        for name, facets in mesh.surfaces.items()
+    parts, shapes = with_parts(mesh)
+    carried = {
+        name: boundary[match_faces(facets, corners_of(boundary, mesh.dim))] for name, facets in parts.items()
     }
+    surfaces = {name: carried[name] for name in mesh.surfaces}
     chart = mesh.chart and mesh.chart.extended(groups)
     if chart is None:
         new = np.arange(len(points)) >= mesh.n_nodes
-        points, placed, _ = put_on_shapes(points, cells, surfaces, mesh.shapes, new)
+        points, placed, _ = put_on_shapes(points, cells, carried, shapes, new)
         if placed.any():
             _follow(points, cells, kind, placed)
     else:

@@ -19,7 +19,7 @@ from fenics_contact.mesh.chart import Chart, kept_valid
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
 from fenics_contact.mesh.halving import halved
 from fenics_contact.mesh.hanging import HangingNodes
-from fenics_contact.mesh.on_shapes import on_shapes
+from fenics_contact.mesh.on_shapes import on_shapes, with_parts
 from fenics_contact.mesh.quadratic import with_more_nodes
 from fenics_contact.mesh.quality import thickness
 
@@ -113,13 +113,15 @@ def _halved_simplices(mesh: BodyMesh, chosen: np.ndarray) -> tuple[_Found, np.nd
     if kind.order == 2:
         groups, cells = with_more_nodes(len(ends), cells, linear, kind)
     positions = np.einsum("kv,cvi->cki", shape_values(linear, kind.nodes), places)
-    surfaces = _carried_surfaces(mesh, ends, cells, vertices)
+    parts, shapes = with_parts(mesh)
+    surfaces = _carried_surfaces(parts, mesh.dim, ends, cells, vertices)
     chart = mesh.chart and mesh.chart.of(vertices[ends]).extended(groups)
     points = _mapped(mesh.points, mesh, parents, positions, cells) if chart is None else chart.points()
     points[: len(vertices)] = mesh.points[vertices]
     if chart is None:
-        points = on_shapes(points, cells, surfaces, mesh.shapes, np.arange(len(points)) >= len(vertices))
-    return (points, cells, surfaces, chart), parents, positions
+        points = on_shapes(points, cells, surfaces, shapes, np.arange(len(points)) >= len(vertices))
+    named = {name: surfaces[name] for name in mesh.surfaces}
+    return (points, cells, named, chart), parents, positions
 
 
 def _around_inverted(mesh: BodyMesh, found: _Found, parents: np.ndarray) -> np.ndarray:
@@ -244,12 +246,12 @@ def _reshaped(mesh: BodyMesh, before: Refinement) -> Refinement:
 
 
 def _carried_surfaces(
-    mesh: BodyMesh, ends: np.ndarray, cells: np.ndarray, vertices: np.ndarray
+    surfaces: dict[str, np.ndarray], dim: int, ends: np.ndarray, cells: np.ndarray, vertices: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Return the fine facets of the surfaces."""
-    boundary, _ = boundary_faces(cells, mesh.dim)
-    spanned = vertices[_spanned(ends, corners_of(boundary, mesh.dim))]
+    boundary, _ = boundary_faces(cells, dim)
+    spanned = vertices[_spanned(ends, corners_of(boundary, dim))]
     return {
-        name: boundary[match_faces(spanned, corners_of(facets, mesh.dim)) >= 0]
-        for name, facets in mesh.surfaces.items()
+        name: boundary[match_faces(spanned, corners_of(facets, dim)) >= 0]
+        for name, facets in surfaces.items()
     }

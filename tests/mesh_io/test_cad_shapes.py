@@ -14,6 +14,7 @@ from mpi4py import MPI
 from fenics_contact import BodyMesh, read_cad
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
+from fenics_contact.mesh import refined
 from fenics_contact.readers import OnCylinder, from_gmsh_model, gmsh_model
 from fenics_contact.readers.cad_shapes import cad_shapes
 from fenics_contact.shapes import Cylinder, Plane, Revolved, Sphere, SurfaceShape, Torus
@@ -382,3 +383,23 @@ def test_what_is_no_cad_file_is_refused(tmp_path: Path) -> None:
             read_cad(tmp_path / name)
     with pytest.raises(InvalidInputError, match="size must be above zero, got -1"):
         read_cad(tmp_path / "beam.step", -1)
+
+
+def test_a_surface_of_several_faces_is_refined_as_its_faces_are(model: Any) -> None:
+    """Beside a ridge the middle of a coarse facet may be nearer to the next face than to its own."""
+    occ = model.model.occ
+    bar = occ.addCylinder(-1.2, 0.0, 0.0, 2.4, 0.0, 0.0, 0.35)
+    occ.fuse([(3, occ.addCylinder(0.0, 0.0, -1.0, 0.0, 0.0, 2.0, 0.5))], [(3, bar)])
+    occ.synchronize()
+    mesh = meshed(model, 0.9)
+    names = list(mesh.shapes)
+    shape = Joined(
+        [mesh.shapes[name] for name in names], [mesh.points[mesh.surfaces[name]] for name in names]
+    )
+    skin = np.concatenate([mesh.surfaces[name] for name in names])
+    joined = BodyMesh(mesh.points, mesh.cells, {"skin": skin}, shapes={"skin": shape})
+    marked = np.random.default_rng(1).choice(mesh.n_cells, mesh.n_cells // 8, replace=False)
+    fine, same = refined(mesh, marked).mesh, refined(joined, marked).mesh
+    np.testing.assert_allclose(same.points, fine.points, atol=1e-9)
+    for name, facets in fine.surfaces.items():
+        np.testing.assert_allclose(mesh.shapes[name].distance(fine.points[np.unique(facets)]), 0.0, atol=1e-7)
