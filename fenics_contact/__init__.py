@@ -18,7 +18,8 @@ Values of loads: SampledField, read_field, Ufl
 Equilibrium: solve_scene, solve_steps, ContactProblem, LoadSequence, AutomaticSteps, TangentNewton,
     FixedPoint, Tolerance
 
-To an accuracy: solve_to, Limits, Level, AccurateResult, quantity, goal_error, GoalError
+To an accuracy: solve_to, minimize_to, Limits, Level, AccurateResult, AccurateDesign, quantity,
+    goal_error, GoalError
 
 Results: State, LinearState, DeformedState, NewtonSteps, Status, contact_area,
     contact_width
@@ -55,6 +56,8 @@ if TYPE_CHECKING:
     from fenics_contact._adaptive.levels import Level as Level
     from fenics_contact._adaptive.levels import Limits as Limits
     from fenics_contact._adaptive.levels import solve_to as solve_to
+    from fenics_contact._adaptive.minimised import AccurateDesign as AccurateDesign
+    from fenics_contact._adaptive.minimised import minimize_to as minimize_to
     from fenics_contact._adaptive.quantities import quantity as quantity
     from fenics_contact._base.checkpoint import Checkpoint as Checkpoint
     from fenics_contact._base.checkpoint import Interrupted as Interrupted

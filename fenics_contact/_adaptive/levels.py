@@ -187,20 +187,30 @@ def solve_to(
         >>> print(result)  # the levels, and why the last is the last  # doctest: +SKIP
     """
     with together(comm):
-        check_numbers(relative_error=relative_error)
-        if not 0.0 < relative_error < 1.0:
-            raise InvalidInputError(
-                f"relative_error must lie between 0 and 1, got {relative_error:g}: 0.01 asks for one percent"
-            )
+        require_share(relative_error)
         objective = named(quantity, scene) if isinstance(quantity, str) else quantity
-    way = _Way(objective, relative_error, limits or Limits(), comm)
+    way = Way(objective, relative_error, limits or Limits(), comm)
+    return followed(way, ContactProblem(scene, comm, solver=solver, tolerance=tolerance), callback)
+
+
+def require_share(relative_error: float) -> None:
+    """Reject an accuracy that nobody can ask for."""
+    check_numbers(relative_error=relative_error)
+    if not 0.0 < relative_error < 1.0:
+        raise InvalidInputError(
+            f"relative_error must lie between 0 and 1, got {relative_error:g}: 0.01 asks for one percent"
+        )
+
+
+def followed(way: Way, first: ContactProblem, callback: Callable[[Level], None] | None) -> AccurateResult:
+    """Return the result of all levels from a first problem on. Collective."""
+    scene, comm = first.scene, first.comm
     with Task("levels", most=way.limits.levels) as task:
-        first = ContactProblem(scene, comm, solver=solver, tolerance=tolerance)
         warnings, problem = first.hold_warnings(), cast("ContactProblem | None", first)
         while problem is not None:
             level = way.add(problem)
             if callback is not None:
-                with user_code("solve_to callback"):
+                with user_code("the callback of levels"):
                     callback(level)
             problem = way.next_problem(problem)
             task.step(len(way.levels), words=way.progress(problem))
@@ -225,7 +235,7 @@ def solve_to(
     return result
 
 
-class _Way:
+class Way:
     """The levels so far."""
 
     def __init__(self, quantity: Objective, wanted: float, limits: Limits, comm: MPI.Comm) -> None:
@@ -239,10 +249,7 @@ class _Way:
 
     def add(self, problem: ContactProblem) -> Level:
         """Solve on the next mesh and estimate its error. Collective."""
-        if self.levels:
-            self._state = problem.solve(start=self._state, refinements=self._refinements, adjoint=True)
-        else:
-            self._state = problem.solve(adjoint=True)
+        self._state = self._solved(problem)
         self._doubted, scene = doubted_pairs(self._state), self._state.scene
         value, error = self._estimated()
         level = Level(
@@ -250,12 +257,23 @@ class _Way:
             unknowns=unknowns_of(scene),
             value=value,
             error=error,
-            products=self._state.solution.products,
+            products=self._products,
             seconds=self._spent(),
             predicted=self._predicted,
         )
         self.levels.append(level)
         return level
+
+    def _solved(self, problem: ContactProblem) -> State:
+        """Return the state on the next mesh. Collective."""
+        if not self.levels:
+            return problem.solve(adjoint=True)
+        return problem.solve(start=self._state, refinements=self._refinements, adjoint=True)
+
+    @property
+    def _products(self) -> int:
+        """Products with F of the last mesh."""
+        return self._state.solution.products
 
     def _estimated(self) -> tuple[float, float]:
         """Return the quantity and its error, unknown where a spot is too small for its cells. Collective."""
@@ -350,17 +368,25 @@ class _Way:
         that the last mesh is not much larger than it must be; `tries`: meshes that are made for that.
         """
         if self._doubted:
-            return refined_at_spots(self._state, self._doubted)
+            return self._at_spots()
         wanted = (1.0 - safety * aim / self.levels[-1].error) / (1.0 - halved)
         share = min((growth - 1.0) / (2.0**self._state.scene.dim - 1.0), 1.0)
         for _ in range(tries):
             marked = bulk(self._shares, min(max(wanted, least), most), share)
-            found = refine_scene(self._state.scene, marked)
+            found = self._halved(marked)
             grown = cells_of(found.scene) / self.levels[-1].cells
             if grown <= growth:
                 break
             share *= (growth - 1.0) / (grown - 1.0)  # meshes need others to be halved, too
         return found
+
+    def _at_spots(self) -> SceneRefinement:
+        """Return the next meshes where spots are smaller than their cells."""
+        return refined_at_spots(self._state, self._doubted)
+
+    def _halved(self, marked: Mapping[str, np.ndarray]) -> SceneRefinement:
+        """Return the next meshes, with some cells halved."""
+        return refine_scene(self._state.scene, marked)
 
     def _singular(self, changes: int = 3) -> str:
         """Say so if the value has changed by more from mesh to mesh, always to the same side.

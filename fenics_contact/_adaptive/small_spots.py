@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +13,13 @@ from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.pair_geometry import hertz_spot, modulus_of, whole_force
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.parts import surface_of
+from fenics_contact._scene.scene import Scene
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.results.resolution import CoarsePeak
 from fenics_contact.results.state import State
+
+#: Halves marked cells of bodies.
+Refine = Callable[[Scene, Mapping[str, np.ndarray]], SceneRefinement]
 
 
 def doubted_pairs(state: State) -> list[int]:
@@ -28,8 +32,9 @@ def doubted_pairs(state: State) -> list[int]:
 
 
 def refined_at_spots(
-    state: State, pairs: Sequence[int], across: float = 2.0, most: int = 8
-) -> SceneRefinement:
+    state: State, pairs: Sequence[int], across: float = 2.0, most: int = 8, *,
+    scene: Scene | None = None, refine: Refine = refine_scene,
+) -> SceneRefinement:  # fmt: skip
     """Halve the cells at the spots of some contact pairs until a spot is wider than they are.
 
     Where but one facet presses and Hertz's theory gives the size of the spot under the force that it
@@ -40,9 +45,12 @@ def refined_at_spots(
         pairs: Numbers of the pairs.
         across: Number of cells.
         most: How often cells are halved at most.
+        scene: The scene in another shape, with the same cells, that is refined in place of the state's.
+        refine: What halves cells.
     """
-    spots = [_Spot.of(state, number) for number in pairs]
-    found = SceneRefinement(state.scene, {})
+    scene = state.scene if scene is None else scene
+    spots = [_Spot.of(state, number, scene) for number in pairs]
+    found = SceneRefinement(scene, {})
     for again in range(most):
         marked: dict[str, np.ndarray] = {}
         for spot in spots:
@@ -53,7 +61,7 @@ def refined_at_spots(
         marked = {name: cells for name, cells in marked.items() if len(cells)}
         if not marked:
             break
-        found = refine_scene(found.scene, marked).after(found)
+        found = refine(found.scene, marked).after(found)
     return found
 
 
@@ -72,15 +80,16 @@ class _Spot:
     half_width: float
 
     @classmethod
-    def of(cls, state: State, number: int) -> _Spot:
-        """Return the spot of a pair."""
-        contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
+    def of(cls, state: State, number: int, scene: Scene) -> _Spot:
+        """Return the spot of a pair, at its place in another shape of the scene."""
+        contact, pair = state.contact, state.scene.contacts[number]
         mine, first = contact.on_pair(number), NodeNumbers.of(scene).first_of(pair.slave.body)
-        places = scene.bodies[pair.slave.body].mesh.points[contact.points.slave[mine] - first]
+        nodes, name = contact.points.slave[mine] - first, pair.slave.body
+        places, shown = (each.bodies[name].mesh.points[nodes] for each in (state.scene, scene))
         sides = [pair.slave, *([pair.master] if isinstance(pair.master, Surface) else [])]
         pressing = contact.normal_force[mine] > 0.0
         bodies = tuple(dict.fromkeys(side.body for side in sides))
-        return cls(bodies, places[pressing], _half_width(state, number, places))
+        return cls(bodies, shown[pressing], _half_width(state, number, places))
 
     def near(self, mesh: BodyMesh, wide: float) -> np.ndarray:
         """Return the cells that may reach the spot and are wider than some length."""

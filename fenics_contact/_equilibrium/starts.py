@@ -215,9 +215,9 @@ class CoarseStart:
 
 
 def _leads_to(coarse: BodyMesh, refinement: Refinement | None, fine: BodyMesh) -> bool:
-    """Return whether a refinement may lead from one mesh to another; None: they are the same."""
+    """Return whether a refinement may lead from one mesh to another; None: they have the same cells."""
     if refinement is None:
-        return fine is coarse
+        return fine is coarse or np.array_equal(fine.cells, coarse.cells)
     covered = int(refinement.parents.max(initial=-1)) + 1
     return fine.cells.shape == refinement.positions.shape[:2] and covered == coarse.n_cells
 

@@ -147,14 +147,15 @@ class BundleTrust:
 
     It stops, with a `Reason`,
 
-    * CONVERGED where w ≤ ε (s + \|J\|) at the present t and the first one and σ + r‖z‖ ≤ 10 ε (s + \|J\|),
+    * CONVERGED where w ≤ ε (s + \|J\|) at the present t and that of a first step of length r, and
+      σ + r‖z‖ ≤ 10 ε (s + \|J\|),
     * STATIONARY where σ + r‖z‖ ≤ ε (s + \|J\|),
     * ITERATION_LIMIT, EVALUATION_LIMIT where ``max_iterations`` or ``max_evaluations`` is reached,
     * NO_DESCENT, INVALID_DESIGNS where t or the radius is practically 0,
     * STEP_FAILED where the quadratic programme cannot be solved,
 
-    with ε ``tolerance``, s ``value_scale`` and r the length of the first step, or of the present one where
-    that is longer. On the published convex test functions the error of J at the stop is below ε (s + \|J\|);
+    with ε ``tolerance``, s ``value_scale`` and r ``reach``, or the length of the present step where that is
+    longer. On the published convex test functions the error of J at the stop is below ε (s + \|J\|);
     for a nonconvex one the test implies only stationarity.
 
     With nonlinear constraints the merit function J + Σ ρ_k max(c_k, 0) takes the place of J; every inequality
@@ -177,6 +178,8 @@ class BundleTrust:
         max_bundle: Largest number of planes, at least 3; aggregation keeps the method convergent with few.
         first_step: Length of the first step relative to the length scale of the problem: half the diagonal of
             the box, or the larger of 1 and ‖x0/scale‖ where a variable is unbounded.
+        reach: Length of the step with which the stop is tested, and distance within which the certificate
+            bounds J, relative to the same length; None for that of the first step.
         locality: Weight of the distance in β_i = max(\|α_i\|, c s_i²), c = locality·‖g‖/length: how fast old
             planes of a nonconvex J lose influence. 0 is right, and faster, for a convex J.
         descent: Fraction of the predicted decrease that makes a step serious, in (0, 1).
@@ -212,6 +215,7 @@ class BundleTrust:
     max_evaluations: int = 500
     max_bundle: int = 100
     first_step: float = 0.3
+    reach: float | None = None
     locality: float = 0.1
     descent: float = 0.05
     inexactness: float = 0.02
@@ -228,7 +232,7 @@ class BundleTrust:
     def __post_init__(self) -> None:
         """Reject parameters with which the method cannot work."""
         positive = ("tolerance", "first_step", "value_scale", "feasibility", "slope_share", "first_accuracy")
-        for name in (*positive, "radius", "least_radius", "least_t", "most_t"):
+        for name in (*positive, "reach", "radius", "least_radius", "least_t", "most_t"):
             given = getattr(self, name)
             if given is not None and not 0.0 < given < np.inf:
                 raise InvalidInputError(f"{name} must be positive and finite, got {getattr(self, name)}")
@@ -311,12 +315,13 @@ class _Run:
     def step(self, state: MethodState) -> tuple[MethodState, Reason | None]:
         """Re-evaluate the centre, or try a step from it; or return why the method must stop."""
         step, state = self._guarded_step(state)
+        reach = self.method.reach or self.method.first_step
         test = stopping_test(
             state.centre.value,
             tolerance=self.method.tolerance,
             value_scale=self.method.size_of(state.history[0].value),
-            reach=self.method.first_step * self.problem.length,
-            first_t=state.first_t,
+            reach=reach * self.problem.length,
+            first_t=state.first_t * reach / self.method.first_step,
         )
         reason = self.terminate(state, step, test)
         wanted = self._wanted(state, step, test, claim=reason is not None and reason.success)

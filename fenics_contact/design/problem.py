@@ -33,6 +33,7 @@ from fenics_contact.errors import (
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.materials.hyperelastic import has_mean_dilatation
 from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.mesh.refinement import Refinement
 from fenics_contact.results.deformed_state import AnyState
 
 logger = logging.getLogger(__name__)
@@ -45,11 +46,13 @@ def design_state(
     tolerance: float,
     *,
     before: AnyState | None = None,
+    refinements: Mapping[str, Refinement] | None = None,
 ) -> AnyState:
     """Compute the equilibrium of a design, whose surfaces may overlap before they are loaded. Collective.
 
     `scene`: the scene in the shape of the design; `start`: state of a neighbouring design, or None for the
-    first one; `before`: state of the same design after the last load step, or None.
+    first one; `before`: state of the same design after the last load step, or None; `refinements`: body name
+    -> refinement of its mesh in ``start`` that led to that of the scene, None where the meshes are the same.
     """
     if scene.is_nonlinear and before is not None:
         raise InvalidInputError(
@@ -57,7 +60,7 @@ def design_state(
         )
     solve = partial(contact.solve, scene, before=before, tolerance=tolerance, design=True)
     try:
-        return solve(start=start)
+        return solve(start=start, refinements=refinements)
     except InfeasibleError as error:
         raise InvalidDesignError(f"the design has no equilibrium: {error}") from error
     except ConvergenceError as error:
@@ -302,6 +305,38 @@ class ShapeProblem(SingleProblem):
             InvalidDesignError: If the design inverts a cell or has no equilibrium.
         """
         return self._solved(alpha, self._tightest, after=after)
+
+    @collectively("ShapeProblem.begin", comm_of)
+    def begin(self, alpha: np.ndarray, coarse: AnyState, refinements: Mapping[str, Refinement]) -> AnyState:
+        """Return the equilibrium of a design, started from that of the same design on coarser meshes.
+
+        The next designs start from it. Collective.
+
+        Args:
+            alpha: Design variables, shape (size,), [length].
+            coarse: Equilibrium of the design on meshes that were refined into those of this problem.
+            refinements: Body name -> refinement of its mesh; bodies that are not named have kept theirs.
+
+        Raises:
+            InvalidDesignError: If the design inverts a cell or has no equilibrium.
+        """
+        scene = self.scene_of(alpha)
+        state = design_state(self.contact, scene, coarse, self._tightest, refinements=refinements)
+        self._memory.record_state(alpha, state)
+        self._memory.products += products_of(state)
+        return state
+
+    @collectively("ShapeProblem.on", lambda self, contact, *_: contact.comm)
+    def on(self, contact: ContactProblem, designs: tuple[SurfaceDesign, ...]) -> ShapeProblem:
+        """Return the problem of the same variables and objective on other meshes. Collective.
+
+        Args:
+            contact: The problem that computes the states, on meshes in another reference shape.
+            designs: The moving surfaces on these meshes.
+        """
+        other = ShapeProblem(contact, designs, self.objective, choice=self.choice, tolerance=self.tolerance)
+        other._apart = True  # the shape given first was, and these bodies may be in that of a design
+        return other
 
     @collectively("ShapeProblem.value_of", comm_of)
     def value_of(self, alpha: np.ndarray) -> float:

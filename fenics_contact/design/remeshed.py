@@ -334,10 +334,7 @@ class Remeshed(SingleProblem):
             partitions = problem.contact.partitions
         else:
             scene, designs = meshed(scene, designs, self._mesher, self.comm)
-        contact, choice, tolerance = problem.contact.on(scene, partitions), problem.choice, problem.tolerance
-        made = ShapeProblem(contact, designs, problem.objective, choice=choice, tolerance=tolerance)
-        made._apart = True  # as on the first mesh: the shape in which this one is made is that of a design
-        self.problems.append(made)
+        self.problems.append(problem.on(problem.contact.on(scene, partitions), designs))
         self.origins.append(np.array(origin, dtype=float))
         self._parents.append(k)
 

@@ -38,7 +38,8 @@ class DesignSurface:
             the crown of a link s runs along the ring over the contact crown's half turn, t across the wire
             over its inner arc; both proportional to arc length.
         directions: Unit normals of the smooth surface at these nodes, out of the body, (n, dim).
-        counts: Number of nodes along s and t, or along s; their product is n.
+        counts: Number of nodes along s and t, or along s; their product is n, but where local refinement has
+            left no grid: then the number of different s and t.
     """
 
     nodes: np.ndarray

@@ -26,7 +26,7 @@ from fenics_contact import (
     quantity,
     theory,
 )
-from fenics_contact._adaptive.levels import AccurateResult, Level, Limits, _Way, solve_to
+from fenics_contact._adaptive.levels import AccurateResult, Level, Limits, Way, solve_to
 from fenics_contact._base.memory import available_memory
 from fenics_contact._base.progress import Kind
 from fenics_contact.design import Movement, PeakPressure, TotalPotential
@@ -95,7 +95,7 @@ def test_less_than_three_meshes_tell_nothing_of_errors():
 
 
 def test_a_small_change_after_a_large_one_is_taken_for_chance():
-    way = _Way(TotalPotential(), 0.01, Limits(), MPI.COMM_SELF)
+    way = Way(TotalPotential(), 0.01, Limits(), MPI.COMM_SELF)
     way._doubted, way._sums = [], [1.0, 1.0, 0.1]
     for value in (100.0, 109.0):
         way.levels.append(Level(1, 1, value, np.inf, 1, 1.0, np.nan))

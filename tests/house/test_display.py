@@ -70,6 +70,7 @@ from fenics_contact._accuracy.certificate import certify
 from fenics_contact._accuracy.recovery import find_sites
 from fenics_contact._accuracy.state_errors import solver_errors
 from fenics_contact._adaptive.levels import AccurateResult, Level, Limits
+from fenics_contact._adaptive.minimised import AccurateDesign
 from fenics_contact._base.display import COLUMNS, LINES, displayed, in_lines
 from fenics_contact._optimize.problem import pose
 from fenics_contact.design import (
@@ -207,6 +208,10 @@ def objects() -> dict[str, Any]:
         StressNear("block", (0, 0, 0), 1.0), MovementNear("block", (0, 0, 0), 1.0, direction=(1, 0, 0)),
         Maximum((LargestPressure(),)), PeakPressure(), goal_error(state, StrainEnergy()),
         AccurateResult(state, 1.0, 0.1, 0.01, False, "why", (Level(8, 81, 1.0, 0.1, 9, 0.1, np.nan),)),
+        AccurateDesign(
+            state, 1.0, 0.1, 0.01, False, "why", (Level(8, 81, 1.0, 0.1, 9, 0.1, np.nan),), (shape,),
+            (minimize(bowl, np.ones(60)),),
+        ),
         Limits(levels=2),
         NewtonSteps(((0.1, 1e-3, 1e-7),)), TangentNewton(), AutomaticSteps(), DesignResponse(shape),
         SceneResponse(lambda load: scene, {"load": 1.0}, {"energy": lambda state: 0.0}, MPI.COMM_SELF),

@@ -319,6 +319,7 @@ def test_history_tells_of_every_evaluation_in_order() -> None:
     [
         ({"tolerance": 0.0}, "tolerance must be positive and finite, got 0.0"),
         ({"first_step": np.nan}, "first_step must be positive and finite, got nan"),
+        ({"reach": 0.0}, "reach must be positive and finite, got 0.0"),
         ({"least_t": 0.0}, "least_t must be positive and finite, got 0.0"),
         ({"max_bundle": 2}, "max_bundle must be at least 3, got 2"),
         ({"max_evaluations": 0}, "max_evaluations must be at least 1, got 0"),
@@ -329,3 +330,15 @@ def test_history_tells_of_every_evaluation_in_order() -> None:
 def test_parameters_that_cannot_work_are_refused(parameters: dict[str, float], text: str) -> None:
     with pytest.raises(InvalidInputError, match=text):
         BundleTrust(**parameters)  # type: ignore[arg-type]
+
+
+def test_a_reach_is_the_distance_within_which_nothing_lower_is_left() -> None:
+    def slope(x: np.ndarray) -> tuple[float, np.ndarray]:
+        return 1.0 + 1e-3 * float(x[0]), np.array([1e-3])
+
+    near = BundleTrust(tolerance=2e-4, first_step=1e-2)
+    results = [
+        minimize(slope, [0.0], method, bounds=(-1.0, 1.0)) for method in (near, replace(near, reach=2.0))
+    ]
+    assert [each.x[0] for each in results] == [0.0, pytest.approx(-1.0, abs=1e-9)]
+    assert all(each.reason.success for each in results)
