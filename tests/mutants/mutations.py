@@ -432,4 +432,25 @@ MUTATIONS = (
         "if False:",
         ("tests/mesh/test_halving.py::test_the_surface_in_contact_is_the_shape_also_at_hanging_nodes",),
     ),
+    Mutation(
+        "new nodes where a ring closes lie on its other side",
+        "mesh/chart.py",
+        "if self.period is not None:",
+        "if False:",
+        ("tests/mesh/test_chart.py::test_new_nodes_lie_on_the_arcs_around_the_section",),
+    ),
+    Mutation(
+        "what a design has moved is refined where it was before",
+        "mesh/refinement.py",
+        "moved = mesh.points - mesh.origin.points",
+        "moved = 0.0 * mesh.points",
+        ("tests/mesh/test_chart.py::test_what_a_design_has_moved_is_refined_with_its_movement",),
+    ),
+    Mutation(
+        "nodes on the boundary leave the true body before those inside are moved",
+        "mesh/chart.py",
+        "nodes = nodes[turn[nodes] == turn[nodes].min()]",
+        "pass",
+        ("tests/mesh/test_chart.py::test_cells_of_coarse_and_strongly_graded_links_stay_valid",),
+    ),
 )
