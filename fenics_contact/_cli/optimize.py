@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import typer
 
+from fenics_contact._adaptive.minimised import AccurateDesign
 from fenics_contact._base.display import force_units
 from fenics_contact._cli.console import Console, ExitCode, facts
 from fenics_contact._cli.options import checkpoint_of, forget, resumable, scene_command
-from fenics_contact._cli.view import Gallery, can_draw, draw_state
+from fenics_contact._cli.run import table_of_levels
+from fenics_contact._cli.view import Gallery, can_draw, draw_meshes, draw_state
 from fenics_contact._optimize.result import Result
 from fenics_contact._scene_file.reading import SceneFile, ShapeTask
+from fenics_contact.design.memory import DesignPoint, JointPoint
 from fenics_contact.design.problem import ShapeProblem
 from fenics_contact.design.several import LoadPath
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.output.cad import CadError, write_step
 from fenics_contact.output.files import only_run_in
-from fenics_contact.output.paraview import ResultSeries, file_of_each
+from fenics_contact.output.paraview import ResultSeries, file_of_each, write_vtu
 from fenics_contact.output.result import write_optimisation_result
 from fenics_contact.output.surfaces import write_design_table, write_stl
 from fenics_contact.output.tables import write_contact_table
@@ -41,9 +45,16 @@ def check_design_files(file: SceneFile) -> None:
 
 
 def write_design_files(
-    console: Console, file: SceneFile, problem: ShapeProblem | LoadPath, alpha: np.ndarray
+    console: Console,
+    file: SceneFile,
+    problem: ShapeProblem | LoadPath,
+    alpha: np.ndarray,
+    fine: ShapeProblem | LoadPath | None = None,
 ) -> list[Path]:
-    """Write the files of a design that the scene file asks for, and return them. Collective."""
+    """Write the files of a design that the scene file asks for, and return them. Collective.
+
+    `problem`: one whose surfaces have grids of nodes; `fine`: on the mesh whose triangles are written.
+    """
     kinds, length, folder = file.document.output.design, file.document.units.length, file.folder
     bodies = sorted({design.body for design in problem.designs})
     written = []
@@ -53,7 +64,7 @@ def write_design_files(
             written.append(write_design_table(problem, alpha, path, design=number, length=length))
     if "stl" in kinds:
         for body, path in file_of_each(bodies, folder, "design", ".stl").items():
-            written.append(write_stl(problem, alpha, path, body=body))
+            written.append(write_stl(fine or problem, alpha, path, body=body))
     if "step" in kinds:
         for body, path in file_of_each(bodies, folder, "design", ".step").items():
             _write_step(console, problem, alpha, path, body, _MILLIMETRES[length])
@@ -77,32 +88,84 @@ def add_to(app: typer.Typer) -> None:
     app.command("optimize", short_help="optimise the contact shape of a scene file")(optimize)
 
 
+def _check(file: SceneFile) -> None:
+    check_design_files(file)
+    file.check_refined()
+
+
+@dataclass(frozen=True, eq=False)
+class _Done:
+    """An optimisation that ended.
+
+    Attributes:
+        problem: That of the result, on the last mesh.
+        gridded: On a mesh whose designed surfaces have grids of nodes, in space the first.
+        before: The first design, on the same mesh.
+        products: Products with F on all meshes.
+        accurate: What `minimize_to` found; None on one mesh.
+    """
+
+    result: Result
+    problem: ShapeProblem | LoadPath
+    gridded: ShapeProblem | LoadPath
+    before: DesignPoint | JointPoint
+    products: int
+    written: list[Path]
+    accurate: AccurateDesign | None = None
+
+
 def _optimize(console: Console, file: SceneFile, resume: bool | None, pictures: bool) -> None:
     """Optimise the contact shape described by the [design] of a scene file."""
     task = file.shape_task()
     words = file.document.design.objective_in_words  # type: ignore[union-attr]
     console.write(f"{task.problem.size} design variables, objective {words}")
+    refines = file.document.accuracy is not None
     with only_run_in(file.folder, console.comm):
-        result, written = _minimised(console, file, task, resume)
-        console.write(facts(_facts(file, task, result)))
+        done = (_to_accuracy if refines else _minimised)(console, file, task, resume)
+        console.write(facts(_facts(file, task, done)))
         gallery = Gallery()
         if pictures and can_draw(console, file, gallery):
-            _draw(console, file, task, result, gallery)
-    names = ", ".join(["result.json", *(path.name for path in (*written, *gallery.drawn))])
+            _draw(console, file, done, gallery)
+    names = ", ".join(["result.json", *(path.name for path in (*done.written, *gallery.drawn))])
     console.write(f"results in {file.folder}/: {names}")
-    if not result.reason.success:
-        console.write(f"not converged: {result.reason.value}")
+    if done.accurate is not None and not done.accurate.reached:
+        console.write(f"the accuracy was not reached: {done.accurate.reason}")
+        raise typer.Exit(int(ExitCode.NOT_CONVERGED))
+    if not done.result.reason.success:
+        console.write(f"not converged: {done.result.reason.value}")
         raise typer.Exit(int(ExitCode.NOT_CONVERGED))
     gallery.require_all()
 
 
-optimize = scene_command(_optimize, check=check_design_files, sensitivity=True)
+optimize = scene_command(_optimize, check=_check, sensitivity=True, accurate=("accuracy",))
 
 
-def _minimised(
-    console: Console, file: SceneFile, task: ShapeTask, resume: bool | None
-) -> tuple[Result, list[Path]]:
-    """Run the optimisation and write its files; return these, too. Collective."""
+def _to_accuracy(console: Console, file: SceneFile, task: ShapeTask, resume: bool | None) -> _Done:
+    """Run the optimisation on finer and finer meshes and write its files. Collective."""
+    asked = file.document.accuracy
+    assert asked is not None
+    if resume:
+        raise InvalidInputError(
+            "--resume needs a checkpoint, and an optimisation to an accuracy keeps none: leave it out"
+        )
+    found = task.minimize_to(asked.relative_error, asked.made(), table_of_levels(console))
+    console.write(f"{found.reason}\n")
+    last, result = found.problems[-1], found.optimisations[-1]
+    gridded = last if file.scene.dim == 2 else found.problems[0]
+    more = {"scene_file": file.source.name, "title": file.title}
+    write_optimisation_result(result, last, file.folder, more=more, accuracy=found)
+    kinds, written = file.document.output.files, list[Path]()
+    if "vtu" in kinds:
+        written.append(write_vtu(found.state, file.folder))
+    written += write_design_files(console, file, gridded, found.x, last)
+    if "csv" in kinds and file.scene.contacts:
+        written.append(write_contact_table(found.state, file.folder / "contact.csv"))
+    products = sum(level.products for level in found.levels)
+    return _Done(result, last, gridded, last.at(task.start), products, written, found)
+
+
+def _minimised(console: Console, file: SceneFile, task: ShapeTask, resume: bool | None) -> _Done:
+    """Run the optimisation and write its files. Collective."""
     checkpoint = checkpoint_of(file, resume)
     kinds = file.document.output.field_files
     series = ResultSeries(file.folder, "designs", console.comm, formats=kinds) if kinds else None
@@ -118,20 +181,22 @@ def _minimised(
     # A run that stopped at a limit can continue from its checkpoint with a larger one.
     if result.reason.success:
         forget(console, checkpoint)
-    return result, written
+    assert task.problem.first is not None
+    return _Done(result, task.problem, task.problem, task.problem.first, task.problem.products, written)
 
 
-def _facts(file: SceneFile, task: ShapeTask, result: Result) -> dict[str, str]:
-    problem = task.problem
-    before, after, units = problem.first, problem.at(result.x), file.document.units
-    assert before is not None
+def _facts(file: SceneFile, task: ShapeTask, done: _Done) -> dict[str, str]:
+    problem, result = done.problem, done.result
+    before, after, units = done.before, problem.at(result.x), file.document.units
+    every = (result,) if done.accurate is None else done.accurate.optimisations
+    evaluations = sum(each.evaluations for each in every)
     drop = (before.value - after.value) / abs(before.value) * 100 if before.value else 0.0
     rows = {
         "objective before": f"{before.value:.9g}",
         "objective after": f"{after.value:.9g}",
         "drop": f"{drop:.3f} %",
-        "iterations": f"{result.iterations}, {result.evaluations} evaluations",
-        "work": f"{problem.products} products with F",
+        "iterations": f"{sum(each.iterations for each in every)}, {evaluations} evaluations",
+        "work": f"{done.products} products with F",
         "stopped because": result.reason.value,
     }
     for one in result.constraints:
@@ -147,18 +212,20 @@ def _facts(file: SceneFile, task: ShapeTask, result: Result) -> dict[str, str]:
     return rows
 
 
-def _draw(console: Console, file: SceneFile, task: ShapeTask, result: Result, gallery: Gallery) -> None:
+def _draw(console: Console, file: SceneFile, done: _Done, gallery: Gallery) -> None:
     """Draw the states before and after, the control net and the history. Collective."""
     from fenics_contact.pictures.designs import plot_control_net, plot_convergence
 
-    problem = task.problem
-    for name, point in (("before", problem.first), ("after", problem.at(result.x))):
-        assert point is not None
+    result, net = done.result, done.gridded
+    for name, point in (("before", done.before), ("after", done.problem.at(result.x))):
         draw_state(console, file, {name: point.state}, gallery, f"_{name}")
-    for number in range(len(problem.designs)):
+    for number in range(len(net.designs)):
         path = file.folder / ("control_net.png" if number == 0 else f"control_net_{number + 1}.png")
-        plot_control_net(problem, result.x, path, design=number)
+        plot_control_net(net, result.x, path, design=number)
         gallery.drawn.append(path)
+    if done.accurate is not None:
+        draw_meshes(file, file.scene, done.accurate.state.scene, gallery)
+        return
     path = file.folder / "convergence.png"
     plot_convergence(result.history, path, title=file.title, comm=console.comm)
     gallery.drawn.append(path)

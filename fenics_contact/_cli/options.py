@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, TypeAlias
@@ -25,12 +25,12 @@ def scene_command(
     *,
     check: Callable[[SceneFile], None] = lambda file: None,
     sensitivity: bool = False,
-    accurate: bool = False,
+    accurate: Sequence[str] = (),
 ) -> Command:
     """Return the command that reads a scene file, checks it, prints its plan and computes.
 
     ``compute`` takes whether to resume, and whether to draw; its docstring is that of the command;
-    ``accurate``: whether it has the options that ask for an accuracy.
+    ``accurate``: names of the options that ask for an accuracy, those it has of ``accuracy`` and ``of``.
     """
 
     def command(
@@ -67,7 +67,8 @@ def scene_command(
             typer.Option(
                 "--accuracy",
                 metavar="1%",
-                help="Refine the meshes until a quantity has this relative error, as 1% or 0.01.",
+                help="Refine the meshes until a quantity, or the objective of a design, has this relative "
+                "error, as 1% or 0.01.",
                 show_default=False,
             ),
         ] = None,
@@ -114,16 +115,15 @@ def scene_command(
             _show_plan(console, file, sensitivity=sensitivity)
             console.write()
             if dry_run:
-                refines = accurate and file.document.accuracy is not None
+                refines = bool(accurate) and file.document.accuracy is not None
                 _show_outputs(console, file, draws=pictures, meshes=refines)
             else:
                 compute(console, file, resume, pictures)
 
     command.__doc__ = compute.__doc__
-    if not accurate:
-        whole = inspect.signature(command, eval_str=True)
-        kept = [each for name, each in whole.parameters.items() if name not in ("accuracy", "of")]
-        command.__signature__ = whole.replace(parameters=kept)  # type: ignore[attr-defined]
+    whole, others = inspect.signature(command, eval_str=True), {"accuracy", "of"} - set(accurate)
+    kept = [each for name, each in whole.parameters.items() if name not in others]
+    command.__signature__ = whole.replace(parameters=kept)  # type: ignore[attr-defined]
     return command
 
 
@@ -184,8 +184,10 @@ def _show_plan(console: Console, file: SceneFile, *, sensitivity: bool) -> None:
     rows = {line[:15].strip(): line[16:] for line in str(plan).splitlines()}
     if file.steps and not sensitivity:
         rows["load steps"] = str(len(file.steps))
-    if file.document.accuracy is not None and not sensitivity:
-        rows["accuracy"] = file.document.accuracy.in_words
+    asked = file.document.accuracy
+    if asked is not None:
+        words = asked.in_words
+        rows["accuracy"] = f"objective{words.removeprefix(str(asked.quantity))}" if sensitivity else words
     console.write(f"{file.title}: {file.source.name} on {console.ranks}")
     console.write(facts(rows))
 

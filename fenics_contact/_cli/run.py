@@ -62,7 +62,7 @@ def _run(console: Console, file: SceneFile, resume: bool | None, pictures: bool)
         raise typer.Exit(int(ExitCode.NOT_CONVERGED))
 
 
-run = scene_command(_run, check=SceneFile.check_accuracy, accurate=True)
+run = scene_command(_run, check=SceneFile.check_accuracy, accurate=("accuracy", "of"))
 
 
 def _files(file: SceneFile) -> list[str]:
@@ -88,16 +88,17 @@ def _at_once(console: Console, file: SceneFile) -> dict[str, State]:
 
 def _to_accuracy(console: Console, file: SceneFile) -> AccurateResult:
     """Solve on finer and finer meshes, print a line for each, and write the files. Collective."""
-    console.write(LEVEL.format("cells", "unknowns", "value", "error", "products", "seconds", "expected"))
-
-    def show(level: Level) -> None:
-        console.write(LEVEL.format(*level.in_words))
-
-    result = file.solve_to(show)
+    result = file.solve_to(table_of_levels(console))
     console.write(f"{result.reason}\n")
     _show(console, file, result.state)
     _write(file, result.state, result)
     return result
+
+
+def table_of_levels(console: Console) -> Callable[[Level], None]:
+    """Print the head of a table of meshes, and return what prints a line of it."""
+    console.write(LEVEL.format("cells", "unknowns", "value", "error", "products", "seconds", "expected"))
+    return lambda level: console.write(LEVEL.format(*level.in_words))
 
 
 def _write(file: SceneFile, state: State, accurate: AccurateResult | None = None) -> None:

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from pydantic import BaseModel
 
-from fenics_contact._adaptive.levels import AccurateResult, Level, solve_to
+from fenics_contact._adaptive.levels import AccurateResult, Level, Limits, solve_to
+from fenics_contact._adaptive.minimised import AccurateDesign, minimize_to
 from fenics_contact._adaptive.quantities import quantity
 from fenics_contact._base.checkpoint import Checkpoint
 from fenics_contact._base.checks import require_file
@@ -235,6 +236,7 @@ class ShapeTask:
         start: Design variables at the start, [length].
         bounds: Least and largest values of the variables, [length].
         constraints: The linear ones in one, volumes, and limits of other objectives.
+        constrain: Makes the same constraints of a problem on another mesh.
         restore: Whether the start may violate limits of other objectives.
     """
 
@@ -242,6 +244,7 @@ class ShapeTask:
     start: np.ndarray
     bounds: tuple[np.ndarray, np.ndarray]
     constraints: tuple[LinearConstraints | NonlinearConstraint, ...]
+    constrain: Callable[[ShapeProblem], tuple[LinearConstraints | NonlinearConstraint, ...]]
     method: BundleTrust
     restore: bool = False
 
@@ -261,6 +264,22 @@ class ShapeTask:
             restore=self.restore,
             callback=callback,
             checkpoint=checkpoint,
+        )
+
+    def minimize_to(
+        self, relative_error: float, limits: Limits, callback: Callable[[Level], None] | None = None
+    ) -> AccurateDesign:
+        """Run it on finer and finer meshes, see `fenics_contact.minimize_to`. Collective."""
+        return minimize_to(
+            self.problem,  # type: ignore[arg-type]  # load paths are refused there
+            self.start,
+            relative_error,
+            self.method,
+            bounds=self.bounds,
+            constraints=self.constrain,
+            restore=self.restore,
+            limits=limits,
+            callback=callback,
         )
 
 
@@ -294,8 +313,9 @@ def shape_task(
     )
     start = np.zeros(problem.size) if design.start is None else _fitting("start", design.start, problem.size)
     method = design.made(raise_on_failure=False)
-    constraints = _constraints(design, problem, start, source)
-    return ShapeTask(problem, start, (lower, upper), constraints, method, design.restore)
+    constrain = partial(_constraints, design, start=start, source=source)
+    constraints = constrain(problem)
+    return ShapeTask(problem, start, (lower, upper), constraints, constrain, method, design.restore)
 
 
 def _over_steps(
@@ -478,6 +498,12 @@ class SceneFile:
 
     def check_accuracy(self) -> None:
         """Refuse an accuracy of what the scene does not have or refined meshes cannot keep. Collective."""
+        self.check_refined()
+        if self.document.accuracy is not None:
+            _ = self.quantity
+
+    def check_refined(self) -> None:
+        """Refuse an accuracy with what refined meshes cannot keep."""
         asked = self.document.accuracy
         if asked is None:
             return
@@ -489,7 +515,6 @@ class SceneFile:
         ]
         if wrong:
             raise SceneFileError(self.source.name, wrong)
-        _ = self.quantity
 
     @cached_property
     def quantity(self) -> Objective:

@@ -359,6 +359,7 @@ def write_optimisation_result(
     *,
     name: str = "result",
     more: Mapping[str, Any] | None = None,
+    accuracy: AccurateResult | None = None,
 ) -> Path:
     """Write the result of an optimisation. Collective.
 
@@ -382,6 +383,8 @@ evaluation; None where a trial point was rejected as invalid |
         folder: Output folder; created.
         name: Name of the file without ".json".
         more: Further results by name.
+        accuracy: What `minimize_to` returned, whose last result and problem these are: ``accuracy`` is as in
+            `write_result`, and the first value is that of the design with which the last mesh began.
 
     Returns:
         The file; `read_result` reads it.
@@ -420,6 +423,8 @@ evaluation; None where a trial point was rejected as invalid |
             "constraints": readable(result.constraints),
             "history": _history(result),
         }
+        if accuracy is not None:
+            record["accuracy"] = _accuracy(accuracy)
     known = best.state.known_errors
     record["errors"] = None if known is None else _errors(known)
     return write_json(target, {**record, "more": dict(more or {})}, comm=comm)

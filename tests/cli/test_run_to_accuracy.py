@@ -102,11 +102,11 @@ def test_load_steps_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert "steps does not go with [accuracy]" in capsys.readouterr().err
 
 
-def test_an_optimisation_has_no_such_option(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_optimisation_asks_for_its_objective_alone(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("optimize", "--help") == 0
     printed = capsys.readouterr().out
-    assert "--accuracy" not in printed
-    assert "--output" in printed
+    assert "--of" not in printed
+    assert "--accuracy" in printed
     assert run("run", "--help") == 0
     printed = capsys.readouterr().out
     assert "--accuracy" in printed
