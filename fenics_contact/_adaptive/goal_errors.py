@@ -157,8 +157,8 @@ def goal_error(
     Raises:
         InvalidInputError: If the state has no multipliers (see `LinearState.dual`), or the quantity is zero
             and nothing that loads the bodies reaches it.
-        ConvergenceError: If the adjoint does not converge; not where some body can slide on the face of the
-            state, see ``without_adjoint``.
+        ConvergenceError: If the adjoint needs more iterations; not where some body can slide on the face of
+            the state, or nodes of several pairs stick on each, see ``without_adjoint``.
 
     Example:
         >>> error = goal_error(state, LargestPressure())  # doctest: +SKIP
@@ -186,7 +186,9 @@ def goal_error(
         try:
             adjoint, of_solver, partials = adjoint_of(linear, partials, linearised, tolerance)
         except ConvergenceError as error:
-            if str(error) != NOT_HELD and Stop.NO_CURVATURE.value not in str(error):
+            # Of a load outside the range of a singular operator rounding decides which of both is found.
+            singular = any(stop.value in str(error) for stop in (Stop.NO_CURVATURE, Stop.STAGNATION))
+            if str(error) != NOT_HELD and not singular:
                 raise
             _require_reached(state, objective, (value,), partials, 0.01 * tolerance)
             return _without_adjoint(linear, value, str(error))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -28,7 +29,7 @@ from fenics_contact._adaptive import goal_errors
 from fenics_contact._adaptive.goal_errors import GoalError, goal_error
 from fenics_contact._adaptive.marking import bulk
 from fenics_contact._adaptive.refined_scene import refine_scene
-from fenics_contact._adaptive.resultants import SupportForce
+from fenics_contact._adaptive.resultants import PairForce, SupportForce
 from fenics_contact.design import (
     ContactArea,
     LargestPressure,
@@ -42,8 +43,8 @@ from fenics_contact.design import (
 from fenics_contact.design.adjoint import NOT_HELD, WeakChoice, linearise_face, solve_adjoint
 from fenics_contact.design.forms import ShapeForms
 from fenics_contact.errors import ConvergenceError, InvalidInputError
-from fenics_contact.gallery import rectangle
-from fenics_contact.materials import NeoHooke, PlaneStrain
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
 from fenics_contact.qp.krylov import Stop
 from tests.adaptive.goals import (
     curved,
@@ -259,6 +260,31 @@ def test_without_an_adjoint_cells_have_their_shares_of_the_energy_norm(
     monkeypatch.setattr(goal_errors, "adjoint_of", stuck)
     with pytest.raises(ConvergenceError, match="more iterations"):
         goal_error(state("floor", 4), StrainEnergy())
+
+
+def cornered(dim: int) -> Scene:
+    """A block pressed into a corner of floor and wall, where its edge sticks on both."""
+    plate = rectangle((0.0, 0.0), (1.0, 1.0), (3, 3))
+    mesh = block((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (5, 5, 5)) if dim == 3 else plate
+    material = IsotropicElasticity(1.0, 0.3) if dim == 3 else PlaneStrain(1.0, 0.3)
+    low, top = f"{'xyz'[dim - 1]}0", f"{'xyz'[dim - 1]}1"
+    sides = {low: np.eye(dim)[-1], "x0": np.eye(dim)[0]}
+    push = (-0.002, 0.0005, -0.01) if dim == 3 else (-0.002, -0.01)
+    pairs = [
+        ContactPair(Surface("block", side), RigidPlane(dim * (0.0,), tuple(normal)), Coulomb(0.3))
+        for side, normal in sides.items()
+    ]
+    return Scene({"block": Body(mesh, material)}, loads=[Traction("block", top, push)], contacts=pairs)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_how_two_pairs_share_the_force_of_an_edge_that_sticks_on_both_has_no_adjoint(dim: int) -> None:
+    """On the larger mesh of the cube rounding ended the solution before its directions did."""
+    found = goal_error(solved(cornered(dim)), PairForce(1, tuple(np.eye(dim)[0])))
+    assert found.value > 0.0
+    assert np.isnan(found.total)
+    assert re.search("stagnation|singular on this face", found.without_adjoint)
+    assert found.by_cell("block").min() > 0.0
 
 
 def pulled(cells: int) -> State:
