@@ -18,8 +18,8 @@ Values of loads: SampledField, read_field, Ufl
 Equilibrium: solve_scene, solve_steps, ContactProblem, LoadSequence, AutomaticSteps, TangentNewton,
     FixedPoint, Tolerance
 
-To an accuracy: solve_to, minimize_to, Limits, Level, AccurateResult, AccurateDesign, quantity,
-    goal_error, GoalError
+To an accuracy: solve_to, solve_steps_to, minimize_to, Limits, Level, AccurateResult, AccurateDesign,
+    CarriedState, quantity, goal_error, GoalError
 
 Results: State, LinearState, DeformedState, NewtonSteps, Status, contact_area,
     contact_width
@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from fenics_contact._adaptive.levels import Level as Level
     from fenics_contact._adaptive.levels import Limits as Limits
     from fenics_contact._adaptive.levels import solve_to as solve_to
+    from fenics_contact._adaptive.load_steps import solve_steps_to as solve_steps_to
     from fenics_contact._adaptive.minimised import AccurateDesign as AccurateDesign
     from fenics_contact._adaptive.minimised import minimize_to as minimize_to
     from fenics_contact._adaptive.quantities import quantity as quantity
@@ -66,6 +67,7 @@ if TYPE_CHECKING:
     from fenics_contact._base.launching import clean_environment as clean_environment
     from fenics_contact._base.progress import PhaseTimer as PhaseTimer
     from fenics_contact._base.progress import show_progress as show_progress
+    from fenics_contact._equilibrium.carried import CarriedState as CarriedState
     from fenics_contact._equilibrium.problem import ContactProblem as ContactProblem
     from fenics_contact._equilibrium.problem import solve_scene as solve_scene
     from fenics_contact._equilibrium.steps import LoadSequence as LoadSequence

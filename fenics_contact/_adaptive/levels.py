@@ -231,12 +231,14 @@ def followed(way: Way, first: ContactProblem, callback: Callable[[Level], None] 
         )
     result = way.result()
     if not result.reached and comm.rank == 0:
-        safe_log(_LOG.warning, "the accuracy asked for was not reached: %s", result.reason)
+        safe_log(_LOG.warning, "the accuracy asked for was not reached%s: %s", way.where, result.reason)
     return result
 
 
 class Way:
     """The levels so far."""
+
+    where = ""  # of what they are, in words for warnings
 
     def __init__(self, quantity: Objective, wanted: float, limits: Limits, comm: MPI.Comm) -> None:
         self.quantity, self.wanted, self.limits, self.comm = quantity, wanted, limits, comm

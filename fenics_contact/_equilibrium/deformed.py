@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact._base.progress import PhaseTimer
+from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._equilibrium.static_admissibility import (
     check_held,
     require_resisted,
@@ -30,6 +31,7 @@ from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.preloads import shortening_columns, shortening_scales
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.plastic import HistoryMaterial
+from fenics_contact.qp.reductions import global_sum
 from fenics_contact.qp.solution import Solution
 from fenics_contact.results.contact import ContactResult
 from fenics_contact.results.deformed_state import DeformedState, row_values_at
@@ -63,7 +65,7 @@ class DeformedEquilibria:
     def solve(
         self,
         scene: Scene,
-        before: State | None,
+        before: State | CarriedState | None,
         tolerance: Tolerance,
         time: float,
         step: LoadStep | None = None,
@@ -81,16 +83,20 @@ class DeformedEquilibria:
             steps = replace(steps, newton=replace(steps.newton, tolerance=tolerance))
         equations, timer = self._equations, self._timer
         acted, start, known = None, equations.at_rest(), None
-        if isinstance(before, DeformedState):
-            acted, known = before.load, before.equilibrium.linearisation
-            start = before.equilibrium.configuration
+        with timer.phase("assemble"):
+            if isinstance(before, CarriedState):
+                acted, start = self._on_meshes_of(scene, before)
+                before = before.state
+            elif isinstance(before, DeformedState):
+                acted, known = before.load, before.equilibrium.linearisation
+                start = before.equilibrium.configuration
         self._require_later(scene, start.time, time)
         with timer.phase("assemble"):
             load = self._loading(scene, time, step, overlap)
             if isinstance(before, DeformedState) and acted is not None:
                 if scene.preloads:
                     acted = drawn_as(before, acted, load)
-                acted, load = moved_as(before, acted, load, equations.contact)
+                acted, load = moved_as(start, acted, load, equations.contact)
             if acted is None:
                 check_held(load.torn)
             if self._unresisted is None:  # supports stay what they are in later steps
@@ -138,6 +144,32 @@ class DeformedEquilibria:
                 f"after {earlier:g}: give later times, or none"
             )
 
+    def _on_meshes_of(self, scene: Scene, carried: CarriedState) -> tuple[Loading, Configuration]:
+        """Return what acted in a state on other meshes and where it ended, on a scene's. Collective."""
+        before = carried.state
+        assert isinstance(before, DeformedState)
+        acted = self._loading(carried.scene_on(scene), before.time, overlap=True)
+        at, moved = before.equilibrium.configuration, carried.fields.displacement(acted.torn)
+        contact = self._equations.contact.at(acted, moved, None)
+        kept = before.history.carried(before.scene, scene, carried.transfers).values
+        was = before.torn_displacement
+        squares = global_sum(self._decomposition.comm, was @ was, moved @ moved)
+        # Sizes of displacements are sums over nodes, of which there are others now.
+        grown = float(np.sqrt(squares[1] / squares[0])) if squares[0] > 0.0 else 1.0
+        history = tuple(
+            kept[mesh.body][mesh.cells] if mesh.body in kept else None for mesh in self._decomposition.meshes
+        )
+        start = Configuration(
+            displacement=moved,
+            multiplier=carried.multiplier(contact.torn),
+            history=history,
+            time=at.time,
+            largest=grown * at.largest,
+            contact=contact,
+            motions=at.motions,
+        )
+        return acted, replace(start, multiplier=_balanced(self._equations.evaluate_at(acted, start)))
+
     def _loading(
         self, scene: Scene, time: float, step: LoadStep | None = None, overlap: bool = False
     ) -> Loading:
@@ -145,6 +177,19 @@ class DeformedEquilibria:
         load = Loading.of(scene, self._decomposition, time, self._assembled, step=step, overlap=overlap)
         self._assembled = load.torn
         return load
+
+
+def _balanced(evaluation: ResidualState) -> np.ndarray:
+    """Return multipliers, owned, that glue what is out of balance as well as rows do one by one. Collective.
+
+    λ_i = b_i D⁻¹ r / b_i D⁻¹ b_iᵀ of rows b_i of gluing, with the forces r out of balance and the diagonal D.
+    """
+    torn, multiplier = evaluation.torn, evaluation.at.multiplier
+    flexibility = 1.0 / torn.decomposition.torn_stiffness
+    size = torn.numbering.to_owned(torn.B.multiply(torn.B) @ flexibility)
+    glued = torn.numbering.owned < torn.n_gluing
+    taken = torn.jump(flexibility * evaluation.unbalanced)
+    return np.where(glued, multiplier + taken / np.where(glued, size, 1.0), multiplier)
 
 
 def drawn_as(before: DeformedState, acted: Loading, load: Loading) -> Loading:
@@ -167,15 +212,12 @@ def drawn_as(before: DeformedState, acted: Loading, load: Loading) -> Loading:
     return replace(acted, torn=replace(torn, right=kept, free=replace(now.free, load=forces)))
 
 
-def moved_as(
-    before: DeformedState, acted: Loading, load: Loading, contact: Contact
-) -> tuple[Loading, Loading]:
+def moved_as(at: Configuration, acted: Loading, load: Loading, contact: Contact) -> tuple[Loading, Loading]:
     """Return the load of the state before with the free components of rigid surfaces of now. Collective.
 
     Those that were held have the force that they transmitted, those that were free are held where they were.
     The load that is to act begins with the free components as they are.
     """
-    at = before.equilibrium.configuration
     if not (load.is_tracked or acted.is_tracked):
         return acted, load
     last = {each.place: each for each in acted.turned}

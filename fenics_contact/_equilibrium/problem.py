@@ -13,6 +13,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI, check_not_forked
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._base.threads import one_thread
+from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._equilibrium.followed_loads import FollowedLoads
 from fenics_contact._equilibrium.starts import CoarseStart, checked_start, first_guess, known_system
 from fenics_contact._equilibrium.static_admissibility import check_held
@@ -65,7 +66,7 @@ class LinearEquilibria:
         tolerance: Tolerance,
         *,
         start: State | CoarseStart | None,
-        before: State | None,
+        before: State | CarriedState | None,
         known: State | None,
         design: bool,
     ) -> LinearState:
@@ -73,7 +74,7 @@ class LinearEquilibria:
 
         Args:
             start: State whose multipliers come first, also one on coarser meshes, or None.
-            before: State from which slip is measured, or None.
+            before: State from which slip is measured, also one on other meshes, or None.
             known: State of which parts may be reused, or None.
 
         Raises:
@@ -84,8 +85,7 @@ class LinearEquilibria:
             # What the facets of a coarse mesh explained, a finer one has kept: a warning names it.
             torn = self._torn(scene, known, overlap=design or isinstance(start, CoarseStart))
             if before is not None:
-                origin = before.torn.slip_origin(before.torn_displacement, before.solution.multiplier)
-                torn = torn.with_slip_from(*origin)
+                torn = torn.with_slip_from(*self._slip_origin(before, torn))
             same = known is not None and torn.points is known.torn.points
             if known is None or not same or _loads_of(torn.scene) != _loads_of(known.scene):
                 check_held(torn)
@@ -107,6 +107,7 @@ class LinearEquilibria:
                     "whose whole motion is prescribed, and preloads by a shortening: prescribe the motion, "
                     "or load the wetted surfaces by Pressure"
                 )
+            assert not isinstance(before, CarriedState)  # refused by its check
             return self._by_passes(torn, tolerance, solver, start, known, before)
         system = DualSystem(torn, self._timer, previous=reused)
         with self._timer.phase("solve"):
@@ -117,6 +118,15 @@ class LinearEquilibria:
         with self._timer.phase("solve"):
             solution = solve(system, solver.with_tolerance(tolerance), first)
         return self._state(system, solution, tolerance=tolerance)
+
+    def _slip_origin(self, before: State | CarriedState, torn: TornSystem) -> tuple[np.ndarray, np.ndarray]:
+        """Return from where a system measures slip. Collective."""
+        if isinstance(before, CarriedState):
+            scene = before.scene_on(torn.scene)
+            return before.slip_origin(
+                build_torn_system(scene, self._decomposition, overlap=True, previous=torn)
+            )
+        return before.torn.slip_origin(before.torn_displacement, before.solution.multiplier)
 
     def _by_passes(
         self,
@@ -399,7 +409,7 @@ class ContactProblem:
         scene: Scene | None = None,
         *,
         start: State | Literal["last"] | None = "last",
-        before: State | None = None,
+        before: State | CarriedState | None = None,
         tolerance: Tolerance = None,
         design: bool = False,
         step: LoadStep | None = None,
@@ -413,7 +423,7 @@ class ContactProblem:
             start: State of a neighbouring geometry or load whose forces are the first guess, by default the
                 last one; None for ``before``. Nonlinear materials start from ``before``.
             before: State at the end of the load step before, from which slip is measured and histories of
-                materials go on; None: the undeformed bodies.
+                materials go on, also one on other meshes, see `CarriedState`; None: the undeformed bodies.
             tolerance: Overrides the problem's tolerance.
             design: Whether it is the state of a design: its bodies may overlap before they are loaded, and
                 derivatives are wanted, which need the dual system and a number for default tolerance.
@@ -446,8 +456,11 @@ class ContactProblem:
         with together(self.comm):
             _require_obstacles_at(scene, time)
             wanted = checked_tolerance(self.tolerance if tolerance is None else tolerance)
+            if isinstance(before, CarriedState):
+                before.check(scene)
+        last = before.state if isinstance(before, CarriedState) else before
         if scene.preloads:
-            scene = replace(scene, preloads=held_at(scene, _lengths_after(before, scene)))
+            scene = replace(scene, preloads=held_at(scene, _lengths_after(last, scene)))
         kind = self._kind(scene, sensitivity=design or adjoint)
         _dolfinx.warn_if_untested(self.comm.rank)  # once PETSc has started on the ranks that solve
         with one_thread(self.comm):
@@ -458,7 +471,7 @@ class ContactProblem:
                 )
             else:
                 check_same_input(self.comm, scene, solver=self.solver, tolerance=wanted)
-                first = (self.state if start == "last" else start) or before
+                first = (self.state if start == "last" else start) or (last if last is before else None)
                 with together(self.comm):
                     guess = checked_start(scene, first, refinements)
                 known = self._alike(scene, first if guess is first else None)

@@ -17,6 +17,7 @@ from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES, shape_values
 from fenics_contact.mesh.refinement import Refinement
+from fenics_contact.mesh.transfer import MeshTransfer
 from fenics_contact.qp.solution import DualSolution
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State
@@ -85,7 +86,7 @@ def carried_over(old: DualSystem, solution: DualSolution, new: DualSystem) -> np
     if len(before.frictional):
         friction[before.frictional] = np.einsum("na,nad->nd", tau, before.points.tangents[before.frictional])
     in_space = np.where(matched[:, None], friction[match], 0.0) if before.points.count else friction
-    _put_contact(after, start, values, in_space)
+    put_contact(after, start, values, in_space)
     return start
 
 
@@ -100,7 +101,7 @@ def _matches(before: ContactPoints, after: ContactPoints) -> np.ndarray:
     return np.where(old[order[index]] == new, order[index], -1)
 
 
-def _put_contact(torn: TornSystem, vector: np.ndarray, normal: np.ndarray, friction: np.ndarray) -> None:
+def put_contact(torn: TornSystem, vector: np.ndarray, normal: np.ndarray, friction: np.ndarray) -> None:
     """Write contact forces into an owned vector.
 
     `normal`: λ_N of every contact point, shape (n,); `friction`: τ as vectors in space, shape (n, dim).
@@ -134,7 +135,8 @@ class CoarseStart:
 
     Attributes:
         state: The state on the coarse meshes.
-        refinements: Body name -> refinement of its mesh; bodies that are not named have kept theirs.
+        refinements: Body name -> refinement of its mesh, or how it became another one of the same family;
+            bodies that are not named have kept theirs.
 
     References:
         R. E. Bank, T. Dupont: An optimal order process for solving finite element equations. Mathematics of
@@ -142,15 +144,19 @@ class CoarseStart:
     """
 
     state: State
-    refinements: Mapping[str, Refinement]
+    refinements: Mapping[str, Refinement | MeshTransfer]
+
+    def fits(self, scene: Scene) -> bool:
+        """Return whether the refinements may lead to the meshes of a scene."""
+        coarse = self.state.scene
+        if list(scene.bodies) != list(coarse.bodies) or not set(self.refinements) <= set(scene.bodies):
+            return False
+        ways = ((coarse.bodies[n].mesh, self.refinements.get(n), b.mesh) for n, b in scene.bodies.items())
+        return all(_leads_to(*way) for way in ways)
 
     def check(self, scene: Scene) -> None:
         """Reject a start that does not fit the meshes of a scene."""
-        coarse = self.state.scene
-        fits = list(scene.bodies) == list(coarse.bodies) and set(self.refinements) <= set(scene.bodies)
-        for name, body in scene.bodies.items() if fits else ():
-            fits = fits and _leads_to(coarse.bodies[name].mesh, self.refinements.get(name), body.mesh)
-        if not fits:
+        if not self.fits(scene):
             raise InvalidInputError(
                 "refinements must lead from the meshes of start to those of the scene, got others, of "
                 f"{sorted(self.refinements)}: give those with which the scene was made, and the state on the "
@@ -160,9 +166,9 @@ class CoarseStart:
     def multiplier(self, system: DualSystem) -> np.ndarray:
         """Return the first guess on the rows of a system, owned; about one product. Collective."""
         torn, problem = system.torn, system.problem
-        moved = self._displacement(torn)
+        moved = self.displacement(torn)
         start = np.zeros(len(torn.numbering.owned))
-        _put_contact(torn, start, *self._contact_forces(torn))
+        put_contact(torn, start, *self.contact_forces(torn))
         glued = torn.numbering.owned < torn.n_equality
         if torn.give is not None:
             soft = torn.give > 0.0
@@ -178,7 +184,7 @@ class CoarseStart:
         lifting = system.preconditioner.lifting(sp.csr_matrix(entries, shape=(len(start), len(ties))))
         return np.where(glued, balanced + lifting.multiplier(force), start)
 
-    def _displacement(self, torn: TornSystem) -> np.ndarray:
+    def displacement(self, torn: TornSystem) -> np.ndarray:
         """Return the interpolated displacement on this rank's torn dofs. Collective."""
         scene = torn.scene
         nodal = np.concatenate(
@@ -186,7 +192,7 @@ class CoarseStart:
         )
         return at_copies(torn.decomposition, nodal)
 
-    def _contact_forces(self, torn: TornSystem) -> tuple[np.ndarray, np.ndarray]:
+    def contact_forces(self, torn: TornSystem) -> tuple[np.ndarray, np.ndarray]:
         """Return normal forces, (n,), and friction in space, (n, dim), of interpolated tractions."""
         points, contact, coarse = torn.points, self.state.contact, self.state.torn
         pressing = contact.normal_force[:, None]
@@ -214,15 +220,19 @@ class CoarseStart:
         return interpolated(coarse, refinement, scene.bodies[name].mesh, nodal)
 
 
-def _leads_to(coarse: BodyMesh, refinement: Refinement | None, fine: BodyMesh) -> bool:
+def _leads_to(coarse: BodyMesh, refinement: Refinement | MeshTransfer | None, fine: BodyMesh) -> bool:
     """Return whether a refinement may lead from one mesh to another; None: they have the same cells."""
     if refinement is None:
         return fine is coarse or np.array_equal(fine.cells, coarse.cells)
+    if isinstance(refinement, MeshTransfer):
+        return refinement.fits(coarse, fine)
     covered = int(refinement.parents.max(initial=-1)) + 1
     return fine.cells.shape == refinement.positions.shape[:2] and covered == coarse.n_cells
 
 
-def interpolated(coarse: BodyMesh, refinement: Refinement, fine: BodyMesh, nodal: np.ndarray) -> np.ndarray:
+def interpolated(
+    coarse: BodyMesh, refinement: Refinement | MeshTransfer, fine: BodyMesh, nodal: np.ndarray
+) -> np.ndarray:
     """Return values at the nodes of a fine mesh for those at the nodes of the coarse one, (n_nodes, ...).
 
     The meshes are those of scenes, where sections may have cut what was refined as a whole: cells have the
@@ -230,5 +240,7 @@ def interpolated(coarse: BodyMesh, refinement: Refinement, fine: BodyMesh, nodal
     """
     _, first = np.unique(fine.cells, return_index=True)
     cell, place = np.divmod(first, fine.cells.shape[1])
-    weights = shape_values(CELL_TYPES[coarse.cell_type], refinement.positions[cell, place])
-    return np.asarray(np.einsum("nv,nv...->n...", weights, nodal[coarse.cells[refinement.parents[cell]]]))
+    kind = CELL_TYPES[coarse.cell_type]
+    parents, positions = refinement.located(cell, kind.nodes[place])
+    weights = shape_values(kind, positions)
+    return np.asarray(np.einsum("nv,nv...->n...", weights, nodal[coarse.cells[parents]]))

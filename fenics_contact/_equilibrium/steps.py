@@ -286,16 +286,19 @@ def solve_steps(
         >>> states = solve_steps(ContactProblem(scene, comm), push)  # doctest: +SKIP
     """
     with together(problem.comm):
-        if not isinstance(steps, Sequence):
-            raise InvalidInputError(
-                f"steps must be a sequence, got {type(steps).__name__}: write [step] for one"
-            )
-        for step in steps:
-            _require_step(step)
+        require_steps(steps)
     sequence = LoadSequence(problem, checkpoint=checkpoint, count=len(steps))
     states = tuple(sequence.advance(step) for step in steps)
     sequence.finish()
     return states
+
+
+def require_steps(steps: object) -> None:
+    """Reject what is no sequence of load steps."""
+    if not isinstance(steps, Sequence):
+        raise InvalidInputError(f"steps must be a sequence, got {type(steps).__name__}: write [step] for one")
+    for step in steps:
+        _require_step(step)
 
 
 def _require_step(step: object) -> None:

@@ -24,6 +24,7 @@ from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_nonlin
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature
 from fenics_contact.mesh.quality import determinants
+from fenics_contact.mesh.transfer import MeshTransfer
 
 
 @displayed
@@ -57,6 +58,26 @@ class History:
         for every in comm.allgather(mine) if comm.size > 1 else [mine]:
             for body, cells, new in every:
                 values[body][cells] = new
+        return History(values)
+
+    def carried(self, old: Scene, new: Scene, transfers: Mapping[str, MeshTransfer]) -> History:
+        """Return the history on other meshes of the bodies, see `MeshTransfer.at_gauss_points`.
+
+        `transfers`: body name -> how its mesh became another one; others have kept theirs.
+        """
+        values = dict(self.values)
+        for name, transfer in transfers.items():
+            if name not in values:
+                continue
+            body, mesh = new.bodies[name], old.bodies[name].mesh
+            degree = quadrature_degree(body.cell_type)
+            found = transfer.at_gauss_points(mesh, body.mesh, degree, values[name])
+            for number, material in enumerate(body.materials):
+                if isinstance(material, HistoryMaterial):
+                    size, mine = material.history_size, body.material_of_cells == number
+                    kept = material.admissible(found[mine, :, :size].reshape(-1, size))
+                    found[mine, :, :size] = kept.reshape(-1, found.shape[1], size)
+            values[name] = found
         return History(values)
 
 

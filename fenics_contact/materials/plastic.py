@@ -115,6 +115,14 @@ class HistoryMaterial(Elasticity):
                 with which a model that depends on it shall compute, so that it ends in NaN, too.
         """
 
+    def admissible(self, history: np.ndarray) -> np.ndarray:
+        """Return internal variables that points may have, near means of those of several points, (n, k).
+
+        Histories that are carried to larger cells are means. Override it where the admissible ones are no
+        convex set.
+        """
+        return history
+
     def answer(self, gradient: np.ndarray, history: np.ndarray, duration: float) -> MaterialResponse:
         """Return what `respond` does, as float64 arrays of the right shapes.
 
@@ -490,6 +498,12 @@ class FinitePlasticity(VonMisesMetal):
     isotropic_hardening: float = 0.0
     saturation_stress: float | None = None
     saturation_rate: float = 0.0
+
+    def admissible(self, history: np.ndarray) -> np.ndarray:
+        """Return plastic deformations that keep the volume, and α; a mean of such is a little too large."""
+        plastic = np.eye(3) + to_tensor(history[:, :6])
+        size = np.cbrt(np.linalg.det(plastic))[:, None, None]
+        return np.column_stack([to_vector(plastic / size - np.eye(3)), history[:, 6]])
 
     def respond(self, gradient: np.ndarray, history: np.ndarray, duration: float) -> MaterialResponse:
         """Return P, its exact tangent and the new plastic deformation; nothing depends on the duration."""

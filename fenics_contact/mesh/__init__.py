@@ -8,10 +8,12 @@ from fenics_contact.mesh.quadratic import quadratic
 from fenics_contact.mesh.quadratic_nodes import in_vtk_order
 from fenics_contact.mesh.quality import scaled_jacobian
 from fenics_contact.mesh.refinement import Refinement, refined
+from fenics_contact.mesh.transfer import MeshTransfer
 
 __all__ = [
     "CellType",
     "Chart",
+    "MeshTransfer",
     "Refinement",
     "bisection_partition",
     "boundary_faces",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -37,22 +38,36 @@ class Refinement:
         parents: The coarse cell in which each cell lies, shape (n_cells,), ascending.
         positions: Where in its coarse cell each node of each cell lies, in reference coordinates, shape
             (n_cells, nodes of a cell, dim).
+        parts: Those one after the other that lead to the mesh; empty if it is one.
     """
 
     mesh: BodyMesh
     parents: np.ndarray
     positions: np.ndarray
+    parts: tuple[Refinement, ...] = ()
 
     def after(self, first: Refinement) -> Refinement:
         """Return the refinement that leads from the mesh before another one to this mesh.
 
         `first`: the one whose mesh this one refines.
         """
-        kind = CELL_TYPES[self.mesh.cell_type]
-        values = shape_values(kind, self.positions.reshape(-1, self.mesh.dim))
-        values = values.reshape(*self.positions.shape[:2], -1)
-        positions = np.einsum("ckn,cni->cki", values, first.positions[self.parents])
-        return Refinement(self.mesh, first.parents[self.parents], positions)
+        cells = np.repeat(self.parents, self.positions.shape[1])
+        _, positions = first.located(cells, self.positions.reshape(-1, self.mesh.dim))
+        positions = positions.reshape(self.positions.shape)
+        return Refinement(self.mesh, first.parents[self.parents], positions, one_by_one((first, self)))
+
+    def located(self, cells: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return in which coarse cells points of fine ones lie, (n,), and where in them, (n, dim).
+
+        `cells`: fine cells, (n,); `positions`: reference coordinates in them, (n, dim).
+        """
+        values = shape_values(CELL_TYPES[self.mesh.cell_type], positions)
+        return self.parents[cells], np.asarray(np.einsum("nk,nki->ni", values, self.positions[cells]))
+
+
+def one_by_one(refinements: Sequence[Refinement]) -> tuple[Refinement, ...]:
+    """Return refinements one after the other with the parts of those that have some in their places."""
+    return tuple(one for each in refinements for one in each.parts or (each,))
 
 
 def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:

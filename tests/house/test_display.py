@@ -72,6 +72,7 @@ from fenics_contact._accuracy.state_errors import solver_errors
 from fenics_contact._adaptive.levels import AccurateResult, Level, Limits
 from fenics_contact._adaptive.minimised import AccurateDesign
 from fenics_contact._base.display import COLUMNS, LINES, displayed, in_lines
+from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._optimize.problem import pose
 from fenics_contact.design import (
     AdaptiveTolerance,
@@ -115,7 +116,7 @@ from fenics_contact.materials import (
     PlaneStress,
     StVenantKirchhoff,
 )
-from fenics_contact.mesh import Chart, refined
+from fenics_contact.mesh import Chart, MeshTransfer, refined
 from fenics_contact.mesh.cell_types import CELL_TYPES
 from fenics_contact.qp import FaceNewton
 from fenics_contact.results import (
@@ -212,6 +213,8 @@ def objects() -> dict[str, Any]:
             state, 1.0, 0.1, 0.01, False, "why", (Level(8, 81, 1.0, 0.1, 9, 0.1, np.nan),), (shape,),
             (minimize(bowl, np.ones(60)),),
         ),
+        CarriedState(state, {"block": MeshTransfer()}),
+        MeshTransfer(),
         Limits(levels=2),
         NewtonSteps(((0.1, 1e-3, 1e-7),)), TangentNewton(), AutomaticSteps(), DesignResponse(shape),
         SceneResponse(lambda load: scene, {"load": 1.0}, {"energy": lambda state: 0.0}, MPI.COMM_SELF),

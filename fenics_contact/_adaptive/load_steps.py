@@ -1,0 +1,132 @@
+"""Load steps to an accuracy: each on meshes of its own, to which the history of the one before is carried."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+from fenics_contact._adaptive.levels import (
+    AccurateResult,
+    Level,
+    Limits,
+    Way,
+    followed,
+    require_share,
+)
+from fenics_contact._adaptive.quantities import quantity as named
+from fenics_contact._base.libraries import MPI
+from fenics_contact._equilibrium.carried import CarriedState
+from fenics_contact._equilibrium.problem import ContactProblem
+from fenics_contact._equilibrium.steps import require_steps
+from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact.design.objective import Objective
+from fenics_contact.errors import collectively, together
+from fenics_contact.mesh.refinement import Refinement
+from fenics_contact.mesh.transfer import MeshTransfer
+from fenics_contact.qp.solve import DualSolver
+from fenics_contact.results.state import State
+
+
+@collectively("solve_steps_to", lambda scene, steps, quantity, relative_error, comm, **_: comm)
+def solve_steps_to(
+    scene: Scene,
+    steps: Sequence[LoadStep],
+    quantity: Objective | str,
+    relative_error: float,
+    comm: MPI.Comm,
+    *,
+    limits: Limits | None = None,
+    solver: DualSolver | None = None,
+    tolerance: float = 1e-6,
+    callback: Callable[[LoadStep, Level], None] | None = None,
+) -> tuple[AccurateResult, ...]:
+    """Compute a quantity at the end of every load step to an accuracy, each on meshes of its own.
+
+    Every step begins on the meshes of the scene and refines them where its quantity needs that, as `solve_to`
+    does: small cells follow a spot that moves on, and are not kept behind it. Slip is measured from the state
+    before, and histories of materials go on from it, carried from its last meshes to each of the step's, see
+    `fenics_contact.CarriedState`. Errors are those of a step alone: what the state before was wrong by, and
+    what its histories lose on larger cells, is not part of them.
+
+    Args:
+        scene: Bodies, contact pairs, and the supports and loads that the steps do not give, on coarse meshes.
+        steps: The steps in their order; what one does not give stays as it was.
+        quantity: As for `solve_to`, of every step.
+        relative_error: Largest error of the quantity relative to it, in every step, between 0 and 1.
+        comm: Communicator over which the subdomains are spread.
+        limits: What may be spent on each step.
+        solver: As for `fenics_contact.solve_scene`.
+        tolerance: Largest relative residual of each state.
+        callback: Called on all ranks with the step and every level of it once it is done.
+
+    Returns:
+        The results of the steps; one whose accuracy was not reached says so, and a warning.
+
+    Raises:
+        InvalidInputError: As `solve_to`, or if a history cannot be carried to other meshes: of contact
+            between bodies that deform much, of friction by slip, of fluid that enters contacts, of preloads
+            in scenes with nonlinear materials.
+        InfeasibleError: If nothing holds some body against its load.
+        ConvergenceError: If the solver does not reach its tolerance on some mesh.
+
+    Example:
+        >>> push = [LoadStep(f"{s}", supports=[roll(s)]) for s in (0.0, 0.5, 1.0)]  # doctest: +SKIP
+        >>> results = solve_steps_to(scene, push, "peak_pressure", 0.02, MPI.COMM_WORLD)  # doctest: +SKIP
+    """
+    with together(comm):
+        require_steps(steps)
+        require_share(relative_error)
+        objective = named(quantity, scene) if isinstance(quantity, str) else quantity
+    results: list[AccurateResult] = []
+    last: _StepWay | None = None
+    for number, step in enumerate(steps, start=1):
+        timed = step if step.time is not None else replace(step, time=float(number))
+        with together(comm):
+            scene = step.applied_to(scene)
+        last = _StepWay(timed, last, objective, relative_error, limits or Limits(), comm)
+        show = None if callback is None else partial(callback, step)
+        results.append(followed(last, ContactProblem(scene, comm, solver=solver, tolerance=tolerance), show))
+    return tuple(results)
+
+
+class _StepWay(Way):
+    """The levels of a load step after another one."""
+
+    def __init__(
+        self,
+        step: LoadStep,
+        before: _StepWay | None,
+        quantity: Objective,
+        wanted: float,
+        limits: Limits,
+        comm: MPI.Comm,
+    ) -> None:
+        super().__init__(quantity, wanted, limits, comm)
+        self.where, self._step = f" in load step {step.name!r}", step
+        # The last state of the step before, and the refinements of each body that led to its meshes.
+        self._before = None if before is None else (before._state, before._chains)
+        self._chains: dict[str, tuple[Refinement, ...]] = {}
+
+    def _solved(self, problem: ContactProblem) -> State:
+        """Return the state on the next mesh. Collective."""
+        for name, refinement in self._refinements.items():
+            self._chains[name] = (*self._chains.get(name, ()), refinement)
+        start, refinements = (self._state, self._refinements) if self.levels else (None, None)
+        return problem.solve(
+            start=start,
+            refinements=refinements,
+            before=self._carried(problem.scene),
+            step=self._step,
+            adjoint=True,
+        )
+
+    def _carried(self, scene: Scene) -> CarriedState | None:
+        """Return the state of the step before on the meshes of now."""
+        if self._before is None:
+            return None
+        (state, old), new = self._before, self._chains
+        names = (name for name in scene.bodies if name in old or name in new)
+        return CarriedState(
+            state, {name: MeshTransfer(old.get(name, ()), new.get(name, ())) for name in names}
+        )
