@@ -60,7 +60,8 @@ class AccuracyPart(Part):
 
 #: Keys of a scene file that cannot be kept where meshes are refined, and why.
 NOT_REFINED = {
-    ("steps",): "load steps have a history on their meshes: leave [[steps]] out, or [accuracy]",
+    ("steps",): "load steps have meshes of their own, for which there is solve_steps_to in Python: leave "
+    "[[steps]] out, or [accuracy]",
     ("solver", "subdomains"): "every mesh is cut anew: leave it out",
     ("solver", "newton"): "loads are followed in parts of the default size: leave it out",
 }

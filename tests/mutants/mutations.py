@@ -183,7 +183,9 @@ MUTATIONS = (
         "_large_deformations/rigid_surfaces.py",
         "np.trace(turned) * spins @ spins.T - spins @ turned @ spins.T",
         "0.0 * spins @ turned @ spins.T",
-        ("tests/nonlinear/test_driven_tools.py::test_the_stiffness_of_a_rigid_surface_is_the_derivative_of_its_loads",),
+        (
+            "tests/nonlinear/test_driven_tools.py::test_the_stiffness_of_a_rigid_surface_is_the_derivative_of_its_loads",
+        ),
     ),
     Mutation(
         "supports that meet have equal parts of the reaction",
@@ -198,6 +200,22 @@ MUTATIONS = (
         "np.where(glued, 0.0, balanced - start)",
         "np.where(glued, 0.0, balanced)",
         ("tests/contact/test_nested_start.py::test_on_the_same_meshes_the_start_is_the_answer[tie beside]",),
+    ),
+    Mutation(
+        "load steps on other meshes forget where the one before ended",
+        "_equilibrium/carried.py",
+        "torn.slip_origin(self.fields.displacement(torn), ",
+        "torn.slip_origin(0 * self.fields.displacement(torn), ",
+        ("tests/adaptive/test_load_steps.py::test_forces_are_those_of_steps_on_a_fine_mesh",),
+    ),
+    Mutation(
+        "histories of materials are not carried to other meshes",
+        "_fem/mechanics.py",
+        "            values[name] = found",
+        "            values[name] = 0.0 * found",
+        (
+            "tests/adaptive/test_load_steps.py::test_uniform_plastic_strain_is_carried_exactly[j2-quadrilateral]",
+        ),
     ),
     Mutation(
         "load steps forget the slip before",
