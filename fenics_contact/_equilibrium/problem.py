@@ -15,7 +15,13 @@ from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._equilibrium.followed_loads import FollowedLoads
-from fenics_contact._equilibrium.starts import CoarseStart, checked_start, first_guess, known_system
+from fenics_contact._equilibrium.starts import (
+    CoarseStart,
+    checked_start,
+    first_guess,
+    known_system,
+    solve_from_coarse,
+)
 from fenics_contact._equilibrium.static_admissibility import check_held
 from fenics_contact._equilibrium.stored import Stored, restored_solution, with_stored_slip
 from fenics_contact._equilibrium.warnings import ContactWarnings
@@ -112,7 +118,8 @@ class LinearEquilibria:
         system = DualSystem(torn, self._timer, previous=reused)
         with self._timer.phase("solve"):
             first = first_guess(start, system)
-        solve = solve_dual if reused is None else FollowedLoads(reused, self._timer).solve
+        alone = solve_from_coarse if isinstance(start, CoarseStart) else solve_dual
+        solve = alone if reused is None else FollowedLoads(reused, self._timer).solve
         if not isinstance(tolerance, float):
             return self._balanced(system, solve, solver, tolerance, first)
         with self._timer.phase("solve"):
@@ -432,7 +439,8 @@ class ContactProblem:
             refinements: Body name -> refinement of the mesh that ``start`` has of it, where the scene has a
                 finer one: nested iteration, in which solutions take few products, as many on fine meshes as
                 on coarse ones. The partition and the number of ranks may be others. An overlap that the
-                facets of the coarse meshes explained is accepted.
+                facets of the coarse meshes explained is accepted. Where Newton's method makes no way from
+                such a start the solve begins cold, which is logged.
             adjoint: Whether adjoints are wanted, as for errors of quantities, which need the dual system.
 
         Raises:

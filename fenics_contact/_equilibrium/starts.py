@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._pairing.points import ContactPoints
 from fenics_contact._scene.scene import Scene
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import ConvergenceError, InvalidInputError
+from fenics_contact.errors.kinds import safe_log
 from fenics_contact.feti.averages import at_copies
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.torn import TornSystem
@@ -18,9 +20,14 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES, shape_values
 from fenics_contact.mesh.refinement import Refinement
 from fenics_contact.mesh.transfer import MeshTransfer
-from fenics_contact.qp.solution import DualSolution
+from fenics_contact.qp.face_newton import FaceNewton
+from fenics_contact.qp.solution import DualSolution, continued
+from fenics_contact.qp.solve import DualSolver
+from fenics_contact.results.dual_solve import solve_dual
 from fenics_contact.results.linear_state import LinearState
 from fenics_contact.results.state import State
+
+_LOG = logging.getLogger(__name__)
 
 
 def known_system(state: State | None) -> DualSystem | None:
@@ -88,6 +95,27 @@ def carried_over(old: DualSystem, solution: DualSolution, new: DualSystem) -> np
     in_space = np.where(matched[:, None], friction[match], 0.0) if before.points.count else friction
     put_contact(after, start, values, in_space)
     return start
+
+
+def solve_from_coarse(
+    system: DualSystem, solver: DualSolver, start: DualSolution | np.ndarray | None
+) -> DualSolution:
+    """Solve, but begin cold where Newton's method needs a rescue from a start. Collective.
+
+    So that a start costs hardly more than none: a rescue takes more products than a solve from nothing.
+    """
+    if not isinstance(start, np.ndarray) or not isinstance(solver, FaceNewton):
+        return solve_dual(system, solver, start)
+    try:
+        return solve_dual(system, replace(solver, max_rescues=0), start)
+    except ConvergenceError as failure:
+        history = failure.history
+    spent = history[-1].products if history else 0
+    if system.problem.comm.rank == 0:
+        safe_log(_LOG.info, "the start from coarser meshes led nowhere in %d products: begun cold", spent)
+    found = solve_dual(system, solver)
+    steps = tuple(continued(history, found.history, spent))
+    return replace(found, products=found.products + spent, history=steps, iterations=len(steps))
 
 
 def _matches(before: ContactPoints, after: ContactPoints) -> np.ndarray:

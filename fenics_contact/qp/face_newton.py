@@ -223,6 +223,7 @@ class FaceNewton:
         repairable: Relative imbalance up to which a rescue starts from the best iterate: proximal points
             preserve equilibrium and do not restore it. From more the first iterate is the start.
         max_vain: Consecutive rescues to the same iterate after which to stop.
+        max_rescues: Rescues after which to stop where one more is needed.
         doubts: Whether to ask, without progress, if friction can suffice at all: more solves, of no use
             where another load is tried after any failure.
         doubted_rescue: Number of the rescue before which that is asked: the first ones mostly help.
@@ -247,6 +248,7 @@ class FaceNewton:
     careful_after: int = 2
     repairable: float = 1e-6
     max_vain: int = 7
+    max_rescues: int = 200
     doubted_rescue: int = 4
     doubt_tolerance: float = 1e-3
 
@@ -361,6 +363,8 @@ class _Run:
 
     def _rescued(self, state: _State) -> _State:
         """Continue from the best iterate improved by a rescue. Collective."""
+        if state.rescues >= self.parameters.max_rescues:
+            self._fail(state)
         if self.parameters.doubts and state.rescues + 1 == self.parameters.doubted_rescue:
             self.friction_alone.require_enough()
         if self.parameters.doubts and state.rescues == 1 and slides(state.history):

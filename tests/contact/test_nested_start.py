@@ -11,10 +11,13 @@ from mpi4py import MPI
 
 from fenics_contact import Body, ContactPair, ContactProblem, Scene, Status, Support, Surface
 from fenics_contact._adaptive.refined_scene import refine_scene
+from fenics_contact._equilibrium.starts import solve_from_coarse
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import rectangle
 from fenics_contact.materials import PlaneStrain
+from fenics_contact.qp import FaceNewton
 from fenics_contact.results.deformed_state import AnyState
+from fenics_contact.results.dual_solve import solve_dual
 from fenics_contact.results.linear_state import LinearState
 from tests.contact import nested_cases
 from tests.contact.nested_cases import SCENES, cut, disc_on_block, refined_near
@@ -139,3 +142,22 @@ def test_starts_that_do_not_fit_are_refused() -> None:
     part = {"disc": fine.refinements["disc"]}
     with pytest.raises(InvalidInputError, match=r"refinements must lead .* got others, of \['disc'\]"):
         solved(start=coarse, refinements=part)
+
+
+def test_a_start_that_leads_nowhere_is_left_for_a_cold_one(caplog: pytest.LogCaptureFixture) -> None:
+    coarse = linear(ContactProblem(SCENES["quarter"](), SELF, tolerance=1e-8).solve())
+    wrong = np.abs(coarse.solution.multiplier).max() * np.cos(
+        7.0 * np.arange(len(coarse.solution.multiplier))
+    )
+    hasty = FaceNewton(1e-6, patience=0)
+    before, cold = coarse.dual.products, solve_dual(coarse.dual, FaceNewton(1e-6))
+    products = coarse.dual.products
+    assert products == before + cold.products
+    with caplog.at_level("INFO"):
+        found = solve_from_coarse(coarse.dual, hasty, wrong)
+    assert found.products == coarse.dual.products - products
+    assert f"led nowhere in {found.history[0].products} products: begun cold" in caplog.text
+    assert found.history[0].outer == 0 < found.history[-1].outer
+    assert [step.iteration for step in found.history] == list(range(found.iterations))
+    assert not any("rescue" in step.method for step in found.history if step.outer == 0)
+    np.testing.assert_allclose(found.multiplier, cold.multiplier, atol=1e-4 * np.abs(cold.multiplier).max())
