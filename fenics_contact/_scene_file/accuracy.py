@@ -60,7 +60,7 @@ class AccuracyPart(Part):
 
 #: Keys of a scene file that cannot be kept where meshes are refined, and why.
 NOT_REFINED = {
-    ("steps",): "load steps have meshes of their own, for which there is solve_steps_to in Python: leave "
+    ("steps",): "load steps have a history on their meshes, which solve_steps_to carries on in Python: leave "
     "[[steps]] out, or [accuracy]",
     ("solver", "subdomains"): "every mesh is cut anew: leave it out",
     ("solver", "newton"): "loads are followed in parts of the default size: leave it out",
