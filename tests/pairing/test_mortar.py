@@ -14,10 +14,16 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from fenics_contact._pairing.mortar.cells import Cells, clip, simplices
-from fenics_contact._pairing.mortar.coupling import CORNERS, MortarCoupling, dual_integrals, mortar_coupling
+from fenics_contact._pairing.mortar.coupling import (
+    CORNERS,
+    MortarCoupling,
+    _heights_along,
+    dual_integrals,
+    mortar_coupling,
+)
 from fenics_contact._pairing.mortar.derivatives import weight_derivatives
 from fenics_contact._pairing.mortar.planes import local_coordinates, measure, rule
-from fenics_contact._surfaces.facets import FacetedSurface, facet_shape_values, faceted_surface
+from fenics_contact._surfaces.facets import FacetedSurface, Relief, facet_shape_values, faceted_surface
 from fenics_contact.errors import InvalidInputError
 from tests.conftest import run_on_ranks
 from tests.pairing.mortar_on_ranks import collect, message_for_a_folded_facet
@@ -153,6 +159,18 @@ def test_surfaces_that_do_not_face_each_other_have_no_multipliers(
     assert len(coupling.node) == len(coupling.area) == len(coupling.gap) == 0
     assert coupling.normal.shape == (0, slave.dim)
     assert coupling.weight.shape == (0, len(master.nodes))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_points_of_a_true_surface_have_no_heights(kind: str) -> None:
+    """Candidates for contact may all be apart."""
+    surface = plate(kind, 4)
+    corners = np.zeros((*surface.facets.shape, surface.dim))
+    flat = Relief(np.zeros_like(surface.normals), corners, np.zeros((len(corners), surface.corners + 1)))
+    local, values = np.zeros((0, 7, surface.dim - 1)), np.zeros((0, 7, surface.corners))
+    nothing = np.zeros(0, dtype=np.int64)
+    found = _heights_along(replace(surface, relief=flat), nothing, local, values, np.zeros((0, surface.dim)))
+    assert found.shape == (0, 7)
 
 
 @kinds

@@ -221,9 +221,9 @@ def _heights_along(
         return np.zeros(local.shape[:2])
     points = local.shape[1]
     facet, direction = np.repeat(facet, points), np.repeat(direction, points, axis=0)
-    values = values.reshape(len(facet), -1)
+    values = values.reshape(len(facet), values.shape[-1])
     normal, _ = interpolated_normal(values, surface.normals[surface.facets[facet]])
-    height = heights(surface, facet, local.reshape(len(facet), -1)).value
+    height = heights(surface, facet, local.reshape(len(facet), local.shape[-1])).value
     return np.asarray(height / np.einsum("nd,nd->n", normal, direction)).reshape(local.shape[:2])
 
 
