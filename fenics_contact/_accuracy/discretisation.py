@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TypeAlias
@@ -268,7 +269,7 @@ def discretisation_error(torn: TornSystem, displacement: np.ndarray) -> Discreti
     `State.conforming_displacement`. Where copies of a node differ, their mean is used.
     """
     scene, comm = torn.scene, torn.decomposition.comm
-    energies = {name: _Energies(torn, body) for name, body in scene.bodies.items()}
+    energies = {name: CellEnergies(torn, body) for name, body in scene.bodies.items()}
     parts = Parts(scene.bodies)
     for subdomain, [(u, g)] in recovered_fields(torn, displacement):
         parts.add(subdomain, energies[subdomain.mesh.body].by_cell(subdomain, u, g))
@@ -350,7 +351,7 @@ def error_products(torn: TornSystem, first: np.ndarray, second: np.ndarray) -> E
     Collective.
     """
     bodies = torn.scene.bodies
-    energies = {name: _Energies(torn, body) for name, body in bodies.items()}
+    energies = {name: CellEnergies(torn, body) for name, body in bodies.items()}
     known = list(recovered_fields(torn, first, second))
     squares = [[energies[part.mesh.body].by_cell(part, *field) for field in fields] for part, fields in known]
     sums = np.zeros(2) + sum(np.array([own.sum() for own in pair]) for pair in squares)
@@ -365,7 +366,7 @@ def error_products(torn: TornSystem, first: np.ndarray, second: np.ndarray) -> E
     return ErrorProducts(*(result.joined() for result in results))
 
 
-class _Energies:
+class CellEnergies:
     """Energies of differences of gradients in one body. Collective."""
 
     def __init__(self, torn: TornSystem, body: Body) -> None:
@@ -378,18 +379,32 @@ class _Energies:
             for material in body.materials
         ]
 
-    def by_cell(self, subdomain: Subdomain, displacement: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    def moved(self, body: Body) -> CellEnergies:
+        """Return those of the body where its nodes lie elsewhere."""
+        result = copy(self)
+        result._body = body
+        return result
+
+    def by_cell(
+        self,
+        subdomain: Subdomain,
+        displacement: np.ndarray,
+        gradient: np.ndarray,
+        among: np.ndarray | None = None,
+    ) -> np.ndarray:
         """Return ∫ C (g − ∇u) : (g − ∇u) over each cell of a subdomain, shape (n_cells,), [force · length].
 
         `displacement`: u at the nodes of its cells, shape (n_cells, nodes of a cell, dim), [length];
-        `gradient`: g there, shape (n_cells, nodes of a cell, dim, dim), dimensionless.
+        `gradient`: g there, shape (n_cells, nodes of a cell, dim, dim), dimensionless; `among`: marks of the
+        body's cells for which it is wanted, zero for others; None for all.
         """
         mesh, whole = subdomain.mesh, self._body.mesh
         nodes, kind = whole.cells[mesh.cells], self._body.material_of_cells[mesh.cells]
         result = np.zeros(len(nodes))
         # Where materials meet, a node has several recovered gradients: one material at a time.
-        for number in np.unique(kind):
-            cells, way = np.flatnonzero(kind == number), self._ways[number]
+        wanted = np.ones(len(nodes), dtype=bool) if among is None else among[mesh.cells]
+        for number in np.unique(kind[wanted]):
+            cells, way = np.flatnonzero(wanted & (kind == number)), self._ways[number]
             u, g = displacement[cells], gradient[cells]
             if isinstance(way, np.ndarray):
                 result[cells] = energy_of_difference(way, whole.cell_type, whole.points[nodes[cells]], u, g)

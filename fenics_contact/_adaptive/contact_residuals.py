@@ -22,23 +22,25 @@ from fenics_contact.shapes.simple import evaluate_shape
 
 
 @dataclass(frozen=True, eq=False)
-class _Places:
+class Places:
     """Points of quadrature on the true slave surface of a pair, on this rank's share of its facets.
 
     Attributes:
         points: Their coordinates, shape (n, dim), [length].
         normal: Outward unit normals of the slave, shape (n, dim).
         weight: The area that belongs to each, shape (n,), [length²] or [length].
+        height: How far the true surface lies above the facet, along the normal, shape (n,), [length].
         values: Weights of the surface's nodes in fields, shape (n, n_nodes).
     """
 
     points: np.ndarray
     normal: np.ndarray
     weight: np.ndarray
+    height: np.ndarray
     values: sp.csr_matrix
 
     @classmethod
-    def of(cls, surface: FacetedSurface, facets: np.ndarray, degree: int = 4) -> _Places:
+    def of(cls, surface: FacetedSurface, facets: np.ndarray, degree: int = 4) -> Places:
         """Return the points of a rule of a degree on some facets, (n_facets,)."""
         local, weights = quadrature(FACET_TYPES[surface.corners, surface.dim], degree)
         if surface.corners != 3:  # facets use coordinates from −1 to 1, as their shape functions do
@@ -55,12 +57,13 @@ class _Places:
         normal, _ = interpolated_normal(values, surface.normals[nodes])
         nothing, every = np.zeros(len(facet)), np.arange(len(facet))
         here = Projection(every, facet, local, nothing, normal, nothing, every[:0])
-        height = heights(surface, facet, local).value[:, None]
-        return cls(points + height * normal, normal, area, node_weights(surface, here))
+        height = heights(surface, facet, local).value
+        return cls(points + height[:, None] * normal, normal, area, height, node_weights(surface, here))
 
-    def part(self, chosen: np.ndarray) -> _Places:
+    def part(self, chosen: np.ndarray) -> Places:
         """Return some of the points."""
-        return _Places(self.points[chosen], self.normal[chosen], self.weight[chosen], self.values[chosen])
+        points, normal, values = self.points[chosen], self.normal[chosen], self.values[chosen]
+        return Places(points, normal, self.weight[chosen], self.height[chosen], values)
 
 
 class _Slave:
@@ -127,7 +130,7 @@ def _of_pair(
     # Where a pair gives other gaps than the measured ones, the difference is interpolated.
     missed = slave.at_nodes(residual - (points.gap - points.distance))
     own = nodal_mean_at(decomposition, field, slave.nodes)[:, : slave.surface.dim]
-    places = _Places.of(slave.surface, slave.facets(state, weight))
+    places = Places.of(slave.surface, slave.facets(state, weight))
     found, gap, normal, theirs = _opposite(state, pair, places)
     places = places.part(found)
     closing = places.values @ own - theirs[:, : slave.surface.dim]
@@ -136,7 +139,7 @@ def _of_pair(
 
 
 def _opposite(
-    state: LinearState, pair: ContactPair, places: _Places
+    state: LinearState, pair: ContactPair, places: Places
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return which points face the master, their gaps and normals, and how it moves there. Collective."""
     torn, scene, field = state.torn, state.torn.scene, state.conforming_displacement
@@ -179,7 +182,7 @@ def of_pressures(state: LinearState, partials: Partials) -> float:
             continue
         pressure = slave.at_nodes(state.contact.normal_force / points.area)
         by_force, every = slave.at_nodes(rows), np.ones(len(slave.nodes))
-        places = _Places.of(slave.surface, slave.facets(state, every), degree=2)
+        places = Places.of(slave.surface, slave.facets(state, every), degree=2)
         area = places.values.T @ places.weight
         spread = places.values.T @ (places.weight * (places.values @ pressure))
         total += 0.5 * float(by_force @ (area * pressure - spread))

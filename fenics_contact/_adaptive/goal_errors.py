@@ -7,10 +7,11 @@ With the adjoint w, ζ of the quantity J at a state, linearised with its statuse
 The first two are sums over cells of ∫ C (G u_h − ∇u_h) : (G w_h − ∇w_h), with gradients G recovered from both
 fields, and of half of the same of u_h alone for energies, J'' = a; of other quantities J'' is left out. The
 third is what contact misses between nodes, the last that a nodal force is a mean of the pressure around its
-node. What remains is of higher order where solutions are smooth, but for two things. The rim of a contact
-between curved bodies lies somewhere between two nodes, which adds an error of the same order that changes
-its sign from mesh to mesh. And at singular corners, where a recovered gradient misses a part of the error,
-the first term is about 0.6 of what it should be.
+node. Where the boundary is curved, facets miss a part of the body and its loads (`boundary_errors`). What
+remains is of higher order where solutions are smooth, but for two things. The rim of a contact between curved
+bodies lies somewhere between two nodes, which adds an error of the same order that changes its sign from mesh
+to mesh. And at singular corners, where a recovered gradient misses a part of the error, the first term is
+about 0.6 of what it should be.
 
 References:
     R. Becker, R. Rannacher, An optimal control approach to a posteriori error estimation in finite element
@@ -32,6 +33,7 @@ from fenics_contact._accuracy.discretisation import (
     error_products,
     of_every_cell,
 )
+from fenics_contact._adaptive.boundary_errors import EnergyShares, between_facets
 from fenics_contact._adaptive.contact_residuals import between_nodes, of_pressures
 from fenics_contact._adaptive.indicator import stress_indicator
 from fenics_contact._base.display import displayed
@@ -75,8 +77,9 @@ class GoalError:
         mesh: By the mesh; NaN if there is no adjoint, see ``without_adjoint``.
         uncancelled: The same if no parts of it cancelled, ≥ 0: where it is much larger than ``mesh``, that
             is uncertain.
-        geometry: By contact surfaces that are not measured between the true shapes, to first order: zero
-            where these are used, or all is flat. The rest of the boundary is not included.
+        geometry: By facets of linear cells on boundaries whose true shape is known, which enclose less or
+            more than the shape, and by contact surfaces that are not measured between the true shapes; to
+            first order. What the quantity itself depends on the shape counts for energies alone.
         solver: By the residuals of the solver, with friction at its own slip bounds, to first order.
         friction: By slip bounds of the solver that are not those of its normal forces, to first order.
         without_adjoint: Why there is no adjoint, in words; empty where there is one. All parts are NaN
@@ -200,7 +203,10 @@ def goal_error(
         others = between, of_pressures(linear, partials)
         bound = _sum(comm, shares) + float(np.abs(others).sum())
         _require_reached(state, objective, (value, bound), partials, 0.01 * tolerance)
-        geometry = _by_geometry(linear, adjoint)
+        boundary, curved = between_facets(linear, adjoint.displacement, energy_shares(smooth))
+        shares = _joined(shares, curved)
+        bound += _sum(comm, curved)
+        geometry = _by_geometry(linear, adjoint) + boundary
         friction = _by_friction(linear, partials, adjoint, linearised)
     return GoalError(
         value, inside + sum(others), bound, geometry, of_solver.correction, friction, "",
@@ -240,6 +246,25 @@ def energy_weight(objective: Objective) -> float:
     if isinstance(objective, WeightedSum):
         return float(sum(weight * energy_weight(each) for weight, each in objective.terms))
     return 0.0
+
+
+def energy_shares(objective: Objective) -> EnergyShares:
+    """Return how an objective depends on the shape at a given state, as far as that is known."""
+    if isinstance(objective, StrainEnergy | TotalPotential):
+        return EnergyShares(1.0, float(isinstance(objective, TotalPotential)))
+    if isinstance(objective, WeightedSum):
+        known = [(weight, energy_shares(each)) for weight, each in objective.terms]
+        sums = (sum(w * getattr(each, name) for w, each in known) for name in ("strain", "load"))
+        return EnergyShares(*sums)
+    return EnergyShares()
+
+
+def _joined(shares: OfCells, others: OfCells) -> OfCells:
+    """Return sums of shares; the others are of some bodies and all their cells, or none of them."""
+    added = {
+        name: (cells, shares[name][1] + values) for name, (cells, values) in others.items() if len(cells)
+    }
+    return {**shares, **added}
 
 
 def _in_cells(state: State, products: ErrorProducts, weight: float) -> tuple[float, OfCells]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,8 @@ from mpi4py import MPI
 
 from fenics_contact import (
     Body,
+    BodyForce,
+    BodyMesh,
     ContactPair,
     Coulomb,
     DistanceObstacle,
@@ -22,8 +25,10 @@ from fenics_contact import (
     solve_scene,
 )
 from fenics_contact._adaptive.goal_errors import goal_error
-from fenics_contact.design import ContactForces, LargestPressure
-from fenics_contact.gallery import block, box_lattice, rectangle, rectangle_lattice
+from fenics_contact._equilibrium.problem import ContactProblem
+from fenics_contact._scene.loads import Load
+from fenics_contact.design import ContactForces, LargestPressure, StrainEnergy
+from fenics_contact.gallery import block, box_lattice, half_disc, rectangle, rectangle_lattice
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import bisection_partition
 from fenics_contact.results import ContactResult
@@ -129,6 +134,27 @@ def under_a_ball() -> Scene:
     body = Body(box_lattice([line, line, -line[::-1]]), IsotropicElasticity(1000.0, 0.3))
     lifted = Support("body", "z0", (0.0, 0.0, 0.05))
     return Scene({"body": body}, [*planes, lifted], contacts=[pair])
+
+
+def hanging(n: int = 3, load: Load | None = None, part: Callable[..., BodyMesh] = half_disc) -> Scene:
+    """A disc or a ball of radius one, held at half its height: its volume lies below, between facets."""
+    mesh, dim = part(1.0, n, grading=1.0, symmetry="x"), 2 if part is half_disc else 3
+    material = RUBBER if dim == 2 else IsotropicElasticity(1000.0, 0.3)
+    side, top = ([0.0 if axis == held else None for axis in range(dim)] for held in (0, dim - 1))
+    supports = [Support("roll", "x0", tuple(side)), Support("roll", "top", tuple(top))]
+    if dim == 3:
+        supports.append(Support("roll", "top", (None, 0.0, None)))
+    weight = BodyForce("roll", (0.0,) * (dim - 1) + (-5.0,))
+    return Scene({"roll": Body(mesh, material)}, supports, [load or weight])
+
+
+def parts_of_hanging(comm: MPI.Comm) -> np.ndarray:
+    """The energy of a disc that hangs, its errors by mesh and geometry, and the shares of its cells."""
+    scene = hanging()
+    cuts = {"roll": bisection_partition(scene.bodies["roll"].mesh, 2)}
+    state = ContactProblem(scene, comm, partitions=cuts, tolerance=1e-10).solve(adjoint=True)
+    found = goal_error(state, StrainEnergy(), tolerance=1e-8)
+    return np.array([found.value, found.mesh, found.geometry, *found.by_cell("roll")])
 
 
 def parts_of(comm: MPI.Comm) -> np.ndarray:

@@ -16,6 +16,7 @@ from fenics_contact import (
     ContactPair,
     Coulomb,
     LinearState,
+    Pressure,
     RigidPlane,
     Scene,
     State,
@@ -30,6 +31,7 @@ from fenics_contact._adaptive.goal_errors import GoalError, goal_error
 from fenics_contact._adaptive.marking import bulk
 from fenics_contact._adaptive.refined_scene import refine_scene
 from fenics_contact._adaptive.resultants import PairForce, SupportForce
+from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact.design import (
     ContactArea,
     LargestPressure,
@@ -43,15 +45,17 @@ from fenics_contact.design import (
 from fenics_contact.design.adjoint import NOT_HELD, WeakChoice, linearise_face, solve_adjoint
 from fenics_contact.design.forms import ShapeForms
 from fenics_contact.errors import ConvergenceError, InvalidInputError
-from fenics_contact.gallery import block, rectangle
+from fenics_contact.gallery import block, hemisphere, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
 from fenics_contact.qp.krylov import Stop
 from tests.adaptive.goals import (
     curved,
+    hanging,
     on_floor,
     on_floor_in_space,
     on_waves,
     parts_of,
+    parts_of_hanging,
     punched,
     resultant,
     solved,
@@ -186,6 +190,71 @@ def test_gaps_of_facets_count_as_an_error_of_the_geometry() -> None:
     assert abs(change) > 1e-3 * abs(found.value)
     assert found.geometry == pytest.approx(change, rel=0.3)
     assert goal_error(true, force).geometry == pytest.approx(0.0, abs=0.1 * abs(change))
+
+
+def geometry_of(scene: Scene, objective: Objective) -> GoalError:
+    return goal_error(ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-9).solve(adjoint=True), objective)
+
+
+def weight_between_facets(scene: Scene, volume: float) -> float:
+    return 5.0 * (volume - scene.bodies["roll"].mesh.volume)
+
+
+def test_bodies_weigh_what_their_true_shapes_enclose() -> None:
+    reaction, disc = SupportForce("roll", "top", (0.0, 1.0)), hanging(3)
+    missing = weight_between_facets(disc, np.pi / 4.0)
+    assert missing > 0.01 * 5.0 * np.pi / 4.0
+    found = geometry_of(disc, reaction)
+    assert found.geometry == pytest.approx(missing, rel=0.03)
+    assert abs(found.mesh) < 1e-9
+    ball, lifted = hanging(3, part=hemisphere), SupportForce("roll", "top", (0.0, 0.0, 1.0))
+    missing = weight_between_facets(ball, np.pi / 3.0)
+    assert geometry_of(ball, lifted).geometry == pytest.approx(missing, rel=0.25)
+
+
+def test_pressure_on_an_arc_is_that_between_its_ends() -> None:
+    """Ends of a boundary do not move: the resultant depends on nothing else."""
+    scene = hanging(3)
+    loads = [Pressure("roll", surface, 2.0) for surface in scene.bodies["roll"].mesh.shapes]
+    clamped = [scene.supports[0], Support("roll", "top", (0.0, 0.0))]
+    reaction = SupportForce("roll", "top", (0.0, 1.0))
+    found = geometry_of(replace(scene, loads=loads, supports=clamped), reaction)
+    assert found.value == pytest.approx(-2.0)
+    assert abs(found.geometry) < 1e-6
+
+
+def test_tractions_act_on_arcs_not_on_chords() -> None:
+    pulled = hanging(3, Traction("roll", "contact", (0.0, -3.0)))
+    mesh = pulled.bodies["roll"].mesh
+    ends = mesh.points[mesh.surfaces["contact"]]
+    angles = np.ptp(np.arctan2(ends[..., 0], 1.0 - ends[..., 1]), axis=1)
+    missing = 3.0 * (angles.sum() - np.linalg.norm(np.diff(ends, axis=1)[:, 0], axis=1).sum())
+    found = geometry_of(pulled, SupportForce("roll", "top", (0.0, 1.0)))
+    assert missing > 1e-3
+    assert found.geometry == pytest.approx(missing, rel=0.1)
+
+
+@pytest.mark.parametrize("objective", [StrainEnergy(), TotalPotential()], ids=lambda x: type(x).__name__)
+def test_energies_know_what_their_true_shapes_store(objective: Objective) -> None:
+    """The same disc with and without its shape on meshes that are refined twice."""
+    scene, values = hanging(3), []
+    flat = {"roll": replace(scene.bodies["roll"], mesh=scene.bodies["roll"].mesh.with_shapes({}))}
+    for fine in (scene, replace(scene, bodies=flat)):
+        for _ in range(2):
+            fine = refine_scene(fine, {"roll": np.arange(fine.bodies["roll"].mesh.n_cells)}).scene
+        values.append(geometry_of(fine, objective).value)
+    found = geometry_of(scene, objective)
+    assert found.geometry == pytest.approx((values[0] - values[1]) / (1.0 - 1.0 / 16.0), rel=0.1)
+    share = found.by_cell("roll") - geometry_of(replace(scene, bodies=flat), objective).by_cell("roll")
+    mesh = scene.bodies["roll"].mesh
+    near = np.concatenate([mesh.surfaces[name].ravel() for name in mesh.shapes])
+    for layer in range(2):  # loads count for all cells around their nodes
+        touching = np.isin(mesh.cells, near).any(axis=1)
+        if layer == 0:
+            assert np.all(share[touching] > 0.0)
+        near = mesh.cells[touching].ravel()
+    assert not touching.all()
+    np.testing.assert_allclose(share[~touching], 0.0, atol=1e-6 * share.max())
 
 
 def test_what_equilibrium_alone_determines_has_no_error() -> None:
@@ -328,15 +397,18 @@ def test_estimates_are_closer_on_meshes_that_follow_them(cell: str) -> None:
 ON_RANKS = """
     import sys
     from mpi4py import MPI
-    from tests.adaptive.goals import parts_of
+    from tests.adaptive.goals import parts_of, parts_of_hanging
 
-    parts = parts_of(MPI.COMM_WORLD)
+    parts = [*parts_of(MPI.COMM_WORLD), *parts_of_hanging(MPI.COMM_WORLD)]
     if MPI.COMM_WORLD.rank == 0:
         sys.stdout.write(" ".join(f"{part:.12e}" for part in parts))
 """
 
 
 def test_one_and_two_ranks_estimate_alike(mpirun: Callable[..., str]) -> None:
-    one, two = parts_of(MPI.COMM_SELF), np.array(mpirun(ON_RANKS, 2).split(), dtype=float)
+    one, disc = parts_of(MPI.COMM_SELF), parts_of_hanging(MPI.COMM_SELF)
+    two = np.array(mpirun(ON_RANKS, 2).split(), dtype=float)
     assert one[1] != 0.0
-    np.testing.assert_allclose(two, one, rtol=1e-5, atol=1e-9 * one[2])
+    assert disc[2] != 0.0
+    np.testing.assert_allclose(two[: len(one)], one, rtol=1e-5, atol=1e-9 * one[2])
+    np.testing.assert_allclose(two[len(one) :], disc, rtol=1e-5, atol=1e-9 * disc[2])
