@@ -35,7 +35,7 @@ def test_a_file_finds_what_python_finds(found: tuple[AccurateResult, list[Level]
     same = solve_to(asking().scene, PeakPressure(), 0.3, MPI.COMM_SELF)
     assert result.reached
     assert tuple(levels) == result.levels
-    assert len(levels) > 3
+    assert len(levels) > 2
     assert [level.cells for level in levels] == [level.cells for level in same.levels]
     assert result.value == pytest.approx(same.value, rel=1e-9)
     assert result.state.scene.bodies["plate"].mesh.n_cells == levels[-1].cells > levels[0].cells == 50
