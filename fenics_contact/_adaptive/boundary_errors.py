@@ -9,6 +9,7 @@ import numpy as np
 
 from fenics_contact._accuracy.discretisation import CellEnergies, OfCells, Parts
 from fenics_contact._adaptive.contact_residuals import Places
+from fenics_contact._adaptive.way_to_images import way_to_images
 from fenics_contact._fem.loads import as_tractions
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.loads import Load, Traction
@@ -75,10 +76,13 @@ def _moved(scene: Scene, step: float) -> Scene | None:
     for name, body in scene.bodies.items():
         if body.mesh.order > 1 or isinstance(body, ToolBody):
             continue
-        curved = [surface_of(scene, Surface(name, each), "best") for each in body.mesh.shapes]
-        curved = [surface for surface in curved if surface.relief is not None]
-        if curved:
-            way = _way_outwards(body.mesh.n_nodes, curved)
+        if body.mesh.origin.chart is not None:
+            way = way_to_images(body.mesh.origin)
+        else:
+            curved = [surface_of(scene, Surface(name, each), "best") for each in body.mesh.shapes]
+            curved = [surface for surface in curved if surface.relief is not None]
+            way = _way_outwards(body.mesh.n_nodes, curved) if curved else np.zeros(1)
+        if way.any():
             moved[name] = replace(body, mesh=body.mesh.moved(body.mesh.points + step * way))
     return replace(scene, bodies={**scene.bodies, **moved}) if moved else None
 
