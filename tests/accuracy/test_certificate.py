@@ -251,7 +251,7 @@ def test_friction_that_falls_short_of_its_bound_does_less_work(
 @pytest.mark.parametrize(
     ("scene", "solver"),
     [
-        (gallery.two_blocks(Coulomb(2.5)), FaceNewton(tolerance=1e-3)),
+        (gallery.two_blocks(Coulomb(2.0)), FaceNewton(tolerance=1e-3)),
         (gallery.pressed_block(Coulomb(1.0), push=0.1), FixedPoint(FaceNewton(tolerance=1e-2))),
     ],
     ids=["one loop", "two loops"],
