@@ -24,9 +24,7 @@ def record() -> dict[str, Any]:
 def test_the_page_is_its_record_and_complete(record: dict[str, Any]) -> None:
     page = (HOME / "README.md").read_text()
     assert page == filled(page, tables(record))
-    measured = [case["case"] for case in record["cases"]]
-    assert measured == [name for name in CASES if name in measured]
-    assert set(CASES) - set(measured) == {"hub"}, "the page says which case has not been measured"
+    assert [case["case"] for case in record["cases"]] == list(CASES)
 
 
 @pytest.fixture(scope="module", params=["punch", "bracket"])
