@@ -156,11 +156,11 @@ def solve_to(
     hold most of it are halved, and so on until the estimate is small enough. On the first two meshes the
     error counts as unknown. While the spot of a contact is smaller than two cells or has but one facet's
     nodes, there is no estimate, and the cells there are halved: until two lie across its half width by
-    Hertz's theory, or once where that does not hold. The error is the sum
-    of two: the estimate of `goal_error`, and what estimates miss, by what values corrected by them have
-    changed by on the last meshes. One above the value itself counts as unknown. It is no bound: on random
-    scenes that were not used to choose the rule, with at most 1500 unknowns in the plane and 3000 in space,
-    the value on up to two further halvings of all cells, extrapolated, was within it in 119 of 128.
+    Hertz's theory, or once where that does not hold. The error is the sum of two: the estimate of
+    `goal_error`, and what estimates miss, by what values corrected by them have changed by on the last
+    meshes. One above the value itself counts as unknown. It is no bound: on random scenes that were not used
+    to choose the rule, with at most 1500 unknowns in the plane and 3000 in space, the value on up to two
+    further halvings of all cells, extrapolated, was within it in 119 of 128.
 
     Args:
         scene: The scene on a coarse mesh.

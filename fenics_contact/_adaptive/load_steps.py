@@ -71,7 +71,7 @@ def solve_steps_to(
         ConvergenceError: If the solver does not reach its tolerance on some mesh.
 
     Example:
-        >>> push = [LoadStep(f"{s}", supports=[roll(s)]) for s in (0.0, 0.5, 1.0)]  # doctest: +SKIP
+        >>> push = [LoadStep("pressed"), LoadStep("pulled", loads=[pull])]  # doctest: +SKIP
         >>> results = solve_steps_to(scene, push, "peak_pressure", 0.02, MPI.COMM_WORLD)  # doctest: +SKIP
     """
     with together(comm):

@@ -37,10 +37,11 @@ class CarriedState:
             kept theirs.
 
     Example:
-        >>> pressed = problem.solve(scene)  # doctest: +SKIP
-        >>> finer = refined(scene.bodies["block"].mesh, near_the_edge)  # doctest: +SKIP
-        >>> before = CarriedState(pressed, {"block": MeshTransfer(new=[finer])})  # doctest: +SKIP
-        >>> state = ContactProblem(pulled, comm).solve(before=before)  # on the finer mesh  # doctest: +SKIP
+        >>> finer = refined(scene.bodies["block"].mesh, [0, 1])  # doctest: +SKIP
+        >>> fine_body = replace(scene.bodies["block"], mesh=finer.mesh)  # doctest: +SKIP
+        >>> pulled = replace(scene, bodies={"block": fine_body}, loads=[pull])  # doctest: +SKIP
+        >>> before = CarriedState(state, {"block": MeshTransfer(new=[finer])})  # doctest: +SKIP
+        >>> after = ContactProblem(pulled, comm).solve(before=before)  # doctest: +SKIP
     """
 
     state: State

@@ -35,7 +35,7 @@ class MeshTransfer:
         >>> left, right = refined(plate, [0]), refined(plate, [7])
         >>> cells, positions = MeshTransfer((left,), (right,)).located(np.array([0]), np.array([[0.2, 0.7]]))
         >>> cells, positions.round(9)  # a child of the first cell, where that was halved
-        (array([2]), array([[0.4, 0.4]]))
+        (array([3]), array([[0.4, 0.4]]))
     """
 
     old: Sequence[Refinement] = ()
