@@ -48,8 +48,10 @@ class MeshTransfer:
 
         Of cells that meet in a point it is the one on the side of the point's own: sections may part them.
 
-        `cells`: of the new mesh, (n,); `positions`: reference coordinates in them, (n, dim); `inward`: part
-        of the way to the centre of its cell that a point is moved before cells are chosen.
+        Args:
+            cells: Cells of the new mesh, shape (n,).
+            positions: Reference coordinates in them, shape (n, dim).
+            inward: Part of the way to the centre of its cell that a point is moved before cells are chosen.
         """
         old, new = (list(one_by_one(chain)) for chain in (self.old, self.new))
         while old and new and old[0] is new[0]:  # both meshes have gone through it
