@@ -54,9 +54,11 @@ def refined_at_spots(
     for again in range(most):
         marked: dict[str, np.ndarray] = {}
         for spot in spots:
+            if again and spot.half_width == 0.0:
+                continue
             wide = spot.half_width / across if again else 0.0
             for name in spot.bodies:
-                cells = spot.near(found.scene.bodies[name].mesh, wide if wide or not again else np.inf)
+                cells = spot.near(found.scene.bodies[name].mesh, wide)
                 marked[name] = np.union1d(marked.get(name, cells), cells)
         marked = {name: cells for name, cells in marked.items() if len(cells)}
         if not marked:

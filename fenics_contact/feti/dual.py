@@ -472,7 +472,7 @@ class DualSystem:
         """Remove the unresisted motions from a torn displacement. Collective."""
         if self.unheld.shape[1] == 0:
             return displacement
-        weighted, gram = self._fit()
+        weighted, gram = self._fit
         sums = self.torn.numbering.comm.allreduce(weighted @ displacement)
         return displacement - self.unheld @ np.linalg.solve(gram, sums)
 
@@ -483,12 +483,13 @@ class DualSystem:
         """
         if self.unheld.shape[1] == 0:
             return gradient
-        weighted, gram = self._fit()
+        weighted, gram = self._fit
         sums = self.torn.numbering.comm.allreduce(self.unheld.T @ gradient)
         return gradient - weighted.T @ np.linalg.solve(gram, sums)
 
+    @cached_property
     def _fit(self) -> tuple[sp.csr_matrix, np.ndarray]:
-        """Return Rᵀ W of this rank and Rᵀ W R of all, W the volume of each node's share. Collective.
+        """Rᵀ W of this rank and Rᵀ W R of all, W the volume of each node's share. Collective on first use.
 
         R are the unresisted motions; (k, torn_size) and (k, k).
         """
