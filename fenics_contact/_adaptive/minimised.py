@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fenics_contact._adaptive.goal_errors import GoalError, goal_error, value_of
+from fenics_contact._adaptive.goal_errors import goal_error, value_of
 from fenics_contact._adaptive.levels import AccurateResult, Level, Limits, Way, followed, require_share
 from fenics_contact._adaptive.refined_designs import refined_design, refined_for_designs
 from fenics_contact._adaptive.refined_scene import SceneRefinement
@@ -252,9 +252,9 @@ class _Descent(Way):
         """Products with F of states, adjoints and estimates of the last mesh."""
         return self._earlier + products_of(self._state)
 
-    def _error(self, estimate: GoalError, *bounds: float) -> float:
+    def _error(self, missing: float, value: float, *bounds: float) -> float:
         """Return the error of the least objective: of its mesh, and what the method was allowed to leave."""
-        return super()._error(estimate, *bounds) + self._left
+        return super()._error(missing, value, *bounds) + self._left
 
     def _at_spots(self) -> SceneRefinement:
         """Return the reference shape on the next meshes where spots are smaller than their cells."""

@@ -4,7 +4,6 @@ import logging
 import re
 from dataclasses import replace
 from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -26,6 +25,7 @@ from fenics_contact import (
     quantity,
     theory,
 )
+from fenics_contact._adaptive.goal_errors import goal_error, value_of
 from fenics_contact._adaptive.levels import AccurateResult, Limits, Way, solve_to
 from fenics_contact._base.memory import available_memory
 from fenics_contact._base.progress import Kind
@@ -94,39 +94,50 @@ def test_less_than_three_meshes_tell_nothing_of_errors():
     assert found.reached
 
 
-def error_after(corrected, sums, value, total, doubted=(), without_adjoint=""):
+def error_after(corrected, sums, state_value, missing, *, without_adjoint=""):
     """The error of a value with its estimate, on the last of some meshes."""
     way = Way(TotalPotential(), 0.01, Limits(), MPI.COMM_SELF)
-    way._doubted, way._sums, way._corrected = list(doubted), sums, corrected
-    return way._error(SimpleNamespace(value=value, total=total, without_adjoint=without_adjoint))
+    way.without_adjoint, way._sums = without_adjoint, sums
+    way._corrected = [*corrected, state_value + missing]
+    return way._error(missing, state_value + missing)
 
 
 def test_errors_are_estimates_and_what_these_turned_out_to_miss():
     assert error_after([110.0, 110.0], [9.0, 3.0, 1.0], 109.0, 1.0) == pytest.approx(1.0), "all agree"
-    # The estimate now promises 108, and before 110 and 109: 0.6 of 1, 0.6 of that and so on, 1.5 in all.
-    assert error_after([110.0, 109.0], [9.0, 3.0, 1.0], 107.0, 1.0) == pytest.approx(2.5)
-    # A small change may be chance: the one before counts; estimates that fall to 3 / 4 leave three times it.
-    assert error_after([112.0, 110.0], [9.0, 4.0, 3.0], 111.0, -1.0) == pytest.approx(7.0)
+    # The estimate now promises 108, and before 109.5 and 109: half of 1, half of that and so on, 1 in all.
+    assert error_after([109.5, 109.0], [9.0, 3.0, 1.0], 107.0, 1.0) == pytest.approx(2.0)
+    # A small change may be chance: what is left of the one before counts.
+    assert error_after([113.0, 109.0], [9.0, 3.0, 1.0], 107.0, 1.0) == pytest.approx(3.0)
+    # Estimates that fall to 3 / 4 leave three times the change.
+    assert error_after([112.0, 112.0], [9.0, 4.0, 3.0], 111.0, -1.0) == pytest.approx(7.0)
 
 
 def test_without_adjoint_errors_go_on_to_fall_as_changes_do():
     def error(*values):
-        return error_after([*values[:2]], [9.0, 3.0, 1.0], values[2], np.nan, without_adjoint="none")
+        return error_after([*values[:2]], [9.0, 3.0, 1.0], values[2], 0.0, without_adjoint="none")
 
-    assert error(109.0, 103.0, 102.0) == pytest.approx(3.0), "a third of 6, and 0.6 / 0.4 of that"
+    assert error(109.0, 103.0, 102.0) == pytest.approx(3.0), "half of 6, and half of that, and so on"
     assert error(109.0, 105.0, 102.0) == pytest.approx(9.0), "what falls to 3 / 4 leaves three times 3"
 
 
 def test_meshes_that_were_refined_at_a_spot_alone_do_not_count():
     nan = float("nan")
     assert error_after([nan, nan], [nan, nan, 1.0], 109.0, 1.0) == np.inf
-    assert error_after([nan, 112.0], [nan, 2.0, 1.0], 109.0, 1.0) == pytest.approx(4.0)
-    assert error_after([110.0, 110.0], [2.0, 2.0, 1.0], 109.0, 1.0, doubted=[0]) == np.inf
+    assert error_after([nan, 112.0], [nan, 2.0, 1.0], 109.0, 1.0) == np.inf
+    assert error_after([113.0, 112.0], [3.0, 2.0, 1.0], 109.0, 1.0) == pytest.approx(3.0)
 
 
 def test_an_error_above_the_value_is_unknown():
-    assert error_after([1.6, 1.0], [1.0, 1.0, 0.5], 1.0, 0.0) == pytest.approx(0.9)
-    assert error_after([2.1, 1.0], [1.0, 1.0, 0.5], 1.0, 0.0) == np.inf
+    assert error_after([1.8, 1.2], [1.0, 1.0, 0.5], 1.0, 0.0) == pytest.approx(0.3)
+    assert error_after([9.0, 4.0], [1.0, 1.0, 0.5], 1.0, 0.0) == np.inf
+
+
+def test_the_quantity_is_corrected_by_its_estimate(peak):
+    last = peak.levels[-1]
+    assert peak.value == last.value
+    assert peak.value - last.state_value == pytest.approx(goal_error(peak.state, PeakPressure()).total)
+    assert last.state_value == value_of(peak.state, PeakPressure())
+    assert [level.value == level.state_value for level in peak.levels[:2]] == [True, False]
 
 
 def test_meshes_grow_by_a_factor_of_about_three():

@@ -208,9 +208,9 @@ def objects() -> dict[str, Any]:
         LargestStress("block"), Movement("block", "z1", (1, 0, 0)),
         StressNear("block", (0, 0, 0), 1.0), MovementNear("block", (0, 0, 0), 1.0, direction=(1, 0, 0)),
         Maximum((LargestPressure(),)), PeakPressure(), goal_error(state, StrainEnergy()),
-        AccurateResult(state, 1.0, 0.1, 0.01, False, "why", (Level(8, 81, 1.0, 0.1, 9, 0.1, np.nan),)),
+        AccurateResult(state, 1.0, 0.1, 0.01, False, "why", (Level(8, 81, 1.0, 0.1, 9, 0.1, np.nan, 1.1),)),
         AccurateDesign(
-            state, 1.0, 0.1, 0.01, False, "why", (Level(8, 81, 1.0, 0.1, 9, 0.1, np.nan),), (shape,),
+            state, 1.0, 0.1, 0.01, False, "why", (Level(8, 81, 1.0, 0.1, 9, 0.1, np.nan, 1.1),), (shape,),
             (minimize(bowl, np.ones(60)),),
         ),
         CarriedState(state, {"block": MeshTransfer()}),

@@ -56,7 +56,7 @@ def _ended(seed: int, state: State, words: list[str]) -> tuple[Outcome, str, flo
         found = solve_to(scene, wanted, ACCURACY, MPI.COMM_SELF, limits=limits)
         if not np.isfinite(found.error):
             return Outcome.REFUSED, f"{name}: {found.reason[:60]}", 0.0, 0
-        values = [found.value, *finer(found, wanted)]
+        values = [found.levels[-1].state_value, *finer(found, wanted)]
     except ConvergenceError as error:
         return Outcome.NOT_CONVERGED, str(error), 0.0, 0
     except FenicsContactError as error:
