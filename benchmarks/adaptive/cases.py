@@ -227,6 +227,6 @@ CASES = {
     "bracket": Case("L on a floor", bracket, {"potential": TotalPotential()}, 0.001, 40_000, 80_000, 100_000),
     "hub": Case(
         "Clamp hub", hub, {"closing of the jaw": Movement("hub", "head", (0.0, -1.0, 0.0))},
-        0.005, 100_000, 170_000, 120_000,
+        0.005, 100_000, 210_000, 120_000,
     ),
 }  # fmt: skip

@@ -71,7 +71,9 @@ def _row(case: dict[str, Any], quantity: str, aim: float) -> tuple[str, ...]:
     beyond = ">" if coarse is None else ""
     last = coarse or case["uniform"][quantity][-1]
     missed = "" if coarse else f" ({100 * errors(case, 'uniform', quantity)[-1]:.2g} %)"
-    ratios = [f"{beyond}{last[name] / fine[name]:.2g}" if fine else "" for name in ("seconds", "unknowns")]
+    ratios = [
+        beyond + _two_digits(last[name] / fine[name]) if fine else "" for name in ("seconds", "unknowns")
+    ]
     cost = (f"{fine['unknowns']}", f"{fine['seconds']:.2g}") if fine else ("not reached", "")
     orders = ["" if np.isnan(p := order(case, way, quantity)) else f"{p:.2f}" for way in LOOKS]
     title = CASES[case["case"]].title
@@ -79,6 +81,11 @@ def _row(case: dict[str, Any], quantity: str, aim: float) -> tuple[str, ...]:
         title, quantity, *cost, orders[0], f"{last['unknowns']}{missed}", f"{last['seconds']:.2g}", orders[1],
         *ratios,
     )  # fmt: skip
+
+
+def _two_digits(number: float) -> str:
+    """Return two significant digits without an exponent."""
+    return f"{float(f'{number:.2g}'):g}"
 
 
 def plot(path: Path, cases: list[dict[str, Any]]) -> None:
