@@ -162,7 +162,7 @@ import scipy.sparse as sp
 
 dual = feti.DualSystem(torn)
 K = sp.block_diag([part.stiffness for part in torn.subdomains], format="csr")
-R, G = dual.kernel, dual.problem.coarse.matrix.toarray()
+R, G = dual.kernel.tocsr(), dual.problem.coarse.matrix.toarray()
 force = K @ np.random.default_rng(1).standard_normal(K.shape[0])  # some force in equilibrium, K v
 left_over = np.linalg.norm(K @ dual.inverse(force) - force) / np.linalg.norm(force)
 print(f"‖K K⁺ K v − K v‖ / ‖K v‖ = {left_over:.1e}, ‖K R‖ / ‖K‖ = {abs(K @ R).max() / abs(K).max():.1e}")

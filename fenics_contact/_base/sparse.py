@@ -236,11 +236,14 @@ def sent(comm: MPI.Comm, receiver: np.ndarray, *columns: np.ndarray) -> tuple[np
 
     `receiver`: rank that receives each row, shape (n,); `columns`: shape (n,) each.
     """
-    order = np.argsort(receiver, kind="stable")
-    cuts = np.searchsorted(receiver[order], np.arange(1, comm.size))
-    outgoing = zip(*(np.split(column[order], cuts) for column in columns), strict=True)
-    incoming = comm.alltoall(list(outgoing))
-    return tuple(np.concatenate([part[i] for part in incoming]) for i in range(len(columns)))
+    if comm.size == 1:
+        return columns
+    order, counts = np.argsort(receiver, kind="stable"), np.bincount(receiver, minlength=comm.size)
+    comm.Alltoall(counts, coming := np.empty_like(counts))
+    received = tuple(np.empty(coming.sum(), dtype=column.dtype) for column in columns)
+    for column, into in zip(columns, received, strict=True):
+        comm.Alltoallv((column[order], counts), (into, coming))
+    return received
 
 
 Vector = npt.NDArray[np.float64]

@@ -29,8 +29,8 @@ from fenics_contact.feti.inverse import (
     LocalKind,
     TornInverse,
     dofs_inside,
-    kernel_matrix,
 )
+from fenics_contact.feti.kernel_basis import TornModes
 from fenics_contact.feti.subdomain import CachedMatrix, LocalOperator, Subdomain
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.kernels import rigid_body_modes
@@ -364,7 +364,7 @@ class TangentSystem(DualSystem):
         each = zip(self.torn.subdomains, self.inverse.tangents, strict=True)
         return {subdomain.mesh.number: operator for subdomain, operator in each}
 
-    def _kernel(self, comm: MPI.Comm) -> sp.csr_matrix:
+    def _kernel(self, comm: MPI.Comm) -> TornModes:
         shared = comm.allgather({n: (each.stiffness, each.softened) for n, each in self.operators.items()})
         blocks = {number: block for part in shared for number, block in part.items()}
         stiffnesses = [blocks[number][0] for number in sorted(blocks)]
@@ -373,14 +373,14 @@ class TangentSystem(DualSystem):
         offset = np.concatenate([[0], np.cumsum([len(block) for block in stiffnesses])])
         mine = offset[[part.mesh.number for part in self.torn.subdomains]]
         total, count = int(offset[-1]), self.torn.free.count
-        motions = kernel_matrix(self.torn.subdomains, total, mine)
+        motions = TornModes.of(self.torn.subdomains, mine, total)
         self.points = sp.csr_matrix((count, total))
         if count:  # free motions move nothing but the right sides of rows
             known = self.torn.free.stiffness
             own = sp.csr_matrix((count, count)) if known is None else sp.csr_matrix(known)
             self.points = sp.hstack([self.points, sp.identity(count)], format="csr")
             self.stiffness = sp.csr_matrix(sp.block_diag([self.stiffness, own]))
-            motions = sp.hstack([motions, sp.csr_matrix((motions.shape[0], count))], format="csr")
+            motions = motions.combined(sp.eye(total, total + count, format="csr"))
         return motions
 
     def _without_unheld(self, coarse: CoarseSpace) -> CoarseSpace:

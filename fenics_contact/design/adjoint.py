@@ -297,7 +297,7 @@ def solve_adjoint(
     entries = system.torn.numbering.to_owned(np.asarray(abs(system.torn.B).sum(axis=1)).ravel())
     by_multiplier = np.where(entries > 0.0, partials.by_multiplier, 0.0)
     right = linearised.moving.T @ (factor * (system.jump(flexed) - by_multiplier))
-    load = np.asarray(problem.comm.allreduce(system.kernel.T @ partials.by_displacement))
+    load = np.asarray(problem.comm.allreduce(system.kernel.resultants(partials.by_displacement)))
     if partials.by_motion is not None:
         load += system.points.T @ partials.by_motion
     # At a minimum of the energy without slip the adjoint multiplier is minus the multiplier itself.

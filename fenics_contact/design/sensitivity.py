@@ -93,7 +93,7 @@ def solve_deformed_adjoint(
     coupling = growth_of(face, linearised.growing, growth)
     by_multiplier = np.concatenate([partials.by_multiplier, np.zeros(exact.further.count)])
     right = system.jump(system.inverse(partials.by_displacement)) - by_multiplier
-    load = np.asarray(tangent.problem.comm.allreduce(system.kernel.T @ partials.by_displacement))
+    load = np.asarray(tangent.problem.comm.allreduce(system.kernel.resultants(partials.by_displacement)))
     found = tangent_adjoint(tangent, face, coupling, right, load, tolerance, max_iterations)
     if found is None:
         raise ConvergenceError(NOT_HELD)

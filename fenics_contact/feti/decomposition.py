@@ -647,11 +647,11 @@ class DualNumbering:
 
         Returns the owned rows, shape (n_owned, n_columns).
         """
-        shares = local.tocoo()
-        rank = self._owner[self.local_rows][shares.row]
-        row, column, value = sent(self.comm, rank, self.local_rows[shares.row], shares.col, shares.data)
-        shape = (len(self.owned), local.shape[1])
-        return sp.csr_matrix((value, (np.searchsorted(self.owned, row), column)), shape=shape)
+        own, shares = local[: len(self.owned)], local[len(self.owned) :].tocoo()
+        ghosts = self.ghosts[shares.row]
+        row, column, value = sent(self.comm, self._owner[ghosts], ghosts, shares.col, shares.data)
+        received = sp.csr_matrix((value, (np.searchsorted(self.owned, row), column)), shape=own.shape)
+        return (own + received).tocsr() if received.nnz else own
 
 
 class Sharing:

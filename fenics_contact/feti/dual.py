@@ -17,8 +17,8 @@ from fenics_contact._base.sparse import ROUNDING, scaled_columns, sweep
 from fenics_contact.errors import InfeasibleError, together
 from fenics_contact.feti.decomposition import DualNumbering
 from fenics_contact.feti.factor import Factor
-from fenics_contact.feti.inverse import Condensations, LocalKind, TornInverse, kernel_matrix
-from fenics_contact.feti.kernel_basis import whole_motions
+from fenics_contact.feti.inverse import Condensations, LocalKind, TornInverse
+from fenics_contact.feti.kernel_basis import TornModes, whole_motions
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.quality import node_volumes
 from fenics_contact.qp.coarse import CoarseSpace
@@ -60,7 +60,7 @@ class DirichletPreconditioner:
         self._inverse, self._numbering = inverse, numbering
         self._sprung: np.ndarray | None = None
         self._B = scaled_columns(B, compliance)
-        self._Bt = self._B.T.tocsr()
+        self._Bt = self._B.T  # shares its memory
         diagonal = numbering.to_owned(np.asarray(B.multiply(self._B).sum(axis=1)).ravel())
         self._equality = 1.0 / np.where(numbering.owned < n_gluing, diagonal, 1.0)
         self._contact = _ContactBlock.of_rows(B, self._B, numbering, n_gluing)
@@ -324,13 +324,13 @@ class DualSystem:
 
     inverse: TornInverse
     problem: DualProblem
-    kernel: sp.csr_matrix
+    kernel: TornModes
     unheld: sp.csr_matrix
     points: sp.csr_matrix
     _unheld_points: np.ndarray
     _bent: np.ndarray
     _B_interface: sp.csr_matrix
-    _Bt_interface: sp.csr_matrix
+    _Bt_interface: sp.csc_matrix
 
     def __init__(
         self,
@@ -352,7 +352,7 @@ class DualSystem:
         comm = torn.numbering.comm
         sweep(comm)
         self.torn, self.products = torn, 0
-        self._B, self._Bt = torn.B, torn.B.T.tocsr()
+        self._B, self._Bt = torn.B, torn.B.T  # shares its memory
         with timer.phase("factor"):
             known = None if previous is None else previous.inverse
             condensations = torn.decomposition.condensations
@@ -399,7 +399,7 @@ class DualSystem:
         torn, comm = self.torn, self.torn.numbering.comm
         # B has no other nonzero columns: products with F then need no vectors of the torn size.
         self._B_interface = torn.B[:, self.inverse.interface].tocsr()
-        self._Bt_interface = self._B_interface.T.tocsr()
+        self._Bt_interface = self._B_interface.T
         with timer.phase("coarse space"):
             self.kernel = self._kernel(comm)
             coarse = self._without_unheld(CoarseSpace(comm, self._coarse_columns(), self._resultants(comm)))
@@ -435,7 +435,7 @@ class DualSystem:
 
     def reach(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """Return abs(B) abs(u), the size of the displacements at each row, owned, [length]. Collective."""
-        moved = self.bent(multiplier) + self.kernel[self.inverse.interface] @ alpha
+        moved = self.bent(multiplier) + (self.kernel @ alpha)[self.inverse.interface]
         return self.torn.numbering.to_owned(abs(self._B_interface) @ np.abs(moved))
 
     def bent(self, multiplier: np.ndarray) -> np.ndarray:
@@ -531,19 +531,18 @@ class DualSystem:
         sewn = self.sewn(self.torn.right - self.jump(displacement))
         return self._at_rest(displacement + self.inverse.extend(sewn))
 
-    def _kernel(self, comm: MPI.Comm) -> sp.csr_matrix:
+    def _kernel(self, comm: MPI.Comm) -> TornModes:
         counts = np.zeros(self.torn.decomposition.tearing.n_subdomains, dtype=np.int64)
         for subdomain in self.torn.subdomains:
             counts[subdomain.mesh.number] = subdomain.kernel.shape[1]
         offset = np.concatenate([[0], np.cumsum(comm.allreduce(counts))])
         mine = offset[[subdomain.mesh.number for subdomain in self.torn.subdomains]]
-        own = kernel_matrix(self.torn.subdomains, int(offset[-1]), mine)
-        motions, count = (own @ whole_motions(self.torn, offset)).tocsr(), self.torn.free.count
-        self.points = sp.csr_matrix((count, motions.shape[1]))
+        own, count = TornModes.of(self.torn.subdomains, mine, int(offset[-1])), self.torn.free.count
+        whole, self.points = whole_motions(self.torn, offset), sp.csr_matrix((count, own.shape[1]))
         if count:  # the motions of points move nothing but the right sides of rows
             self.points = sp.hstack([self.points, sp.identity(count)], format="csr")
-            motions = sp.hstack([motions, sp.csr_matrix((motions.shape[0], count))], format="csr")
-        return motions
+            whole = sp.hstack([whole, sp.csr_matrix((whole.shape[0], count))], format="csr")
+        return own.combined(whole)
 
     def _without_unheld(self, coarse: CoarseSpace) -> CoarseSpace:
         """Remove the motions in the kernel of B from R, and their rows from G. Collective.
@@ -556,13 +555,14 @@ class DualSystem:
         # Each in terms of its own mode: then motions of bodies that are not connected share no entries.
         unfelt = unfelt @ np.linalg.inv(unfelt[order[:k]])
         unfelt[np.abs(unfelt) <= ROUNDING * np.abs(unfelt).max(initial=0.0)] = 0.0
-        self.unheld = (self.kernel @ sp.csr_matrix(unfelt)).tocsr()
+        self.unheld = self.kernel.combined(sp.csr_matrix(unfelt)).tocsr()
         self._unheld_points = self.points @ unfelt
         if k == 0:
             return coarse
         self._require_unloaded()
         remaining = np.sort(order[k:])
-        self.kernel, self.points = self.kernel[:, remaining], self.points[:, remaining]
+        self.kernel = replace(self.kernel, coefficients=self.kernel.coefficients[:, remaining])
+        self.points = self.points[:, remaining]
         return CoarseSpace(coarse.comm, coarse.matrix[remaining], coarse.load[remaining])
 
     def _require_unloaded(self, unbalanced: float = 1e-8) -> None:
@@ -584,7 +584,7 @@ class DualSystem:
 
     def _resultants(self, comm: MPI.Comm) -> np.ndarray:
         """Return e = Rᵀ f, replicated; rounding of balanced loads is set to zero."""
-        resultants = np.asarray(comm.allreduce(self.kernel.T @ self.torn.load))
+        resultants = np.asarray(comm.allreduce(self.kernel.resultants(self.torn.load)))
         resultants += self.points.T @ self.torn.free.load
         size = self._size(comm.allreduce(np.abs(self.torn.load).sum()))
         resultants[np.abs(resultants) <= ROUNDING * size] = 0.0
@@ -596,7 +596,7 @@ class DualSystem:
 
     def _coarse_columns(self) -> sp.csr_matrix:
         """Return this rank's owned columns of G = Rᵀ Bᵀ, shape (n_modes, n_owned)."""
-        columns = self.torn.numbering.sum_rows(self._B @ self.kernel).T.tocsr()
+        columns = self.torn.numbering.sum_rows(self.kernel.moved_by(self._B)).T.tocsr()
         if self.torn.free.count:
             columns = (columns - self.points.T @ self.torn.free.columns.T).tocsr()
         columns.data[np.abs(columns.data) <= ROUNDING * np.abs(columns.data).max(initial=0.0)] = 0.0

@@ -463,19 +463,3 @@ def _factored(
     if explicit:
         return ExplicitOperator(subdomain, interface, condensations)
     return ImplicitOperator(subdomain, interface)
-
-
-def kernel_matrix(
-    subdomains: Sequence[Subdomain], total_modes: int, mode_offset: np.ndarray
-) -> sp.csr_matrix:
-    """Return R of this rank, shape (torn_size, total_modes): only columns of its own subdomains are nonzero.
-
-    `total_modes`: number of kernel vectors of all subdomains of all ranks; `mode_offset`: first kernel vector
-    of each of this rank's subdomains.
-    """
-    blocks = sp.block_diag([subdomain.kernel for subdomain in subdomains], format="coo")
-    own = np.concatenate(
-        [start + np.arange(s.kernel.shape[1]) for s, start in zip(subdomains, mode_offset, strict=True)]
-    )
-    shape = (blocks.shape[0], total_modes)
-    return sp.csr_matrix((blocks.data, (blocks.row, own[blocks.col])), shape=shape)

@@ -7,6 +7,8 @@ is stiff and its support soft. As a separate basis vector it suffers no cancella
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +17,70 @@ import scipy.sparse as sp
 from fenics_contact.errors import together
 from fenics_contact.feti.subdomain import Subdomain, kernel_of_body
 from fenics_contact.feti.torn import TornSystem
+
+
+@dataclass(frozen=True, eq=False)
+class TornModes:
+    """R = diag(R_s) C on this rank's torn vectors: modes of its subdomains and which of them move together.
+
+    Only C is stored: as a sparse matrix R would need more memory than all rows of B and their products.
+
+    Attributes:
+        parts: R_s of each subdomain, shape (size, k_s) each, as it has them.
+        coefficients: C, shape (Σ k_s, n_modes).
+    """
+
+    parts: tuple[np.ndarray, ...]
+    coefficients: sp.csr_matrix
+
+    @classmethod
+    def of(cls, subdomains: Sequence[Subdomain], first: np.ndarray, total: int) -> TornModes:
+        """Take the modes of this rank's subdomains, numbered from ``first`` of each among ``total``."""
+        parts = tuple(subdomain.kernel for subdomain in subdomains)
+        modes = [start + np.arange(part.shape[1]) for part, start in zip(parts, first, strict=True)]
+        columns = np.concatenate(modes)
+        entries = np.ones(len(columns)), (np.arange(len(columns)), columns)
+        return cls(parts, sp.csr_matrix(entries, shape=(len(columns), total)))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Length of torn vectors, and number of modes of all ranks."""
+        return sum(map(len, self.parts)), self.coefficients.shape[1]
+
+    def __matmul__(self, alpha: np.ndarray) -> np.ndarray:
+        """Return R α for α of shape (n_modes,)."""
+        each = np.split(self.coefficients @ alpha, self._ends)
+        return np.concatenate([part @ own for part, own in zip(self.parts, each, strict=True)])
+
+    def resultants(self, force: np.ndarray) -> np.ndarray:
+        """Return Rᵀ f of a torn vector, this rank's share, shape (n_modes,)."""
+        each = np.split(force, np.cumsum([len(part) for part in self.parts])[:-1])
+        own = [part.T @ values for part, values in zip(self.parts, each, strict=True)]
+        return np.asarray(self.coefficients.T @ np.concatenate(own))
+
+    def moved_by(self, rows: sp.csr_matrix) -> sp.csr_matrix:
+        """Return rows · R for sparse rows on torn vectors, shape (n_rows, torn_size)."""
+        sizes, widths = np.array([part.shape for part in self.parts]).T
+        first = np.repeat(np.cumsum(widths) - widths, sizes)
+        counts = np.repeat(widths, sizes)
+        start = np.concatenate([[0], np.cumsum(counts)])
+        column = np.arange(start[-1]) - np.repeat(start[:-1] - first, counts)
+        values = np.concatenate([part.ravel() for part in self.parts])
+        modes = sp.csr_matrix((values, column.astype(np.int32), start), shape=(len(counts), widths.sum()))
+        return (rows @ modes) @ self.coefficients
+
+    def combined(self, coefficients: sp.csr_matrix) -> TornModes:
+        """Return the modes R A for a matrix A, shape (n_modes, n)."""
+        return replace(self, coefficients=(self.coefficients @ coefficients).tocsr())
+
+    def tocsr(self) -> sp.csr_matrix:
+        """Return R as a sparse matrix, shape (torn_size, n_modes)."""
+        return self.moved_by(sp.identity(self.shape[0], format="csr"))
+
+    @property
+    def _ends(self) -> np.ndarray:
+        """Where the modes of each subdomain but the last end."""
+        return np.cumsum([part.shape[1] for part in self.parts])[:-1]
 
 
 def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:

@@ -154,7 +154,7 @@ class CoarseSpace:
                 f"e must have shape ({self.matrix.shape[0]},) like the rows of G, got {self.load.shape}: "
                 "assemble both from the same list of floating subdomains"
             )
-        self._transposed = self.matrix.T.tocsr()
+        self._transposed = self.matrix.T  # shares its memory
         self._gram_matrix = gram
 
     @cached_property

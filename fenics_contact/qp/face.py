@@ -62,9 +62,9 @@ class Face:
         return face_basis(self.layout, self.closed, self.stick, self._turning, self.direction)
 
     @cached_property
-    def _transposed(self) -> sp.csr_matrix:
-        """Zᵀ."""
-        return self.restriction.T.tocsr()
+    def _transposed(self) -> sp.csc_matrix:
+        """Zᵀ, which shares the memory of Z."""
+        return self.restriction.T
 
     @property
     def n_face(self) -> int:

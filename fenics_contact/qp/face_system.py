@@ -138,9 +138,9 @@ class ObliqueProjector:
         return self.solve(self.moving.apply(v))
 
     @cached_property
-    def transposed(self) -> sp.csr_matrix:
-        """G_sᵀ, shape (n_face, m)."""
-        return self.tested.T.tocsr()
+    def transposed(self) -> sp.csc_matrix:
+        """G_sᵀ, which shares the memory of G_s, shape (n_face, m)."""
+        return self.tested.T
 
     def __call__(self, v: Vector) -> Vector:
         """Project. Collective."""
@@ -212,7 +212,9 @@ class CoupledSystem:
         that of the face; `least_damping`: lower bound on D, so that motions that only offsets resist stay
         distinct from unresisted ones.
         """
-        oblique = ObliqueProjector.build(sp.csr_matrix(coarse.matrix @ tested), coarse.restricted(moving))
+        on_face = tested is system.face.restriction
+        columns = system.coarse.matrix if on_face else sp.csr_matrix(coarse.matrix @ tested)
+        oblique = ObliqueProjector.build(columns, coarse.restricted(moving))
         if oblique is None:
             return None
         kappa = system.face.curvature if curvature is None else curvature
@@ -227,9 +229,9 @@ class CoupledSystem:
         return CoupledSystem.build(self.system, coarse, self.moving, self.tested, curvature=self.curvature)
 
     @cached_property
-    def _testing(self) -> sp.csr_matrix:
-        """Wᵀ."""
-        return self.tested.T.tocsr()
+    def _testing(self) -> sp.csc_matrix:
+        """Wᵀ, which shares the memory of W."""
+        return self.tested.T
 
     def operate(self, z: Vector, full: Vector) -> Vector:
         """Return (Wᵀ F Z + κ) z, shape (n_face,), where full = F Z z."""

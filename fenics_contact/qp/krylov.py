@@ -206,9 +206,10 @@ class Krylov:
 
     def combined(self, kind: int, length: int) -> Vector:
         """Return the sum of factor times vector, of one kind of vectors of a given length."""
-        if not self.kept:
-            return np.zeros(length)
-        return np.asarray(self.factors @ np.array([vectors[kind] for vectors in self.kept]))
+        total = np.zeros(length)
+        for factor, vectors in zip(self.factors, self.kept, strict=True):  # without a copy of them all
+            total += factor * vectors[kind]
+        return total
 
 
 def gmres(

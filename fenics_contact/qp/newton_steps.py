@@ -390,7 +390,8 @@ class FaceSteps:
         taken = Damped(after, 1.0)
         if not whole:
             taken = self.safeguards.shorten(self.problem, before, after, state.before)
-        faces = (face, *state.faces[: self.safeguards.longest_cycle])
+        # A copy without Z and what else was computed on the face: of earlier ones only the marks are of use.
+        faces = (replace(face), *state.faces[: self.safeguards.longest_cycle])
         following = FaceState(taken.point, step, faces, mismatch, before.residuals, taken.fraction)
         return following, self._record(number, taken, solved, changed)
 

@@ -182,7 +182,7 @@ def made(state: AnyState, multiplier: np.ndarray, way: np.ndarray) -> DualSoluti
     product = problem.operator(multiplier)
     mesh = state.torn.decomposition.meshes[0]
     alpha = state.dual_solution.alpha + np.linalg.lstsq(
-        state.dual.kernel.toarray(), np.tile(way, len(mesh.nodes)), rcond=None
+        state.dual.kernel.tocsr().toarray(), np.tile(way, len(mesh.nodes)), rcond=None
     )[0]  # fmt: skip
     residual = product - problem.rhs - problem.coarse.transpose(alpha)
     return replace(

@@ -73,6 +73,7 @@ def test_a_step_from_the_same_state_is_the_same_step() -> None:
         assert np.array_equal(state.iterate.multiplier, before)
         assert np.array_equal(state.step, rho)
         assert len(once.faces) == len(state.faces) + 1
+        assert not {"restriction", "fixed", "damping"} & set(vars(once.faces[0]))  # bytes of no further use
         state = once
     assert state.iterate.residuals.worst < 0.1
 
