@@ -493,6 +493,15 @@ class Bars:
         self._progress.stop()
 
 
+#: Phases that timers are in, the innermost last.
+_UNDER_WAY: list[str] = []
+
+
+def phase_under_way() -> str:
+    """Return the name of the innermost phase that a timer is in, "" outside of all."""
+    return _UNDER_WAY[-1] if _UNDER_WAY else ""
+
+
 class PhaseTimer:
     """Adds up wall time under names, and reports the phase under way (`fenics_contact.progress`).
 
@@ -512,8 +521,10 @@ class PhaseTimer:
     def phase(self, name: str) -> Iterator[None]:
         """Add the time spent in the block to phase ``name``, also when the block fails."""
         start = perf_counter()
+        _UNDER_WAY.append(name)
         try:
             with Task(name):
                 yield
         finally:
+            _UNDER_WAY.pop()
             self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start

@@ -262,6 +262,7 @@ class SharedFactor:
 
     Attributes:
         holders: Number of ranks that hold the factors.
+        flops: Floating point operations of one solution on this rank, refined once.
     """
 
     def __init__(
@@ -281,6 +282,7 @@ class SharedFactor:
         rows = self._own_rows(share)
         self._holds = comm.rank < self.holders
         self._subset = _first_ranks(comm, self.holders)
+        self.flops = 0
         if self._holds:
             self._factor(rows)
 
@@ -341,6 +343,8 @@ class SharedFactor:
         self._ksp.setUp()
         self._right, self._left = self._matrix.createVecs()
         self._residual, self._correction = self._matrix.createVecs()
+        entries = pc.getFactorMatrix().getInfo(PETSc.Mat.InfoType.LOCAL)["nz_used"]
+        self.flops = 4 * int(entries) + 2 * rows.nnz  # L and U, twice
         vectors = (self._right, self._left, self._residual, self._correction)
         dispose_with(self, pc, self._ksp, shifted, self._matrix, *vectors, comm=self._subset)
 

@@ -237,6 +237,11 @@ class _Updated:
         self._moved = factor.solve_many(columns)
         self._small = np.linalg.solve(np.eye(len(added)) + added @ (columns.T @ self._moved), added)
 
+    @property
+    def entries(self) -> int:
+        """Number of entries of the factor and of the columns."""
+        return self._factor.entries + self._moved.size
+
     def solve(self, right: np.ndarray, out: np.ndarray) -> None:
         """Write the solution for one right side, shape (n,), into ``out``."""
         self._factor.solve(right, out)

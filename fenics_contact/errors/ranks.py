@@ -79,7 +79,7 @@ def own_of(comm: MPI.Comm) -> MPI.Comm:
     Collective on ``comm`` on first use.
     """
     kind: Any = type(comm)
-    key = _key(kind)
+    key = _key(kind.__mro__[-2])  # of any kind: one with counts shares the duplicate of that without
     own: Any = comm.Get_attr(key)
     if own is None:
         own = _duplicated(comm)
@@ -244,6 +244,8 @@ def agree(
             raise error
         return
     own = own_of(comm)
+    if (ledger := getattr(comm, "ledger", None)) is not None:
+        ledger.add("meetings")
     places, stop = exchanged(own, error, where, wait)
     if FAILED in places:
         named = _named(stop, where) if users else stop

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.costs import count_messages, count_of_exchange, with_ledger
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._base.libraries import MPI, PETSc, free_communicators, start
 from fenics_contact._base.sparse import LAST_PLACES, dispose_with, expected_seconds, sent
@@ -465,6 +466,7 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
             ranks than subdomains, or scene or partitions differ from rank to rank.
     """
     start(comm)
+    comm = with_ledger(comm)
     if isinstance(partitions, Mapping):
         partitions = with_tool_parts(scene.bodies, partitions)
     check_same_input(comm, scene, partitions=partitions)
@@ -583,6 +585,7 @@ class DualNumbering:
         self.offset = int(starts[comm.rank])
         self.owned = order[starts[comm.rank] : starts[comm.rank + 1]]
         self.ghosts = touched[owner[touched] != comm.rank]
+        self._messages = count_of_exchange(comm, owner[self.ghosts])
         self._vector = PETSc.Vec().createGhost(
             self._position[self.ghosts].astype(PETSc.IntType), (len(self.owned), self.total), comm=comm
         )
@@ -616,6 +619,7 @@ class DualNumbering:
 
     def to_local(self, owned: np.ndarray) -> np.ndarray:
         """Return the local vector (owned, then ghosts) of an owned one. Collective."""
+        count_messages(self.comm, self._messages)
         self._vector.array_w[:] = owned
         self._vector.ghostUpdate(PETSc.InsertMode.INSERT, PETSc.ScatterMode.FORWARD)
         with self._vector.localForm() as local:
@@ -623,6 +627,7 @@ class DualNumbering:
 
     def to_owned(self, local: np.ndarray) -> np.ndarray:
         """Add up the shares of all ranks and return the owned part. Collective."""
+        count_messages(self.comm, self._messages)
         with self._vector.localForm() as form:
             form.array_w[:] = local
         self._vector.ghostUpdate(PETSc.InsertMode.ADD_VALUES, PETSc.ScatterMode.REVERSE)

@@ -11,6 +11,7 @@ import scipy.linalg
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from fenics_contact._base.costs import count_flops
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._base.sparse import ROUNDING, scaled_columns, sweep
@@ -95,6 +96,7 @@ class DirichletPreconditioner:
         self._contact = self._contact.softened(soft)
 
     def _apply(self, residual: np.ndarray, contact: _ContactBlock) -> np.ndarray:
+        count_flops(self._numbering.comm, self._inverse.flops[1] + 4 * self._B.nnz)
         result = self._force(self._inverse.stiffen(self._jump(residual, contact)), contact)
         return result if self._sprung is None else result + self._sprung * residual
 
@@ -220,6 +222,7 @@ class _ContactBlock:
             return x
         right, solution = self._gathered(x), np.empty(self._size)
         if self._size:
+            count_flops(self._numbering.comm, 4 * self._factor.entries)
             self._factor.solve(right, solution)
         result = x.copy()
         result[self._owned] = self._scattered(solution)
@@ -429,6 +432,7 @@ class DualSystem:
         """Return F λ = B K⁺ Bᵀ λ for an owned vector, with C λ on rows of springs. Collective."""
         self.products += 1
         numbering, give = self.torn.numbering, self.torn.give
+        count_flops(numbering.comm, self.inverse.flops[0] + 4 * self._B_interface.nnz)
         force = self._Bt_interface @ numbering.to_local(multiplier)
         product = numbering.to_owned(self._B_interface @ self.inverse.flex(force))
         return product if give is None else product + give * multiplier
@@ -440,6 +444,7 @@ class DualSystem:
 
     def bent(self, multiplier: np.ndarray) -> np.ndarray:
         """Return K⁺(f − Bᵀλ) on the interface, (n_interface,), [length]; one product. Collective."""
+        count_flops(self.torn.numbering.comm, self.inverse.flops[0] + 2 * self._B_interface.nnz)
         return self._bent - self.inverse.flex(self._Bt_interface @ self.torn.numbering.to_local(multiplier))
 
     def force(self, multiplier: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -46,6 +46,11 @@ class Factor:
         pc.setUp()
         if _solver() == "mumps":
             require_factored(pc.getFactorMatrix())
+
+    @cached_property
+    def entries(self) -> int:
+        """Number of entries of the factor."""
+        return int(self._factor.getInfo()["nz_used"])
 
     def solve(self, right: np.ndarray, out: np.ndarray) -> None:
         """Write the solution for one right side, shape (n,), into ``out``."""

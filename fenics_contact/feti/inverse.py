@@ -6,6 +6,7 @@ import ctypes
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from enum import Enum
+from functools import cached_property
 from itertools import pairwise
 from typing import Protocol
 
@@ -135,6 +136,11 @@ class ExplicitOperator:
         self._K_ib, self._K_bb = rows[:, interface].tocsr(), stiffness[interface][:, interface].tocsr()
         self._inner = Factor(rows[:, self._inside].tocsr()) if len(self._inside) else None
 
+    @property
+    def flops(self) -> tuple[int, int]:
+        """Floating point operations of `flex` and of `stiffen`."""
+        return 2 * self._size**2, 2 * self._size**2
+
     def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb times an interface force into ``displacement``."""
         blas.dspmv(self._size, 1.0, self._flexible, force, y=displacement, overwrite_y=1, lower=1)
@@ -222,6 +228,10 @@ def _packed_inverse(
 class Inverse(Protocol):
     """The inverse of a matrix of order n by its factors."""
 
+    @property
+    def entries(self) -> int:
+        """Number of entries of the factors, one triangle of each."""
+
     def solve(self, right: np.ndarray, out: np.ndarray) -> None:
         """Write the solution for one right side, shape (n,), into ``out``."""
 
@@ -250,6 +260,12 @@ class FactoredOperator:
         self._K_ib = self._K_bi.T  # shares its memory
         self._right, self._left = np.zeros(stiffness.shape[0]), np.zeros(stiffness.shape[0])
         self._inner = np.zeros(len(self._rest))
+
+    @property
+    def flops(self) -> tuple[int, int]:
+        """Floating point operations of `flex` and of `stiffen`: two for each entry and substitution."""
+        inside = 0 if self._inside is None else self._inside.entries
+        return 4 * self._factor.entries, 4 * inside + 2 * self._K_bb.nnz + 4 * self._K_bi.nnz
 
     def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write the inverse on the interface times a force there into ``displacement``."""
@@ -370,6 +386,13 @@ class TornInverse:
         self._parts = [slice(int(a), int(b)) for a, b in pairwise(starts)]
         shifted = [local + start for local, start in zip(self._local, self.offset[:-1], strict=True)]
         self.interface = np.concatenate(shifted) if shifted else np.zeros(0, dtype=np.int64)
+
+    @cached_property
+    def flops(self) -> tuple[int, int]:
+        """Floating point operations of `flex` and of `stiffen`."""
+        every = np.array([operator.flops for operator in self.operators], dtype=np.int64).reshape(-1, 2)
+        flexed, stiffened = every.sum(axis=0).tolist()
+        return flexed, stiffened
 
     def __call__(self, right: np.ndarray) -> np.ndarray:
         """Return K⁺ times a torn vector, shape (torn_size,)."""

@@ -34,6 +34,10 @@ class LocalOperator(Protocol):
     interface b.
     """
 
+    @property
+    def flops(self) -> tuple[int, int]:
+        """Floating point operations of `flex` and of `stiffen`."""
+
     def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb times an interface force, shape (n_b,), into ``displacement``."""
 

@@ -11,7 +11,7 @@ import json
 import platform
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import asdict, fields, is_dataclass
 from functools import partial
 from importlib import metadata
 from pathlib import Path
@@ -284,6 +284,7 @@ that move also with their ``rotation`` and ``translation`` in the state |
 that was read from a checkpoint is marked so and has no tolerance |
     | ``counts`` | torn unknowns, multipliers, F-products, steps; `State.counts` |
     | ``seconds`` | by phase |
+    | ``costs`` | of rank 0: ``set_up``, ``solve``, ``recovery``, each with the counts of a `PhaseCosts` |
     | ``residuals`` | ``gluing``, ``natural``, ``equilibrium``; recomputed, relative |
     | ``residual_history`` | ``method``, ``outer``, ``products``, ``natural``, ``gluing``, ``coarse``: \
 lists, one entry per step of the solver; empty for a state that was read from a checkpoint |
@@ -465,6 +466,7 @@ def _state_record(state: State, unheld: Sequence[UnheldMotion]) -> dict[str, Any
         },
         "counts": state.counts,
         "seconds": dict(state.seconds),
+        "costs": {name: asdict(getattr(state.costs, name)) for name in ("set_up", "solve", "recovery")},
         "residuals": {
             "gluing": readable(solution.gluing_residual),
             "natural": readable(solution.natural_residual),

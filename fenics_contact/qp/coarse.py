@@ -11,6 +11,7 @@ import scipy.linalg
 import scipy.sparse as sp
 from scipy.linalg import lapack
 
+from fenics_contact._base.costs import count_flops
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import SharedFactor
 from fenics_contact.errors import InvalidInputError
@@ -46,6 +47,11 @@ class GramInverse:
             self.rank = int(keep.sum())
             self.null_space = self._scale[:, None] * vectors[:, ~keep]
             self._root = vectors[:, keep] / np.sqrt(values[keep])
+
+    @property
+    def flops(self) -> int:
+        """Floating point operations of one solution on this rank."""
+        return 2 * len(self._scale) ** 2 if self._cholesky is not None else 4 * self._root.size
 
     def solve(self, right_side: Vector) -> Vector:
         """Apply the generalised inverse to an array of shape (m,) or (m, k)."""
@@ -88,6 +94,11 @@ class SparseGramInverse:
         self._null = self._null_vectors()
         self.rank = len(diagonal) - self._null.shape[1]
         self.null_space = scale[:, None] * self._null
+
+    @property
+    def flops(self) -> int:
+        """Floating point operations of one solution on this rank."""
+        return self._factor.flops + 8 * self._null.size
 
     def solve(self, right_side: Vector) -> Vector:
         """Apply the generalised inverse to a replicated array of shape (m,). Collective."""
@@ -188,6 +199,7 @@ class CoarseSpace:
 
     def solve(self, right_side: Vector) -> Vector:
         """Return (G G^T)^-1 times an array of shape (m,), replicated. Collective."""
+        count_flops(self.comm, self.gram.flops)
         return self.gram.solve(right_side)
 
     def coefficients(self, x: Vector) -> Vector:
@@ -250,6 +262,10 @@ def summed_if_small(comm: MPI.Comm, share: sp.csr_matrix) -> Gram:
 class SquareInverse(Protocol):
     """The inverse of a square matrix."""
 
+    @property
+    def flops(self) -> int:
+        """Floating point operations of one solution on this rank."""
+
     def solve(self, right_side: Vector) -> Vector:
         """Return the inverse times a replicated array of shape (m,). Collective."""
 
@@ -286,6 +302,11 @@ class DenseSquareInverse:
         norm = np.abs(scaled).sum(axis=0).max()
         self.condition = 0.0 if failed or norm == 0.0 else float(lapack.dgecon(lu, norm)[0])
         self._factor = (lu, pivots)
+
+    @property
+    def flops(self) -> int:
+        """Floating point operations of one solution."""
+        return 2 * len(self._scale) ** 2
 
     def solve(self, right_side: Vector) -> Vector:
         """Return the inverse times a replicated array of shape (m,)."""

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._base.costs import count_flops
 from fenics_contact._base.libraries import MPI
 from fenics_contact.qp.coarse import CoarseSpace, SquareInverse, gram_matrix, invert_square
 from fenics_contact.qp.face import Face
@@ -131,6 +132,7 @@ class ObliqueProjector:
 
     def solve(self, resultant: Vector) -> Vector:
         """Return (G_u G_sᵀ)⁻¹ times a replicated array of shape (m,). Collective."""
+        count_flops(self.moving.comm, self.inverse.flops)
         return self.inverse.solve(resultant)
 
     def coefficients(self, v: Vector) -> Vector:

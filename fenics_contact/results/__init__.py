@@ -3,6 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from fenics_contact._base.costs import Costs, PhaseCosts
 from fenics_contact.qp.fixed_point import Damping
 from fenics_contact.results.contact import ContactResult
 from fenics_contact.results.fields import GatheredFields
@@ -20,11 +21,13 @@ __all__ = [
     "Balance",
     "BalancedTolerance",
     "ContactResult",
+    "Costs",
     "Damping",
     "DiscretisationError",
     "Energies",
     "GatheredFields",
     "PairResultants",
+    "PhaseCosts",
     "Preloads",
     "Resultant",
     "Resultants",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from fenics_contact._base.checks import GivenVector
+from fenics_contact._base.costs import Costs, costs_of
 from fenics_contact._base.display import counted, displayed, in_lines
 from fenics_contact._base.libraries import MPI
 from fenics_contact._fem.forms import temperature_of
@@ -584,6 +585,19 @@ class State(ABC):
         for name in meshes:
             blocks[name] = turned_around(blocks[name], revolved)
         return blocks
+
+    @property
+    def costs(self) -> Costs:
+        """Messages, reductions, copied tables and operations of this rank so far, by phase.
+
+        Those of all work on the subdomains of this state, whichever state it was for. A model of time on
+        other machines and more ranks is made of them.
+
+        Example:
+            >>> print(state.costs)  # doctest: +SKIP
+            >>> sum(comm.allgather(state.costs.total.message_bytes))  # of all ranks  # doctest: +SKIP
+        """
+        return costs_of(self.torn.decomposition.comm)
 
     @property
     def counts(self) -> dict[str, int]:

@@ -167,6 +167,7 @@ def objects() -> dict[str, Any]:
     roots = [
         shape.function(TotalPotential()),
         shape, point, state, scene, scene.plan(), state.estimate_errors(), partials,
+        state.costs, state.costs.total,
         state.gather_fields("block"), state.balance(), state.resultants(), find_sites(state.torn),
         solve_adjoint(state, partials, linearise_face(state, WeakChoice.RELEASED)),
         certify(state.dual, state.dual_solution), solver_errors(state.system, state.solution),

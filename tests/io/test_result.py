@@ -93,6 +93,7 @@ def test_energies_residuals_and_contact_are_the_states(tmp_path: Path) -> None:
     assert found["solver"]["tolerance"] == 1e-6
     assert found["solver"]["methods"] == ["face Newton"]
     assert sum(found["seconds"].values()) > 0.0
+    assert found["costs"]["solve"]["flops"] == state.costs.solve.flops > 0
     (pair,) = found["contact"]
     assert [pair[status.name.lower()] for status in Status] == [state.contact.count(s) for s in Status]
     assert pair["peak_pressure"] == state.contact.pressure.max() > 0.0
