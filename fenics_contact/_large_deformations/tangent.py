@@ -311,7 +311,7 @@ class TangentInverse(TornInverse):
     ) -> None:
         """Factor the tangents; ``earlier`` has operators of an earlier shape by number of subdomain."""
         self._earlier = earlier
-        super().__init__(torn.subdomains, torn.B, condensations, kind=LocalKind.IMPLICIT)
+        super().__init__(torn.subdomains, torn.B, condensations, kind=LocalKind.IMPLICIT, shared=False)
 
     def _factor(
         self, subdomain: Subdomain, interface: np.ndarray, condensations: Condensations

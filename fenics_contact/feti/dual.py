@@ -342,6 +342,7 @@ class DualSystem:
         *,
         kind: LocalKind = LocalKind.AUTOMATIC,
         previous: DualSystem | None = None,
+        shared: bool = True,
     ) -> None:
         """Factor the subdomains and assemble d, G, e. Collective.
 
@@ -350,11 +351,12 @@ class DualSystem:
             timer: Collects the wall time.
             kind: How the subdomains are stored; the cost model chooses by default.
             previous: System of another geometry; the factors of unchanged subdomains are reused.
+            shared: Whether subdomains of a rank that are alike share factors.
         """
         timer = timer or PhaseTimer()
         comm = torn.numbering.comm
         sweep(comm)
-        self.torn, self.products = torn, 0
+        self.torn, self.products, self._shared = torn, 0, shared
         self._B, self._Bt = torn.B, torn.B.T  # shares its memory
         with timer.phase("factor"):
             known = None if previous is None else previous.inverse
@@ -374,12 +376,14 @@ class DualSystem:
         self, torn: TornSystem, condensations: Condensations, kind: LocalKind, known: TornInverse | None
     ) -> TornInverse:
         """Factor the subdomains."""
-        return TornInverse(torn.subdomains, torn.B, condensations, kind=kind, previous=known)
+        return TornInverse(
+            torn.subdomains, torn.B, condensations, kind=kind, previous=known, shared=self._shared
+        )
 
     def _is_that_of(self, previous: DualSystem) -> bool:
         """Return whether F and G are those of an earlier system. Collective."""
         mine, other = self.torn.free.columns, previous.torn.free.columns
-        differs = self.torn.B is not previous.torn.B or self.inverse.factored > 0
+        differs = self.torn.B is not previous.torn.B or self.inverse.changed
         differs = differs or mine.shape != other.shape or bool(abs(mine - other).sum() > 0.0)
         return not self.torn.numbering.comm.allreduce(int(differs))
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from enum import Enum
 from functools import cached_property
 from itertools import pairwise
-from typing import Protocol
+from typing import Protocol, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,7 +17,9 @@ from scipy.linalg import blas, lapack
 from fenics_contact._base.libraries import PETSc
 from fenics_contact._base.sparse import dispose_with, prefers_explicit
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.alike import Kind, Kinds, Motion
 from fenics_contact.feti.factor import Factor, petsc_call, regularised, symmetric_matrix
+from fenics_contact.feti.moved import Batch, MovedInterface, MovedOperator, SharedOperator
 from fenics_contact.feti.subdomain import LocalOperator, Subdomain, interface_dofs
 
 #: Number of cached symbolic factorisations. Each also holds the values of its last matrix: a few MB.
@@ -112,6 +114,8 @@ class Condensations:
 class ExplicitOperator:
     """(K⁺)_bb and S as packed triangles; S, used only for preconditioning, in single precision.
 
+    Where many subdomains are alike, as whole matrices: one product then reads them once for all.
+
     With the trace Q of the kernel on the interface, orthonormal, S + ρ Q Qᵀ is positive definite, and
 
         K⁺ = T diag(K_ii⁻¹, (S + ρ Q Qᵀ)⁻¹) Tᵀ,   T = [I, −K_ii⁻¹ K_ib; 0, I],
@@ -143,7 +147,30 @@ class ExplicitOperator:
 
     def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb times an interface force into ``displacement``."""
-        blas.dspmv(self._size, 1.0, self._flexible, force, y=displacement, overwrite_y=1, lower=1)
+        if self._flexible.ndim == 2:
+            displacement[:] = self.flex_all(force[None])[0]
+        else:
+            blas.dspmv(self._size, 1.0, self._flexible, force, y=displacement, overwrite_y=1, lower=1)
+
+    def share(self) -> None:
+        """Store whole matrices from now on."""
+        if self._flexible.ndim == 1:
+            self._flexible = _whole(lapack.dtpttr(self._size, self._flexible, uplo="L")[0])
+            self._stiff = _whole(lapack.stpttr(self._size, self._stiff, uplo="L")[0])
+
+    def flex_all(self, forces: np.ndarray) -> np.ndarray:
+        """Return (K⁺)_bb times interface forces of several subdomains alike, the rows, shape (k, n_b)."""
+        return np.asarray(forces @ self._flexible)
+
+    def stiffen_all(self, displacements: np.ndarray) -> np.ndarray:
+        """Return S, rounded to single precision, times interface displacements, the rows, shape (k, n_b)."""
+        size = np.abs(displacements).max(axis=1, initial=0.0)
+        usual = (size > 0.0) & np.isfinite(size)
+        scale = np.where(usual, size, 1.0)[:, None]
+        scaled = np.where(usual[:, None], displacements / scale, 0.0).astype(np.float32)
+        forces = (scaled @ self._stiff) * (self._unit * scale)
+        forces[~usual] = size[~usual, None]
+        return np.asarray(forces)
 
     def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
         """Write S, rounded to single precision, times an interface displacement into ``force``.
@@ -151,6 +178,9 @@ class ExplicitOperator:
         The range of single precision suffices neither for all units nor for diverging iterates: both factors
         are scaled.
         """
+        if self._stiff.ndim == 2:
+            force[:] = self.stiffen_all(displacement[None])[0]
+            return
         size = float(np.abs(displacement).max(initial=0.0))
         if size == 0.0 or not np.isfinite(size):
             force[:] = size
@@ -187,8 +217,11 @@ class ExplicitOperator:
         starts = np.repeat(np.repeat(rows.indptr[:-1], counts), pairs)
         second = starts + np.arange(len(first)) - np.repeat(np.cumsum(pairs) - pairs, pairs)
         i, j = rows.indices[first].astype(np.int64), rows.indices[second].astype(np.int64)
-        low, high = np.minimum(i, j), np.maximum(i, j)
-        entries = self._flexible[high + low * (2 * self._size - low - 1) // 2]
+        if self._flexible.ndim == 2:
+            entries = self._flexible[i, j]
+        else:
+            low, high = np.minimum(i, j), np.maximum(i, j)
+            entries = self._flexible[high + low * (2 * self._size - low - 1) // 2]
         row = np.repeat(np.arange(rows.shape[0]), counts)[first]
         return np.bincount(row, rows.data[first] * rows.data[second] * entries, minlength=rows.shape[0])
 
@@ -198,6 +231,13 @@ class ExplicitOperator:
         if self._inner is not None and right.any():
             self._inner.solve(right, solution)
         return solution
+
+
+def _whole(lower: np.ndarray) -> np.ndarray:
+    """Return the symmetric matrix of a lower triangle, whose other entries are zero."""
+    whole = lower + lower.T
+    np.fill_diagonal(whole, lower.diagonal())
+    return np.asarray(whole)
 
 
 def _packed_inverse(
@@ -296,6 +336,22 @@ class FactoredOperator:
         whole[self._rest] = -self._inner
         return whole, force
 
+    def share(self) -> None:
+        """Factors are stored the same way for any number of subdomains."""
+
+    def flex_all(self, forces: np.ndarray) -> np.ndarray:
+        """Return the inverse times interface forces of several subdomains alike, the rows, shape (k, n_b)."""
+        right = np.zeros((len(self._right), len(forces)), order="F")
+        right[self._interface] = forces.T
+        return np.asarray(self._factor.solve_many(right)[self._interface].T)
+
+    def stiffen_all(self, displacements: np.ndarray) -> np.ndarray:
+        """Return the Schur complement times several interface displacements, the rows, shape (k, n_b)."""
+        force, pulled = self._forces(displacements.T)
+        if self._inside is not None:
+            force -= self._forces_from_inside(self._inside.solve_many(pulled))
+        return np.asarray(force.T)
+
     def invert(self, right: np.ndarray) -> np.ndarray:
         """Return the inverse times a vector, shape (n,)."""
         solution = np.empty_like(right)
@@ -346,12 +402,16 @@ class LocalKind(Enum):
 class TornInverse:
     """K⁺ of this rank's subdomains and their operators on the interface, one after the other.
 
-    Vectors on the interface hold the interface dofs of all subdomains in their order.
+    Vectors on the interface hold the interface dofs of all subdomains in their order. Subdomains that are
+    alike have one operator, that of the first of their kind.
 
     Attributes:
         offset: First dof of each subdomain in the torn vector, and the total, shape (n + 1,).
         interface: Interface dofs in the torn vector, shape (n_interface,).
-        factored: Number of newly factored ones; the others are reused.
+        operators: Those of the subdomains.
+        factored: Number of newly factored kinds; the others are reused.
+        changed: Whether any subdomain has another matrix or interface than in the previous one.
+        kinds: Of its subdomains, in the order of their first ones.
     """
 
     def __init__(
@@ -362,30 +422,81 @@ class TornInverse:
         *,
         kind: LocalKind = LocalKind.AUTOMATIC,
         previous: TornInverse | None = None,
+        shared: bool = True,
     ) -> None:
         """Factor the subdomains.
 
-        `B`: this rank's part of B, shape (n_local_rows, torn_size).
+        `B`: this rank's part of B, shape (n_local_rows, torn_size); `shared`: whether those that are alike
+        share factors.
         """
         self.offset = np.cumsum([0] + [subdomain.mesh.size for subdomain in subdomains])
         self._subdomains, self._kind = tuple(subdomains), kind
         touched = np.zeros(self.offset[-1], dtype=bool)
         touched[B.indices] = True
-        self.operators: list[LocalOperator] = []
-        self._local: list[np.ndarray] = []
-        self.factored = 0
-        for index, subdomain in enumerate(subdomains):
-            marks = touched[self.offset[index] : self.offset[index + 1]]
-            local = interface_dofs(marks, subdomain.kernel, subdomain.points)
-            known = None if previous is None else previous._operator_of(index, subdomain, local, kind)
-            self.factored += known is None
-            self.operators.append(known or self._factor(subdomain, local, condensations))
-            subdomain.matrix.forget()
-            self._local.append(local)
+        self._local = [
+            interface_dofs(touched[start:stop], subdomain.kernel, subdomain.points)
+            for subdomain, (start, stop) in zip(subdomains, pairwise(self.offset), strict=True)
+        ]
         starts = np.cumsum([0] + [len(local) for local in self._local])
         self._parts = [slice(int(a), int(b)) for a, b in pairwise(starts)]
         shifted = [local + start for local, start in zip(self._local, self.offset[:-1], strict=True)]
         self.interface = np.concatenate(shifted) if shifted else np.zeros(0, dtype=np.int64)
+        known = [None if previous is None else previous._known(i, self) for i in range(len(self._local))]
+        self.changed = None in known
+        self._sort(known, shared)
+        self.factored = 0
+        for each in self.kinds:
+            if each.operator is None:
+                each.operator = self._factor(each.subdomain, each.interface, condensations)
+                self.factored += 1
+            each.subdomain.matrix.forget()
+        self._operate()
+
+    def _known(self, index: int, other: TornInverse) -> tuple[Kind, Motion | None] | None:
+        """Return kind and motion of a subdomain with the same matrix and interface in another inverse."""
+        same = self._subdomains[index].matrix is other._subdomains[index].matrix and self._kind is other._kind
+        same = same and np.array_equal(self._local[index], other._local[index])
+        return self._members[index] if same else None
+
+    def _sort(self, known: Sequence[tuple[Kind, Motion | None] | None], shared: bool) -> None:
+        """Find the kind of each subdomain, and how it lies on the first one of its kind."""
+        kinds = Kinds()
+        for kind in dict.fromkeys(each[0] for each in known if each is not None):
+            kinds.add(kind)  # whatever others change to, these stay
+        self._members: list[tuple[Kind, Motion | None]] = []
+        for member, subdomain, local in zip(known, self._subdomains, self._local, strict=True):
+            if member is None:
+                given = Kind(subdomain, local)
+                member = kinds.place(given) if shared else (kinds.add(given), None)
+            self._members.append(member)
+        kinds.forget()
+        self.kinds = kinds.all
+        firsts = {id(each.subdomain) for each in self.kinds}
+        for subdomain in self._subdomains:
+            if id(subdomain) not in firsts:
+                subdomain.matrix.forget()
+
+    def _operate(self) -> None:
+        """Make the operators of the subdomains, and the batches of those that are applied at once."""
+        self.operators: list[LocalOperator] = []
+        batches: dict[Kind, list[tuple[int, MovedInterface | None]]] = {kind: [] for kind in self.kinds}
+        for (kind, motion), local, part in zip(self._members, self._local, self._parts, strict=True):
+            operator, moved = factored(kind), None
+            if motion is not None:
+                operator = MovedOperator(operator, motion, local, kind.interface)
+                moved = operator.interface
+            self.operators.append(operator)
+            batches[kind].append((part.start, moved))
+        self._alone: list[tuple[LocalOperator, slice]] = []
+        self._batches: list[tuple[SharedOperator, Batch]] = []
+        for kind, members in batches.items():
+            size, (start, moved) = len(kind.interface), members[0]
+            if len(members) == 1 and moved is None:
+                self._alone.append((factored(kind), slice(start, start + size)))
+            else:
+                shared = cast(SharedOperator, kind.operator)
+                shared.share()
+                self._batches.append((shared, Batch(members, size)))
 
     @cached_property
     def flops(self) -> tuple[int, int]:
@@ -404,11 +515,11 @@ class TornInverse:
 
     def flex(self, force: np.ndarray) -> np.ndarray:
         """Return (K⁺)_bb times an interface force, shape (n_interface,)."""
-        return self._each(lambda operator: operator.flex, force)
+        return self._each(lambda one: one.flex, lambda all_: all_.flex_all, force)
 
     def stiffen(self, displacement: np.ndarray) -> np.ndarray:
         """Return S times an interface displacement, shape (n_interface,)."""
-        return self._each(lambda operator: operator.stiffen, displacement)
+        return self._each(lambda one: one.stiffen, lambda all_: all_.stiffen_all, displacement)
 
     def energy(self, displacement: np.ndarray) -> tuple[float, np.ndarray]:
         """Return wᵀ S w of this rank and S w, shape (n_interface,), both in double precision.
@@ -461,19 +572,21 @@ class TornInverse:
     def _each(
         self,
         method: Callable[[LocalOperator], Callable[[np.ndarray, np.ndarray], None]],
+        at_once: Callable[[SharedOperator], Callable[[np.ndarray], np.ndarray]],
         given: np.ndarray,
     ) -> np.ndarray:
         result = np.empty_like(given)
-        for operator, part in zip(self.operators, self._parts, strict=True):
+        for operator, part in self._alone:
             method(operator)(given[part], result[part])
+        for shared, batch in self._batches:
+            batch.scatter(at_once(shared)(batch.gather(given)), result)
         return result
 
-    def _operator_of(
-        self, index: int, subdomain: Subdomain, interface: np.ndarray, kind: LocalKind
-    ) -> LocalOperator | None:
-        """Return the operator of a subdomain if its matrix and interface are the same as here."""
-        same = self._subdomains[index].matrix is subdomain.matrix and self._kind is kind
-        return self.operators[index] if same and np.array_equal(self._local[index], interface) else None
+
+def factored(kind: Kind) -> LocalOperator:
+    """Return the operator of a kind that has one."""
+    assert kind.operator is not None
+    return kind.operator
 
 
 def _factored(

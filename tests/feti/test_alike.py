@@ -1,0 +1,262 @@
+"""Subdomains that are alike up to a rigid motion share factors, others do not, and answers stay the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy.sparse import csr_matrix
+from scipy.spatial.transform import Rotation
+
+from fenics_contact import (
+    Body,
+    BodyMesh,
+    ContactPair,
+    ContactProblem,
+    Coulomb,
+    RigidPlane,
+    Scene,
+    Support,
+    Surface,
+    Traction,
+    box_partition,
+    solve_scene,
+)
+from fenics_contact.feti import DualSystem, build_torn_system, decompose
+from fenics_contact.feti.alike import Kind, Kinds
+from fenics_contact.feti.inverse import LocalKind, TornInverse
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, OrthotropicElasticity, PlaneStrain
+from fenics_contact.qp import FaceNewton
+from tests.feti.scenes import STEEL, skewed
+
+TURN = Rotation.from_euler("xyz", [0.3, -0.7, 1.1]).as_matrix()
+QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+IN_PLANE = Rotation.from_euler("z", 0.4).as_matrix()[:2, :2]
+WAYS = (LocalKind.IMPLICIT, LocalKind.EXPLICIT)
+
+
+def bent(cell: str = "hexahedron") -> BodyMesh:
+    """A mesh that no rotation or mirror maps on itself."""
+    return skewed(block((0, 0, 0), (1.0, 1.2, 0.9), (2, 3, 2), cell))
+
+
+def renumbered(mesh: BodyMesh) -> BodyMesh:
+    """The same mesh with nodes and cells in another order."""
+    random = np.random.default_rng(0)
+    order, cells = random.permutation(mesh.n_nodes), random.permutation(mesh.n_cells)
+    new = np.argsort(order)
+    surfaces = {name: new[facets] for name, facets in mesh.surfaces.items()}
+    return BodyMesh(mesh.points[order], new[mesh.cells[cells]], surfaces)
+
+
+def of_bodies(bodies: Sequence[Body], sides: Sequence[str], kind: LocalKind) -> TornInverse:
+    """The inverse of bodies with one subdomain each, on the supported sides of which are their interfaces."""
+    named = {f"body {k}": body for k, body in enumerate(bodies)}
+    supports = [Support(name, side) for name, side in zip(named, sides, strict=True)]
+    scene = Scene(named, supports)
+    parts = {name: np.zeros(body.mesh.n_cells, dtype=int) for name, body in named.items()}
+    torn = build_torn_system(scene, decompose(scene, parts, MPI.COMM_SELF))
+    return DualSystem(torn, kind=kind).inverse
+
+
+def require_operators_of_each(inverse: TornInverse) -> None:
+    """Hold every operator against the subdomain's own matrix."""
+    random = np.random.default_rng(1)
+    forces = random.normal(size=len(inverse.interface))
+    flexed, stiffened = np.zeros_like(forces), np.zeros_like(forces)
+    each = zip(inverse._subdomains, inverse.operators, inverse._local, inverse._parts, strict=True)
+    for subdomain, operator, b, part in each:
+        K = subdomain.matrix.get().toarray()
+        inner = np.setdiff1d(np.arange(len(K)), b)
+        w = K @ random.normal(size=len(K))
+        np.testing.assert_allclose(K @ operator.invert(w), w, atol=1e-10 * np.abs(w).max())
+        on_b = np.zeros(len(K))
+        on_b[b] = forces[part]
+        flexed[part] = operator.invert(on_b)[b]
+        bending = np.linalg.solve(K[np.ix_(inner, inner)], K[np.ix_(inner, b)])
+        S = K[np.ix_(b, b)] - K[np.ix_(b, inner)] @ bending
+        stiffened[part] = S @ forces[part]
+        whole, force = operator.extend(forces[part])
+        np.testing.assert_allclose(whole[inner], -bending @ forces[part], atol=1e-10 * np.abs(whole).max())
+        np.testing.assert_allclose(force, stiffened[part], atol=1e-10 * np.abs(force).max())
+        rows = np.round(random.normal(size=(4, len(b))))
+        columns = np.array([_flexed(operator, row) for row in rows])
+        found = operator.row_flexibility(csr_matrix(rows))
+        np.testing.assert_allclose(found, np.einsum("kn,kn->k", rows, columns), rtol=1e-8)
+    np.testing.assert_allclose(inverse.flex(forces), flexed, atol=1e-10 * np.abs(flexed).max())
+    np.testing.assert_allclose(inverse.stiffen(forces), stiffened, atol=1e-5 * np.abs(stiffened).max())
+
+
+def _flexed(operator: Any, force: np.ndarray) -> np.ndarray:
+    operator.flex(force, found := np.empty_like(force))
+    return found
+
+
+def moved(mesh: BodyMesh, Q: np.ndarray) -> BodyMesh:
+    return mesh.moved(mesh.points @ Q.T + np.array([3.0, -2.0, 0.7]))
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
+def test_bodies_that_are_shifted_turned_and_renumbered_are_one_kind(cell: str, way: LocalKind) -> None:
+    mesh = bent(cell)
+    meshes = [mesh, moved(mesh, np.eye(3)), moved(mesh, QUARTER), moved(mesh, TURN), renumbered(mesh)]
+    inverse = of_bodies([Body(each, STEEL) for each in meshes], ["x0"] * 5, way)
+    assert (len(inverse.kinds), inverse.factored) == (1, 1)
+    require_operators_of_each(inverse)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_mirrored_pieces_are_one_kind(way: LocalKind) -> None:
+    straight = block((-1, 0, 0), (1, 1.2, 0.9), (4, 3, 2))
+    x, y, z = straight.points.T
+    mesh = straight.moved(np.column_stack([x + 0.2 * x * y * z, y + 0.1 * y * z, z + 0.1 * x**2]))
+    scene = Scene({"bar": Body(mesh, STEEL)}, [Support("bar", "z0")])
+    torn = build_torn_system(scene, decompose(scene, {"bar": box_partition(mesh, (2, 1, 1))}, MPI.COMM_SELF))
+    inverse = DualSystem(torn, kind=way).inverse
+    assert len(inverse.kinds) == 1
+    require_operators_of_each(inverse)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_pieces_of_which_single_components_are_held_are_one_kind_along_the_axes_alone(way: LocalKind) -> None:
+    mesh = bent()
+    meshes = [mesh, moved(mesh, QUARTER), moved(mesh, TURN)]
+    values = [(0.0, None, None), (None, 0.0, None), (0.0, None, None)]
+    named = {f"body {k}": Body(each, STEEL) for k, each in enumerate(meshes)}
+    held = [Support(name, "y0", value) for name, value in zip(named, values, strict=True)]
+    scene = Scene(named, [*held, *(Support(name, "x0") for name in named)])
+    parts = {name: np.zeros(mesh.n_cells, dtype=int) for name in named}
+    torn = build_torn_system(scene, decompose(scene, parts, MPI.COMM_SELF))
+    inverse = DualSystem(torn, kind=way).inverse
+    assert [len(inverse.kinds), *(kind.width for kind in inverse.kinds)] == [2, 3, 3]
+    require_operators_of_each(inverse)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_plane_pieces_are_turned_in_their_plane(way: LocalKind) -> None:
+    straight = rectangle((0, 0), (1.0, 1.3), (3, 4))
+    x, y = straight.points.T
+    mesh = straight.moved(np.column_stack([x + 0.1 * x * y, y + 0.05 * x**2]))
+    turned = mesh.moved(mesh.points @ IN_PLANE.T + 2.0)
+    inverse = of_bodies([Body(each, PlaneStrain(210.0, 0.3)) for each in (mesh, turned)], ["x0"] * 2, way)
+    assert len(inverse.kinds) == 1
+    require_operators_of_each(inverse)
+
+
+def wood(axes: np.ndarray) -> OrthotropicElasticity:
+    return OrthotropicElasticity(
+        (11000.0, 900.0, 500.0), (0.4, 0.5, 0.03), (700.0, 650.0, 90.0), tuple(map(tuple, axes.tolist()))
+    )
+
+
+def test_material_axes_count_with_the_shape() -> None:
+    mesh, turned = bent(), moved(bent(), TURN)
+    with_it = of_bodies([Body(mesh, wood(np.eye(3))), Body(turned, wood(TURN.T))], ["x0"] * 2, WAYS[1])
+    assert len(with_it.kinds) == 1
+    require_operators_of_each(with_it)
+    left = of_bodies([Body(mesh, wood(np.eye(3))), Body(turned, wood(np.eye(3)))], ["x0"] * 2, WAYS[1])
+    assert len(left.kinds) == 2
+    require_operators_of_each(left)
+    other = of_bodies([Body(mesh, wood(np.eye(3))), Body(mesh, wood(QUARTER))], ["x0"] * 2, WAYS[1])
+    assert len(other.kinds) == 2
+
+
+def _a_node_aside(body: Body) -> Body:
+    points = body.mesh.points.copy()
+    points[np.argmax(points.sum(axis=1)), 0] += 1e-6
+    return replace(body, mesh=body.mesh.moved(points))
+
+
+def _longer(body: Body) -> Body:
+    return replace(body, mesh=body.mesh.moved(body.mesh.points * [1.0 + 1e-6, 1.0, 1.0]))
+
+
+def _stiffer(body: Body) -> Body:
+    return replace(body, material=IsotropicElasticity(210.0 * (1 + 1e-6), 0.3))
+
+
+def _contracting(body: Body) -> Body:
+    return replace(body, material=IsotropicElasticity(210.0, 0.3 + 1e-6))
+
+
+@pytest.mark.parametrize("changed", [_a_node_aside, _longer, _stiffer, _contracting])
+@pytest.mark.parametrize("Q", [np.eye(3), QUARTER, TURN], ids=["shifted", "quarter", "turned"])
+def test_what_is_alike_but_for_a_millionth_is_not_shared(
+    Q: np.ndarray, changed: Callable[[Body], Body]
+) -> None:
+    body = Body(bent(), STEEL)
+    other = replace(changed(body), mesh=moved(changed(body).mesh, Q))
+    inverse = of_bodies([body, other], ["x0"] * 2, LocalKind.EXPLICIT)
+    assert len(inverse.kinds) == 2
+    require_operators_of_each(inverse)
+
+
+def test_interfaces_elsewhere_are_other_kinds_unless_the_shape_maps_them() -> None:
+    cube, brick = block((0, 0, 0), (1, 1, 1), (3, 3, 3)), block((0, 0, 0), (1, 1, 0.8), (3, 3, 3))
+    for mesh, kinds in ((cube, 1), (brick, 2)):
+        inverse = of_bodies([Body(mesh, STEEL)] * 3, ["x0", "y1", "z1"], LocalKind.EXPLICIT)
+        assert len(inverse.kinds) == kinds
+        require_operators_of_each(inverse)
+
+
+def sliding(counts: tuple[int, int, int] = (8, 4, 4)) -> Scene:
+    mesh = block((0, 0, 0), (2, 1, 1), counts)
+    return Scene(
+        {"block": Body(mesh, IsotropicElasticity(1.0, 0.3))},
+        [Support("block", "x0")],
+        [Traction("block", "z1", (-0.01, -0.007, -0.04))],
+        [ContactPair(Surface("block", "z0"), RigidPlane((0, 0, -0.01), (0, 0, 1)), Coulomb(0.3))],
+    )
+
+
+def alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def apart(kinds: Kinds, given: Kind) -> tuple[Kind, None]:
+        return kinds.add(given), None
+
+    monkeypatch.setattr(Kinds, "place", apart)
+
+
+def test_sharing_changes_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = sliding()
+    cut = {"block": box_partition(scene.bodies["block"].mesh, (4, 2, 2))}
+    solver = FaceNewton(tolerance=1e-11)
+    shared = solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=solver)
+    assert len(shared.dual.inverse.kinds) <= 6
+    alone(monkeypatch)
+    other = solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=solver)
+    assert len(other.dual.inverse.kinds) == 16
+    assert abs(shared.counts["f_products"] - other.counts["f_products"]) <= 1
+    size = np.abs(other.contact.force).max()
+    np.testing.assert_allclose(shared.contact.force, other.contact.force, atol=1e-10 * size)
+    displaced, expected = (state.gather_displacement("block") for state in (shared, other))
+    np.testing.assert_allclose(displaced, expected, atol=1e-10 * np.abs(expected).max())
+    assert size > 0.0
+
+
+def test_a_moved_subdomain_is_factored_alone_or_joins_a_kind() -> None:
+    scene = sliding()
+    mesh = scene.bodies["block"].mesh
+    cut = {"block": box_partition(mesh, (4, 2, 2))}
+    problem = ContactProblem(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=1e-11))
+    first = problem.solve()
+    points = mesh.points.copy()
+    corner = np.argmax(points @ [1.0, 2.0, 4.0])
+    points[corner] += [0.02, 0.03, 0.01]
+    other = replace(scene, bodies={"block": replace(scene.bodies["block"], mesh=mesh.moved(points))})
+    second = problem.solve(other, start=first)
+    assert second.dual.inverse.factored == 1
+    third = problem.solve(scene, start=second)
+    assert third.dual.inverse.factored == 0
+    assert third.dual.inverse.changed
+    expected = solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=1e-11))
+    size = np.abs(expected.contact.force).max()
+    np.testing.assert_allclose(third.contact.force, expected.contact.force, atol=1e-9 * size)
+    apart = solve_scene(other, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=1e-11))
+    np.testing.assert_allclose(second.contact.force, apart.contact.force, atol=1e-9 * size)
+    assert np.abs(second.contact.force - first.contact.force).max() > 1e-6 * size
