@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact import _dolfinx
 from fenics_contact._base.costs import count_messages, count_of_exchange, with_ledger
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._base.libraries import MPI, PETSc, free_communicators, start
@@ -487,7 +488,7 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
         here = np.flatnonzero(tearing.subdomain_rank == comm.rank)
         _check_communicators(len(here), each=20 if scene.is_nonlinear else 14)
     with together(comm):
-        meshes = tuple(_cut(scene, partitions, tearing, int(number)) for number in here)
+        meshes = tuple(_cut(scene, partitions, tearing, here))
         prescribed, axes = prescribed_along(scene, tearing)
         gluing = gluing_rows(tearing, ~np.isnan(prescribed), axes, hanging_nodes(scene, tearing))
     block_offset = np.cumsum([0] + [len(mesh.nodes) for mesh in meshes])
@@ -538,11 +539,15 @@ def _check_communicators(subdomains: int, each: int) -> None:
         )
 
 
-def _cut(scene: Scene, partitions: Mapping[str, np.ndarray], tearing: Tearing, number: int) -> SubdomainMesh:
-    index = int(np.searchsorted(tearing.subdomain_offset, number, side="right")) - 1
-    name = tearing.body_names[index]
-    cells = np.flatnonzero(partitions[name] == number - tearing.subdomain_offset[index])
-    return cut_out(number, name, scene.bodies[name], cells)
+def _cut(
+    scene: Scene, partitions: Mapping[str, np.ndarray], tearing: Tearing, here: np.ndarray
+) -> Iterator[SubdomainMesh]:
+    spaces: dict[bytes, _dolfinx.fem.FunctionSpace] = {}
+    body = np.searchsorted(tearing.subdomain_offset, here, side="right") - 1
+    for number, index in zip(here, body, strict=True):
+        name = tearing.body_names[index]
+        cells = np.flatnonzero(partitions[name] == number - tearing.subdomain_offset[index])
+        yield cut_out(int(number), name, scene.bodies[name], cells, spaces)
 
 
 def _copy_blocks(tearing: Tearing, meshes: tuple[SubdomainMesh, ...], block_offset: np.ndarray) -> np.ndarray:
@@ -602,9 +607,8 @@ class DualNumbering:
 
     def local_index(self, rows: np.ndarray) -> np.ndarray:
         """Return the positions of touched or owned rows in a local vector."""
-        lookup = np.full(self.total, -1, dtype=np.int64)
-        lookup[self.local_rows] = np.arange(len(self.owned) + len(self.ghosts))
-        return lookup[rows]
+        own = self.owned_index(rows)
+        return np.where(own >= 0, own, len(self.owned) + np.searchsorted(self.ghosts, rows))
 
     def position(self, rows: np.ndarray) -> np.ndarray:
         """Return the positions of rows in the concatenation of all ranks' owned parts."""
@@ -638,11 +642,8 @@ class DualNumbering:
 
         Meant for contact rows, which are few; ``rows`` must be the same on every rank.
         """
-        mine = np.zeros(len(rows))
-        index = np.full(self.total, -1, dtype=np.int64)
-        index[self.owned] = np.arange(len(self.owned))
-        here = index[rows] >= 0
-        mine[here] = owned[index[rows[here]]]
+        mine, index = np.zeros(len(rows)), self.owned_index(rows)
+        mine[index >= 0] = owned[index[index >= 0]]
         return np.asarray(self.comm.allreduce(mine))
 
     def sum_rows(self, local: sp.csr_matrix) -> sp.csr_matrix:

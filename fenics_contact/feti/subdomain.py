@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from hashlib import blake2b
 from typing import Protocol
 
 import numpy as np
@@ -92,7 +93,8 @@ class SubdomainMesh:
     Attributes:
         cells: Cells of the body's mesh, in this mesh's order.
         nodes: Nodes of the body, by block: block b sits on node ``nodes[b]``.
-        space: dolfinx function space of displacements on the subdomain's own mesh.
+        space: dolfinx function space of displacements on a mesh of its own, or one that subdomains with cells
+            connected alike share: nodes are where who assembled last has moved them.
         facets: Surface of the body -> (cells, local facets) on this mesh; `facets_of` adds to it.
         following: Its hanging nodes; None without any.
     """
@@ -180,18 +182,31 @@ class CachedMatrix:
         self._matrix = None
 
 
-def cut_out(number: int, body_name: str, body: Body, cells: np.ndarray) -> SubdomainMesh:
-    """Build the mesh of one subdomain."""
-    mesh = body.mesh
+def cut_out(
+    number: int,
+    body_name: str,
+    body: Body,
+    cells: np.ndarray,
+    spaces: dict[bytes, _dolfinx.fem.FunctionSpace] | None = None,
+) -> SubdomainMesh:
+    """Build the mesh of one subdomain.
+
+    `spaces`: those built so far, to which its own is added. Subdomains whose cells are connected alike share
+    one: whoever assembles on it moves its nodes first.
+    """
+    mesh, spaces = body.mesh, {} if spaces is None else spaces
     used, local = np.unique(mesh.cells[cells], return_inverse=True)
-    local = local.reshape(len(cells), -1)
-    own = _dolfinx.local_mesh(mesh.points[used], local, mesh.cell_type)
-    space = _dolfinx.coefficient(own, "u", body.components).function_space
+    local = local.reshape(len(cells), -1).astype(np.int32)
+    key = blake2b(f"{body.cell_type} {body.components}".encode() + local.tobytes()).digest()
+    if key not in spaces:
+        own = _dolfinx.local_mesh(mesh.points[used], local, mesh.cell_type)
+        spaces[key] = _dolfinx.coefficient(own, "u", body.components).function_space
+    space = spaces[key]
     input_nodes, dofs = _dolfinx.node_dofs(space)
     nodes = np.empty(len(used), dtype=np.int64)
     nodes[dofs] = used[input_nodes]
-    following = Following.of(mesh, nodes, body.components)
-    return SubdomainMesh(number, body_name, cells[_dolfinx.input_cells(own)], nodes, space, {}, following)
+    cells, following = cells[_dolfinx.input_cells(space.mesh)], Following.of(mesh, nodes, body.components)
+    return SubdomainMesh(number, body_name, cells, nodes, space, {}, following)
 
 
 def assemble(

@@ -13,6 +13,7 @@ from fenics_contact import Body, Scene, TotalForce, Traction, _dolfinx, solve_sc
 from fenics_contact._base import libraries
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import build_torn_system, decompose, decomposition
+from fenics_contact.feti.subdomain import assemble, cut_out
 from fenics_contact.gallery import block
 from tests.feti.scenes import CELLS, STEEL, clamped_block, lone_block, touching_blocks
 
@@ -114,6 +115,7 @@ def test_subdomains_hold_their_cells_and_know_their_nodes(cell: str) -> None:
     for part in decomposition.meshes:
         np.testing.assert_array_equal(np.flatnonzero(partitions["block"] == part.number), np.sort(part.cells))
         np.testing.assert_array_equal(np.sort(part.nodes), np.unique(mesh.cells[part.cells]))
+        _dolfinx.update_coordinates(part.space.mesh, mesh.points[np.sort(part.nodes)])
         coordinates = part.space.tabulate_dof_coordinates()
         np.testing.assert_allclose(coordinates, mesh.points[part.nodes], atol=1e-14)
     assert (
@@ -121,6 +123,31 @@ def test_subdomains_hold_their_cells_and_know_their_nodes(cell: str) -> None:
         == decomposition.torn_size
         == 3 * sum(len(m.nodes) for m in decomposition.meshes)
     )
+
+
+def test_subdomains_whose_cells_are_connected_alike_share_a_mesh() -> None:
+    scene, partitions = clamped_block("hexahedron", layers=3)  # bent: no two have the same shape
+    torn = build_torn_system(scene, decompose(scene, partitions, MPI.COMM_SELF))
+    assert len({id(part.mesh.space) for part in torn.subdomains}) == 1
+    stiffnesses = [part.stiffness.toarray() for part in torn.subdomains]
+    assert np.abs(stiffnesses[0] - stiffnesses[-1]).max() > 1e-3 * np.abs(stiffnesses[0]).max()
+    for part, stiffness in zip(torn.subdomains, stiffnesses, strict=True):
+        alone = assemble(
+            cut_out(part.mesh.number, "block", scene.bodies["block"], np.sort(part.mesh.cells)),
+            scene.bodies["block"], scene.loads, torn.decomposition.forms,
+        )  # fmt: skip
+        assert alone.mesh.space is not part.mesh.space
+        assert np.array_equal(alone.mesh.nodes, part.mesh.nodes)
+        assert np.array_equal(alone.mesh.cells, part.mesh.cells)
+        np.testing.assert_array_equal(alone.stiffness.toarray(), stiffness)
+        np.testing.assert_array_equal(alone.load, part.load)
+
+
+def test_subdomains_of_other_cells_or_components_have_meshes_of_their_own() -> None:
+    scene, partitions = touching_blocks()
+    meshes = decompose(scene, partitions, MPI.COMM_SELF).meshes
+    of_body = {name: {id(m.space) for m in meshes if m.body == name} for name in ("lower", "upper")}
+    assert not of_body["lower"] & of_body["upper"]
 
 
 @pytest.mark.parametrize("cell", CELLS)
