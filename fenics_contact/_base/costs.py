@@ -279,6 +279,12 @@ def _kinds() -> tuple[type, type]:
             self._count("transfer", "transfers", *parts[: self.rank], *parts[self.rank + 1 :])
             return parts
 
+        def Alltoallv(self, sendbuf: Any, recvbuf: Any) -> None:
+            super().Alltoallv(sendbuf, recvbuf)
+            values, counts = recvbuf
+            own = slice(start := int(counts[: self.rank].sum()), start + int(counts[self.rank]))
+            self._count("transfer", "transfers", np.delete(values, own))
+
         def _count(self, kind: str, kinds: str, *data: Any) -> None:
             if self.ledger is not None:
                 self.ledger.call(kind, kinds, sum(map(size_of, data)))

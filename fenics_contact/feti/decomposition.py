@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -24,7 +24,6 @@ from fenics_contact._scene.supports import Roller, ToolMotion
 from fenics_contact._scene.tools import with_tool_parts
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.following import hanging_nodes
-from fenics_contact.feti.inverse import Condensations
 from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.subdomain import SubdomainMesh, cut_out
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -383,7 +382,6 @@ class Decomposition:
         block_offset: First block of dofs of each of them in this rank's torn vector, and the total.
         copy_block: Block of each copy in this rank's torn vector, −1 if another rank holds it.
         gluing: Gluing and Dirichlet rows of all subdomains.
-        condensations: Symbolic factorisations of this rank's subdomains.
     """
 
     comm: MPI.Comm
@@ -394,7 +392,6 @@ class Decomposition:
     copy_block: np.ndarray
     gluing: GluingRows
     forms: FormLibrary
-    condensations: Condensations = field(default_factory=Condensations)
 
     @property
     def torn_size(self) -> int:

@@ -360,9 +360,9 @@ class DualSystem:
         self._B, self._Bt = torn.B, torn.B.T  # shares its memory
         with timer.phase("factor"):
             known = None if previous is None else previous.inverse
-            condensations = torn.decomposition.condensations
             with together(comm):
-                self.inverse = self._inverse(torn, condensations, kind, known)
+                # Not kept for later systems: MUMPS holds several times what remains, for a third of its time.
+                self.inverse = self._inverse(torn, Condensations(), kind, known)
         if previous is not None and self._is_that_of(previous):
             self._take_over(previous, timer)
         else:
