@@ -19,6 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
+from fenics_contact.feti.nearby import Nearby
 from fenics_contact.feti.subdomain import LocalOperator, Subdomain
 
 
@@ -175,13 +176,13 @@ class Kinds:
         """Start empty."""
         self._agreement = agreement or Agreement()
         self.all: list[Kind] = []
-        # By counts: kind, a subdomain of it with a numbering of its own, and how it lies on the first one.
-        self._seen: dict[tuple[int, ...], list[tuple[Kind, Kind, Motion | None]]] = defaultdict(list)
+        # By counts and trace: kind, a subdomain of it with a numbering of its own, how it lies on the first.
+        self._seen: dict[tuple[int, ...], Nearby[tuple[Kind, Kind, Motion | None]]] = defaultdict(Nearby)
 
     def add(self, kind: Kind) -> Kind:
         """Take a kind without comparing it with others."""
         self.all.append(kind)
-        self._seen[kind.key].append((kind, kind, None))
+        self._seen[kind.key].add(kind.size[0], (kind, kind, None))
         return kind
 
     def place(self, given: Kind) -> tuple[Kind, Motion | None]:
@@ -189,9 +190,9 @@ class Kinds:
 
         The motion is None where it is the same dof by dof. One that is like none before is a new kind.
         """
-        seen = self._seen[given.key]
-        room = self._agreement.matrix * len(given.subdomain.load) * given.size if seen else 0.0
-        near = [each for each in seen if np.all(np.abs(each[1].size - given.size) <= room)]
+        seen, room = self._seen[given.key], self._agreement.matrix * len(given.diagonal) * given.size
+        near = seen.near(given.size[0], room[0])
+        near = [each for each in near if abs(each[1].size[1] - given.size[1]) <= room[1]]
         for kind, other, motion in near:
             if self._same_numbers(other, given):
                 return kind, motion
@@ -199,15 +200,14 @@ class Kinds:
             if motion is None:
                 found = self._motion(first, given)
                 if found is not None:  # others may be the same as this one dof by dof
-                    seen.append((kind, given, found))
+                    seen.add(given.size[0], (kind, given, found))
                     return kind, found
         return self.add(given), None
 
     def forget(self) -> None:
         """Free what only comparisons need."""
-        for seen in self._seen.values():
-            for _, each, _ in seen:
-                each.forget()
+        for kind in self.all:
+            kind.forget()
 
     def _same_numbers(self, one: Kind, other: Kind) -> bool:
         """Return whether two subdomains are the same dof by dof."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from collections.abc import Callable, Sequence
 from enum import Enum
 from functools import cached_property
@@ -444,12 +444,14 @@ class TornInverse:
         known = [None if previous is None else previous._known(i, self) for i in range(len(self._local))]
         self.changed = None in known
         self._sort(known, shared)
-        self.factored = 0
-        for each in self.kinds:
-            if each.operator is None:
-                each.operator = self._factor(each.subdomain, each.interface, condensations)
-                self.factored += 1
-            each.subdomain.matrix.forget()
+        new = [kind for kind in self.kinds if kind.operator is None]
+        uses = Counter(id(kind.subdomain.matrix) for kind in new)
+        for each in new:
+            each.operator = self._factor(each.subdomain, each.interface, condensations)
+            uses[id(each.subdomain.matrix)] -= 1
+            if not uses[id(each.subdomain.matrix)]:
+                each.subdomain.matrix.forget()
+        self.factored = len(new)
         self._operate()
 
     def _known(self, index: int, other: TornInverse) -> tuple[Kind, Motion | None] | None:
@@ -471,9 +473,9 @@ class TornInverse:
             self._members.append(member)
         kinds.forget()
         self.kinds = kinds.all
-        firsts = {id(each.subdomain) for each in self.kinds}
-        for subdomain in self._subdomains:
-            if id(subdomain) not in firsts:
+        needed = {id(each.subdomain.matrix) for each in self.kinds if each.operator is None}
+        for subdomain in (*self._subdomains, *(each.subdomain for each in self.kinds)):
+            if id(subdomain.matrix) not in needed:
                 subdomain.matrix.forget()
 
     def _operate(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from hashlib import blake2b
@@ -24,8 +25,9 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.factor import fixing_nodes
 from fenics_contact.feti.following import Following
 from fenics_contact.feti.foundations import foundation_stiffness, separated
+from fenics_contact.feti.nearby import Nearby
 from fenics_contact.materials.elastic import Material
-from fenics_contact.mesh.faces import corners_of
+from fenics_contact.mesh.faces import coordinate_rounding, corners_of
 
 
 class LocalOperator(Protocol):
@@ -182,6 +184,33 @@ class CachedMatrix:
         self._matrix = None
 
 
+class Assembled:
+    """Subdomains assembled so far; their matrices serve others that are the same but for a translation."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        # By space: subdomains with cells connected and numbered alike share one.
+        self._known: dict[int, Nearby[Subdomain]] = defaultdict(Nearby)
+
+    def add(self, subdomain: Subdomain) -> None:
+        """Add a subdomain whose matrix depends on cells, numbering, materials and shape alone."""
+        shape = _from_own_origin(subdomain.points)
+        self._known[id(subdomain.mesh.space)].add(float(np.abs(shape).sum()), subdomain)
+
+    def same_as(self, mesh: SubdomainMesh, parts: Composition, points: np.ndarray) -> Subdomain | None:
+        """Return one with the same cells, numbering and materials, and the same points but for a translation.
+
+        Coordinates may differ in their last digits: no mesh knows its shape better than these.
+        """
+        shape, rounding = _from_own_origin(points), coordinate_rounding(points)
+        room = shape.size * rounding
+        for other in self._known[id(mesh.space)].near(float(np.abs(shape).sum()), room):
+            apart = np.abs(_from_own_origin(other.points) - shape).max()
+            if apart <= rounding and other.material.same_as(parts):
+                return other
+        return None
+
+
 def cut_out(
     number: int,
     body_name: str,
@@ -216,8 +245,13 @@ def assemble(
     forms: FormLibrary,
     earlier: Subdomain | None = None,
     foundations: Sequence[ElasticFoundation] = (),
+    *,
+    assembled: Assembled | None = None,
 ) -> Subdomain:
-    """Assemble K_s, f_s and R_s for the present coordinates of ``body``."""
+    """Assemble K_s, f_s and R_s for the present coordinates of ``body``.
+
+    `assembled`: others, whose matrices are used where they are the same; this one is added.
+    """
     parts = composition(body, mesh.cells)
     beds = tuple(each for each in foundations if each.body == mesh.body)
     points = body.mesh.points[mesh.nodes]
@@ -226,8 +260,10 @@ def assemble(
     springs = body.springs if isinstance(body, ToolBody) else ()
     known = earlier is not None and earlier.foundations == beds and earlier.springs == springs
     if earlier is None or not known or not _same_stiffness(earlier, parts, points):
-        earlier = _with_stiffness(mesh, body, parts, forms, points, beds)
-    elif earlier.loads == acting:
+        earlier = _with_stiffness(mesh, body, parts, forms, points, beds, assembled)
+    elif assembled is not None and _depends_on_shape_alone(mesh, body, parts, forms, beds):
+        assembled.add(earlier)
+    if earlier.loads == acting:
         return earlier
     force = np.zeros(mesh.size)
     for load in acting:
@@ -263,8 +299,15 @@ def _with_stiffness(
     forms: FormLibrary,
     points: np.ndarray,
     foundations: tuple[ElasticFoundation, ...],
+    assembled: Assembled | None,
 ) -> Subdomain:
     """Return the subdomain without loads."""
+    if not _depends_on_shape_alone(mesh, body, parts, forms, foundations):
+        assembled = None
+    twin = None if assembled is None else assembled.same_as(mesh, parts, points)
+    if twin is not None:
+        kernel = kernel_of_body(body, points, parts.materials).reshape(mesh.size, -1)
+        return replace(twin, mesh=mesh, loads=(), points=points, load=np.zeros(mesh.size), kernel=kernel)
     space, cell_type = mesh.space, body.cell_type
     by_input_node = points[np.argsort(mesh.nodes)]
     if not _varies(parts, body, forms):
@@ -290,7 +333,22 @@ def _with_stiffness(
     typical = float(K.diagonal().mean())
     springs = body.springs if isinstance(body, ToolBody) else ()
     nothing = np.zeros(mesh.size)
-    return Subdomain(mesh, parts, foundations, (), points, nothing, kernel, typical, matrix, springs)
+    found = Subdomain(mesh, parts, foundations, (), points, nothing, kernel, typical, matrix, springs)
+    if assembled is not None:
+        assembled.add(found)
+    return found
+
+
+def _depends_on_shape_alone(
+    mesh: SubdomainMesh,
+    body: Body,
+    parts: Composition,
+    forms: FormLibrary,
+    beds: Sequence[ElasticFoundation],
+) -> bool:
+    """Return whether the stiffness depends on cells, numbering, materials and shape, but not on the place."""
+    special = bool(beds) or isinstance(body, ToolBody) or mesh.following is not None
+    return not (special or _dolfinx.is_revolved(body.cell_type) or _varies(parts, body, forms))
 
 
 def foundation_of(mesh: SubdomainMesh, body: Body, foundations: Sequence[ElasticFoundation]) -> sp.csr_matrix:

@@ -48,7 +48,7 @@ from fenics_contact.feti.preloads import (
     with_shortenings,
 )
 from fenics_contact.feti.springs import SpringRows, spring_points, with_springs
-from fenics_contact.feti.subdomain import Subdomain, assemble
+from fenics_contact.feti.subdomain import Assembled, Subdomain, assemble
 from fenics_contact.qp.cones import CoulombLaw, SlipLaw, Strengths, TrescaLaw
 from fenics_contact.qp.layout import ContactLayout
 
@@ -514,10 +514,14 @@ def build_torn_system(
     decomposition.forms.prepare(scene)  # a new load may be of a type that the first scene did not have
     with together(comm):
         known = (None,) * len(decomposition.meshes) if previous is None else previous.subdomains
+        assembled = Assembled()
         subdomains = tuple(
-            assemble(mesh, scene.bodies[mesh.body], loads, decomposition.forms, earlier, scene.foundations)
+            assemble(
+                mesh, scene.bodies[mesh.body], loads, decomposition.forms, earlier, scene.foundations,
+                assembled=assembled,
+            )
             for mesh, earlier in zip(decomposition.meshes, known, strict=True)
-        )
+        )  # fmt: skip
     with together(comm):
         prescribed, axes = prescribed_along(scene, decomposition.tearing)
         right = decomposition.gluing.right_side(prescribed, axes)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
+import ufl
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 from scipy.spatial.transform import Rotation
+from ufl.domain import extract_unique_domain
 
 from fenics_contact import (
     Body,
@@ -18,6 +20,7 @@ from fenics_contact import (
     ContactPair,
     ContactProblem,
     Coulomb,
+    ElasticFoundation,
     RigidPlane,
     Scene,
     Support,
@@ -29,8 +32,15 @@ from fenics_contact import (
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.feti.alike import Kind, Kinds
 from fenics_contact.feti.inverse import LocalKind, TornInverse
+from fenics_contact.feti.subdomain import assemble
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.materials import IsotropicElasticity, OrthotropicElasticity, PlaneStrain
+from fenics_contact.materials import (
+    Elasticity,
+    IsotropicElasticity,
+    OrthotropicElasticity,
+    PlaneStrain,
+    strain,
+)
 from fenics_contact.qp import FaceNewton
 from tests.feti.scenes import STEEL, skewed
 
@@ -260,3 +270,51 @@ def test_a_moved_subdomain_is_factored_alone_or_joins_a_kind() -> None:
     apart = solve_scene(other, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=1e-11))
     np.testing.assert_allclose(second.contact.force, apart.contact.force, atol=1e-9 * size)
     assert np.abs(second.contact.force - first.contact.force).max() > 1e-6 * size
+
+
+@dataclass(frozen=True)
+class Stiffening(Elasticity):
+    """A material whose stiffness grows along x."""
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        return (210.0,)
+
+    def stress(self, u: Any, parameters: tuple[ufl.Constant, ...]) -> Any:
+        x = ufl.SpatialCoordinate(extract_unique_domain(u))[0]
+        return parameters[0] * (1.0 + x) * strain(u)
+
+
+def matrices(scene: Scene, boxes: tuple[int, int, int]) -> int:
+    """Return how many matrices are assembled, after comparing each with the subdomain's own."""
+    cut = {name: box_partition(body.mesh, boxes) for name, body in scene.bodies.items()}
+    decomposition = decompose(scene, cut, MPI.COMM_SELF)
+    subdomains = build_torn_system(scene, decomposition).subdomains
+    for found in subdomains:
+        body = scene.bodies[found.mesh.body]
+        own = assemble(found.mesh, body, [], decomposition.forms, foundations=scene.foundations)
+        assert abs(found.stiffness - own.stiffness).max() < 1e-12 * abs(own.stiffness).max()
+        np.testing.assert_array_equal(found.kernel, own.kernel)
+        np.testing.assert_array_equal(found.points, own.points)
+    return len({id(each.matrix) for each in subdomains})
+
+
+def test_pieces_that_differ_by_a_translation_are_assembled_once() -> None:
+    bar = Body(block((0.1, 0.2, 0.3), (3.1, 1.2, 1.3), (6, 2, 2)), STEEL)
+    assert matrices(Scene({"bar": bar}), (3, 1, 1)) == 1
+    graded = replace(bar, mesh=bar.mesh.moved(bar.mesh.points**1.5))
+    assert matrices(Scene({"bar": graded}), (3, 1, 1)) == 3
+    longer = replace(bar, mesh=bar.mesh.moved(bar.mesh.points * [1.0 + 1e-9, 1.0, 1.0]))
+    other = IsotropicElasticity(100.0, 0.3)
+    bodies = {"bar": bar, "longer": longer, "softer": replace(bar, material=other), "again": bar}
+    assert matrices(Scene(bodies), (3, 1, 1)) == 3
+
+
+def test_what_depends_on_more_than_the_shape_is_assembled_for_each_piece() -> None:
+    bar = Body(block((0, 0, 0), (3, 1, 1), (6, 2, 2)), STEEL)
+    beds = [ElasticFoundation("bar", "x1", 3.0)]
+    assert matrices(Scene({"bar": bar}, foundations=beds), (3, 1, 1)) == 3
+    assert matrices(Scene({"bar": replace(bar, material=Stiffening())}), (3, 1, 1)) == 3
+    halves = replace(bar.mesh, regions={"left": np.arange(12), "right": np.arange(12, 24)})
+    materials = {"left": STEEL, "right": IsotropicElasticity(100.0, 0.3)}
+    assert matrices(Scene({"bar": Body(halves, materials)}), (3, 1, 1)) == 3
