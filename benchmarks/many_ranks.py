@@ -1,0 +1,291 @@
+"""A model of time on many ranks, from counts as `state.costs` has them.
+
+`python -m benchmarks.many_ranks` prints what it says of up to ten thousand ranks; under mpirun with `--check`
+its counts beside those of a run, with `--memory` the memory of each rank. See `docs/scaling.md`.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from math import log2
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from scipy.linalg import blas
+
+from benchmarks.cases.scenes import block_mesh, block_on_plane
+from fenics_contact import LinearState, Scene, box_partition, solve_scene
+from fenics_contact._base.sparse import FACTOR_BYTES, ROWS_PER_RANK, prefers_explicit
+from fenics_contact.gallery import block
+from fenics_contact.qp import FaceNewton
+from fenics_contact.qp.coarse import DENSE_LIMIT
+from fenics_contact.results import PhaseCosts
+from fenics_contact.study.report import table
+from fenics_contact.study.worker import peak_memory
+
+#: Reductions of each size that a solve takes: numbers for each product and for each step, as counted on 2, 4
+#: and 64 ranks. "coarse": vectors of all rigid motions.
+COARSE, CONTACT, SCALARS, MATRICES = (2.5, 4.5), (2.0, -1.0), (3.0, 5.0), 3.5
+#: Neighbours of a cube in a lattice.
+NEIGHBOURS = 26
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What a rank's share of a machine does.
+
+    Attributes:
+        latency: Of a message, [s].
+        bandwidth: Of messages, [byte/s].
+        flops: Operations of products that read triangles from memory, [1/s]: four for 6 bytes, half of the
+            triangles being in single precision. The default is that of a core of a full node, 5 GB/s.
+        iteration: Of Python in an iteration, [s].
+        subdomain: Of Python in an iteration for each subdomain, [s].
+    """
+
+    latency: float = 2e-6
+    bandwidth: float = 2e9
+    flops: float = 3.3e9
+    iteration: float = 1e-3
+    subdomain: float = 1e-5
+
+    def seconds(self, costs: PhaseCosts, ranks: int) -> dict[str, float]:
+        """Return the seconds of each kind of costs, nothing overlapping.
+
+        A reduction or a copy takes log₂ P steps; it moves its bytes twice or once. In a transfer every rank
+        waits for every other.
+
+        Args:
+            costs: Of the rank with the most.
+            ranks: P, their number.
+        """
+        depth = np.ceil(log2(ranks)) if ranks > 1 else 0.0
+        calls = 2 * costs.reductions + costs.copies + costs.meetings
+        moved = 2 * costs.reduction_bytes + costs.copy_bytes + 8 * ranks * costs.meetings
+        return {
+            "messages": costs.messages * self.latency + costs.message_bytes / self.bandwidth,
+            "global": (depth * calls + (ranks - 1) * costs.transfers) * self.latency
+            + (moved + costs.transfer_bytes) / self.bandwidth,
+            "operations": costs.flops / self.flops,
+        }
+
+    def overhead(self, lattice: Lattice, ranks: int) -> float:
+        """Return the seconds of Python in a solve on a number of ranks."""
+        return lattice.products * (self.iteration + self.subdomain * lattice.side**3 / ranks)
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """A block cut into side³ equal boxes of edge³ hexahedra; one side is clamped, one lies on a plane.
+
+    Attributes:
+        side: Subdomains along an edge of the block, at least 2.
+        edge: Elements along an edge of a subdomain.
+        products: F-products of the solve, counted: they do not follow from the sizes.
+        steps: Newton steps, counted.
+    """
+
+    side: int
+    edge: int = 6
+    products: int = 50
+    steps: int = 8
+    local: int = field(init=False)
+    unknowns: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Determine the operations of K⁺ and S of all subdomains, and the torn unknowns."""
+        object.__setattr__(self, "unknowns", 3 * (self.edge + 1) ** 3 * self.side**3)
+        # Sides glued, clamped or in contact, of the first, an inner and the last subdomain in each direction.
+        sides = np.array([[2, 2, 1], [1, 2, 1], [2, 2, 1]])
+        count, nodes = np.array([1, self.side - 2, 1]), self.edge + 1
+        inner = np.einsum("i,j,k->ijk", *(nodes - sides))
+        number = np.einsum("i,j,k->ijk", count, count, count)
+        size, total = 3 * nodes**3, 0.0
+        for free, many in zip(inner.ravel(), number.ravel(), strict=True):
+            interface = size - 3 * int(free)
+            sparse = 4 * FACTOR_BYTES / 8 * (size**1.5 + (size - interface) ** 1.5)
+            total += many * (4 * interface**2 if prefers_explicit(size, interface) else sparse)
+        object.__setattr__(self, "local", int(total))
+
+    @property
+    def motions(self) -> int:
+        """Rigid motions of all subdomains, the size of the coarse problem."""
+        return 6 * self.side**3
+
+    @property
+    def contact_rows(self) -> int:
+        """Multipliers of the contact, three at a node."""
+        return 3 * (self.side * self.edge + 1) ** 2
+
+    def solve(self, ranks: int) -> PhaseCosts:
+        """Return the costs of the iterations of the rank with the most.
+
+        Up to `side` ranks hold slabs, more of them cubes. A gluing row between two ranks belongs to a copy of
+        a node, not to the node: edges have several.
+        """
+        steps, products, size = self.steps, self.products, self.motions
+        exchanges = 2 * products + 2 * (products - steps)
+        neighbours = min(ranks - 1, NEIGHBOURS if ranks > self.side else 2)
+        faces = float(neighbours * self.side**2)
+        if ranks > self.side:
+            faces = 6 * (1 - ranks ** (-1 / 3)) * (self.side**3 / ranks) ** (2 / 3)
+        coarse, contact, scalars = (a * products + b * steps for a, b in (COARSE, CONTACT, SCALARS))
+        matrices, dense = MATRICES * steps, size <= DENSE_LIMIT
+        bytes_ = 8 * (coarse * size + contact * self.contact_rows + 2 * scalars + dense * matrices * size**2)
+        solving = 2 * size**2 if dense else 124 * size ** (4 / 3) / self.holders(ranks)
+        flops = products * self.local / ranks + coarse * solving + 4 * contact * self.contact_rows
+        if ranks == 1:
+            return PhaseCosts(flops=round(flops))
+        return PhaseCosts(
+            messages=exchanges * neighbours,
+            message_bytes=round(exchanges * 8 * 3 * faces * (self.edge + 1) ** 2),
+            reductions=round(coarse + contact + scalars + matrices * dense),
+            reduction_bytes=round(bytes_),
+            copies=round(steps + coarse * (not dense)),
+            copy_bytes=round(20 * steps * self.contact_rows + 8 * coarse * size * (not dense)),
+            transfers=round(matrices * (not dense)),
+            meetings=3,
+            largest_reduction=8 * size**2 if dense else 8 * size,
+            largest_copy=max(20 * self.contact_rows, 0 if dense else 8 * size),
+            flops=round(flops),
+        )
+
+    def holders(self, ranks: int) -> int:
+        """Return the ranks that hold the factors of the coarse problem."""
+        return 1 if self.motions <= DENSE_LIMIT else min(ranks, -(-self.motions // ROWS_PER_RANK))
+
+    def coarse_factors(self, ranks: int) -> float:
+        """Return the seconds of all coarse factorisations, from one of 1.4 s for 24 576 motions on a core."""
+        return MATRICES * self.steps * 1.4 * (self.motions / 24576) ** 2 / self.holders(ranks)
+
+    def replicated(self) -> float:
+        """Return the bytes that every rank holds of the whole problem, see `docs/scaling.md`."""
+        return REPLICATED * self.unknowns
+
+
+#: Bytes for each torn unknown of the whole problem that every rank holds: meshes 26, gluing rows 31,
+#: copies of nodes 13, multipliers and contact points 10.
+REPLICATED = 80.0
+
+
+def extrapolated(machine: Machine, edge: int = 6, a_rank: int = 100_000, most: int = 10_000) -> str:
+    """Return a table of the seconds of a solve with about as many unknowns on each of more and more ranks."""
+    body = []
+    for ranks in (1, 8, 64, 512, 4096, most):
+        lattice = Lattice(round((a_rank * ranks / (3 * (edge + 1) ** 3)) ** (1 / 3)), edge)
+        parts = machine.seconds(lattice.solve(ranks), ranks)
+        local = lattice.products * lattice.local / ranks / machine.flops
+        body.append(
+            (
+                str(ranks), f"{lattice.unknowns:.3g}", str(lattice.motions), f"{local:.3g}",
+                f"{parts['operations'] - local:.3g}", f"{lattice.coarse_factors(ranks):.3g}",
+                f"{parts['messages']:.3g}", f"{parts['global']:.3g}", f"{lattice.replicated() / 1e9:.3g}",
+            )
+        )  # fmt: skip
+    head = ("ranks", "unknowns", "rigid motions", "subdomains [s]", "coarse, contact [s]")
+    return table((*head, "coarse factors [s]", "messages [s]", "global [s]", "copied [GB a rank]"), body)
+
+
+def measured(comm: MPI.Comm, size: int = 654, count: int = 64) -> Machine:
+    """Return what the first two of these ranks do, others waiting. Collective.
+
+    Packed triangles of the size of an interface are applied one after the other, each from memory.
+    """
+    triangles = [np.ones(size * (size + 1) // 2) for _ in range(count)]
+    given, begun = np.ones(size), perf_counter()
+    for triangle in triangles:
+        blas.dspmv(size, 1.0, triangle, given, lower=1)
+    rate = 2 * size**2 * count / (perf_counter() - begun)
+    if comm.size == 1:
+        return Machine(flops=rate)
+    latency = _ping_pong(comm, 1, 200)
+    return Machine(latency, 8e6 / max(_ping_pong(comm, 1_000_000, 10), 1e-9), rate)
+
+
+def _ping_pong(comm: MPI.Comm, numbers: int, times: int) -> float:
+    """Return the seconds of a message between the first two ranks, the same on all. Collective."""
+    data, comm_rank = np.zeros(numbers), comm.rank
+    comm.Barrier()
+    begun = perf_counter()
+    for _ in range(times):
+        if comm_rank == 0:
+            comm.Send(data, 1)
+            comm.Recv(data, 1)
+        elif comm_rank == 1:
+            comm.Recv(data, 0)
+            comm.Send(data, 0)
+    return float(comm.bcast((perf_counter() - begun) / (2 * times)))
+
+
+def scene(side: int, edge: int) -> tuple[Scene, dict[str, np.ndarray]]:
+    """Return the scene of a lattice, and its partition."""
+    mesh = block_mesh((side * edge,) * 3)
+    return block_on_plane(mesh, 0.3), {"block": box_partition(mesh, (side,) * 3)}
+
+
+def checked(comm: MPI.Comm, side: int = 4, edge: int = 2) -> dict[str, Any]:
+    """Solve a lattice; return the counts of the rank with the most, and those of the model. Collective.
+
+    The model is given products and steps, nothing else.
+    """
+    given, partitions = scene(side, edge)
+    state = solve_scene(given, comm, partitions=partitions, solver=FaceNewton(tolerance=1e-6))
+    assert isinstance(state, LinearState)
+    mine = asdict(state.costs.solve)
+    most = {name: max(comm.allgather(value)) for name, value in mine.items()}
+    lattice = Lattice(side, edge, state.solution.products, state.solution.iterations)
+    return {
+        "counted": most,
+        "model": asdict(lattice.solve(comm.size)),
+        "seconds": comm.allreduce(state.seconds["solve"], op=MPI.MAX),
+        "overhead": Machine().overhead(lattice, comm.size),
+    }
+
+
+def memory(comm: MPI.Comm, edge: int = 6, a_rank: int = 6) -> str:
+    """Solve a beam with some subdomains on every rank; return their memory in words. Collective."""
+    imports = peak_memory()
+    length = a_rank * comm.size
+    mesh = block((0.0, 0.0, 0.0), (length, 1.0, 1.0), (edge * length, edge, edge))
+    given = block_on_plane(mesh, 0.3)
+    partitions = {"block": box_partition(mesh, (length, 1, 1))}
+    state = solve_scene(given, comm, partitions=partitions, solver=FaceNewton(tolerance=1e-6))
+    every = np.array(comm.allgather((peak_memory() - imports) / 1e6))
+    copies = state.costs.total
+    return (
+        f"{comm.size} ranks, {state.counts['torn_unknowns']} unknowns, {state.solution.products} products: "
+        f"{every.mean():.1f} MB a rank above the imports, {every.min():.1f} to {every.max():.1f}; "
+        f"largest copy {copies.largest_copy} B, reduction {copies.largest_reduction} B"
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print what the command line asks for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    for name in ("latency", "bandwidth", "flops"):
+        parser.add_argument(f"--{name}", type=float, default=getattr(Machine(), name))
+    parser.add_argument("--edge", type=int, default=6, help="elements along an edge of a subdomain")
+    parser.add_argument("--check", action="store_true", help="compare the counts of a run")
+    parser.add_argument("--memory", action="store_true", help="measure the memory of each rank")
+    settings, comm = parser.parse_args(arguments), MPI.COMM_WORLD
+    if settings.memory:
+        words = memory(comm, settings.edge)
+    elif settings.check:
+        here, run = measured(comm), checked(comm, edge=settings.edge)
+        rows = [(name, str(n), str(run["model"][name])) for name, n in run["counted"].items()]
+        spent = sum(here.seconds(PhaseCosts(**run["counted"]), comm.size).values()) + run["overhead"]
+        rows.append(("seconds", f"{run['seconds']:.3g}", f"{spent:.3g}"))
+        words = f"{here} on {comm.size} ranks\n\n{table(('solve', 'counted', 'model'), rows)}"
+    else:
+        machine = Machine(settings.latency, settings.bandwidth, settings.flops)
+        words = f"{machine}\n\n{extrapolated(machine, settings.edge)}"
+    if comm.rank == 0:
+        print(words)
+
+
+if __name__ == "__main__":
+    main()
