@@ -44,6 +44,8 @@ def chain_runs() -> list[Job]:
         *(run(f"chain-friction-{mu}", "chain", {"friction_coefficient": float(mu)}) for mu in OTHER_FRICTION),
         *(run(f"chain-compared-{ranks}", "chain", COMPARED, ranks, repeats=1) for ranks in (1, 2, 4)),
         run("chain-default", "chain", {"default_partition": True}),
+        run("chain-equal", "chain", {"default_partition": True, "grading": 0.0}),
+        run("chain-tetrahedra", "chain", {"default_partition": True, "cell": "tetrahedron"}),
         run("chain-compared-boxes", "chain", {**COMPARED, "boxes": [6, 2, 2]}, repeats=1),
         run("chain-compared-bisection", "chain", {**COMPARED, "parts": 16}, repeats=1),
     ]

@@ -189,6 +189,17 @@ ROWS = (
         "default-partition-chain", "default partition / boxes by hand, seconds, paper's chain", "ratio", 1.2,
         "lower", _ratio("chain-default", "chain", _seconds), "chain-default",
     ),
+    *(
+        Row(
+            f"products-{kind}", f"F-products, chain of {words}, default partition", "products", 90, "lower",
+            _products(f"chain-{kind}"), f"chain-{kind}",
+        )
+        for kind, words in (("equal", "equal cells"), ("tetrahedra", "tetrahedra"))
+    ),
+    Row(
+        "tetrahedra", "chain of tetrahedra / of hexahedra, seconds, default partitions", "ratio", 1.2,
+        "lower", _ratio("chain-tetrahedra", "chain-default", _seconds), "chain-tetrahedra",
+    ),
     Row(
         "growth", "seconds per unknown, chain refined three times / not refined", "ratio", 1.5, "lower",
         _ratio("chain-refined-3", "chain-default", lambda run: run["seconds"] / unknowns(run)),

@@ -17,7 +17,7 @@ from fenics_contact.mesh import bisection_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.study.measuring import slowest
-from fenics_contact.study.scenes.chain_links import chain, graded_links
+from fenics_contact.study.scenes.chain_links import GRADING, chain, graded_links
 
 
 def cold_state(
@@ -29,6 +29,8 @@ def cold_state(
     default_partition: bool = False,
     friction_coefficient: float = FRICTION_COEFFICIENT,
     tolerance: float = 1e-6,
+    cell: str = "hexahedron",
+    grading: float = GRADING,
 ) -> tuple[AnyState, float]:
     """Mesh, decompose and solve the chain, with nothing prepared. Collective.
 
@@ -40,6 +42,8 @@ def cold_state(
         default_partition: Whether the scene is cut as it is by default.
         friction_coefficient: Of the pair.
         tolerance: Of every residual.
+        cell: Cell type.
+        grading: As of `LinkShape`; 0 for cells of equal length along the links.
 
     Returns:
         The state and the wall seconds of the slowest rank.
@@ -47,7 +51,7 @@ def cold_state(
     comm.Barrier()
     start, meshing = perf_counter(), PhaseTimer()
     with meshing.phase("mesh"):
-        scene = chain(graded_links(cells), friction_coefficient)
+        scene = chain(graded_links(cells, cell, grading), friction_coefficient)
 
     def cut(mesh: BodyMesh) -> np.ndarray:
         return box_partition(mesh, boxes) if parts is None else bisection_partition(mesh, parts)

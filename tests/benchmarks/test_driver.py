@@ -25,8 +25,10 @@ from benchmarks.optimisation_tolerance import report as tolerance
 from benchmarks.plan import run, runs
 from benchmarks.study import chosen, filled
 from fenics_contact import solve_scene
+from fenics_contact.mesh.quality import cell_volumes
 from fenics_contact.study import runner
 from fenics_contact.study.runner import Job, measure
+from fenics_contact.study.scenes.chain_links import graded_links
 from tests.benchmarks.small_records import all_summaries
 from tests.conftest import ROOT, read_environment
 
@@ -95,6 +97,19 @@ def test_what_needs_another_program_runs_without_mpi() -> None:
 def test_every_module_has_what_it_imports(path: Path) -> None:
     parts = path.relative_to(ROOT).with_suffix("").parts
     importlib.import_module(".".join(parts[:-1] if parts[-1] == "__init__" else parts))
+
+
+def test_chains_have_the_cells_that_their_runs_name() -> None:
+    known = {job.name: job.arguments for job in runs()}
+    ratios, types = [], []
+    for name in ("chain-default", "chain-equal", "chain-tetrahedra"):
+        given = {key: known[name][key] for key in ("cell", "grading") if key in known[name]}
+        mesh = graded_links((24, 2, 8), **given).first.mesh
+        volume = cell_volumes(mesh.points, mesh.cells)
+        ratios.append(volume.max() / volume.min())
+        types.append(mesh.cell_type)
+    assert types == ["hexahedron", "hexahedron", "tetrahedron"]
+    assert ratios[1] < 0.5 * min(ratios[0], ratios[2])
 
 
 def test_the_face_of_a_state_is_solved_as_a_linear_problem() -> None:

@@ -35,10 +35,10 @@ ENERGY, PEAK, FINER = -20260.0, 4350.0, "meshes of up to 1.6 million unknowns"
 GRIP = 0.5
 
 
-def graded_links(cells: tuple[int, int, int], cell: str = "hexahedron") -> TwoLinks:
+def graded_links(cells: tuple[int, int, int], cell: str = "hexahedron", grading: float = GRADING) -> TwoLinks:
     """Mesh the links as in the demo, given the numbers of cells around, through and across."""
     around, through, across = cells
-    shape = LinkShape(n_around=around, n_a=through, n_b=across, grading=GRADING, cell=cell)
+    shape = LinkShape(n_around=around, n_a=through, n_b=across, grading=grading, cell=cell)
     return two_links(shape)
 
 
