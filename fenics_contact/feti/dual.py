@@ -323,6 +323,7 @@ class DualSystem:
         points: The motions q of rigid surfaces in terms of the modes, shape (n_free, n_modes), replicated.
         problem: The problem for the dual solvers.
         products: F-products so far.
+        kinds: Number of kinds of subdomains, those of each rank counted on their own.
     """
 
     inverse: TornInverse
@@ -363,6 +364,7 @@ class DualSystem:
             with together(comm):
                 # Not kept for later systems: MUMPS holds several times what remains, for a third of its time.
                 self.inverse = self._inverse(torn, Condensations(), kind, known)
+            self.kinds = int(comm.allreduce(len(self.inverse.kinds)))
         if previous is not None and self._is_that_of(previous):
             self._take_over(previous, timer)
         else:

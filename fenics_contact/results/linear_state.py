@@ -41,6 +41,12 @@ class LinearState(State):
     solution: DualSolution | DirectSolution
     system: DualSystem | DirectSystem
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """Those of every state, and the ``kinds`` of subdomains whose factors those alike share, by rank."""
+        kinds = {} if isinstance(self.system, DirectSystem) else {"kinds": self.system.kinds}
+        return {**super().counts, **kinds}
+
     def _errors_in_words(self) -> dict[str, str]:
         if self.known_errors is None:
             return {"errors": "not estimated yet: call state.estimate_errors()"}

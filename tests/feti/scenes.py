@@ -64,6 +64,18 @@ def clamped_block(cell: str, boxes: tuple[int, int, int] = (2, 2, 2), layers: in
     )
 
 
+def sliding_block() -> Cut:
+    """A clamped block in sixteen cubes that is pressed on a plane and dragged over it with friction."""
+    mesh = block((0, 0, 0), (2, 1, 1), (8, 4, 4))
+    scene = Scene(
+        {"block": Body(mesh, IsotropicElasticity(1.0, 0.3))},
+        [Support("block", "x0")],
+        [Traction("block", "z1", (-0.01, -0.007, -0.04))],
+        [ContactPair(Surface("block", "z0"), RigidPlane((0, 0, -0.01), (0, 0, 1)), Coulomb(0.3))],
+    )
+    return scene, {"block": box_partition(mesh, (4, 2, 2))}
+
+
 def three_that_meet(mesh: BodyMesh, x: float, y: float) -> np.ndarray:
     """Cut a mesh into three subdomains that meet along a line upright."""
     east, north = (mesh.points[mesh.cells].mean(axis=1)[:, :2] > (x, y)).T

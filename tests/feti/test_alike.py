@@ -17,15 +17,10 @@ from ufl.domain import extract_unique_domain
 from fenics_contact import (
     Body,
     BodyMesh,
-    ContactPair,
     ContactProblem,
-    Coulomb,
     ElasticFoundation,
-    RigidPlane,
     Scene,
     Support,
-    Surface,
-    Traction,
     box_partition,
     solve_scene,
 )
@@ -42,7 +37,7 @@ from fenics_contact.materials import (
     strain,
 )
 from fenics_contact.qp import FaceNewton
-from tests.feti.scenes import STEEL, skewed
+from tests.feti.scenes import STEEL, skewed, sliding_block
 
 TURN = Rotation.from_euler("xyz", [0.3, -0.7, 1.1]).as_matrix()
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -215,16 +210,6 @@ def test_interfaces_elsewhere_are_other_kinds_unless_the_shape_maps_them() -> No
         require_operators_of_each(inverse)
 
 
-def sliding(counts: tuple[int, int, int] = (8, 4, 4)) -> Scene:
-    mesh = block((0, 0, 0), (2, 1, 1), counts)
-    return Scene(
-        {"block": Body(mesh, IsotropicElasticity(1.0, 0.3))},
-        [Support("block", "x0")],
-        [Traction("block", "z1", (-0.01, -0.007, -0.04))],
-        [ContactPair(Surface("block", "z0"), RigidPlane((0, 0, -0.01), (0, 0, 1)), Coulomb(0.3))],
-    )
-
-
 def alone(monkeypatch: pytest.MonkeyPatch) -> None:
     def apart(kinds: Kinds, given: Kind) -> tuple[Kind, None]:
         return kinds.add(given), None
@@ -233,14 +218,13 @@ def alone(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_sharing_changes_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = sliding()
-    cut = {"block": box_partition(scene.bodies["block"].mesh, (4, 2, 2))}
+    scene, cut = sliding_block()
     solver = FaceNewton(tolerance=1e-11)
     shared = solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=solver)
-    assert len(shared.dual.inverse.kinds) <= 6
+    assert shared.counts["kinds"] == len(shared.dual.inverse.kinds) <= 6
     alone(monkeypatch)
     other = solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=solver)
-    assert len(other.dual.inverse.kinds) == 16
+    assert other.counts["kinds"] == 16
     assert abs(shared.counts["f_products"] - other.counts["f_products"]) <= 1
     size = np.abs(other.contact.force).max()
     np.testing.assert_allclose(shared.contact.force, other.contact.force, atol=1e-10 * size)
@@ -249,10 +233,36 @@ def test_sharing_changes_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     assert size > 0.0
 
 
+ON_RANKS = """
+    import numpy as np
+    from mpi4py import MPI
+    from fenics_contact import solve_scene
+    from fenics_contact.qp import FaceNewton
+    from tests.feti.scenes import sliding_block
+
+    scene, cut = sliding_block()
+    state = solve_scene(scene, MPI.COMM_WORLD, partitions=cut, solver=FaceNewton(tolerance=1e-11))
+    own = MPI.COMM_WORLD.allgather(len(state.dual.inverse.kinds))
+    assert state.counts["kinds"] == sum(own)
+    if MPI.COMM_WORLD.rank == 0:
+        order = np.argsort(state.contact.points.slave)
+        print(*own, *state.contact.force[order].ravel().tolist())
+"""
+
+
+def test_each_rank_shares_among_its_own_with_the_same_answer(mpirun: Callable[..., str]) -> None:
+    words = mpirun(ON_RANKS, 2).split()
+    kinds, forces = [int(word) for word in words[:2]], np.array(words[2:], dtype=float)
+    scene, cut = sliding_block()
+    alone = solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=1e-11))
+    expected = alone.contact.force[np.argsort(alone.contact.points.slave)].ravel()
+    np.testing.assert_allclose(forces, expected, atol=1e-10 * np.abs(expected).max())
+    assert max(kinds) <= alone.counts["kinds"]
+
+
 def test_a_moved_subdomain_is_factored_alone_or_joins_a_kind() -> None:
-    scene = sliding()
+    scene, cut = sliding_block()
     mesh = scene.bodies["block"].mesh
-    cut = {"block": box_partition(mesh, (4, 2, 2))}
     problem = ContactProblem(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=1e-11))
     first = problem.solve()
     points = mesh.points.copy()
