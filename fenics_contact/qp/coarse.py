@@ -255,8 +255,15 @@ def gram_matrix(comm: MPI.Comm, columns: sp.csr_matrix) -> Gram:
 
 def summed_if_small(comm: MPI.Comm, share: sp.csr_matrix) -> Gram:
     """Return the sum over the ranks, dense, up to `DENSE_LIMIT`; beyond it the share. Collective."""
-    m = share.shape[0]
-    return global_sum(comm, share.toarray()).reshape(m, m) if m <= DENSE_LIMIT else share
+    if share.shape[0] > DENSE_LIMIT:
+        return share
+    matrix = share.toarray()
+    if comm.size > 1:  # a quarter of the entries or less is sent: those that some rank has
+        mine = np.packbits(matrix != 0.0)
+        comm.Allreduce(mine, used := np.empty_like(mine), op=MPI.BOR)
+        filled = np.flatnonzero(np.unpackbits(used).view(bool))
+        matrix.ravel()[filled] = global_sum(comm, matrix.ravel()[filled])
+    return matrix
 
 
 class SquareInverse(Protocol):

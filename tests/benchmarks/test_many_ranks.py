@@ -56,7 +56,7 @@ def test_lattices_have_the_sizes_of_their_subdomains() -> None:
     alone, many = one.solve(1), one.solve(64)
     assert (alone.messages, alone.reductions, alone.copies) == (0, 0, 0)
     assert many.flops > alone.flops / 64
-    assert many.largest_reduction == 8 * 384**2
+    assert many.largest_reduction == 8 * 25 * 10**3
     assert more.solve(64).largest_copy == max(8 * 6 * 512, 20 * more.contact_rows)
     assert Lattice(40).holders(1000) == 20
     assert Lattice(40).coarse_factors(1000) == pytest.approx(

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 import scipy.sparse as sp
 from mpi4py import MPI
 
@@ -153,3 +154,30 @@ def test_sparse_factors_take_two_operations_for_each_entry_and_substitution() ->
     assert factor.entries == 19, "no fill"
     operator = FactoredOperator(chain, np.array([0, 9]), factor, Factor(chain[1:9][:, 1:9].tocsr()))
     assert operator.flops == (4 * 19, 4 * 15 + 2 * 2 + 4 * 2)
+
+
+SUMMED = """
+    import numpy as np, scipy.sparse as sp
+    from mpi4py import MPI
+    from fenics_contact._base.costs import costs_of, with_ledger
+    from fenics_contact.qp.coarse import DENSE_LIMIT, summed_if_small
+    comm = with_ledger(MPI.COMM_WORLD)
+    def share(rank, size=40):
+        rows, columns = np.arange(size), (np.arange(size) + rank) % size
+        return sp.csr_matrix((np.full(size, (-1.0) ** rank), (rows, columns)), shape=(size, size))
+    mine = share(comm.rank) + share(7)
+    found = summed_if_small(comm, mine)
+    known = sum(share(rank).toarray() + share(7).toarray() for rank in range(comm.size))
+    assert np.array_equal(found, known)
+    assert costs_of(comm).total.reduction_bytes == 8 * 40 * (comm.size + 1) + 40**2 // 8
+    large = sp.identity(DENSE_LIMIT + 1, format="csr")
+    assert summed_if_small(comm, large) is large
+    comm.Barrier()
+    if comm.rank == 0:
+        print("summed")
+"""
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_ranks_sum_the_entries_that_one_of_them_has(mpirun: Callable[..., str], ranks: int) -> None:
+    assert mpirun(SUMMED, ranks).split() == ["summed"]
