@@ -13,7 +13,13 @@ from fenics_contact.feti.subdomain import LocalOperator
 
 
 class SharedOperator(LocalOperator, Protocol):
-    """One that also serves several subdomains at once."""
+    """One that also serves several subdomains at once.
+
+    Attributes:
+        pays_from: Number of subdomains from which this is faster than one after the other.
+    """
+
+    pays_from: int
 
     def share(self) -> None:
         """Prepare for several subdomains."""

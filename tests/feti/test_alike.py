@@ -26,7 +26,7 @@ from fenics_contact import (
 )
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.feti.alike import Kind, Kinds
-from fenics_contact.feti.inverse import LocalKind, TornInverse
+from fenics_contact.feti.inverse import ExplicitOperator, FactoredOperator, LocalKind, TornInverse
 from fenics_contact.feti.subdomain import assemble
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
@@ -43,6 +43,14 @@ TURN = Rotation.from_euler("xyz", [0.3, -0.7, 1.1]).as_matrix()
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 IN_PLANE = Rotation.from_euler("z", 0.4).as_matrix()[:2, :2]
 WAYS = (LocalKind.IMPLICIT, LocalKind.EXPLICIT)
+
+
+@pytest.fixture(params=[1, 1000], ids=["at once", "one by one"], autouse=True)
+def number_from_which_products_are_taken_at_once(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for operator in (ExplicitOperator, FactoredOperator):
+        monkeypatch.setattr(operator, "pays_from", request.param)
 
 
 def bent(cell: str = "hexahedron") -> BodyMesh:
