@@ -23,6 +23,7 @@ class Stop(Enum):
     NO_CURVATURE = "direction without curvature: the operator is singular on this face"
     BAD_PRECONDITIONER = "preconditioner is not positive"
     STAGNATION = "stagnation: rounding has eaten the residual"
+    ENOUGH = "what is left is not linear"
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +43,10 @@ class FaceStep:
     iterations: int
     measure: float
     stop: Stop
+
+
+#: Whether a step is accurate enough, from δ, F Z δ and its measure: more may be missing than the face knows.
+Enough: TypeAlias = Callable[[Vector, Vector, float], bool]
 
 
 class _Rows:
@@ -66,7 +71,13 @@ class _Rows:
 
 
 def projected_cg(
-    system: FaceSystem, gradient: Vector, weights: Vector, tolerance: float, max_iterations: int
+    system: FaceSystem,
+    gradient: Vector,
+    weights: Vector,
+    tolerance: float,
+    max_iterations: int,
+    enough: Enough | None = None,
+    asked_every: int = 4,
 ) -> FaceStep:
     """Minimise ½ δᵀA δ + gᵀδ over G Z δ = 0 with A = Zᵀ F Z + κ. Collective.
 
@@ -76,7 +87,8 @@ def projected_cg(
     matrix–vector products.
 
     `gradient`: g = Zᵀ(F λ − d) + κ y at the starting point, shape (n_face,), owned; `weights`: positive
-    weights of the stopping norm ‖weights · P_F(g + A δ)‖, shape (n_face,), owned.
+    weights of the stopping norm ‖weights · P_F(g + A δ)‖, shape (n_face,), owned; `enough`: ends the
+    iteration before the tolerance is reached, asked every few iterations.
 
     Returns the step and why the iteration ended; nothing is raised, the caller decides what a failure means.
 
@@ -115,6 +127,10 @@ def projected_cg(
         if since_best > system.patience:
             stop = Stop.STAGNATION
             break
+        asked = iterations % asked_every == 0 and size > tolerance
+        if enough is not None and asked and enough(step, product, size):
+            stop = Stop.ENOUGH
+            break
     return FaceStep(step, product, residual, iterations, size, stop)
 
 
@@ -152,7 +168,12 @@ def _image(
 
 
 def projected_gmres(
-    coupled: CoupledSystem, gradient: Vector, weights: Vector, tolerance: float, max_iterations: int
+    coupled: CoupledSystem,
+    gradient: Vector,
+    weights: Vector,
+    tolerance: float,
+    max_iterations: int,
+    enough: Enough | None = None,
 ) -> FaceStep:
     """Solve (Wᵀ F Z + κ) δ = −g + (G W)ᵀ α with G Z δ = 0. Collective.
 
@@ -160,7 +181,7 @@ def projected_gmres(
     minimised and compared with the tolerance.
 
     `gradient`: g = Wᵀ(F λ − d) + κ y at the starting point, shape (n_face,), owned; `weights`: positive
-    weights, shape (n_face,), owned.
+    weights, shape (n_face,), owned; `enough`: ends the iteration before the tolerance is reached.
 
     Returns the step in face coordinates (the multiplier moves by Z δ) and why the iteration ended.
 
@@ -174,9 +195,13 @@ def projected_gmres(
         full = operator(coupled.moving @ direction)
         return weights * coupled.image(direction, full), (direction, full)
 
+    def both(found: Krylov) -> tuple[Vector, Vector]:
+        return found.combined(0, len(gradient)), found.combined(1, coupled.moving.shape[0])
+
+    ends = None if enough is None else lambda found: enough(*both(found), found.residual)
     first = -weights * coupled.oblique(gradient)
-    found = gmres(comm, first, expand, tolerance, max_iterations, coupled.system.patience)
-    step, product = found.combined(0, len(gradient)), found.combined(1, coupled.moving.shape[0])
+    found = gmres(comm, first, expand, tolerance, max_iterations, coupled.system.patience, ends)
+    step, product = both(found)
     residual = coupled.oblique(gradient + coupled.operate(step, product))
     left = float(np.sqrt(global_sum(comm, (weights * residual) @ (weights * residual))[0]))
     stop = found.stop
@@ -219,8 +244,13 @@ def gmres(
     tolerance: float,
     max_iterations: int,
     patience: int,
+    enough: Callable[[Krylov], bool] | None = None,
+    asked_every: int = 4,
 ) -> Krylov:
-    """Combine directions whose images sum up to ``first``, by GMRES without restart. Collective."""
+    """Combine directions whose images sum up to ``first``, by GMRES without restart. Collective.
+
+    `enough`: ends the iteration before the tolerance is reached, asked every few iterations.
+    """
     size = float(np.sqrt(global_sum(comm, first @ first)[0]))
     basis, kept, small, stop = _Rows(len(first)), list[Kept](), _LeastSquares(size), Stop.CONVERGED
     vector: Vector = np.asarray(first / (size or 1.0), dtype=np.float64)
@@ -240,6 +270,10 @@ def gmres(
             # The Krylov space is exhausted: the remainder lies outside the operator's range.
             stop = Stop.CONVERGED if small.residual <= tolerance else Stop.NO_CURVATURE
             break
+        if enough is not None and basis.count % asked_every == 0 and small.residual > tolerance:
+            if enough(Krylov(small.solution(), tuple(kept), small.residual, stop)):
+                stop = Stop.ENOUGH
+                break
         vector = image / column[-1]
     return Krylov(small.solution(), tuple(kept), small.residual, stop)
 

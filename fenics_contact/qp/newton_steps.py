@@ -378,7 +378,8 @@ class FaceSteps:
         changed = round(float(global_sum(self.problem.comm, count)[0]))
         # (a), (c) Its solution, as accurate as the last face's prediction warrants.
         expected = None if changed else state.mismatch
-        solved = self._solve(face, before, self.forcing.by_prediction(before.residuals, expected, care))
+        tolerance = self.forcing.by_prediction(before.residuals, expected, care)
+        solved = self._solve(face, before, tolerance, predicted=expected is not None)
         # (d) Rigid motions, then the damped step.
         alpha = self._motions(solved, before, step)
         after = iterate_at(self.problem, self._relieved(solved, alpha, step), solved.product, alpha)
@@ -408,8 +409,12 @@ class FaceSteps:
         step[layout.tangential[turned]] *= self.safeguards.reduction
         return step, classify(layout, bound, iterate.multiplier, iterate.residual, step, soft)
 
-    def _solve(self, face: Face, before: Iterate, tolerance: float) -> _SolvedFace:
-        """Solve the linear system of a face, in which slipping forces grow with normal forces. Collective."""
+    def _solve(self, face: Face, before: Iterate, tolerance: float, *, predicted: bool) -> _SolvedFace:
+        """Solve the linear system of a face, in which slipping forces grow with normal forces. Collective.
+
+        `predicted`: whether the tolerance is by a prediction of the face, which may turn out wrong: it is
+        solved no further than other residuals allow.
+        """
         problem = self.problem
         system = self.systems.build(face)
         growth = problem.law.growth(before.multiplier)
@@ -425,10 +430,26 @@ class FaceSteps:
             if system.weighted_norm(contrary.excess, weights) <= tolerance:
                 contrary = None
         limit = max(self.max_products - self.operator.products, 1)
+
+        seen: list[float] = []
+
+        def enough(step: Vector, image: Vector, size: float) -> bool:
+            moved, whole = entered + linear.advance(step), product + image
+            alpha = self._fitted(system, linear, moved, whole, before)
+            residuals = iterate_at(problem, moved, whole, alpha).residuals
+            seen.append(residuals.size_in_scales_of(before.residuals))
+            # What falls with the linear residual is due to that.
+            left = len(seen) > 1 and seen[-1] > 0.5 * seen[-2]
+            return left and size <= self.forcing.largest * seen[-1]
+
+        # Rows that contradict each other have a residual that no step changes; where nothing presses there is
+        # no force to measure others by.
+        asked = predicted and contrary is None and before.residuals.natural > 0.0
+        ends = enough if asked else None
         if isinstance(linear, CoupledFace):
-            inner = projected_gmres(linear.coupled, gradient, weights, tolerance, limit)
+            inner = projected_gmres(linear.coupled, gradient, weights, tolerance, limit, ends)
         else:
-            inner = projected_cg(linear, gradient, weights, tolerance, limit)
+            inner = projected_cg(linear, gradient, weights, tolerance, limit, ends)
         multiplier, product = entered + linear.advance(inner.step), product + inner.product
         return _SolvedFace(system, linear, multiplier, product, inner, contrary)
 
@@ -448,13 +469,24 @@ class FaceSteps:
 
     def _motions(self, solved: _SolvedFace, before: Iterate, step: Vector) -> Vector:
         """Return α after a step: from the rows of the face, then in equilibrium. Collective."""
-        problem, system, flexed = self.problem, solved.system, solved.product - self.problem.rhs
-        alpha = solved.linear.motions(system.gradient(solved.multiplier, flexed))
-        alpha = keep_free_motions(system.coarse, before.motions(problem), alpha)
+        problem, system = self.problem, solved.system
+        alpha = self._fitted(system, solved.linear, solved.multiplier, solved.product, before)
         if not self.safeguards.moves_held and system.coarse.gram.rank == problem.coarse.m:
             return alpha
-        residual = flexed - problem.coarse.transpose(alpha)
+        residual = solved.product - problem.rhs - problem.coarse.transpose(alpha)
         return np.asarray(alpha + self.correction(solved.multiplier, residual, step), dtype=np.float64)
+
+    def _fitted(
+        self,
+        system: FaceSystem,
+        linear: FaceSystem | CoupledFace,
+        multiplier: Vector,
+        product: Vector,
+        before: Iterate,
+    ) -> Vector:
+        """Return α of a multiplier of a face, from the rows of the face. Collective."""
+        alpha = linear.motions(system.gradient(multiplier, product - self.problem.rhs))
+        return keep_free_motions(system.coarse, before.motions(self.problem), alpha)
 
     def _record(self, number: int, taken: Damped[Iterate], solved: _SolvedFace, changed: int) -> SolverStep:
         inner, face, coarse = solved.inner, solved.system.face, solved.system.coarse

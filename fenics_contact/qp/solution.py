@@ -54,6 +54,13 @@ class Residuals:
         """√(natural² + gluing²), which the solution of a face predicts."""
         return float(np.hypot(self.natural, self.gluing))
 
+    def size_in_scales_of(self, other: Residuals) -> float:
+        """The size in the scales of other residuals, of the face that they select: see `residual_weights`."""
+        natural = self.natural * (self.force_scale or 1.0) / (other.force_scale or np.inf)
+        return float(
+            np.hypot(natural, self.gluing * (self.gluing_scale or 1.0) / (other.gluing_scale or 1.0))
+        )
+
     def worst_in_scales_with(self, other: Residuals) -> float:
         """The worst residual in the smaller scales of two, so that two iterates can be compared.
 
