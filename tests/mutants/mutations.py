@@ -295,6 +295,27 @@ MUTATIONS = (
         ("tests/contact/test_symmetry_planes.py::test_what_is_left_free_by_rounding_alone_is_held",),
     ),
     Mutation(
+        "subdomains that are almost alike share factors",
+        "feti/alike.py",
+        "matrix: float = 1e-12",
+        "matrix: float = 1e-5",
+        ("tests/feti/test_alike.py::test_what_is_alike_but_for_a_millionth_is_not_shared",),
+    ),
+    Mutation(
+        "what a mirrored subdomain returns keeps the signs of the first one",
+        "feti/moved.py",
+        "vector[motion.place] = motion.sign * moved",
+        "vector[motion.place] = moved",
+        ("tests/feti/test_alike.py::test_mirrored_pieces_are_one_kind",),
+    ),
+    Mutation(
+        "matrices that depend on the place serve subdomains elsewhere",
+        "feti/subdomain.py",
+        "return not (special or _dolfinx.is_revolved(body.cell_type) or _varies(parts, body, forms))",
+        "return not special",
+        ("tests/feti/test_alike.py::test_what_depends_on_more_than_the_shape_is_assembled_for_each_piece",),
+    ),
+    Mutation(
         "small pivots are zeros",
         "feti/inverse.py",
         "unit = 2.0 ** np.round(np.log2(stiffness.diagonal().max()))",
