@@ -21,7 +21,7 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._base.memory import available_memory
 from fenics_contact._base.progress import Task
 from fenics_contact._equilibrium.problem import ContactProblem
-from fenics_contact._scene.plan import expected_memory
+from fenics_contact._scene.memory import Subdomains, expected_memory
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.true_shapes import sides_without_shape
 from fenics_contact.design.objective import Objective
@@ -357,7 +357,8 @@ class Way:
             found = self._refined(aim)
             scene, self._refinements = found.scene, found.refinements
             partitions = scene.partition(self.comm.size)
-            needed, left = expected_memory(scene, partitions), limits.memory or available_memory()
+            needed = expected_memory(scene, Subdomains.of(scene, partitions), self.comm.size)
+            left = limits.memory or available_memory()
         unknowns = unknowns_of(scene)
         self._predicted = last.seconds * (unknowns / last.unknowns) ** growth
         next_mesh = f"{_percent(last)}, and the next mesh of {unknowns} unknowns would"

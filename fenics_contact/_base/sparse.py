@@ -99,15 +99,9 @@ def expected_seconds(size: int, interface: int) -> float:
     return min(_totals(size, interface, PRODUCTS, MEASURED))
 
 
-def expected_bytes(size: int, interface: int, triangle_bytes: float = 6.0) -> float:
-    """Return the memory of a factored subdomain stored in the cheaper way; arguments as above.
-
-    `triangle_bytes`: bytes of the two packed triangles of dense operators, divided by the square of the
-    interface dofs.
-    """
-    if prefers_explicit(size, interface):
-        return triangle_bytes * interface**2 + FACTOR_BYTES * (size - interface) ** 1.5
-    return FACTOR_BYTES * (size**1.5 + (size - interface) ** 1.5)
+def factor_bytes(size: int, dim: int) -> float:
+    """Return the memory of a sparse Cholesky factor of a body in some dimensions, by nested dissection."""
+    return FACTOR_BYTES * size**1.5 if dim == 3 else 11.0 * size * np.log2(size + 2.0)
 
 
 def _totals(size: int, interface: int, products: int, rates: Rates) -> tuple[float, float]:

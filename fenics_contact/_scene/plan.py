@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact._base.display import counted, displayed
-from fenics_contact._base.sparse import expected_bytes
 from fenics_contact._scene.loads import BodyForce, ThermalStrain
+from fenics_contact._scene.memory import Subdomains, expected_memory
 from fenics_contact._scene.pairs import Coulomb, Surface, Tresca
 from fenics_contact._scene.parts import in_words
 from fenics_contact._scene.supports import RigidSurface, Roller
@@ -176,10 +176,6 @@ def held_by_supports(scene: SceneParts, body: str) -> bool:
     return resisted_motions(held_components(scene, body, modes)).shape[1] == modes.shape[2]
 
 
-#: Bytes per torn unknown besides the factors: meshes, rows of B, vectors and their history.
-BYTES_PER_UNKNOWN = 1200
-
-
 class SolverKind(StrEnum):
     """How the equilibrium is computed."""
 
@@ -258,10 +254,13 @@ class Plan:
         }
 
 
-def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensitivity: bool = False) -> Plan:
+def make_plan(
+    scene: SceneParts, partitions: Mapping[str, np.ndarray], *, ranks: int = 1, sensitivity: bool = False
+) -> Plan:
     """Decide what a scene needs.
 
-    `sensitivity`: whether derivatives by the shape are wanted.
+    `ranks`: among which the subdomains are dealt out; `sensitivity`: whether derivatives by the shape are
+    wanted.
     """
     from fenics_contact._scene.pair_geometry import pair_geometry, unpaired_bodies
 
@@ -269,8 +268,8 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
     effects = effects_of(scene)
     partitions = {name: pieces(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
     names = {effect.name for effect in effects}
-    nodes, shared = _nodes_of_subdomains(scene, partitions)
-    subdomains, unknowns = len(nodes), scene.components * int(nodes.sum())
+    parts = Subdomains.of(scene, partitions)
+    subdomains, unknowns = len(parts.size), int(parts.size.sum())
     solver = choose_solver(scene, subdomains, sensitivity=sensitivity)
     direct = solver is SolverKind.DIRECT
     loose = sum(int(s.free.sum()) for s in scene.supports if isinstance(s, RigidSurface))
@@ -287,37 +286,12 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
         fixed_point=EffectName.COULOMB in names,
         coarse_motions=motions,
         adjoint=sensitivity,
-        memory=_memory(scene.components * nodes, scene.components * shared) + 8.0 * motions**2,
+        memory=expected_memory(scene, parts, ranks),
         contacts=tuple(pair_geometry(scene, pair) for pair in scene.contacts),
         ties=tuple(f"{tie.place}; {in_words(tie)}" for tie in scene.ties),
         unpaired=unpaired_bodies(scene),
         preloads=tuple(map(partial(_section_in_words, scene), scene.preloads)),
     )
-
-
-def expected_memory(scene: SceneParts, partitions: Mapping[str, np.ndarray]) -> float:
-    """Return the expected memory of all ranks together, [bytes], without that of the coarse problem."""
-    nodes, shared = _nodes_of_subdomains(scene, partitions)
-    return _memory(scene.components * nodes, scene.components * shared)
-
-
-def _nodes_of_subdomains(
-    scene: SceneParts, partitions: Mapping[str, np.ndarray]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the numbers of nodes, and of shared ones, of the subdomains of all bodies with a partition."""
-    counts = [
-        _node_counts(body.mesh, partitions[name]) for name, body in scene.bodies.items() if name in partitions
-    ]
-    nodes, shared = (np.concatenate(column) for column in zip(*counts, strict=True))
-    return nodes, shared
-
-
-def _memory(sizes: np.ndarray, interfaces: np.ndarray) -> float:
-    """Return the expected memory of subdomains with these numbers of unknowns and shared ones, [bytes]."""
-    factors = sum(
-        expected_bytes(int(size), int(shared)) for size, shared in zip(sizes, interfaces, strict=True)
-    )
-    return float(factors + BYTES_PER_UNKNOWN * sizes.sum())
 
 
 def _section_in_words(scene: SceneParts, preload: Preload) -> str:
@@ -380,12 +354,3 @@ def _bearing_nodes(scene: SceneParts, surface: Surface) -> int:
 
 def _slave_nodes(scene: SceneParts, surface: Surface) -> int:
     return len(np.unique(scene.facets(surface)))
-
-
-def _node_counts(mesh: BodyMesh, partition: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nodes of each subdomain, and how many of them it shares, shape (n_subdomains,) each."""
-    keys = np.unique(partition[:, None] * np.int64(mesh.n_nodes) + mesh.cells)
-    subdomain, node = keys // mesh.n_nodes, keys % mesh.n_nodes
-    torn = np.bincount(node)[node] > 1
-    count = int(partition.max()) + 1
-    return np.bincount(subdomain, minlength=count), np.bincount(subdomain[torn], minlength=count)

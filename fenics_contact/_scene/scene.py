@@ -133,7 +133,7 @@ class Scene(SceneParts):
 
         Args:
             partitions: Body name -> subdomain of every cell; by default what `partition` returns.
-            ranks: Number of ranks, if the partition is left open.
+            ranks: Number of ranks, each of which holds numbering and meshes, and factors of its own.
             sensitivity: Whether derivatives by the shape are wanted.
 
         Example:
@@ -142,7 +142,7 @@ class Scene(SceneParts):
         from fenics_contact._scene.plan import make_plan
 
         cut = self.partition(ranks) if partitions is None else partitions
-        return make_plan(self, cut, sensitivity=sensitivity)
+        return make_plan(self, cut, ranks=ranks, sensitivity=sensitivity)
 
 
 #: Loads or supports as functions of time.

@@ -18,6 +18,7 @@ from fenics_contact._base.sparse import LAST_PLACES, dispose_with, expected_seco
 from fenics_contact._fem.forms import FormLibrary, cell_stiffness
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.local_axes import LocalAxes, joined_axes, same_axes
+from fenics_contact._scene.memory import require_memory
 from fenics_contact._scene.revolution import hold_axis
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import Roller, ToolMotion
@@ -471,6 +472,8 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
     with together(comm):
         _check_partitions(scene, partitions)
         partitions = {name: _whole(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
+    if not scene.is_nonlinear:
+        require_memory(scene, partitions, comm)
     forms = FormLibrary(comm)
     forms.prepare(scene)
     # Ranks agree on errors after each local stage, before the next collective one.

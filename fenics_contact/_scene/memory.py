@@ -1,0 +1,235 @@
+"""The memory that a state of a scene needs, from its cells, cuts and pairs alone, for linear materials."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._base.libraries import MPI
+from fenics_contact._base.memory import available_memory
+from fenics_contact._base.sparse import factor_bytes, prefers_explicit
+from fenics_contact._scene.pairs import Surface
+from fenics_contact.errors import InvalidInputError, together
+
+if TYPE_CHECKING:
+    from fenics_contact._scene.body import Body
+    from fenics_contact._scene.parts import SceneParts
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Bytes by what needs them, measured on blocks, chains and plates (hexahedra, tetrahedra, quadratic).
+
+    Attributes:
+        start: What a rank needs at first, whatever the scene.
+        heap: What a rank does not give back of the workspaces of factors.
+        tables: Numbering, gluing rows and meshes, of each torn unknown on every rank.
+        own: Kernels, coordinates and loads, of each torn unknown.
+        system: Rows of B, coarse space and vectors, of each torn unknown.
+        entry: Of an entry of a sparse matrix.
+        workspace: Of MUMPS and PETSc for each entry of a matrix that is condensed, for each of the condensed
+            one, and relative to the factors of both.
+        cached: Workspaces that a rank keeps while it factors.
+        inverting: Of each entry of a condensed matrix while it is inverted.
+        vectors: Vectors of multipliers that iterations keep.
+    """
+
+    start: float = 9e6
+    heap: float = 8e6
+    tables: float = 90.0
+    own: float = 100.0
+    system: float = 110.0
+    entry: float = 12.0
+    workspace: tuple[float, float, float] = (27.0, 24.0, 0.5)
+    cached: int = 8
+    inverting: float = 24.0
+    vectors: float = 130.0
+
+
+@dataclass(frozen=True)
+class Subdomains:
+    """The subdomains of a scene and what counts for their memory, shape (n_subdomains,) each.
+
+    Attributes:
+        size: Unknowns.
+        interface: Those that rows of B touch.
+        kind: Numbers of kinds: those that seem alike up to rotations and mirrors have the same.
+        matrix: The same of those that seem alike up to translations, wherever rows of B touch them.
+        pattern: Numbers of those whose cells seem connected alike, up to numbering.
+        couplings: Entries of a row of the stiffness, about.
+        place: Place of each among those of its body, in (0, 1).
+    """
+
+    size: np.ndarray
+    interface: np.ndarray
+    kind: np.ndarray
+    matrix: np.ndarray
+    pattern: np.ndarray
+    couplings: np.ndarray
+    place: np.ndarray
+
+    @classmethod
+    def of(cls, scene: SceneParts, partitions: Mapping[str, np.ndarray]) -> Subdomains:
+        """Return those of the bodies that have a partition of their cells."""
+        materials = [body.material for body in scene.bodies.values()]
+        sizes, shapes, turned, place = [], [], [], []
+        for (name, body), material in zip(scene.bodies.items(), materials, strict=True):
+            if name not in partitions:
+                continue
+            counts, invariants, moments = _counted(scene, name, partitions[name])
+            couplings = np.full(len(counts), _couplings(body, partitions[name]))
+            own = np.full(len(counts), materials.index(material))
+            sizes.append(np.column_stack([counts, own, couplings]))
+            shapes.append(invariants)
+            turned.append(moments)
+            place.append((np.arange(len(counts)) + 0.5) / len(counts))
+        counts = np.concatenate(sizes)
+        size, interface = counts[:, :2].astype(np.int64).T
+        numbers = (
+            _numbered(counts, np.concatenate(shapes)),
+            _numbered(counts[:, [0, 2, 3, -2]], np.concatenate(turned)),
+            _numbered(counts, np.zeros((len(counts), 0))),
+        )
+        return cls(size, interface, *numbers, counts[:, -1], np.concatenate(place))
+
+
+def _numbered(counts: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+    """Return the number of each subdomain among those of which counts, or shapes to six places, differ."""
+    alike = np.round(shapes / np.abs(shapes).max(initial=np.finfo(float).tiny), 6) + 0.0  # no -0.0
+    _, number = np.unique(np.column_stack([counts, alike]), axis=0, return_inverse=True)
+    return np.asarray(number.ravel())
+
+
+def expected_memory(
+    scene: SceneParts, parts: Subdomains, ranks: int = 1, rates: Rates | None = None
+) -> float:
+    """Return the largest memory that a state takes on all ranks together, without libraries, [bytes].
+
+    It is the largest one of that with all stiffness matrices, that while the last subdomains are factored,
+    and that while the dual problem is solved. Subdomains of a rank that are alike count once.
+    """
+    rates = rates or Rates()
+    torn = int(parts.size.sum())
+    nodes = sum(body.mesh.n_nodes for body in scene.bodies.values())
+    fixed = sum(int(np.count_nonzero(scene.fixed(name))) for name in scene.body_names)
+    multipliers = torn - scene.components * nodes + fixed
+    meshes = sum(body.mesh.points.nbytes + body.mesh.cells.nbytes for body in scene.bodies.values())
+    steady = ranks * (rates.start + meshes + rates.tables * torn) + rates.own * torn
+    factors = workspaces = assembled = 0.0
+    for rank in range(ranks):
+        mine = np.flatnonzero((parts.place * ranks).astype(int) == rank)
+        held, during = _factors(parts, mine, scene.dim, rates)
+        factors, workspaces = factors + held, workspaces + during
+        first = mine[np.unique(parts.matrix[mine], return_index=True)[1]]
+        assembled += rates.entry * float(parts.couplings[first] @ parts.size[first])
+    solving = rates.system * torn + 8.0 * rates.vectors * multipliers
+    return steady + max(assembled, ranks * rates.heap + factors + max(workspaces, solving))
+
+
+def require_memory(
+    scene: SceneParts,
+    partitions: Mapping[str, np.ndarray],
+    comm: MPI.Comm,
+    *,
+    small: int = 50_000,
+    certain: float = 1.3,
+) -> None:
+    """Refuse a scene of which a state needs more memory than its machines have left. Collective.
+
+    `small`: unknowns up to which nothing is computed; `certain`: how far the expected memory must exceed what
+    is left, as it is an estimate.
+    """
+    unknowns = scene.components * sum(body.mesh.n_nodes for body in scene.bodies.values())
+    if unknowns <= small:
+        return
+    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    here = machine.size
+    machine.Free()
+    with together(comm):
+        left = available_memory()
+        needed = expected_memory(scene, Subdomains.of(scene, partitions), comm.size) * here / comm.size
+        if left is not None and needed > certain * left:
+            raise InvalidInputError(
+                f"a state must fit into memory, but {unknowns} unknowns need about {needed / 1e9:.3g} GB on "
+                f"this machine, and {left / 1e9:.3g} GB are left: about {int(unknowns * left / needed):,} "
+                "unknowns would fit; take coarser meshes, refine where it matters, or use more machines"
+            )
+
+
+def _factors(parts: Subdomains, mine: np.ndarray, dim: int, rates: Rates) -> tuple[float, float]:
+    """Return the bytes of factors of some subdomains, and of the workspaces while the last are made."""
+    _, first, members = np.unique(parts.kind[mine], return_index=True, return_counts=True)
+    held, largest, during = 0.0, 0.0, {}
+    by_matrix, by_condensed, by_factor = rates.workspace
+    for index, count in zip(mine[first], members, strict=True):
+        n, b = int(parts.size[index]), int(parts.interface[index])
+        coupled = parts.couplings[index] * b
+        held += factor_bytes(n - b, dim) + rates.entry * coupled
+        if not prefers_explicit(n, b):
+            held += factor_bytes(n, dim)
+            continue
+        held += (12.0 if count > 1 else 6.0) * b**2
+        largest = max(largest, rates.inverting * b**2)
+        workspace = by_matrix * parts.couplings[index] * n + by_condensed * b**2
+        during[int(parts.pattern[index])] = workspace + by_factor * factor_bytes(n, dim)
+    return held, largest + sum(sorted(during.values())[-rates.cached :])
+
+
+def _counted(
+    scene: SceneParts, name: str, partition: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return unknowns, interface dofs and sums over cells of subdomains, invariants and moments of each."""
+    body = scene.bodies[name]
+    mesh, count = body.mesh, int(partition.max()) + 1
+    every = partition[:, None] * np.int64(mesh.n_nodes) + mesh.cells
+    keys, cells = np.unique(every, return_counts=True)
+    subdomain, node = keys // mesh.n_nodes, keys % mesh.n_nodes
+    marks = scene.fixed(name).astype(float)
+    for pair in (*scene.contacts, *scene.ties):
+        # The master has rows at fewer nodes than the slave, and seldom the same pieces.
+        for surface, mark in ((pair.slave, 1.0), (pair.master, 1.5)):
+            if isinstance(surface, Surface) and surface.body == name:
+                marks[np.unique(scene.facets(surface))] = mark
+    marks[np.bincount(node, minlength=mesh.n_nodes) > 1] = 1.0
+    on_interface = marks[node].sum(axis=1)
+    touched = np.count_nonzero(marks[node], axis=1)
+    nodes, interface, *connected = (
+        np.bincount(subdomain, weight, minlength=count)
+        for weight in (None, touched, cells**2.0, cells**3.0, cells * on_interface, cells**2 * on_interface)
+    )
+    squares, fourth = _moments(mesh.points[node], subdomain, cells**2.0, nodes)
+    at_interface, fourth_there = _moments(mesh.points[node], subdomain, cells * on_interface, nodes)
+    material = np.bincount(partition, body.material_of_cells, minlength=count)
+    principal = [np.linalg.eigvalsh(each) for each in (squares, at_interface)]
+    invariants = np.column_stack([*principal, fourth, fourth_there])
+    moments = np.column_stack([squares.reshape(count, -1), fourth])
+    counts = np.column_stack([scene.components * nodes, interface, *connected, material])
+    return counts, invariants, moments
+
+
+def _moments(
+    points: np.ndarray, subdomain: np.ndarray, weight: np.ndarray, nodes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return second moments of weighted nodes about the mean, (n, dim, dim), and roots of fourth ones."""
+    count = len(nodes)
+
+    def summed(values: np.ndarray) -> np.ndarray:
+        return np.bincount(subdomain, values, minlength=count)
+
+    arms = points - np.stack([summed(x) / nodes for x in points.T], axis=1)[subdomain]
+    squares = np.array([[summed(weight * x * y) for y in arms.T] for x in arms.T])
+    fourth = summed(weight * (arms**2).sum(axis=1) ** 2)
+    return np.moveaxis(squares, -1, 0), np.sqrt(fourth)
+
+
+def _couplings(body: Body, partition: np.ndarray) -> float:
+    """Return the entries of a row of the stiffness of a body's first subdomain."""
+    _, nodes = np.unique(body.mesh.cells[partition == 0], return_inverse=True)
+    cells = nodes.reshape(-1, body.mesh.cells.shape[1])
+    of_cell = np.repeat(np.arange(len(cells)), cells.shape[1])
+    incidence = sp.csr_matrix((np.ones(cells.size), (cells.ravel(), of_cell)))
+    return float(body.components * (incidence @ incidence.T).nnz / incidence.shape[0])

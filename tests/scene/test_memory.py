@@ -1,0 +1,115 @@
+"""The memory that a state needs is known from the scene, and refused where there is less."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from benchmarks.cases.scenes import block_mesh, block_on_plane
+from fenics_contact import Scene, box_partition, solve_scene
+from fenics_contact._scene import memory
+from fenics_contact._scene.memory import Rates, Subdomains, expected_memory, require_memory
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti import DualSystem, build_torn_system, decompose, decomposition
+from fenics_contact.gallery import block
+from tests.feti.scenes import skewed
+
+#: A straight mesh, how often it is cut along each axis, and whether it is bent.
+CUTS = {
+    "equal": (block_mesh((12, 6, 6)), (4, 2, 2), False),
+    "tetrahedra": (block((0, 0, 0), (2, 1, 1), (6, 4, 4), "tetrahedron"), (3, 2, 2), False),
+    "bent": (block_mesh((6, 4, 4)), (3, 2, 2), True),
+}
+
+
+def cut(name: str) -> tuple[Scene, dict[str, np.ndarray]]:
+    mesh, boxes, bent = CUTS[name]
+    return block_on_plane(skewed(mesh) if bent else mesh, 0.3), {"block": box_partition(mesh, boxes)}
+
+
+@pytest.mark.parametrize("name", CUTS)
+def test_kinds_matrices_and_interfaces_are_those_that_are_built(name: str) -> None:
+    scene, parts = cut(name)
+    known = Subdomains.of(scene, parts)
+    torn = build_torn_system(scene, decompose(scene, parts, MPI.COMM_SELF))
+    system = DualSystem(torn)
+    assert known.size.tolist() == [part.mesh.size for part in torn.subdomains]
+    assert known.interface.sum() == len(system.inverse.interface)
+    assert len(set(known.kind)) == len(system.inverse.kinds)
+    assert len(set(known.matrix)) == len({id(part.matrix) for part in torn.subdomains})
+    entries = sum(part.stiffness.nnz for part in torn.subdomains)
+    assert known.couplings @ known.size == pytest.approx(entries, rel=0.05)
+
+
+def test_every_rank_has_factors_and_tables_of_its_own() -> None:
+    scene, parts = cut("equal")
+    known, rates = Subdomains.of(scene, parts), Rates()
+    alone, two = expected_memory(scene, known), expected_memory(scene, known, 2)
+    tables = rates.start + rates.tables * known.size.sum()
+    assert two > alone + tables
+    assert two < 2.0 * alone
+    unlike = Subdomains.of(*cut("bent"))
+    assert len(set(unlike.kind)) == len(unlike.size) == 12
+    assert scene.plan(parts).memory == alone
+    assert scene.plan(parts, ranks=2).memory == two
+
+
+def test_a_scene_that_does_not_fit_into_memory_is_refused_before_it_is_built(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    mesh = block_mesh((34, 22, 22))
+    scene = block_on_plane(mesh, 0.3)
+    parts = {"block": box_partition(mesh, (5, 4, 4))}
+    needed = scene.plan(parts).memory
+    monkeypatch.setattr(memory, "available_memory", lambda: 0.5 * needed)
+    message = (
+        rf"a state must fit into memory, but {mesh.points.size} unknowns need about {needed / 1e9:.3g} GB on "
+        rf"this machine, and {0.5 * needed / 1e9:.3g} GB are left: about {mesh.points.size // 2:,} unknowns "
+        "would fit; take coarser meshes"
+    )
+    monkeypatch.setattr(decomposition, "cut_out", None)  # nothing is cut
+    with pytest.raises(InvalidInputError, match=message):
+        solve_scene(scene, MPI.COMM_SELF, partitions=parts)
+    monkeypatch.setattr(memory, "available_memory", lambda: 0.9 * needed)  # an estimate may err
+    require_memory(scene, parts, MPI.COMM_SELF)
+    monkeypatch.setattr(memory, "available_memory", lambda: None)
+    require_memory(scene, parts, MPI.COMM_SELF)
+
+
+TAKEN = """
+import sys
+from mpi4py import MPI
+from benchmarks.cases.scenes import block_mesh, block_on_plane
+from fenics_contact import _dolfinx, solve_scene
+from fenics_contact._base.libraries import start
+from fenics_contact.gallery import block
+from fenics_contact.qp import FaceNewton
+from fenics_contact.study.worker import peak_memory
+
+comm = MPI.COMM_WORLD
+start(comm)
+_dolfinx.release()
+before = peak_memory()
+if sys.argv[1] == "tetrahedra":
+    mesh = block((0, 0, 0), (2, 1, 1), (26, 13, 12), "tetrahedron")
+else:
+    mesh = block_mesh((40, 21, 20))
+scene = block_on_plane(mesh, 0.3)
+parts = scene.partition(comm.size)
+solve_scene(scene, comm, partitions=parts, solver=FaceNewton())
+taken = comm.allreduce(peak_memory() - before)
+if comm.rank == 0:
+    print(scene.plan(parts, ranks=comm.size).memory / taken)
+"""
+
+
+@pytest.mark.claim
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("cells", ["tetrahedra", "hexahedra"])
+def test_the_expected_memory_is_what_a_state_takes(
+    mpirun: Callable[..., str], cells: str, ranks: int
+) -> None:
+    assert float(mpirun(TAKEN, ranks, cells, fresh=True)) == pytest.approx(1.0, abs=0.2)
