@@ -31,6 +31,7 @@ class Rates:
         own: Kernels, coordinates and loads, of each torn unknown.
         system: Rows of B, coarse space and vectors, of each torn unknown.
         entry: Of an entry of a sparse matrix.
+        whole: Subdomains alike from which their dense matrices are stored as a whole, not as triangles.
         workspace: Of MUMPS and PETSc for each entry of a matrix that is condensed, for each of the condensed
             one, and relative to the factors of both.
         cached: Workspaces that a rank keeps while it factors.
@@ -44,9 +45,10 @@ class Rates:
     own: float = 100.0
     system: float = 110.0
     entry: float = 12.0
+    whole: int = 8
     workspace: tuple[float, float, float] = (27.0, 24.0, 0.5)
     cached: int = 8
-    inverting: float = 24.0
+    inverting: float = 18.0
     vectors: float = 130.0
 
 
@@ -172,7 +174,7 @@ def _factors(parts: Subdomains, mine: np.ndarray, dim: int, rates: Rates) -> tup
         if not prefers_explicit(n, b):
             held += factor_bytes(n, dim)
             continue
-        held += (12.0 if count > 1 else 6.0) * b**2
+        held += (12.0 if count >= rates.whole else 6.0) * b**2
         largest = max(largest, rates.inverting * b**2)
         workspace = by_matrix * parts.couplings[index] * n + by_condensed * b**2
         during[int(parts.pattern[index])] = workspace + by_factor * factor_bytes(n, dim)
