@@ -41,7 +41,8 @@ class AccurateDesign(AccurateResult):
 
     Attributes:
         state: The state of the design on the last mesh; its scene has the shape of the design.
-        value: The objective of the design.
+        value: The objective of the design, with what its adjoint has for its error; ``levels`` have that of
+            its state alone, too, which the table shows.
         error: Estimate of the error of ``value`` as the least objective, by mesh and optimiser, ≥ 0.
         problems: The problem on each mesh; all have the same variables. Files of designed surfaces in space,
             whose nodes must form a grid, are written with the first.
@@ -61,9 +62,9 @@ class AccurateDesign(AccurateResult):
         head = ("cells", "unknowns", "start", "least", "error", "designs", "products", "seconds", "predicted")
         rows: list[tuple[str, ...]] = [head]
         for level, result in zip(self.levels, self.optimisations, strict=True):
-            cells, unknowns, value, error, *cost = level.in_words
-            designs = f"{result.evaluations}"
-            rows.append((cells, unknowns, f"{result.history[0].value:.6g}", value, error, designs, *cost))
+            cells, unknowns, _, error, *cost = level.in_words
+            both = (f"{result.history[0].value:.6g}", f"{level.state_value:.6g}")
+            rows.append((cells, unknowns, *both, error, f"{result.evaluations}", *cost))
         return "\n".join([*aligned(rows, 0), self.reason])
 
 

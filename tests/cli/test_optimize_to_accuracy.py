@@ -43,7 +43,7 @@ def test_an_optimisation_to_an_accuracy_writes_its_meshes_and_the_design(
     levels = record["accuracy"]["levels"]
     assert [int(line.split()[0]) for line in table[1:-1]] == levels["cells"]
     assert len(levels["cells"]) > 2
-    assert record["optimisation"]["objective"]["final"] == pytest.approx(levels["value"][-1])
+    assert record["optimisation"]["objective"]["final"] == pytest.approx(levels["state_value"][-1])
     assert f" {sum(levels['products'])} products with F\n" in printed
     assert "seconds" in printed
     assert record["accuracy"]["reached"]
