@@ -50,24 +50,35 @@ Enough: TypeAlias = Callable[[Vector, Vector, float], bool]
 
 
 class _Rows:
-    """Growing blocks of row vectors, one block for each kind of vector."""
+    """Growing sets of vectors, one for each kind, in blocks that are never copied: they fill the memory."""
 
-    def __init__(self, *lengths: int) -> None:
-        """Start empty; lengths are those of this rank's vectors of each kind."""
+    def __init__(self, *lengths: int, rows: int = 16) -> None:
+        """Start empty; lengths are those of this rank's vectors of each kind, `rows` those of a block."""
         self.count = 0
-        self._blocks: list[Vector] = [np.empty((32, length)) for length in lengths]
+        self._rows, self._blocks = rows, [(length, list[Vector]()) for length in lengths]
 
     def append(self, *rows: Vector) -> None:
-        """Append one vector of each kind; storage doubles when full."""
-        if self.count == len(self._blocks[0]):
-            self._blocks = [np.vstack([block, np.empty_like(block)]) for block in self._blocks]
-        for block, row in zip(self._blocks, rows, strict=True):
-            block[self.count] = row
+        """Append one vector of each kind."""
+        number, place = divmod(self.count, self._rows)
+        for (length, blocks), row in zip(self._blocks, rows, strict=True):
+            if number == len(blocks):
+                blocks.append(np.zeros((self._rows, length)))
+            blocks[number][place] = row
         self.count += 1
 
-    def __getitem__(self, kind: int) -> Vector:
-        """Return all vectors of a kind, shape (count, length)."""
-        return self._blocks[kind][: self.count]
+    def dot(self, kind: int, vector: Vector) -> Vector:
+        """Return this rank's products of all vectors of a kind with one, shape (count,)."""
+        parts = [np.zeros(0), *(block @ vector for block in self._blocks[kind][1])]
+        return np.concatenate(parts)[: self.count]
+
+    def combined(self, kind: int, factors: Vector) -> Vector:
+        """Return the sum of factor times vector over all vectors of a kind; factors of shape (count,)."""
+        length, blocks = self._blocks[kind]
+        total = np.zeros(length)
+        for number, block in enumerate(blocks):
+            part = factors[number * self._rows : (number + 1) * self._rows]
+            total += part @ block[: len(part)]
+        return total
 
 
 def projected_cg(
@@ -140,10 +151,9 @@ def _next_direction(
     """Return the new direction and its product with the residual, with the sign of a descent direction."""
     z = system.precondition(residual)
     m = system.coarse.m
-    directions, images = rows[0], rows[1]
-    sums = global_sum(system.comm, system.coarse.local(z), images @ z, residual @ z)
+    sums = global_sum(system.comm, system.coarse.local(z), rows.dot(1, z), residual @ z)
     projected = z - system.coarse.transpose(system.coarse.solve(sums[:m]))
-    conjugate = projected - (sums[m:-1] / np.array(curvatures)) @ directions
+    conjugate = projected - rows.combined(0, sums[m:-1] / np.array(curvatures))
     return -conjugate, float(sums[-1])
 
 
@@ -261,7 +271,7 @@ def gmres(
         image, vectors = expand(vector)
         basis.append(vector)
         kept.append(vectors)
-        image, column = _orthogonalised(comm, basis[0], image)
+        image, column = _orthogonalised(comm, basis, image)
         small.append(column)
         if basis.count - small.last_progress > patience:
             stop = Stop.STAGNATION
@@ -278,12 +288,12 @@ def gmres(
     return Krylov(small.solution(), tuple(kept), small.residual, stop)
 
 
-def _orthogonalised(comm: MPI.Comm, vectors: Vector, image: Vector) -> tuple[Vector, Vector]:
+def _orthogonalised(comm: MPI.Comm, basis: _Rows, image: Vector) -> tuple[Vector, Vector]:
     """Subtract the components along the basis, twice, and return the rest with the Hessenberg column."""
-    coefficients = np.zeros(len(vectors))
+    coefficients = np.zeros(basis.count)
     for _ in range(2):
-        correction = global_sum(comm, vectors @ image)
-        image = image - correction @ vectors
+        correction = global_sum(comm, basis.dot(0, image))
+        image = image - basis.combined(0, correction)
         coefficients += correction
     length = np.sqrt(global_sum(comm, image @ image))
     return image, np.concatenate([coefficients, length])
