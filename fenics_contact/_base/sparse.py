@@ -146,7 +146,7 @@ def sweep(comm: MPI.Comm) -> None:
     if comm.size == 1:
         return
     sharing: dict[Key, tuple[Key, list[int]]] = {}
-    for key in _waiting:
+    for key in list(_waiting):  # garbage that is collected meanwhile adds to it
         ranks = _ranks_in(comm, _groups[key[0]])
         if MPI.UNDEFINED not in ranks:
             sharing[zlib.crc32(repr(ranks).encode()), key[1]] = key, ranks

@@ -19,7 +19,7 @@ from fenics_contact.study.scenes.chain_links import chain
 pytestmark = pytest.mark.slow
 
 #: Of the products of the best boxes, as many as there are subdomains; METIS's boundaries are never plane.
-DEFAULT, METIS, METIS_GRADED = 1.15, 1.5, 2.2
+DEFAULT, METIS, METIS_GRADED = 1.15, 1.6, 2.2
 
 
 def links(counts: tuple[int, int, int], grading: float) -> Scene:

@@ -89,3 +89,19 @@ def test_memory_does_not_grow_with_the_number_of_factors(kind: str) -> None:
     for _ in range(8):
         build()
     assert resident() - before < 20  # one factor takes more than that
+
+
+def test_garbage_that_is_collected_during_a_sweep_waits_for_the_next_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    waiting: dict[disposal.Key, tuple[tuple[()], None]] = {(0, 1): ((), None)}
+
+    def collecting(*_: object) -> list[int]:
+        waiting[0, 2] = (), None
+        return [0, 1]
+
+    monkeypatch.setattr(disposal, "_waiting", waiting)
+    monkeypatch.setattr(disposal, "_groups", [None])
+    monkeypatch.setattr(disposal, "_ranks_in", collecting)
+    sweep(TwoRanks())  # type: ignore[arg-type]
+    assert list(waiting) == [(0, 2)]
