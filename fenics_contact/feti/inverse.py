@@ -16,6 +16,7 @@ from scipy.linalg import blas, lapack
 
 from fenics_contact._base.libraries import PETSc
 from fenics_contact._base.sparse import dispose_with, prefers_explicit
+from fenics_contact._scene.memory import Rates
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.alike import Kind, Kinds, Motion
 from fenics_contact.feti.factor import Factor, petsc_call, regularised, symmetric_matrix
@@ -128,7 +129,7 @@ class ExplicitOperator:
             for each, measured with interfaces of 300 to 1000 dofs.
     """
 
-    pays_from = 8
+    pays_from = Rates.whole  # what the plan counts with
 
     def __init__(self, subdomain: Subdomain, interface: np.ndarray, condensations: Condensations) -> None:
         """Condense a subdomain on its interface.
