@@ -49,7 +49,8 @@ class PolynomialFit:
         plain = scale * np.column_stack([np.prod(place**power, axis=1) for power in powers])
         terms = plain / np.maximum((place**2).sum(axis=1), 1e-12)[:, None]
         columns = np.column_stack([plain, height])
-        sums = _summed(centre, len(narrow), terms[:, :, None] * columns[:, None])
+        # Power by power: all products of pairs at once would be the largest array of a whole solve.
+        sums = np.stack([_summed(centre, len(narrow), term[:, None] * columns) for term in terms.T], axis=1)
         degree = np.array([sum(power) for power in powers])
         kept = _determined(sums, degree, narrow)
         return cls(centre, terms, _inverse_on(sums[:, :, :-1], kept), scale)

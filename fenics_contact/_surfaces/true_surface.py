@@ -258,40 +258,56 @@ def _crossed(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return (one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])[:, None]
 
 
-def _fitted(surface: FacetedSurface, wedges: Wedges, order: int) -> tuple[np.ndarray, np.ndarray]:
-    """Fit polynomials around all wedges.
+def _fitted(
+    surface: FacetedSurface, wedges: Wedges, order: int, most: int = 512
+) -> tuple[np.ndarray, np.ndarray]:
+    """Fit polynomials around all wedges, `most` at once: what lies around many fills the memory.
 
     Returns their normals, shape (n_wedges, dim), and their second derivatives along the surface, positive
     where it is concave, shape (n_wedges, dim, dim), [1 / length].
     """
-    node, mirrored = wedges.node, wedges.mirrored
-    count, dim = len(node), surface.dim
-    summed = np.zeros((count, dim))
+    count, mirrored = len(wedges.node), wedges.mirrored
+    summed = np.zeros((count, surface.dim))
     np.add.at(summed, wedges.of_corner, corner_products(surface.points, surface.facets))
     summed = surface.within(summed, mirrored)
     mean = summed / np.linalg.norm(summed, axis=1)[:, None]
-    centre, around, narrow = wedges.patches(order)
-    away = surface.points[node[around]] - surface.points[node[centre]]
-    planes = np.eye(dim) if surface.planes is None else surface.planes
-    away, centre = _with_mirror_images(away, centre, mirrored, planes)
+    axes, (centre, around, narrow) = tangent_bases(mean), wedges.patches(order)
+    normal, in_space = np.empty_like(mean), np.empty((count, surface.dim, surface.dim))
+    for start in range(0, count, most):
+        some = slice(start, start + most)
+        pairs = slice(*np.searchsorted(centre, (start, start + most)))
+        away = surface.points[wedges.node[around[pairs]]] - surface.points[wedges.node[centre[pairs]]]
+        planes = np.eye(surface.dim) if surface.planes is None else surface.planes
+        patch = _with_mirror_images(away, centre[pairs] - start, mirrored[some], planes)
+        normal[some], in_space[some] = _fit_around(*patch, mean[some], axes[some], narrow[some], order)
+    normal = surface.within(normal, mirrored)
+    return normal / np.linalg.norm(normal, axis=1)[:, None], in_space
+
+
+def _fit_around(
+    away: np.ndarray, centre: np.ndarray, mean: np.ndarray, axes: np.ndarray, narrow: np.ndarray, order: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return vectors along the normals and the second derivatives of surfaces through the nodes around some.
+
+    `away`: from the centre of a patch to its nodes, shape (n_pairs, dim); `centre`: which it is, shape
+    (n_pairs,); `mean`: mean normals at the centres, shape (n, dim); `axes`: axes of the planes across, shape
+    (n, dim − 1, dim); `narrow`: as for `PolynomialFit`.
+    """
+    count, width = axes.shape[:2]
     size = np.zeros(count)
     np.maximum.at(size, centre, np.linalg.norm(away, axis=1))
     # Relative to the patch's size: powers of the coordinates are then of order one, however fine the mesh.
-    axes = tangent_bases(mean)
     place = np.einsum("nad,nd->na", axes[centre], away) / size[centre][:, None]
     height = np.einsum("nd,nd->n", mean[centre], away) / size[centre]
-    powers = powers_of(dim - 1, order)
     coefficients = PolynomialFit.of(place, height, centre, narrow, order).coefficients(height)
-    slope, bend = coefficients[:, : dim - 1], np.zeros((count, dim - 1, dim - 1))
-    for power, coefficient in zip(powers, coefficients.T, strict=True):
+    slope, bend = coefficients[:, :width], np.zeros((count, width, width))
+    for power, coefficient in zip(powers_of(width, order), coefficients.T, strict=True):
         if sum(power) == 2:
-            one, other = np.repeat(np.arange(dim - 1), power)
+            one, other = np.repeat(np.arange(width), power)
             bend[:, one, other] += coefficient
             bend[:, other, one] += coefficient
-    normal = mean - np.einsum("na,nad->nd", slope, axes)
-    normal = surface.within(normal, mirrored)
     in_space = np.einsum("nab,nad,nbe->nde", bend, axes, axes) / size[:, None, None]
-    return normal / np.linalg.norm(normal, axis=1)[:, None], in_space
+    return mean - np.einsum("na,nad->nd", slope, axes), in_space
 
 
 def rings_of(wedge: np.ndarray, count: int, rings: int) -> tuple[np.ndarray, np.ndarray]:

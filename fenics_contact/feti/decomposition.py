@@ -106,17 +106,20 @@ def tear(
     total = int(subdomain_offset[-1])
     keys, sums = [], []
     for index, name in enumerate(names):
-        cells = scene.bodies[name].mesh.cells
-        subdomain = partitions[name].astype(np.int64) + subdomain_offset[index]
-        # One integer key per node and subdomain: unique keys are the copies, already in their order.
-        every = (cells + node_offset[index]) * total + subdomain[:, None]
-        unique, where = np.unique(every.ravel(), return_inverse=True)
-        added = np.bincount(where.ravel(), np.repeat(stiffness[name], cells.shape[1]))
-        keys.append(unique)
-        # Beside cells of another size the number of cells counts as well: a fifth fewer products.
-        even = scene.bodies[name].mesh.hanging is None
-        sums.append(added / (np.bincount(where.ravel()) if even else 2**scene.dim))
+        mesh = scene.bodies[name].mesh
+        order = np.argsort(partitions[name], kind="stable")
+        ends = np.cumsum(np.bincount(partitions[name], minlength=counts[index]))
+        # One subdomain after the other: the corners of all cells at once take more memory than the meshes.
+        for number, own in enumerate(np.split(order, ends[:-1])):
+            nodes, where, times = np.unique(mesh.cells[own], return_inverse=True, return_counts=True)
+            added = np.bincount(where.ravel(), np.repeat(stiffness[name][own], mesh.cells.shape[1]))
+            # One integer key per node and subdomain: keys in their order are those of copies.
+            keys.append((nodes + node_offset[index]) * total + subdomain_offset[index] + number)
+            # Beside cells of another size the number of cells counts as well: a fifth fewer products.
+            sums.append(added / (times if mesh.hanging is None else 2**scene.dim))
     key, stiff = np.concatenate(keys), np.concatenate(sums)
+    order = np.argsort(key)
+    key, stiff = key[order], stiff[order]
     multiplicity = np.bincount(key // total, minlength=int(node_offset[-1]))
     costs = _costs(key % total, multiplicity[key // total] > 1, total, scene.components)
     return Tearing(

@@ -151,12 +151,34 @@ def number_faces(faces: np.ndarray) -> np.ndarray:
     """
     if faces.shape[0] == 0:
         return np.zeros(0, dtype=np.int64)
-    keys = face_keys(faces)
+    return _numbered(face_keys(faces))
+
+
+def _numbered(keys: np.ndarray) -> np.ndarray:
+    """Return consecutive numbers of keys, (n, 2), in their order, the same for equal ones, (n,)."""
     order = np.lexsort((keys[:, 1], keys[:, 0]))
-    changes = np.any(np.diff(keys[order], axis=0) != 0, axis=1)
-    numbers = np.empty(faces.shape[0], dtype=np.int64)
-    numbers[order] = np.concatenate([[0], np.cumsum(changes)])
+    changes = np.zeros(len(keys), dtype=bool)
+    for column in keys.T:  # one after the other: keys are the largest arrays of a mesh
+        ordered = column[order]
+        changes[1:] |= ordered[1:] != ordered[:-1]
+    numbers = np.empty(len(keys), dtype=np.int64)
+    numbers[order] = np.cumsum(changes)
     return numbers
+
+
+def _numbers_of_faces(cells: np.ndarray, dim: int) -> np.ndarray:
+    """Return the numbers of the faces of all cells, as `number_faces`, cell by cell."""
+    faces = cell_type_of(cells, dim).faces
+    keys = np.empty((len(cells), len(faces), 2), dtype=np.int64)
+    for place, nodes in enumerate(faces):
+        keys[:, place] = face_keys(cells[:, nodes])
+    return _numbered(keys.reshape(-1, 2))
+
+
+def _faces_at(cells: np.ndarray, dim: int, places: np.ndarray) -> np.ndarray:
+    """Return some faces of cells, by their places in the list of all, (n, nodes of a face)."""
+    faces = cell_type_of(cells, dim).faces
+    return cells[places[:, None] // len(faces), faces[places % len(faces)]]
 
 
 def boundary_faces(
@@ -172,14 +194,12 @@ def boundary_faces(
     Returns:
         The faces, outward, (n, nodes of a face), and the cell that each belongs to, (n,), ascending.
     """
-    faces = cell_faces(cells, dim)
-    flat = faces.reshape(-1, faces.shape[2])
-    numbers = number_faces(flat)
+    numbers = _numbers_of_faces(cells, dim)
     single = np.flatnonzero(np.bincount(numbers)[numbers] == 1)
     if hanging is not None:
-        small, large = _on_larger(flat[single], hanging)
+        small, large = _on_larger(_faces_at(cells, dim, single), hanging)
         single = np.delete(single, np.concatenate([small, large]))
-    return flat[single], single // faces.shape[1]
+    return _faces_at(cells, dim, single), single // len(cell_type_of(cells, dim).faces)
 
 
 def _on_larger(faces: np.ndarray, hanging: HangingNodes) -> tuple[np.ndarray, np.ndarray]:
@@ -210,24 +230,23 @@ def shared_faces(
 
     Returns the faces, outward of the first cell, (n, nodes of a face), and their two cells, (n, 2).
     """
-    faces = cell_faces(cells, dim)
-    flat = faces.reshape(-1, faces.shape[2])
-    numbers = number_faces(flat)
+    numbers, of_cell = _numbers_of_faces(cells, dim), len(cell_type_of(cells, dim).faces)
     counts = np.bincount(numbers)
     if counts.max() > 2:
-        worst = flat[np.argmax(numbers == np.argmax(counts))]
+        worst = _faces_at(cells, dim, np.flatnonzero(numbers == np.argmax(counts))[:1])[0]
         raise InvalidInputError(
             f"a face must belong to at most 2 cells, the face with nodes {worst.tolist()} belongs to "
             f"{counts.max()}: remove duplicated or overlapping cells"
         )
     order = np.argsort(numbers, kind="stable")
     order = order[counts[numbers[order]] == 2]
-    found, pairs = flat[order[::2]], (order // faces.shape[1]).reshape(-1, 2)
+    found, pairs = _faces_at(cells, dim, order[::2]), (order // of_cell).reshape(-1, 2)
     if hanging is not None:
         single = np.flatnonzero(counts[numbers] == 1)
-        small, large = (single[which] for which in _on_larger(flat[single], hanging))
-        found = np.concatenate([found, flat[small]])
-        pairs = np.concatenate([pairs, np.column_stack([small, large]) // faces.shape[1]])
+        chosen = _faces_at(cells, dim, single)
+        small, large = _on_larger(chosen, hanging)
+        found = np.concatenate([found, chosen[small]])
+        pairs = np.concatenate([pairs, np.column_stack([single[small], single[large]]) // of_cell])
     return found, pairs
 
 

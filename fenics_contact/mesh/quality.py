@@ -6,7 +6,7 @@ triangles, for which "volume" is the area.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -115,7 +115,7 @@ def cell_volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     if cell.is_affine:
         return np.asarray(cell.reference_volume * jacobians(points, cells)[:, 0])
     positions, weights = quadrature(cell)
-    return np.asarray(jacobians(points, cells, positions) @ weights)
+    return _in_parts(cells, lambda some: jacobians(points, some, positions) @ weights)
 
 
 def volume(points: np.ndarray, cells: np.ndarray) -> float:
@@ -135,10 +135,22 @@ def thickness(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     Returns:
         (n_cells,) [length]; 0 where a cell is inverted or flat, else a fraction of the diagonal.
     """
-    corners = points[cells]
-    size = np.linalg.norm(corners.max(axis=1) - corners.min(axis=1), axis=1)
-    smallest = jacobians(points, cells).min(axis=1) / np.maximum(size, 1e-100) ** points.shape[1]
-    return np.asarray(np.where(smallest <= LAST_PLACES, 0.0, smallest) * size)
+
+    def of(cells: np.ndarray) -> np.ndarray:
+        corners = points[cells]
+        size = np.linalg.norm(corners.max(axis=1) - corners.min(axis=1), axis=1)
+        smallest = jacobians(points, cells).min(axis=1) / np.maximum(size, 1e-100) ** points.shape[1]
+        return np.asarray(np.where(smallest <= LAST_PLACES, 0.0, smallest) * size)
+
+    return _in_parts(cells, of)
+
+
+def _in_parts(
+    cells: np.ndarray, function: Callable[[np.ndarray], np.ndarray], most: int = 2048
+) -> np.ndarray:
+    """Return a function's values at all cells, shape (n_cells,); it sees `most` at once, to save memory."""
+    parts = [function(cells[start : start + most]) for start in range(0, max(len(cells), 1), most)]
+    return np.concatenate(parts)
 
 
 #: Largest distance of nodes from their shape, relative to the shortest edge of a facet around them.

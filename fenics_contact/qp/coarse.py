@@ -37,12 +37,11 @@ class GramInverse:
         diagonal = np.diagonal(matrix)
         floor = RANK_TOLERANCE**2 * max(diagonal.max(initial=0.0), np.finfo(float).tiny)
         self._scale = 1.0 / np.sqrt(np.where(diagonal > floor, diagonal, 1.0))
-        scaled = self._scale[:, None] * matrix * self._scale
         self.rank = len(matrix)
         self.null_space = np.zeros((len(matrix), 0))
-        self._cholesky = _trusted_cholesky(scaled)
+        self._cholesky = _trusted_cholesky(_scaled(matrix, self._scale))
         if self._cholesky is None:
-            values, vectors = scipy.linalg.eigh(scaled)
+            values, vectors = scipy.linalg.eigh(_scaled(matrix, self._scale))
             keep = values > RANK_TOLERANCE * values.max(initial=0.0)
             self.rank = int(keep.sum())
             self.null_space = self._scale[:, None] * vectors[:, ~keep]
@@ -63,14 +62,22 @@ class GramInverse:
         return scale * scipy.linalg.cho_solve((self._cholesky, True), scale * right_side, check_finite=False)
 
 
+def _scaled(matrix: Vector, scale: Vector) -> Vector:
+    """Return a matrix with scaled rows and columns, stored by columns as LAPACK overwrites it by factors."""
+    scaled = np.multiply(scale[:, None], matrix, order="F")
+    scaled *= scale
+    return scaled
+
+
 def _trusted_cholesky(matrix: Vector) -> Vector | None:
-    """Return the lower Cholesky factor, or None if the matrix is singular or close to it."""
+    """Overwrite a matrix by its lower Cholesky factor; None if it is singular or close to it."""
     if len(matrix) == 0:
         return np.zeros((0, 0))
-    factor, info = lapack.dpotrf(matrix, lower=1)
+    norm = lapack.dlange("1", matrix)
+    factor, info = lapack.dpotrf(matrix, lower=1, overwrite_a=1)
     if info != 0:
         return None
-    reciprocal_condition, _ = lapack.dpocon(factor, np.abs(matrix).sum(axis=0).max(), uplo="L")
+    reciprocal_condition, _ = lapack.dpocon(factor, norm, uplo="L")
     return factor if reciprocal_condition > RANK_TOLERANCE else None
 
 
@@ -172,6 +179,7 @@ class CoarseSpace:
     def gram(self) -> GramInverse | SparseGramInverse:
         """Generalised inverse of G G^T, factored on first access. Collective then."""
         gram = gram_matrix(self.comm, self.matrix) if self._gram_matrix is None else self._gram_matrix
+        self._gram_matrix = None  # of no use beside its factors
         return GramInverse(gram) if isinstance(gram, np.ndarray) else SparseGramInverse(self.comm, gram)
 
     def with_load(self, load: Vector) -> CoarseSpace:
@@ -248,7 +256,7 @@ class CoarseSpace:
 def gram_matrix(comm: MPI.Comm, columns: sp.csr_matrix) -> Gram:
     """Return C C^T for owned columns C: the sum over the ranks, or beyond `DENSE_LIMIT` this rank's share.
 
-    Matrices of the same size can be added in either form. Collective.
+    Collective.
     """
     return summed_if_small(comm, (columns @ columns.T).tocsr())
 
@@ -264,6 +272,14 @@ def summed_if_small(comm: MPI.Comm, share: sp.csr_matrix) -> Gram:
         filled = np.flatnonzero(np.unpackbits(used).view(bool))
         matrix.ravel()[filled] = global_sum(comm, matrix.ravel()[filled])
     return matrix
+
+
+def plus(gram: Gram, sparse: sp.csr_matrix) -> Gram:
+    """Return the sum of both, in place where the first is dense."""
+    if not isinstance(gram, np.ndarray):
+        return gram + sparse
+    gram[np.repeat(np.arange(len(gram)), np.diff(sparse.indptr)), sparse.indices] += sparse.data
+    return gram
 
 
 class SquareInverse(Protocol):
@@ -304,9 +320,9 @@ class DenseSquareInverse:
         self._scale, self.condition = scale, 1.0
         if len(matrix) == 0:
             return
-        scaled = scale[:, None] * matrix * scale
-        lu, pivots, failed = lapack.dgetrf(scaled)
-        norm = np.abs(scaled).sum(axis=0).max()
+        scaled = _scaled(matrix, scale)
+        norm = lapack.dlange("1", scaled)
+        lu, pivots, failed = lapack.dgetrf(scaled, overwrite_a=1)
         self.condition = 0.0 if failed or norm == 0.0 else float(lapack.dgecon(lu, norm)[0])
         self._factor = (lu, pivots)
 

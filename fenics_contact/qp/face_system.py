@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from fenics_contact._base.costs import count_flops
 from fenics_contact._base.libraries import MPI
-from fenics_contact.qp.coarse import CoarseSpace, SquareInverse, gram_matrix, invert_square
+from fenics_contact.qp.coarse import CoarseSpace, SquareInverse, gram_matrix, invert_square, plus
 from fenics_contact.qp.face import Face
 from fenics_contact.qp.problem import DualProblem, FacePreconditioner, Operator, ShiftedOperator
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
@@ -92,14 +92,16 @@ class FaceSystems:
         """Prepare for ``problem`` with its (counted) operator F. Collective."""
         self._problem = problem
         self._operator = operator
-        self._equality_gram = gram_matrix(problem.comm, problem.coarse.matrix[:, problem.layout.equality])
+        # Kept without its zeros: dense, it would be one matrix more beside those of each face.
+        gluing = gram_matrix(problem.comm, problem.coarse.matrix[:, problem.layout.equality])
+        self._equality_gram = sp.csr_matrix(gluing)
 
     def build(self, face: Face) -> FaceSystem:
         """Return the system of a face. Collective."""
         problem, coarse = self._problem, self._problem.coarse
         n_equality = len(problem.layout.equality)
         columns = coarse.matrix @ face.restriction[:, n_equality:]
-        gram = self._equality_gram + gram_matrix(problem.comm, columns)
+        gram = plus(gram_matrix(problem.comm, columns), self._equality_gram)
         load = coarse.load - coarse.apply(face.fixed)
         restricted = coarse.restricted(face.restriction, load, gram=gram)
         preconditioner = problem.preconditioner

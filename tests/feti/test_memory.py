@@ -10,9 +10,15 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from benchmarks.cases.scenes import block_mesh, block_on_plane
-from fenics_contact import box_partition
+from fenics_contact import BodyMesh, box_partition
+from fenics_contact._surfaces.facets import faceted_surface
+from fenics_contact._surfaces.true_surface import reconstructed
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
+from fenics_contact.feti.decomposition import tear
+from fenics_contact.mesh.faces import boundary_faces, neighbours
+from fenics_contact.mesh.quality import cell_volumes, thickness
 from fenics_contact.qp import FaceNewton
+from fenics_contact.qp.coarse import DenseSquareInverse, GramInverse
 from fenics_contact.results.dual_solve import solve_dual
 
 
@@ -76,3 +82,31 @@ def test_the_coarse_space_needs_few_bytes_a_torn_unknown_while_it_is_built(syste
 def test_the_solution_needs_few_vectors_besides_those_of_its_krylov_space(system: DualSystem) -> None:
     peak = traced(solve_dual, system, FaceNewton(tolerance=1e-8))
     assert peak < 150 * 8 * system.torn.numbering.total
+
+
+@pytest.fixture(scope="module")
+def fine() -> BodyMesh:
+    return block_mesh((40, 24, 12))
+
+
+def test_what_every_rank_does_with_the_whole_mesh_takes_little_beside_it(fine: BodyMesh) -> None:
+    whole = fine.points.nbytes + fine.cells.nbytes
+    assert traced(cell_volumes, fine.points, fine.cells) < 2.0 * whole
+    assert traced(thickness, fine.points, fine.cells) < 3.0 * whole
+    assert traced(neighbours, fine.cells) < 5.0 * whole
+    assert traced(boundary_faces, fine.cells) < 5.0 * whole
+    parts = {"block": box_partition(fine, (10, 6, 3))}
+    assert traced(tear, block_on_plane(fine), parts, 4, {"block": np.ones(fine.n_cells)}) < 2.0 * whole
+
+
+def test_the_true_surface_of_many_facets_is_fitted_in_parts(fine: BodyMesh) -> None:
+    facets = fine.surfaces["z0"]
+    assert traced(reconstructed, faceted_surface(fine.points, facets)) < 5000 * len(facets)
+
+
+def test_dense_coarse_matrices_are_factored_in_one_copy() -> None:
+    matrix = np.eye(400) + 1e-3
+    assert traced(GramInverse, matrix) < 1.2 * matrix.nbytes
+    assert traced(DenseSquareInverse, matrix, np.ones(400)) < 1.2 * matrix.nbytes
+    found = GramInverse(matrix).solve(matrix[:, 7])
+    np.testing.assert_allclose(found, np.eye(400)[7], atol=1e-14)
