@@ -1,7 +1,8 @@
-"""Memory that a machine has left."""
+"""Memory that a machine has left, and its return."""
 
 from __future__ import annotations
 
+import ctypes
 from pathlib import Path
 
 
@@ -17,3 +18,13 @@ def available_memory(table: Path = Path("/proc/meminfo")) -> float | None:
         if name == "MemAvailable":
             return 1024.0 * float(size.split()[0])
     return None
+
+
+def return_memory() -> None:
+    """Return to the system what was freed between objects that stay; only where the C library is GNU's.
+
+    Workspaces of factors leave holes between these, which otherwise stay the program's: up to a fifth of all.
+    """
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)

@@ -34,7 +34,6 @@ class Rates:
         whole: Subdomains alike from which their dense matrices are stored as a whole, not as triangles.
         workspace: Of MUMPS and PETSc for each entry of a matrix that is condensed, for each of the condensed
             one, and relative to the factors of both.
-        cached: Workspaces that a rank keeps while it factors.
         inverting: Of each entry of a condensed matrix while it is inverted.
         vectors: Vectors of multipliers that iterations keep.
     """
@@ -47,7 +46,6 @@ class Rates:
     entry: float = 12.0
     whole: int = 8
     workspace: tuple[float, float, float] = (27.0, 24.0, 0.5)
-    cached: int = 8
     inverting: float = 18.0
     vectors: float = 130.0
 
@@ -61,7 +59,6 @@ class Subdomains:
         interface: Those that rows of B touch.
         kind: Numbers of kinds: those that seem alike up to rotations and mirrors have the same.
         matrix: The same of those that seem alike up to translations, wherever rows of B touch them.
-        pattern: Numbers of those whose cells seem connected alike, up to numbering.
         couplings: Entries of a row of the stiffness, about.
         place: Place of each among those of its body, in (0, 1).
     """
@@ -70,7 +67,6 @@ class Subdomains:
     interface: np.ndarray
     kind: np.ndarray
     matrix: np.ndarray
-    pattern: np.ndarray
     couplings: np.ndarray
     place: np.ndarray
 
@@ -94,7 +90,6 @@ class Subdomains:
         numbers = (
             _numbered(counts, np.concatenate(shapes)),
             _numbered(counts[:, [0, 2, 3, -2]], np.concatenate(turned)),
-            _numbered(counts, np.zeros((len(counts), 0))),
         )
         return cls(size, interface, *numbers, counts[:, -1], np.concatenate(place))
 
@@ -165,7 +160,7 @@ def require_memory(
 def _factors(parts: Subdomains, mine: np.ndarray, dim: int, rates: Rates) -> tuple[float, float]:
     """Return the bytes of factors of some subdomains, and of the workspaces while the last are made."""
     _, first, members = np.unique(parts.kind[mine], return_index=True, return_counts=True)
-    held, largest, during = 0.0, 0.0, {}
+    held, largest, during = 0.0, 0.0, list[float]()
     by_matrix, by_condensed, by_factor = rates.workspace
     for index, count in zip(mine[first], members, strict=True):
         n, b = int(parts.size[index]), int(parts.interface[index])
@@ -177,8 +172,8 @@ def _factors(parts: Subdomains, mine: np.ndarray, dim: int, rates: Rates) -> tup
         held += (12.0 if count >= rates.whole else 6.0) * b**2
         largest = max(largest, rates.inverting * b**2)
         workspace = by_matrix * parts.couplings[index] * n + by_condensed * b**2
-        during[int(parts.pattern[index])] = workspace + by_factor * factor_bytes(n, dim)
-    return held, largest + sum(sorted(during.values())[-rates.cached :])
+        during.append(workspace + by_factor * factor_bytes(n, dim))
+    return held, largest + max(during, default=0.0)
 
 
 def _counted(

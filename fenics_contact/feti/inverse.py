@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections import Counter, OrderedDict
+from collections import Counter
 from collections.abc import Callable, Sequence
 from enum import Enum
 from functools import cached_property
@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from scipy.linalg import blas, lapack
 
 from fenics_contact._base.libraries import PETSc
+from fenics_contact._base.memory import return_memory
 from fenics_contact._base.sparse import dispose_with, prefers_explicit
 from fenics_contact._scene.memory import Rates
 from fenics_contact.errors import InvalidInputError
@@ -22,9 +23,6 @@ from fenics_contact.feti.alike import Kind, Kinds, Motion
 from fenics_contact.feti.factor import Factor, petsc_call, regularised, symmetric_matrix
 from fenics_contact.feti.moved import Batch, MovedInterface, MovedOperator, SharedOperator
 from fenics_contact.feti.subdomain import LocalOperator, Subdomain, interface_dofs
-
-#: Number of cached symbolic factorisations. Each also holds the values of its last matrix: a few MB.
-CACHED = 8
 
 
 class Condensation:
@@ -87,15 +85,15 @@ class Condensation:
 
 
 class Condensations:
-    """Caches the most recent condensations, by pattern and interface.
+    """Keeps the last condensation for matrices with the same pattern and interface.
 
-    Subdomains of a regular partition share one pattern and a handful of interfaces, and a new geometry
-    changes neither.
+    Subdomains of a regular partition share one pattern and a handful of interfaces: those that share both
+    should come one after the other. A workspace takes 15 to 50 MB, so no other is kept.
     """
 
     def __init__(self) -> None:
         """Start empty."""
-        self._recent: OrderedDict[tuple[bytes, bytes, bytes], Condensation] = OrderedDict()
+        self._last: tuple[tuple[bytes, bytes, bytes], Condensation] | None = None
         self.analysed = 0
 
     def schur_complement(self, stiffness: sp.csr_matrix, interface: np.ndarray) -> np.ndarray:
@@ -103,13 +101,11 @@ class Condensations:
         if len(interface) == stiffness.shape[0]:
             return stiffness[interface][:, interface].toarray(order="F")
         key = (stiffness.indptr.tobytes(), stiffness.indices.tobytes(), interface.tobytes())
-        if key not in self._recent:
-            self._recent[key] = Condensation(stiffness, interface)
+        if self._last is None or self._last[0] != key:
+            self._last = None  # before the next one is made
+            self._last = key, Condensation(stiffness, interface)
             self.analysed += 1
-        self._recent.move_to_end(key)
-        if len(self._recent) > CACHED:
-            self._recent.popitem(last=False)
-        return self._recent[key](stiffness)
+        return self._last[1](stiffness)
 
 
 class ExplicitOperator:
@@ -215,10 +211,17 @@ class ExplicitOperator:
         solution[self._inside] = relaxed - self._solve_inside(self._K_ib @ trace)
         return solution
 
-    def row_flexibility(self, rows: sp.csr_matrix) -> np.ndarray:
-        """Return bᵀ (K⁺)_bb b for each row b of a matrix with interface columns, shape (n_rows,)."""
+    def row_flexibility(self, rows: sp.csr_matrix, pairs: int = 100_000) -> np.ndarray:
+        """Return bᵀ (K⁺)_bb b for each row b of a matrix with interface columns, shape (n_rows,).
+
+        `pairs`: pairs of entries of rows that are looked up at once: long rows of mortar contact have many.
+        """
+        parts = _pieces(np.diff(rows.indptr).astype(np.int64) ** 2, pairs)
+        return np.concatenate([np.zeros(0), *(self._flexibility_of(rows[part]) for part in parts)])
+
+    def _flexibility_of(self, rows: sp.csr_matrix) -> np.ndarray:
         counts = np.diff(rows.indptr)
-        # All pairs of entries within each row: rows of B are short.
+        # All pairs of entries within each row.
         pairs = np.repeat(counts, counts)
         first = np.repeat(np.arange(len(rows.indices)), pairs)
         starts = np.repeat(np.repeat(rows.indptr[:-1], counts), pairs)
@@ -238,6 +241,13 @@ class ExplicitOperator:
         if self._inner is not None and right.any():
             self._inner.solve(right, solution)
         return solution
+
+
+def _pieces(work: np.ndarray, most: int) -> list[slice]:
+    """Return consecutive slices of items whose work sums up to about ``most`` each; integers, shape (n,)."""
+    piece = (np.cumsum(work) - work) // most
+    starts = np.flatnonzero(np.diff(piece, prepend=-1)).tolist()
+    return [slice(start, end) for start, end in pairwise([*starts, len(work)])]
 
 
 def _whole(lower: np.ndarray) -> np.ndarray:
@@ -371,11 +381,19 @@ class FactoredOperator:
         self._factor.solve(right, solution)
         return solution
 
-    def row_flexibility(self, rows: sp.csr_matrix) -> np.ndarray:
-        """Return bᵀ K⁻¹ b for each row b of a matrix with interface columns, shape (n_rows,)."""
-        right = np.zeros((len(self._right), rows.shape[0]))
-        right[self._interface] = rows.toarray().T
-        return np.asarray(np.einsum("nk,nk->k", right, self._factor.solve_many(right)))
+    def row_flexibility(self, rows: sp.csr_matrix, at_once: int = 32) -> np.ndarray:
+        """Return bᵀ K⁻¹ b for each row b of a matrix with interface columns, shape (n_rows,).
+
+        `at_once`: rows that are solved for together: a vector of the size of the subdomain for each.
+        """
+        flexibility = np.empty(rows.shape[0])
+        for part in _pieces(np.ones(rows.shape[0], dtype=np.int64), at_once):
+            block = rows[part].toarray().T
+            right = np.zeros((len(self._right), block.shape[1]), order="F")
+            right[self._interface] = block
+            solved = self._factor.solve_many(right)[self._interface]
+            flexibility[part] = np.einsum("nk,nk->k", block, solved)
+        return flexibility
 
 
 class ImplicitOperator(FactoredOperator):
@@ -459,11 +477,15 @@ class TornInverse:
         self._sort(known, shared)
         new = [kind for kind in self.kinds if kind.operator is None]
         uses = Counter(id(kind.subdomain.matrix) for kind in new)
-        for each in new:
+        held = len(new)
+        for each in _by_pattern(new):
             each.operator = self._factor(each.subdomain, each.interface, condensations)
             uses[id(each.subdomain.matrix)] -= 1
             if not uses[id(each.subdomain.matrix)]:
                 each.subdomain.matrix.forget()
+            if held % 8 == 1:
+                return_memory()
+            held -= 1
         self.factored = len(new)
         self._operate()
 
@@ -596,6 +618,14 @@ class TornInverse:
         for shared, batch in self._batches:
             batch.scatter(at_once(shared)(batch.gather(given)), result)
         return result
+
+
+def _by_pattern(kinds: Sequence[Kind]) -> list[Kind]:
+    """Return kinds in an order in which those with the same pattern and interface follow each other."""
+    groups: dict[tuple[int, bytes], list[Kind]] = {}
+    for kind in kinds:  # subdomains with cells connected alike share a space
+        groups.setdefault((id(kind.subdomain.mesh.space), kind.interface.tobytes()), []).append(kind)
+    return [kind for group in groups.values() for kind in group]
 
 
 def factored(kind: Kind) -> LocalOperator:

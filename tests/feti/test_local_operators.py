@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from fenics_contact.feti.inverse import (
     ExplicitOperator,
     ImplicitOperator,
     LocalKind,
+    TornInverse,
 )
 from fenics_contact.feti.subdomain import LocalOperator, Subdomain, interface_dofs
 from fenics_contact.gallery import block
@@ -83,6 +85,8 @@ def test_flexing_is_the_inverse_seen_from_the_interface(cell: str, kind: type) -
     rows = sp.random(7, len(b), density=0.1, random_state=3, format="csr")
     expected = np.einsum("ij,jk,ik->i", rows.toarray(), F, rows.toarray())
     np.testing.assert_allclose(operator.row_flexibility(rows), expected, rtol=1e-9, atol=1e-12 * abs(F).max())
+    one_by_one = operator.row_flexibility(rows, 1)  # type: ignore[call-arg]  # the protocol has no such choice
+    np.testing.assert_allclose(one_by_one, operator.row_flexibility(rows), rtol=1e-12)
 
 
 @pytest.mark.parametrize("cell", CELLS)
@@ -171,6 +175,28 @@ def test_subdomains_with_the_same_pattern_share_one_symbolic_factorisation(
     assert 1 <= made.pop().analysed <= 3
     workspaces = [each for each in gc.get_objects() if isinstance(each, Condensation)]
     assert not workspaces  # none is kept with the system
+
+
+def test_only_one_workspace_is_held_while_subdomains_are_factored(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[weakref.ref[Condensation]] = []
+    held: list[int] = []
+    begin = Condensation.__init__
+
+    def counted(self: Condensation, pattern: sp.csr_matrix, interface: np.ndarray) -> None:
+        held.append(sum(each() is not None for each in made))
+        made.append(weakref.ref(self))
+        begin(self, pattern, interface)
+
+    monkeypatch.setattr(Condensation, "__init__", counted)
+    # Of two patterns in turn.
+    pieces = 2 * [piece("hexahedron", cells=2), piece("hexahedron")]
+    B = sp.identity(sum(each.mesh.size for each in pieces), format="csr")
+    B = B[np.concatenate([surface(each) for each in pieces])]
+    condensations = Condensations()
+    inverse = TornInverse(pieces, B, condensations, kind=LocalKind.EXPLICIT, shared=False)
+    assert inverse.factored == 4
+    assert condensations.analysed == len(made) == 2
+    assert held == [0, 0]
 
 
 def test_both_kinds_give_the_same_contact_forces() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from mpi4py import MPI
 
 from benchmarks.cases.scenes import block_mesh, block_on_plane
 from fenics_contact import Scene, box_partition, solve_scene
+from fenics_contact._base.memory import return_memory
 from fenics_contact._scene import memory
 from fenics_contact._scene.memory import Rates, Subdomains, expected_memory, require_memory
 from fenics_contact.errors import InvalidInputError
@@ -113,3 +116,21 @@ def test_the_expected_memory_is_what_a_state_takes(
     mpirun: Callable[..., str], cells: str, ranks: int
 ) -> None:
     assert float(mpirun(TAKEN, ranks, cells, fresh=True)) == pytest.approx(1.0, abs=0.2)
+
+
+def test_what_was_freed_between_objects_that_stay_returns_to_the_system() -> None:
+    if not hasattr(ctypes.CDLL(None), "malloc_trim"):
+        pytest.skip("only the C library of GNU returns it")
+
+    def resident() -> int:
+        return 4096 * int(Path("/proc/self/statm").read_text().split()[1])
+
+    size = 60_000  # small enough not to be mapped one by one
+    pieces: list[bytearray | None] = [bytearray(size) for _ in range(800)]
+    for place in range(800):
+        if place % 8:
+            pieces[place] = None
+    before = resident()
+    return_memory()
+    assert resident() < before - 0.5 * 700 * size
+    assert sum(each is not None for each in pieces) == 100
