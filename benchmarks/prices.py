@@ -18,7 +18,8 @@ from mpi4py import MPI
 from benchmarks.cases.scenes import block_mesh, block_on_plane
 from fenics_contact._base.sparse import explicit_cost, implicit_cost, prefers_explicit
 from fenics_contact.feti import build_torn_system, decompose
-from fenics_contact.feti.inverse import Condensations, ExplicitOperator, ImplicitOperator
+from fenics_contact.feti.condensation import Condensations
+from fenics_contact.feti.inverse import ExplicitOperator, ImplicitOperator
 from fenics_contact.feti.subdomain import Subdomain
 from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.study.report import table

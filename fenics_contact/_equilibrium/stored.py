@@ -34,8 +34,8 @@ def restored_solution(system: DualSystem, stored: Stored) -> DualSolution:
     """Compute the residuals of a stored multiplier. Collective; one product."""
     problem, law = system.problem, system.torn.law
     multiplier, motion = stored["multiplier"][system.torn.numbering.owned], stored["motion"]
-    operator = CountedOperator(problem.operator)
-    iterate = iterate_at(problem.with_law(law), multiplier, operator(multiplier), motion)
+    operator = CountedOperator(problem.operator, exact=problem.exact)
+    iterate = iterate_at(problem.with_law(law), multiplier, operator.exactly(multiplier), motion)
     return DualSolution(
         problem=problem,
         multiplier=multiplier,

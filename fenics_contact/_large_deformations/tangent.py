@@ -13,6 +13,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from fenics_contact._base.libraries import MPI, PETSc
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact.errors import ConvergenceError
+from fenics_contact.feti.condensation import Condensations
 from fenics_contact.feti.dual import DirichletPreconditioner, DualSystem
 from fenics_contact.feti.factor import (
     Factor,
@@ -23,13 +24,7 @@ from fenics_contact.feti.factor import (
     require_factored,
     symmetric_matrix,
 )
-from fenics_contact.feti.inverse import (
-    Condensations,
-    FactoredOperator,
-    LocalKind,
-    TornInverse,
-    dofs_inside,
-)
+from fenics_contact.feti.inverse import FactoredOperator, LocalKind, TornInverse, dofs_inside
 from fenics_contact.feti.kernel_basis import TornModes
 from fenics_contact.feti.subdomain import CachedMatrix, LocalOperator, Subdomain
 from fenics_contact.feti.torn import TornSystem

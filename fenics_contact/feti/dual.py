@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import cast
@@ -16,9 +17,10 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._base.sparse import ROUNDING, scaled_columns, sweep
 from fenics_contact.errors import InfeasibleError, together
+from fenics_contact.feti.condensation import Condensations
 from fenics_contact.feti.decomposition import DualNumbering
 from fenics_contact.feti.factor import Factor
-from fenics_contact.feti.inverse import Condensations, LocalKind, TornInverse
+from fenics_contact.feti.inverse import LocalKind, TornInverse
 from fenics_contact.feti.kernel_basis import TornModes, whole_motions
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.quality import node_volumes
@@ -400,7 +402,12 @@ class DualSystem:
             scaling = previous.problem.scaling
             scaling = None if scaling is None else scaling.with_load(coarse.load)
         self.problem = replace(
-            previous.problem, operator=self.apply, coarse=coarse, scaling=scaling, reach=self.reach
+            previous.problem,
+            operator=self.apply,
+            coarse=coarse,
+            scaling=scaling,
+            reach=self.reach,
+            exact=self.apply_exactly if self.inverse.is_rounded else None,
         )
 
     def _set_up(self, timer: PhaseTimer) -> None:
@@ -432,26 +439,37 @@ class DualSystem:
             scaling,
             self.reach,
             supported,
+            exact=self.apply_exactly if self.inverse.is_rounded else None,
         )
 
     def apply(self, multiplier: np.ndarray) -> np.ndarray:
         """Return F λ = B K⁺ Bᵀ λ for an owned vector, with C λ on rows of springs. Collective."""
+        return self._applied(self.inverse.flex, multiplier)
+
+    def apply_exactly(self, multiplier: np.ndarray) -> np.ndarray:
+        """Return F λ in double precision, however K⁺ is stored. Collective."""
+        return self._applied(self.inverse.flex_exactly, multiplier)
+
+    def _applied(self, flex: Callable[[np.ndarray], np.ndarray], multiplier: np.ndarray) -> np.ndarray:
         self.products += 1
         numbering, give = self.torn.numbering, self.torn.give
         count_flops(numbering.comm, self.inverse.flops[0] + 4 * self._B_interface.nnz)
         force = self._Bt_interface @ numbering.to_local(multiplier)
-        product = numbering.to_owned(self._B_interface @ self.inverse.flex(force))
+        product = numbering.to_owned(self._B_interface @ flex(force))
         return product if give is None else product + give * multiplier
 
     def reach(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """Return abs(B) abs(u), the size of the displacements at each row, owned, [length]. Collective."""
-        moved = self.bent(multiplier) + (self.kernel @ alpha)[self.inverse.interface]
+        count_flops(self.torn.numbering.comm, self.inverse.flops[0] + 2 * self._B_interface.nnz)
+        force = self._Bt_interface @ self.torn.numbering.to_local(multiplier)
+        moved = self._bent - self.inverse.flex(force) + (self.kernel @ alpha)[self.inverse.interface]
         return self.torn.numbering.to_owned(abs(self._B_interface) @ np.abs(moved))
 
     def bent(self, multiplier: np.ndarray) -> np.ndarray:
         """Return K⁺(f − Bᵀλ) on the interface, (n_interface,), [length]; one product. Collective."""
         count_flops(self.torn.numbering.comm, self.inverse.flops[0] + 2 * self._B_interface.nnz)
-        return self._bent - self.inverse.flex(self._Bt_interface @ self.torn.numbering.to_local(multiplier))
+        force = self._Bt_interface @ self.torn.numbering.to_local(multiplier)
+        return self._bent - self.inverse.flex_exactly(force)
 
     def force(self, multiplier: np.ndarray) -> np.ndarray:
         """Return Bᵀλ on this rank's torn dofs, [force]. Collective."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections import Counter
 from collections.abc import Callable, Sequence
 from enum import Enum
@@ -14,98 +13,15 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import blas, lapack
 
-from fenics_contact._base.libraries import PETSc
 from fenics_contact._base.memory import return_memory
-from fenics_contact._base.sparse import dispose_with, prefers_explicit
+from fenics_contact._base.sparse import prefers_explicit
 from fenics_contact._scene.memory import Rates
-from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.alike import Kind, Kinds, Motion
-from fenics_contact.feti.factor import Factor, petsc_call, regularised, symmetric_matrix
+from fenics_contact.feti.compact import CompactOperator, Insides
+from fenics_contact.feti.condensation import Condensations, pieces, regular_factor
+from fenics_contact.feti.factor import Factor, regularised
 from fenics_contact.feti.moved import Batch, MovedInterface, MovedOperator, SharedOperator
 from fenics_contact.feti.subdomain import LocalOperator, Subdomain, interface_dofs
-
-
-class Condensation:
-    """S = K_bb − K_bi K_ii⁻¹ K_ib by MUMPS, which factors K_ii and forms S in one pass.
-
-    The ordering and the symbolic factorisation are computed once; each call only refills the values.
-    """
-
-    def __init__(self, pattern: sp.csr_matrix, interface: np.ndarray) -> None:
-        """Prepare for symmetric matrices with the sparsity of ``pattern``.
-
-        `pattern`: any matrix with the pattern, shape (n, n); `interface`: the dofs b, shape (n_b,).
-        """
-        self._size, self._interface = len(interface), interface
-        self._structure = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType))
-        self._matrix = symmetric_matrix(pattern)
-        self._pc = PETSc.PC().create(PETSc.COMM_SELF)
-        self._pc.setOperators(self._matrix)
-        self._pc.setType(PETSc.PC.Type.CHOLESKY)
-        self._pc.setFactorSolverType("mumps")
-        self._pc.setFactorSetUpSolverType()
-        self._factor = self._pc.getFactorMatrix()
-        self._factor.setMumpsIcntl(7, 5)  # ICNTL(7) = 5: nested dissection by METIS
-        self._rows = PETSc.IS().createGeneral(interface.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
-        petsc_call("MatFactorSetSchurIS", self._factor.handle, self._rows.handle)
-        dispose_with(self, self._rows, self._factor, self._pc, self._matrix)
-
-    def __call__(self, stiffness: sp.csr_matrix) -> np.ndarray:
-        """Return S of a matrix with the pattern, shape (n_b, n_b), Fortran order."""
-        # MUMPS treats pivots below about 1e-16 as zero here: results would depend on the units of length and
-        # force. Scaling by a power of two is exact.
-        unit = 2.0 ** np.round(np.log2(stiffness.diagonal().max()))
-        self._matrix.setValuesCSR(*self._structure, stiffness.data / unit)
-        self._matrix.assemble()
-        self._pc.setUp()
-        if self._factor.getMumpsInfog(1) < 0:
-            return self._by_factor(stiffness)
-        return unit * self._schur_complement()
-
-    def _by_factor(self, stiffness: sp.csr_matrix) -> np.ndarray:
-        """Return S by factors of K_ii: MUMPS may take too little memory where hardly a dof lies inside."""
-        inside = np.ones(stiffness.shape[0], dtype=bool)
-        inside[self._interface] = False
-        between = stiffness[inside][:, self._interface]
-        bent = Factor(stiffness[inside][:, inside].tocsr()).solve_many(between.toarray(order="F"))
-        own = stiffness[self._interface][:, self._interface].toarray(order="F")
-        return np.asfortranarray(own - between.T @ bent)
-
-    def _schur_complement(self) -> np.ndarray:
-        # petsc4py does not wrap this yet, so PETSc's own library is called.
-        matrix, status = ctypes.c_void_p(), ctypes.c_int()
-        values = ctypes.POINTER(ctypes.c_double)()
-        factor = self._factor.handle
-        petsc_call("MatFactorGetSchurComplement", factor, ctypes.byref(matrix), ctypes.byref(status))
-        petsc_call("MatDenseGetArrayRead", matrix, ctypes.byref(values))
-        schur = np.array(np.ctypeslib.as_array(values, shape=(self._size, self._size))).T
-        petsc_call("MatDenseRestoreArrayRead", matrix, ctypes.byref(values))
-        petsc_call("MatFactorRestoreSchurComplement", factor, ctypes.byref(matrix), status)
-        return schur
-
-
-class Condensations:
-    """Keeps the last condensation for matrices with the same pattern and interface.
-
-    Subdomains of a regular partition share one pattern and a handful of interfaces: those that share both
-    should come one after the other. A workspace takes 15 to 50 MB, so no other is kept.
-    """
-
-    def __init__(self) -> None:
-        """Start empty."""
-        self._last: tuple[tuple[bytes, bytes, bytes], Condensation] | None = None
-        self.analysed = 0
-
-    def schur_complement(self, stiffness: sp.csr_matrix, interface: np.ndarray) -> np.ndarray:
-        """Return the Schur complement of ``stiffness`` on the dofs ``interface``, shape (n_b, n_b)."""
-        if len(interface) == stiffness.shape[0]:
-            return stiffness[interface][:, interface].toarray(order="F")
-        key = (stiffness.indptr.tobytes(), stiffness.indices.tobytes(), interface.tobytes())
-        if self._last is None or self._last[0] != key:
-            self._last = None  # before the next one is made
-            self._last = key, Condensation(stiffness, interface)
-            self.analysed += 1
-        return self._last[1](stiffness)
 
 
 class ExplicitOperator:
@@ -154,6 +70,9 @@ class ExplicitOperator:
             displacement[:] = self.flex_all(force[None])[0]
         else:
             blas.dspmv(self._size, 1.0, self._flexible, force, y=displacement, overwrite_y=1, lower=1)
+
+    #: Nothing is rounded.
+    flex_exactly = flex
 
     def share(self) -> None:
         """Store whole matrices from now on."""
@@ -216,7 +135,7 @@ class ExplicitOperator:
 
         `pairs`: pairs of entries of rows that are looked up at once: long rows of mortar contact have many.
         """
-        parts = _pieces(np.diff(rows.indptr).astype(np.int64) ** 2, pairs)
+        parts = pieces(np.diff(rows.indptr).astype(np.int64) ** 2, pairs)
         return np.concatenate([np.zeros(0), *(self._flexibility_of(rows[part]) for part in parts)])
 
     def _flexibility_of(self, rows: sp.csr_matrix) -> np.ndarray:
@@ -243,13 +162,6 @@ class ExplicitOperator:
         return solution
 
 
-def _pieces(work: np.ndarray, most: int) -> list[slice]:
-    """Return consecutive slices of items whose work sums up to about ``most`` each; integers, shape (n,)."""
-    piece = (np.cumsum(work) - work) // most
-    starts = np.flatnonzero(np.diff(piece, prepend=-1)).tolist()
-    return [slice(start, end) for start, end in pairwise([*starts, len(work)])]
-
-
 def _whole(lower: np.ndarray) -> np.ndarray:
     """Return the symmetric matrix of a lower triangle, whose other entries are zero."""
     whole = lower + lower.T
@@ -257,26 +169,9 @@ def _whole(lower: np.ndarray) -> np.ndarray:
     return np.asarray(whole)
 
 
-def _packed_inverse(
-    schur: np.ndarray, kernel: np.ndarray, typical: float, rounded: float = 1e-12
-) -> np.ndarray:
-    """Return the packed lower triangle of (S + ρ Q Qᵀ)⁻¹, overwriting ``schur``.
-
-    ρ is the largest diagonal entry of S. Where that is rounding compared with the typical stiffness, every
-    displacement of the interface is a rigid motion, as in a statically determinate body.
-
-    `rounded`: entries of S below this fraction of those of K are rounding.
-    """
-    modes, _ = np.linalg.qr(kernel)
-    largest = schur.diagonal().max()
-    rho = largest if largest > rounded * typical else typical
-    filled = blas.dsyrk(rho, modes, beta=1.0, c=schur, lower=1, overwrite_c=1)
-    factor, failed = lapack.dpotrf(filled, lower=1, overwrite_a=1)
-    if failed:
-        raise InvalidInputError(
-            "the stiffness of every subdomain must be positive definite up to its kernel, but its Schur "
-            f"complement loses definiteness in row {failed}: check the material and the kernel of the model"
-        )
+def _packed_inverse(schur: np.ndarray, kernel: np.ndarray, typical: float) -> np.ndarray:
+    """Return the packed lower triangle of (S + ρ Q Qᵀ)⁻¹, overwriting ``schur``."""
+    factor = regular_factor(schur, kernel, typical)[0]
     inverse, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
     packed, _ = lapack.dtrttp(inverse, uplo="L")
     return np.asarray(packed)
@@ -336,6 +231,9 @@ class FactoredOperator:
         self._factor.solve(self._right, self._left)
         displacement[:] = self._left[self._interface]
 
+    #: Nothing is rounded.
+    flex_exactly = flex
+
     def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
         """Write the Schur complement times an interface displacement into ``force``."""
         force[:], pulled = self._forces(displacement)
@@ -387,7 +285,7 @@ class FactoredOperator:
         `at_once`: rows that are solved for together: a vector of the size of the subdomain for each.
         """
         flexibility = np.empty(rows.shape[0])
-        for part in _pieces(np.ones(rows.shape[0], dtype=np.int64), at_once):
+        for part in pieces(np.ones(rows.shape[0], dtype=np.int64), at_once):
             block = rows[part].toarray().T
             right = np.zeros((len(self._right), block.shape[1]), order="F")
             right[self._interface] = block
@@ -428,6 +326,8 @@ class LocalKind(Enum):
     IMPLICIT = "implicit"
     #: As dense matrices on the interface: more set-up and memory, faster products.
     EXPLICIT = "explicit"
+    #: As one dense triangle in single precision: least memory; what is done once or twice is slower.
+    COMPACT = "compact"
 
 
 class TornInverse:
@@ -461,7 +361,7 @@ class TornInverse:
         share factors.
         """
         self.offset = np.cumsum([0] + [subdomain.mesh.size for subdomain in subdomains])
-        self._subdomains, self._kind = tuple(subdomains), kind
+        self._subdomains, self._kind, self._insides = tuple(subdomains), kind, Insides()
         touched = np.zeros(self.offset[-1], dtype=bool)
         touched[B.indices] = True
         self._local = [
@@ -545,14 +445,36 @@ class TornInverse:
     def __call__(self, right: np.ndarray) -> np.ndarray:
         """Return K⁺ times a torn vector, shape (torn_size,)."""
         solution = np.zeros_like(right)
-        for operator, start, stop in zip(self.operators, self.offset[:-1], self.offset[1:], strict=True):
-            if right[start:stop].any():  # most subdomains carry no load
-                solution[start:stop] = operator.invert(right[start:stop])
+        for index in self._by_kind:
+            own = slice(*self.offset[index : index + 2])
+            if right[own].any():  # most subdomains carry no load
+                solution[own] = self.operators[index].invert(right[own])
         return solution
 
     def flex(self, force: np.ndarray) -> np.ndarray:
         """Return (K⁺)_bb times an interface force, shape (n_interface,)."""
         return self._each(lambda one: one.flex, lambda all_: all_.flex_all, force)
+
+    @property
+    def is_rounded(self) -> bool:
+        """Whether `flex` is in single precision."""
+        return self._kind is LocalKind.COMPACT
+
+    def flex_exactly(self, force: np.ndarray) -> np.ndarray:
+        """Return (K⁺)_bb times an interface force, in double precision however it is stored."""
+        if not self.is_rounded:
+            return self.flex(force)
+        result = np.empty_like(force)
+        for index in self._by_kind:
+            part = self._parts[index]
+            self.operators[index].flex_exactly(force[part], result[part])
+        return result
+
+    @cached_property
+    def _by_kind(self) -> list[int]:
+        """The subdomains, those of each kind one after the other."""
+        first = {id(kind): number for number, kind in enumerate(self.kinds)}
+        return sorted(range(len(self._members)), key=lambda index: first[id(self._members[index][0])])
 
     def stiffen(self, displacement: np.ndarray) -> np.ndarray:
         """Return S times an interface displacement, shape (n_interface,)."""
@@ -566,14 +488,14 @@ class TornInverse:
         `displacement`: w, shape (n_interface,).
         """
         energy, force = 0.0, np.zeros_like(displacement)
-        each = zip(self._subdomains, self.operators, self._local, self._parts, strict=True)
-        for subdomain, operator, local, part in each:
+        for index in self._by_kind:
+            part = self._parts[index]
             moved = displacement[part]
             if not moved.any():
                 continue
-            modes, _ = np.linalg.qr(subdomain.kernel[local])
+            modes, _ = np.linalg.qr(self._subdomains[index].kernel[self._local[index]])
             bent = moved - modes @ (modes.T @ moved)
-            _, force[part] = operator.extend(bent)
+            _, force[part] = self.operators[index].extend(bent)
             energy += float(bent @ force[part])
         return max(energy, 0.0), force
 
@@ -583,10 +505,9 @@ class TornInverse:
         `displacement`: w, shape (n_interface,).
         """
         whole = np.zeros(self.offset[-1])
-        each = zip(self.operators, self._parts, self.offset[:-1], self.offset[1:], strict=True)
-        for operator, part, start, stop in each:
-            if displacement[part].any():
-                whole[start:stop], _ = operator.extend(displacement[part])
+        for index in self._by_kind:
+            if (moved := displacement[self._parts[index]]).any():
+                whole[slice(*self.offset[index : index + 2])], _ = self.operators[index].extend(moved)
         return whole
 
     def row_flexibility(self, rows: sp.csr_matrix) -> np.ndarray:
@@ -604,6 +525,12 @@ class TornInverse:
         self, subdomain: Subdomain, interface: np.ndarray, condensations: Condensations
     ) -> LocalOperator:
         """Factor one subdomain."""
+        if self._kind is LocalKind.COMPACT:
+            schur = condensations.schur_complement(subdomain.stiffness, interface)
+            compact = CompactOperator(subdomain, interface, schur, self._insides)
+            if compact.contracts:
+                return compact
+            return ExplicitOperator(subdomain, interface, condensations)
         return _factored(subdomain, interface, condensations, self._kind)
 
     def _each(

@@ -60,12 +60,22 @@ class TornModes:
 
     def moved_by(self, rows: sp.csr_matrix) -> sp.csr_matrix:
         """Return rows · R for sparse rows on torn vectors, shape (n_rows, torn_size)."""
-        sizes, widths = np.array([part.shape for part in self.parts]).T
+        # Where no row acts, R is not needed.
+        used = np.unique(rows.indices)
+        starts = np.cumsum([0, *map(len, self.parts)])
+        ends = np.searchsorted(used, starts)
+        parts = [
+            part[used[a:b] - start]
+            for part, start, (a, b) in zip(self.parts, starts[:-1], pairwise(ends), strict=True)
+        ]
+        place = np.searchsorted(used, rows.indices)
+        rows = sp.csr_matrix((rows.data, place, rows.indptr), shape=(rows.shape[0], len(used)))
+        sizes, widths = np.array([part.shape for part in parts]).T
         first = np.repeat(np.cumsum(widths) - widths, sizes)
         counts = np.repeat(widths, sizes)
         start = np.concatenate([[0], np.cumsum(counts)])
         column = np.arange(start[-1]) - np.repeat(start[:-1] - first, counts)
-        values = np.concatenate([part.ravel() for part in self.parts])
+        values = np.concatenate([part.ravel() for part in parts])
         modes = sp.csr_matrix((values, column.astype(np.int32), start), shape=(len(counts), widths.sum()))
         return (rows @ modes) @ self.coefficients
 
@@ -75,6 +85,8 @@ class TornModes:
 
     def tocsr(self) -> sp.csr_matrix:
         """Return R as a sparse matrix, shape (torn_size, n_modes)."""
+        if self.shape[1] == 0:
+            return sp.csr_matrix(self.shape)
         return self.moved_by(sp.identity(self.shape[0], format="csr"))
 
     @property

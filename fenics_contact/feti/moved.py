@@ -82,6 +82,11 @@ class MovedOperator:
         self.first.flex(_there(force, self.interface), moved := np.empty_like(force))
         displacement[:] = _back(moved, self.interface)
 
+    def flex_exactly(self, force: np.ndarray, displacement: np.ndarray) -> None:
+        """Write the same in double precision, however the first one is stored."""
+        self.first.flex_exactly(_there(force, self.interface), moved := np.empty_like(force))
+        displacement[:] = _back(moved, self.interface)
+
     def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
         """Write S, or a close approximation, times an interface displacement into ``force``."""
         self.first.stiffen(_there(displacement, self.interface), moved := np.empty_like(force))

@@ -44,6 +44,9 @@ class LocalOperator(Protocol):
     def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb times an interface force, shape (n_b,), into ``displacement``."""
 
+    def flex_exactly(self, force: np.ndarray, displacement: np.ndarray) -> None:
+        """Write the same in double precision, however it is stored."""
+
     def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
         """Write S, or a close approximation, times an interface displacement into ``force``."""
 
@@ -178,6 +181,11 @@ class CachedMatrix:
         if self._matrix is None:
             self._matrix = self._make()
         return self._matrix
+
+    @property
+    def held(self) -> bool:
+        """Whether it is stored now."""
+        return self._matrix is not None
 
     def forget(self) -> None:
         """Free the memory."""

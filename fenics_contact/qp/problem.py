@@ -96,6 +96,8 @@ class DualProblem:
         friction: The law of the slip bounds; None where no disc carries a force.
         compliance: By how much contact rows give way to their forces; None where none does.
         least: Sizes below which those of forces and jumps do not fall in residuals; None: no such sizes.
+        exact: F in double precision, owned to owned, collective, where `operator` is in single precision and
+            only directions and images of Krylov methods are computed by it; None where it is exact itself.
     """
 
     comm: MPI.Comm
@@ -111,6 +113,7 @@ class DualProblem:
     friction: SlipLaw | None = None
     compliance: Compliance | None = None
     least: LeastSizes | None = None
+    exact: Operator | None = None
 
     @cached_property
     def between_supports(self) -> Marks:
@@ -226,9 +229,14 @@ class Scaling:
         """Return the problem for μ, see `DualProblem.scaled_problem`."""
         s, precondition, reach = self.factor, problem.preconditioner, problem.reach
         discs, friction = s[problem.layout.tangential[:, 0]], problem.friction
+
+        def scaled(F: Operator) -> Operator:
+            return lambda x: s * F(s * x)
+
         return replace(
             problem,
-            operator=lambda x: s * problem.operator(s * x),
+            operator=scaled(problem.operator),
+            exact=None if problem.exact is None else scaled(problem.exact),
             rhs=s * problem.rhs,
             coarse=self.coarse,
             diagonal=s**2 * problem.diagonal,
@@ -281,14 +289,22 @@ class _ScaledRows:
 class CountedOperator:
     """The dual operator together with the number of times it was applied."""
 
-    def __init__(self, operator: Operator, report: Report | None = None) -> None:
-        """Wrap ``operator``."""
-        self._operator, self._report = operator, report
+    def __init__(
+        self, operator: Operator, report: Report | None = None, exact: Operator | None = None
+    ) -> None:
+        """Wrap ``operator``; ``exact`` is F in double precision where it is in single precision."""
+        self._operator, self._report, self._exact = operator, report, exact or operator
         self.products = 0
 
     def __call__(self, x: Vector) -> Vector:
         """Apply F to an owned vector and count. Collective."""
-        product = self._operator(x)
+        return self._counted(self._operator(x))
+
+    def exactly(self, x: Vector) -> Vector:
+        """Apply F in double precision, however it is stored, to an owned vector and count. Collective."""
+        return self._counted(self._exact(x))
+
+    def _counted(self, product: Vector) -> Vector:
         self.products += 1
         self.report(self.products, None)
         return product

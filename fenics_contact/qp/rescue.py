@@ -263,7 +263,9 @@ class Rescue:
         for state in outer_iterations(frozen, start, settings):
             if state.residuals.within(target) or start.operator.products >= limit:
                 break
-        improved = certify(problem, state.multiplier, start.operator(state.multiplier), state.residual)
+        improved = certify(
+            problem, state.multiplier, start.operator.exactly(state.multiplier), state.residual
+        )
         line = state.record(0, frozen, start.operator.products)
         return improved.iterate, replace(line, method="SMALSE rescue"), state.memory
 

@@ -316,7 +316,7 @@ class Smalse:
             history.append(state.record(len(history), problem, operator.products))
             start.reached(history[-1])
             if state.residuals.within(0.5 * self.tolerance):
-                product = operator(state.multiplier)
+                product = operator.exactly(state.multiplier)
                 answer = certify(problem, state.multiplier, product, state.residual)
                 if answer.iterate.residuals.within(self.tolerance):
                     return answer.solution(history, operator.products, state.memory)

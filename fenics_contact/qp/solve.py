@@ -189,7 +189,9 @@ def _solve_as_given(
         if start is None:
             require_equilibrium(problem)
         operator = CountedOperator(
-            problem.operator, lambda products, residual: task.step(products, measure=residual)
+            problem.operator,
+            lambda products, residual: task.step(products, measure=residual),
+            problem.exact,
         )
         begin = _begin(problem, operator, start, same)
         answer = _as_it_is(problem, begin, solver.tolerance)
@@ -315,7 +317,9 @@ def _begin(
         multiplier = coarse.particular() if given is None else np.array(given, dtype=np.float64)
         with together(problem.comm):
             _require_size(multiplier, problem.layout.size)
-        product = apply_unless_zero(problem, operator, multiplier)
+        # A cold start is never the answer, and rounding of its product is that of the first step's.
+        apply = operator if given is None else operator.exactly
+        product = apply_unless_zero(problem, apply, multiplier)
     if earlier is not None and earlier.alpha.shape == (coarse.m,):
         iterate = iterate_at(problem, multiplier, product, earlier.alpha)
     else:

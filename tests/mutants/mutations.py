@@ -317,7 +317,7 @@ MUTATIONS = (
     ),
     Mutation(
         "small pivots are zeros",
-        "feti/inverse.py",
+        "feti/condensation.py",
         "unit = 2.0 ** np.round(np.log2(stiffness.diagonal().max()))",
         "unit = 1.0",
         ("tests/contact/test_units.py::test_subdomains_are_factored_alike_in_all_units",),

@@ -1,0 +1,129 @@
+"""Schur complements of subdomains on their interface, and their Cholesky factors."""
+
+from __future__ import annotations
+
+import ctypes
+from itertools import pairwise
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import blas, lapack
+
+from fenics_contact._base.libraries import PETSc
+from fenics_contact._base.sparse import dispose_with
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.factor import Factor, petsc_call, symmetric_matrix
+
+
+class Condensation:
+    """S = K_bb − K_bi K_ii⁻¹ K_ib by MUMPS, which factors K_ii and forms S in one pass.
+
+    The ordering and the symbolic factorisation are computed once; each call only refills the values.
+    """
+
+    def __init__(self, pattern: sp.csr_matrix, interface: np.ndarray) -> None:
+        """Prepare for symmetric matrices with the sparsity of ``pattern``.
+
+        `pattern`: any matrix with the pattern, shape (n, n); `interface`: the dofs b, shape (n_b,).
+        """
+        self._size, self._interface = len(interface), interface
+        self._structure = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType))
+        self._matrix = symmetric_matrix(pattern)
+        self._pc = PETSc.PC().create(PETSc.COMM_SELF)
+        self._pc.setOperators(self._matrix)
+        self._pc.setType(PETSc.PC.Type.CHOLESKY)
+        self._pc.setFactorSolverType("mumps")
+        self._pc.setFactorSetUpSolverType()
+        self._factor = self._pc.getFactorMatrix()
+        self._factor.setMumpsIcntl(7, 5)  # ICNTL(7) = 5: nested dissection by METIS
+        self._rows = PETSc.IS().createGeneral(interface.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+        petsc_call("MatFactorSetSchurIS", self._factor.handle, self._rows.handle)
+        dispose_with(self, self._rows, self._factor, self._pc, self._matrix)
+
+    def __call__(self, stiffness: sp.csr_matrix) -> np.ndarray:
+        """Return S of a matrix with the pattern, shape (n_b, n_b), Fortran order."""
+        # MUMPS treats pivots below about 1e-16 as zero here: results would depend on the units of length and
+        # force. Scaling by a power of two is exact.
+        unit = 2.0 ** np.round(np.log2(stiffness.diagonal().max()))
+        self._matrix.setValuesCSR(*self._structure, stiffness.data / unit)
+        self._matrix.assemble()
+        self._pc.setUp()
+        if self._factor.getMumpsInfog(1) < 0:
+            return self._by_factor(stiffness)
+        return unit * self._schur_complement()
+
+    def _by_factor(self, stiffness: sp.csr_matrix) -> np.ndarray:
+        """Return S by factors of K_ii: MUMPS may take too little memory where hardly a dof lies inside."""
+        inside = np.ones(stiffness.shape[0], dtype=bool)
+        inside[self._interface] = False
+        between = stiffness[inside][:, self._interface]
+        bent = Factor(stiffness[inside][:, inside].tocsr()).solve_many(between.toarray(order="F"))
+        own = stiffness[self._interface][:, self._interface].toarray(order="F")
+        return np.asfortranarray(own - between.T @ bent)
+
+    def _schur_complement(self) -> np.ndarray:
+        # petsc4py does not wrap this yet, so PETSc's own library is called.
+        matrix, status = ctypes.c_void_p(), ctypes.c_int()
+        values = ctypes.POINTER(ctypes.c_double)()
+        factor = self._factor.handle
+        petsc_call("MatFactorGetSchurComplement", factor, ctypes.byref(matrix), ctypes.byref(status))
+        petsc_call("MatDenseGetArrayRead", matrix, ctypes.byref(values))
+        schur = np.array(np.ctypeslib.as_array(values, shape=(self._size, self._size))).T
+        petsc_call("MatDenseRestoreArrayRead", matrix, ctypes.byref(values))
+        petsc_call("MatFactorRestoreSchurComplement", factor, ctypes.byref(matrix), status)
+        return schur
+
+
+class Condensations:
+    """Keeps the last condensation for matrices with the same pattern and interface.
+
+    Subdomains of a regular partition share one pattern and a handful of interfaces: those that share both
+    should come one after the other. A workspace takes 15 to 50 MB, so no other is kept.
+    """
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._last: tuple[tuple[bytes, bytes, bytes], Condensation] | None = None
+        self.analysed = 0
+
+    def schur_complement(self, stiffness: sp.csr_matrix, interface: np.ndarray) -> np.ndarray:
+        """Return the Schur complement of ``stiffness`` on the dofs ``interface``, shape (n_b, n_b)."""
+        if len(interface) == stiffness.shape[0]:
+            return stiffness[interface][:, interface].toarray(order="F")
+        key = (stiffness.indptr.tobytes(), stiffness.indices.tobytes(), interface.tobytes())
+        if self._last is None or self._last[0] != key:
+            self._last = None  # before the next one is made
+            self._last = key, Condensation(stiffness, interface)
+            self.analysed += 1
+        return self._last[1](stiffness)
+
+
+def regular_factor(
+    schur: np.ndarray, kernel: np.ndarray, typical: float, rounded: float = 1e-12
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the lower Cholesky factor of S + ρ Q Qᵀ, Q and ρ, overwriting ``schur``.
+
+    Q is the trace of the kernel on the interface, orthonormal, shape (n_b, n_modes). ρ is the largest
+    diagonal entry of S. Where that is rounding compared with the typical stiffness, every displacement of the
+    interface is a rigid motion, as in a statically determinate body.
+
+    `rounded`: entries of S below this fraction of those of K are rounding.
+    """
+    modes, _ = np.linalg.qr(kernel)
+    largest = schur.diagonal().max()
+    rho = largest if largest > rounded * typical else typical
+    filled = blas.dsyrk(rho, modes, beta=1.0, c=schur, lower=1, overwrite_c=1)
+    factor, failed = lapack.dpotrf(filled, lower=1, overwrite_a=1)
+    if failed:
+        raise InvalidInputError(
+            "the stiffness of every subdomain must be positive definite up to its kernel, but its Schur "
+            f"complement loses definiteness in row {failed}: check the material and the kernel of the model"
+        )
+    return factor, modes, float(rho)
+
+
+def pieces(work: np.ndarray, most: int) -> list[slice]:
+    """Return consecutive slices of items whose work sums up to about ``most`` each; integers, shape (n,)."""
+    piece = (np.cumsum(work) - work) // most
+    starts = np.flatnonzero(np.diff(piece, prepend=-1)).tolist()
+    return [slice(start, end) for start, end in pairwise([*starts, len(work)])]
