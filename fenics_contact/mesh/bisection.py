@@ -15,6 +15,7 @@ from fenics_contact._base.checks import check_count
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cuts import closed, pieces
+from fenics_contact.mesh.equal_boxes import equal_boxes
 from fenics_contact.mesh.faces import coordinate_rounding
 from fenics_contact.mesh.partition import (
     cell_weights,
@@ -253,7 +254,8 @@ def default_partition(
 ) -> np.ndarray:
     """Cut a body into a number of subdomains suited to its size, and at least one for every rank.
 
-    A number near the target that can be halved often is chosen: halves are similar, so that their matrices
+    A structured body of equal cells is cut into boxes of which many are alike, see `equal_boxes`. Of others a
+    number near the target that can be halved often is chosen: halves are similar, so that their matrices
     share a pattern. The cuts are those of `bisection_partition`; subdomains with three times the usual number
     of cells, as where a mesh is refined near a point, are cut again. Only a body with fewer cells than ranks
     has fewer subdomains than there are ranks.
@@ -264,6 +266,9 @@ def default_partition(
     check_count(ranks, "ranks")
     check_one_piece(mesh, body)
     target, least = target_parts(mesh, nodes), min(ranks, mesh.n_cells)
+    boxes = equal_boxes(mesh, target, least)
+    if boxes is not None:
+        return boxes
     usual = -(-mesh.n_cells // target)
     return _bisected(mesh, _often_halved(target, least, mesh.n_cells), usual)
 
