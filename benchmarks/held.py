@@ -28,8 +28,7 @@ HELD = {
     "chain-default": Held(72576, 55),
     "linear-face": Held(66528, 90),
     "frictionless-block": Held(34992, 24),
-    "block-28k": Held(28611, 37),
-    "block-28k-default": Held(28611, 36),
+    "block-28k": Held(28611, 36),
     # 10 or 11 by the processor, 16 to 18 with PETSc 3.22; without the rigid motions 22.
     "gamg-28k": Held(28611, 11, margin=1.7),
     "cholesky-28k": Held(28611, 1),

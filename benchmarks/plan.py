@@ -9,9 +9,8 @@ from benchmarks.cases.scene_data import PAPER_CELLS
 from benchmarks.held import HELD
 from fenics_contact.study.runner import Job
 
-#: Cells of the block by a name for their number, and boxes of about 6 elements, the fastest of 5, 6 and 8.
+#: Cells of the block by a name for their number.
 BLOCKS = {"28k": (32, 16, 16), "92k": (48, 24, 24), "212k": (64, 32, 32)}
-BLOCK_BOXES = {"28k": (6, 3, 3), "92k": (8, 4, 4), "212k": (10, 5, 5)}
 
 #: Solvers of one linear system that the state is held against.
 LINEAR = {"gamg": "CG + GAMG", "cholesky": "MUMPS's Cholesky"}
@@ -53,14 +52,17 @@ def chain_runs() -> list[Job]:
 
 def block_runs() -> list[Job]:
     """Return the block by this package and by others."""
-    found = [run("frictionless-block", "frictionless_block")]
+    by_hand = {"counts": list(BLOCKS["92k"]), "boxes": [8, 4, 4]}
+    found = [
+        run("frictionless-block", "frictionless_block"),
+        run("block-92k-boxes", "sliding_block", by_hand),
+    ]
     for size, cells in BLOCKS.items():
         mesh = {"counts": list(cells)}
         repeats, limit = (1, 3600.0) if size == "212k" else (3, 1200.0)
         newton = {"repeats": repeats, "threads": 2, "limit": limit}
         found += [
-            run(f"block-{size}", "sliding_block", {**mesh, "boxes": list(BLOCK_BOXES[size])}),
-            run(f"block-{size}-default", "sliding_block", mesh),
+            run(f"block-{size}", "sliding_block", mesh),
             *(run(f"{solver}-{size}", "linear_block", {**mesh, "solver": solver}) for solver in LINEAR),
             run(f"newton-{size}-ranks", "newton_block", mesh, repeats=1, limit=limit),
             run(f"newton-{size}-threads", "newton_block", mesh, 1, **newton),

@@ -67,7 +67,16 @@ def targets_table(found: Sequence[Result]) -> str:
 
 def runs_table(summaries: Summaries) -> str:
     """Return seconds, memory and load of every run."""
-    head = ("run", "ranks", "unknowns", "products or steps", "seconds", "memory", "above the imports")
+    head = (
+        "run",
+        "ranks",
+        "unknowns",
+        "kinds of subdomains",
+        "products or steps",
+        "seconds",
+        "memory",
+        "above the imports",
+    )
     return table((*head, "load", "runs"), [_run_line(name, run) for name, run in summaries.items()])
 
 
@@ -75,12 +84,13 @@ def _run_line(name: str, run: Record) -> tuple[str, ...]:
     load, repeats = f"{run['load_average']:.1f}", str(run["repeats"])
     if "skipped" in run or "refused" in run:
         why = f"refused: {run['refused']}" if "refused" in run else "skipped"
-        return (name, "", "", why, "", "", "", load, repeats)
+        return (name, "", "", "", why, "", "", "", load, repeats)
     counts = run.get("counts", {})
     return (
         name,
         str(run["ranks"]),
         str(unknowns(run)) if counts else "",
+        f"{counts['kinds']} of {counts['subdomains']}" if "kinds" in counts else "",
         "" if work(run) is None else str(work(run)),
         f"{run['seconds']:.2f}" if "seconds" in run else "",
         f"{run['peak_memory'] / 1e6:.0f} MB",
@@ -119,7 +129,7 @@ def blocks_table(summaries: Summaries) -> str:
     for size in BLOCKS:
         ours = f"block-{size}"
         others = (*newton_names(size), f"getfem-{size}", *(f"{solver}-{size}" for solver in LINEAR))
-        for name in (ours, f"{ours}-default", *others):
+        for name in (ours, f"{ours}-boxes", *others):
             run = summaries.get(name)
             if run is None:
                 continue

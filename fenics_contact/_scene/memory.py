@@ -93,6 +93,14 @@ class Subdomains:
         )
         return cls(size, interface, *numbers, counts[:, -1], np.concatenate(place))
 
+    def of_rank(self, rank: int, ranks: int) -> np.ndarray:
+        """Return those that a rank gets when they are dealt out."""
+        return np.flatnonzero((self.place * ranks).astype(int) == rank)
+
+    def kinds(self, ranks: int = 1) -> int:
+        """Return how many kinds the ranks have, each of its own."""
+        return sum(len(np.unique(self.kind[self.of_rank(rank, ranks)])) for rank in range(ranks))
+
 
 def _numbered(counts: np.ndarray, shapes: np.ndarray) -> np.ndarray:
     """Return the number of each subdomain among those of which counts, or shapes to six places, differ."""
@@ -118,7 +126,7 @@ def expected_memory(
     steady = ranks * (rates.start + meshes + rates.tables * torn) + rates.own * torn
     factors = workspaces = assembled = 0.0
     for rank in range(ranks):
-        mine = np.flatnonzero((parts.place * ranks).astype(int) == rank)
+        mine = parts.of_rank(rank, ranks)
         held, during = _factors(parts, mine, scene.dim, rates)
         factors, workspaces = factors + held, workspaces + during
         first = mine[np.unique(parts.matrix[mine], return_index=True)[1]]

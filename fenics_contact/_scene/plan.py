@@ -205,6 +205,8 @@ class Plan:
         fixed_point: Whether slip bounds follow the normal forces (Coulomb's law).
         coarse_motions: Rigid motions of the subdomains and free ones of rigid surfaces, the size of the
             coarse problem; 0 without one.
+        kinds: Subdomains of different shape, material or interface on their ranks: those alike share factors.
+            About, as matrices decide; of nonlinear materials none are shared.
         adjoint: Whether sensitivities are requested, which need one adjoint solve per design.
         memory: Expected memory of all ranks together without their libraries, [bytes].
         contacts: Between which surfaces the gaps of each contact pair are measured, and where it is enforced.
@@ -222,6 +224,7 @@ class Plan:
     cone: ConeKind
     fixed_point: bool
     coarse_motions: int
+    kinds: int
     adjoint: bool
     memory: float
     contacts: tuple[PairGeometry, ...]
@@ -237,9 +240,10 @@ class Plan:
         kinds = ", ".join(f"{count} {kind}" for kind, count in self.multipliers.items() if count)
         coarse = f"{self.coarse_motions} rigid motions" if self.coarse_motions else "none"
         bounds = "follow the normal forces" if self.fixed_point else "given"
+        alike = f" of {counted(self.kinds, 'kind')}" if self.kinds < self.subdomains else ""
         return {
             "effects": "; ".join(f"{effect.name} ({effect.reason})" for effect in self.effects),
-            "unknowns": f"{self.unknowns} in {counted(self.subdomains, 'subdomain')}",
+            "unknowns": f"{self.unknowns} in {counted(self.subdomains, 'subdomain')}{alike}",
             "multipliers": kinds or "none",
             "solver": self.solver.value,
             "cone": self.cone.value,
@@ -285,6 +289,7 @@ def make_plan(
         cone=_cone(names),
         fixed_point=EffectName.COULOMB in names,
         coarse_motions=motions,
+        kinds=subdomains if solver is SolverKind.TANGENT_NEWTON else parts.kinds(ranks),
         adjoint=sensitivity,
         memory=expected_memory(scene, parts, ranks),
         contacts=tuple(pair_geometry(scene, pair) for pair in scene.contacts),

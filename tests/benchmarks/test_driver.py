@@ -49,12 +49,10 @@ def test_every_run_has_a_name_of_its_own_and_a_function_that_takes_its_arguments
 def test_a_name_chooses_its_run_and_a_beginning_all_runs_that_have_it() -> None:
     assert [job.name for job in chosen(runs(), ["chain"])] == ["chain"]
     assert [job.name for job in chosen(runs(), ["block", "getfem"])] == [
+        "block-92k-boxes",
         "block-28k",
-        "block-28k-default",
         "block-92k",
-        "block-92k-default",
         "block-212k",
-        "block-212k-default",
         "getfem-28k",
     ]
     assert chosen(runs(), []) == runs()

@@ -104,8 +104,10 @@ def test_only_a_refusal_by_name_counts(error: str, value: float) -> None:
 
 def test_the_table_says_what_was_not_met(tmp_path: Path) -> None:
     summaries = all_summaries()
-    summaries["chain"] = record(counts={"torn_unknowns": 1000, "f_products": 91})
+    counts = {"torn_unknowns": 1000, "f_products": 91, "kinds": 4, "subdomains": 54}
+    summaries["chain"] = record(counts=counts)
     write_results(tmp_path, summaries)
+    assert "\n| chain | 2 | 1000 | 4 of 54 | 91 |" in (tmp_path / "results.md").read_text()
     (line,) = (line for line in (tmp_path / "results.md").read_text().splitlines() if "μ = 0.3" in line)
     assert "| 91 products | ≤ 90 | **no** |" in line
 
@@ -127,11 +129,11 @@ def test_results_that_cannot_be_written_whole_leave_those_that_are_there(tmp_pat
 
 def test_the_default_partition_counts_only_with_the_same_answer() -> None:
     summaries = all_summaries()
-    summaries["block-92k-default"] = record(seconds=3.0)
+    summaries["block-92k"] = record(seconds=3.0)
     values = {row.name: entry["value"] for row, entry in results(summaries)[0]}
     assert values["default-partition"] == 1.5
-    summaries["block-92k-default"] = record(total_potential=-2.1)
-    with pytest.raises(ValueError, match="both solvers of block-92k-default must find the same state"):
+    summaries["block-92k-boxes"] = record(total_potential=-2.1)
+    with pytest.raises(ValueError, match="both solvers of block-92k-boxes must find the same state"):
         results(summaries)
 
 

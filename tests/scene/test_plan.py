@@ -99,6 +99,7 @@ def test_what_is_built_is_what_was_planned(name: str) -> None:
     counts = state.counts
     assert counts["torn_unknowns"] == plan.unknowns
     assert counts["subdomains"] == plan.subdomains
+    assert counts["kinds"] == plan.kinds
     kinds = plan.multipliers
     assert counts["equality_multipliers"] == kinds["gluing"] + kinds["prescribed"] + kinds["tied"]
     assert counts["normal_multipliers"] == kinds["normal"]
@@ -160,6 +161,9 @@ def test_without_a_partition_the_plan_has_the_default_one() -> None:
     plan = stack(contacts=pair()).plan()
     assert plan.subdomains == 2
     assert stack(contacts=pair()).plan(ranks=4).subdomains == 4
+    eight = stack(contacts=pair()).plan(cuts(stack(), (2, 2, 1)))
+    assert eight.kinds == 2  # those of the lower cube are held, too
+    assert " in 8 subdomains of 2 kinds\n" in str(eight)
 
 
 def test_the_plan_in_words_names_every_decision() -> None:
