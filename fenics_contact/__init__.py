@@ -15,8 +15,8 @@ Loads: Traction, Pressure, TotalForce, BodyForce, gravity, centrifugal, point_ma
 
 Values of loads: SampledField, read_field, Ufl
 
-Equilibrium: solve_scene, solve_steps, ContactProblem, LoadSequence, AutomaticSteps, TangentNewton,
-    FixedPoint, Tolerance
+Equilibrium: solve_scene, solve_nested, solve_steps, ContactProblem, LoadSequence, AutomaticSteps,
+    TangentNewton, FixedPoint, Tolerance
 
 To an accuracy: solve_to, solve_steps_to, minimize_to, Limits, Level, AccurateResult, AccurateDesign,
     CarriedState, quantity, goal_error, GoalError
@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from fenics_contact._adaptive.load_steps import solve_steps_to as solve_steps_to
     from fenics_contact._adaptive.minimised import AccurateDesign as AccurateDesign
     from fenics_contact._adaptive.minimised import minimize_to as minimize_to
+    from fenics_contact._adaptive.nested import solve_nested as solve_nested
     from fenics_contact._adaptive.quantities import quantity as quantity
     from fenics_contact._base.checkpoint import Checkpoint as Checkpoint
     from fenics_contact._base.checkpoint import Interrupted as Interrupted
