@@ -28,7 +28,7 @@ import scipy.sparse as sp
 
 from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
-from fenics_contact.feti.decomposition import Sharing
+from fenics_contact.feti.averages import Sharing
 from fenics_contact.feti.torn import TornSystem
 
 

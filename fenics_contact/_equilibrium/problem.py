@@ -297,13 +297,14 @@ class ContactProblem:
         solver: DualSolver | None = None,
         tolerance: Tolerance = None,
         steps: AutomaticSteps | None = None,
+        memory: float | None = None,
     ) -> None:
         """Prepare; nothing is computed yet. Arguments as for `solve_scene`."""
         self.scene, self.comm = scene, comm
         self.solver, self.tolerance, self.steps = solver, tolerance, steps
         self.timer = PhaseTimer()
         self.state = None
-        self._partitions, self._decomposition = partitions, None
+        self._partitions, self._decomposition, self._memory = partitions, None, memory
         self._warnings = ContactWarnings()
 
     state: AnyState | None
@@ -337,7 +338,7 @@ class ContactProblem:
         """Return the subdomains, those of the first scene solved: its supports fix some nodes."""
         if self._decomposition is None:
             with self.timer.phase("decompose"):
-                self._decomposition = decompose(scene, self.partitions, self.comm)
+                self._decomposition = decompose(scene, self.partitions, self.comm, memory=self._memory)
         return self._decomposition
 
     @classmethod
@@ -559,6 +560,7 @@ def solve_scene(
     solver: DualSolver | None = None,
     tolerance: Tolerance = None,
     steps: AutomaticSteps | None = None,
+    memory: float | None = None,
 ) -> AnyState:
     """Compute the equilibrium of a scene. Collective on ``comm``.
 
@@ -574,6 +576,9 @@ def solve_scene(
             differences between states. Where materials are nonlinear a number, 1e-8 by default.
         steps: How loads on nonlinear materials are followed; None: the default
             `fenics_contact.AutomaticSteps`.
+        memory: What a state of linear materials may take on a machine, [bytes]; by default what the machine
+            has left. Where it does not suffice otherwise, subdomains are stored in single precision, at less
+            than half the memory, and products in double precision confirm the answer.
 
     Raises:
         InvalidInputError: If scene or partition cannot be used.
@@ -586,7 +591,7 @@ def solve_scene(
         >>> state = solve_scene(scene, MPI.COMM_SELF, partitions=parts)  # doctest: +SKIP
     """
     problem = ContactProblem(
-        scene, comm, partitions=partitions, solver=solver, tolerance=tolerance, steps=steps
+        scene, comm, partitions=partitions, solver=solver, tolerance=tolerance, steps=steps, memory=memory
     )
     return problem.solve()
 

@@ -34,6 +34,7 @@ class Rates:
         whole: Subdomains alike from which their dense matrices are stored as a whole, not as triangles.
         workspace: Of MUMPS and PETSc for each entry of a matrix that is condensed, for each of the condensed
             one, and relative to the factors of both.
+        modes: Of each row of one that is stored compactly.
         inverting: Of each entry of a condensed matrix while it is inverted.
         vectors: Vectors of multipliers that iterations keep.
     """
@@ -46,6 +47,7 @@ class Rates:
     entry: float = 12.0
     whole: int = 8
     workspace: tuple[float, float, float] = (27.0, 24.0, 0.5)
+    modes: float = 32.0
     inverting: float = 18.0
     vectors: float = 130.0
 
@@ -110,12 +112,19 @@ def _numbered(counts: np.ndarray, shapes: np.ndarray) -> np.ndarray:
 
 
 def expected_memory(
-    scene: SceneParts, parts: Subdomains, ranks: int = 1, rates: Rates | None = None
+    scene: SceneParts,
+    parts: Subdomains,
+    ranks: int = 1,
+    rates: Rates | None = None,
+    *,
+    compact: bool = False,
 ) -> float:
     """Return the largest memory that a state takes on all ranks together, without libraries, [bytes].
 
     It is the largest one of that with all stiffness matrices, that while the last subdomains are factored,
     and that while the dual problem is solved. Subdomains of a rank that are alike count once.
+
+    `compact`: whether each is stored as one triangle in single precision, `LocalKind.COMPACT`.
     """
     rates = rates or Rates()
     torn = int(parts.size.sum())
@@ -127,11 +136,13 @@ def expected_memory(
     factors = workspaces = assembled = 0.0
     for rank in range(ranks):
         mine = parts.of_rank(rank, ranks)
-        held, during = _factors(parts, mine, scene.dim, rates)
+        held, during = _factors(parts, mine, scene.dim, rates, compact)
         factors, workspaces = factors + held, workspaces + during
         first = mine[np.unique(parts.matrix[mine], return_index=True)[1]]
         assembled += rates.entry * float(parts.couplings[first] @ parts.size[first])
     solving = rates.system * torn + 8.0 * rates.vectors * multipliers
+    if compact:  # while the first ones are condensed all matrices are there
+        assembled += workspaces
     return steady + max(assembled, ranks * rates.heap + factors + max(workspaces, solving))
 
 
@@ -140,38 +151,65 @@ def require_memory(
     partitions: Mapping[str, np.ndarray],
     comm: MPI.Comm,
     *,
+    limit: float | None = None,
     small: int = 50_000,
     certain: float = 1.3,
-) -> None:
+    roomy: float = 0.9,
+) -> bool:
     """Refuse a scene of which a state needs more memory than its machines have left. Collective.
 
-    `small`: unknowns up to which nothing is computed; `certain`: how far the expected memory must exceed what
-    is left, as it is an estimate.
+    Returns whether it fits only where subdomains are stored compactly.
+
+    `limit`: memory that a state may take on a machine, [bytes]; None: what it has left; `small`: unknowns up
+    to which nothing is computed without a limit; `certain`: how far the expected memory must exceed what
+    is left, as it is an estimate; `roomy`: share of it up to which subdomains are stored for speed.
     """
     unknowns = scene.components * sum(body.mesh.n_nodes for body in scene.bodies.values())
-    if unknowns <= small:
-        return
+    with together(comm):
+        _check_limit(limit)
+    if limit is None and unknowns <= small:
+        return False
     machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
     here = machine.size
     machine.Free()
     with together(comm):
-        left = available_memory()
-        needed = expected_memory(scene, Subdomains.of(scene, partitions), comm.size) * here / comm.size
+        left, share = limit or available_memory(), here / comm.size
+        parts = Subdomains.of(scene, partitions)
+        compact = left is not None and share * expected_memory(scene, parts, comm.size) > roomy * left
+        needed = share * expected_memory(scene, parts, comm.size, compact=True) if compact else 0.0
         if left is not None and needed > certain * left:
             raise InvalidInputError(
                 f"a state must fit into memory, but {unknowns} unknowns need about {needed / 1e9:.3g} GB on "
-                f"this machine, and {left / 1e9:.3g} GB are left: about {int(unknowns * left / needed):,} "
+                f"this machine, and {left / 1e9:.3g} GB {'are left' if limit is None else 'are allowed'}: "
+                f"about {int(unknowns * left / needed):,} "
                 "unknowns would fit; take coarser meshes, refine where it matters, or use more machines"
             )
+    return bool(comm.allreduce(int(compact), op=MPI.MAX))
 
 
-def _factors(parts: Subdomains, mine: np.ndarray, dim: int, rates: Rates) -> tuple[float, float]:
+def _check_limit(limit: float | None) -> None:
+    if limit is not None and not 0.0 < limit < np.inf:
+        raise InvalidInputError(
+            f"memory must be a positive number of bytes, got {limit!r}: give what a state may take on a "
+            "machine, such as 8e9, or leave it out for what the machine has left"
+        )
+
+
+def _factors(
+    parts: Subdomains, mine: np.ndarray, dim: int, rates: Rates, compact: bool
+) -> tuple[float, float]:
     """Return the bytes of factors of some subdomains, and of the workspaces while the last are made."""
     _, first, members = np.unique(parts.kind[mine], return_index=True, return_counts=True)
     held, largest, during = 0.0, 0.0, list[float]()
     by_matrix, by_condensed, by_factor = rates.workspace
     for index, count in zip(mine[first], members, strict=True):
         n, b = int(parts.size[index]), int(parts.interface[index])
+        if compact:
+            held += (4.0 if count >= rates.whole else 2.0) * b**2 + rates.modes * b
+            largest = max(largest, rates.inverting * b**2)
+            workspace = by_matrix * parts.couplings[index] * n + by_condensed * b**2
+            during.append(workspace + by_factor * factor_bytes(n, dim))
+            continue
         coupled = parts.couplings[index] * b
         held += factor_bytes(n - b, dim) + rates.entry * coupled
         if not prefers_explicit(n, b):

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import blas, lapack
 
+from fenics_contact._base.memory import return_memory
 from fenics_contact.feti.condensation import pieces, regular_factor
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.subdomain import Subdomain
@@ -64,6 +65,8 @@ class Insides:
             self._last = None  # before the next one is made
             self._last = operator, operator.make_inside()
             self.made += 1
+            if self.made % 32 == 0:
+                return_memory()
         return self._last[1]
 
 

@@ -386,6 +386,7 @@ class Decomposition:
         block_offset: First block of dofs of each of them in this rank's torn vector, and the total.
         copy_block: Block of each copy in this rank's torn vector, −1 if another rank holds it.
         gluing: Gluing and Dirichlet rows of all subdomains.
+        compact: Whether a state fits into memory only with subdomains stored as `LocalKind.COMPACT`.
     """
 
     comm: MPI.Comm
@@ -396,6 +397,7 @@ class Decomposition:
     copy_block: np.ndarray
     gluing: GluingRows
     forms: FormLibrary
+    compact: bool = False
 
     @property
     def torn_size(self) -> int:
@@ -455,13 +457,16 @@ class Decomposition:
         return self.gluing.axes
 
 
-def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm) -> Decomposition:
+def decompose(
+    scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm, *, memory: float | None = None
+) -> Decomposition:
     """Cut a scene into subdomains and distribute them over ranks. Collective on ``comm``.
 
     Args:
         scene: The scene, the same on every rank.
         partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
         comm: Communicator.
+        memory: What a state may take on a machine, [bytes]; None: what it has left.
 
     Raises:
         InvalidInputError: If a partition does not fit its body, a subdomain is not connected, there are more
@@ -475,8 +480,7 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
     with together(comm):
         _check_partitions(scene, partitions)
         partitions = {name: _whole(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
-    if not scene.is_nonlinear:
-        require_memory(scene, partitions, comm)
+    compact = not scene.is_nonlinear and require_memory(scene, partitions, comm, limit=memory)
     forms = FormLibrary(comm)
     forms.prepare(scene)
     # Ranks agree on errors after each local stage, before the next collective one.
@@ -496,7 +500,9 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
         gluing = gluing_rows(tearing, ~np.isnan(prescribed), axes, hanging_nodes(scene, tearing))
     block_offset = np.cumsum([0] + [len(mesh.nodes) for mesh in meshes])
     copy_block = _copy_blocks(tearing, meshes, block_offset)
-    return Decomposition(comm, tearing, dict(partitions), meshes, block_offset, copy_block, gluing, forms)
+    return Decomposition(
+        comm, tearing, dict(partitions), meshes, block_offset, copy_block, gluing, forms, compact
+    )
 
 
 def _whole(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
@@ -661,40 +667,3 @@ class DualNumbering:
         row, column, value = sent(self.comm, self._owner[ghosts], ghosts, shares.col, shares.data)
         received = sp.csr_matrix((value, (np.searchsorted(self.owned, row), column)), shape=own.shape)
         return (own + received).tocsr() if received.nnz else own
-
-
-class Sharing:
-    """Items of which more than one rank may hold a part, identified by global numbers."""
-
-    def __init__(self, comm: MPI.Comm, keys: np.ndarray, mine: np.ndarray) -> None:
-        """Determine which ranks share which items. Collective on ``comm``.
-
-        `keys`: number of each item that this rank holds, ascending, shape (n,); `mine`: positions in ``keys``
-        of those that other ranks may hold as well.
-        """
-        self.comm = comm
-        every = comm.allgather(keys[mine]) if comm.size > 1 else [keys[mine]]
-        self._with: list[np.ndarray] = []
-        for rank, other in enumerate(every):
-            common = mine[np.isin(keys[mine], other)] if rank != comm.rank else mine[:0]
-            self._with.append(common)
-        self.shared = np.unique(np.concatenate(self._with))
-
-    def add_up(self, values: np.ndarray) -> np.ndarray:
-        """Return values in which the rows of shared items are the sums over all ranks. Collective.
-
-        The ranks that share an item obtain bitwise equal sums.
-
-        `values`: this rank's parts, shape (n, ...).
-        """
-        if self.comm.size == 1:
-            return values
-        received = self.comm.alltoall([values[rows] for rows in self._with])
-        total = values.copy()
-        total[self.shared] = 0.0
-        for rank, (rows, part) in enumerate(zip(self._with, received, strict=True)):
-            if rank == self.comm.rank:
-                total[self.shared] += values[self.shared]
-            else:
-                total[rows] += part
-        return total

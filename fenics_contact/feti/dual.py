@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from fenics_contact._base.costs import count_flops
 from fenics_contact._base.libraries import MPI
+from fenics_contact._base.memory import return_memory
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._base.sparse import ROUNDING, scaled_columns, sweep
 from fenics_contact.errors import InfeasibleError, together
@@ -352,12 +353,14 @@ class DualSystem:
         Args:
             torn: The torn system.
             timer: Collects the wall time.
-            kind: How the subdomains are stored; the cost model chooses by default.
+            kind: How the subdomains are stored; by default memory and then the cost model choose.
             previous: System of another geometry; the factors of unchanged subdomains are reused.
             shared: Whether subdomains of a rank that are alike share factors.
         """
         timer = timer or PhaseTimer()
         comm = torn.numbering.comm
+        if kind is LocalKind.AUTOMATIC and torn.decomposition.compact:
+            kind = LocalKind.COMPACT
         sweep(comm)
         self.torn, self.products, self._shared = torn, 0, shared
         self._B, self._Bt = torn.B, torn.B.T  # shares its memory
@@ -371,6 +374,7 @@ class DualSystem:
             self._take_over(previous, timer)
         else:
             self._set_up(timer)
+        return_memory()
         bent = self.inverse(torn.load)
         self._bent = bent[self.inverse.interface]
         rhs = self.jump(bent) - torn.right

@@ -15,9 +15,12 @@ from fenics_contact import Scene, box_partition, solve_scene
 from fenics_contact._base.memory import return_memory
 from fenics_contact._scene import memory
 from fenics_contact._scene.memory import Rates, Subdomains, expected_memory, require_memory
+from fenics_contact.design.adjoint import WeakChoice, linearise_face, solve_adjoint
+from fenics_contact.design.objective import Partials
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import DualSystem, build_torn_system, decompose, decomposition
 from fenics_contact.gallery import block
+from fenics_contact.results.linear_state import LinearState
 from tests.feti.scenes import skewed
 
 #: A straight mesh, how often it is cut along each axis, and whether it is bent.
@@ -66,7 +69,7 @@ def test_a_scene_that_does_not_fit_into_memory_is_refused_before_it_is_built(
     mesh = block_mesh((34, 22, 22))
     scene = block_on_plane(mesh, 0.3)
     parts = {"block": box_partition(mesh, (5, 4, 4))}
-    needed = scene.plan(parts).memory
+    needed = expected_memory(scene, Subdomains.of(scene, parts), compact=True)
     monkeypatch.setattr(memory, "available_memory", lambda: 0.5 * needed)
     message = (
         rf"a state must fit into memory, but {mesh.points.size} unknowns need about {needed / 1e9:.3g} GB on "
@@ -76,10 +79,40 @@ def test_a_scene_that_does_not_fit_into_memory_is_refused_before_it_is_built(
     monkeypatch.setattr(decomposition, "cut_out", None)  # nothing is cut
     with pytest.raises(InvalidInputError, match=message):
         solve_scene(scene, MPI.COMM_SELF, partitions=parts)
+    allowed = message.replace("are left", "are allowed")
+    with pytest.raises(InvalidInputError, match=allowed):
+        solve_scene(scene, MPI.COMM_SELF, partitions=parts, memory=0.5 * needed)
     monkeypatch.setattr(memory, "available_memory", lambda: 0.9 * needed)  # an estimate may err
-    require_memory(scene, parts, MPI.COMM_SELF)
+    assert require_memory(scene, parts, MPI.COMM_SELF)
     monkeypatch.setattr(memory, "available_memory", lambda: None)
-    require_memory(scene, parts, MPI.COMM_SELF)
+    assert not require_memory(scene, parts, MPI.COMM_SELF)
+
+
+def test_subdomains_are_stored_compactly_where_a_state_would_not_fit_otherwise() -> None:
+    scene, parts = cut("bent")
+    known = Subdomains.of(scene, parts)
+    needed, least = (expected_memory(scene, known, compact=compact) for compact in (False, True))
+    assert least < needed
+    roomy = solve_scene(scene, MPI.COMM_SELF, partitions=parts, memory=2.0 * needed, tolerance=1e-11)
+    tight = solve_scene(scene, MPI.COMM_SELF, partitions=parts, memory=needed, tolerance=1e-11)
+    assert isinstance(roomy, LinearState)
+    assert isinstance(tight, LinearState)
+    assert not roomy.dual.inverse.is_rounded
+    assert tight.dual.inverse.is_rounded
+    forces = roomy.solution.multiplier
+    np.testing.assert_allclose(tight.solution.multiplier, forces, atol=1e-10 * np.abs(forces).max())
+    nodes = scene.bodies["block"].mesh.n_nodes
+    by_displacement = np.random.default_rng(0).standard_normal(roomy.torn_displacement.shape)
+    partials = Partials(0.0, by_displacement, np.zeros_like(forces), np.zeros((nodes, 3)))
+    adjoints = [
+        solve_adjoint(state, partials, linearise_face(state, WeakChoice.RELEASED), tolerance=1e-10)
+        for state in (roomy, tight)
+    ]
+    expected, found = (adjoint.multiplier for adjoint in adjoints)
+    np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
+    for without_sense in (0.0, np.nan, np.inf):
+        with pytest.raises(InvalidInputError, match="memory must be a positive number of bytes, got"):
+            solve_scene(scene, MPI.COMM_SELF, partitions=parts, memory=without_sense)
 
 
 TAKEN = """
