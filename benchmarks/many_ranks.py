@@ -20,6 +20,7 @@ from scipy.linalg import blas
 from benchmarks.cases.scenes import block_mesh, block_on_plane
 from fenics_contact import LinearState, Scene, box_partition, solve_scene
 from fenics_contact._base.sparse import FACTOR_BYTES, ROWS_PER_RANK, prefers_explicit
+from fenics_contact.feti.reduced_coarse import Elimination
 from fenics_contact.gallery import block
 from fenics_contact.qp import FaceNewton
 from fenics_contact.qp.coarse import DENSE_LIMIT
@@ -30,6 +31,11 @@ from fenics_contact.study.worker import peak_memory
 #: Reductions of each size that a solve takes: numbers for each product and for each step, as counted on 2, 4
 #: and 64 ranks. "coarse": vectors of all rigid motions. One of the matrices has contact rows only.
 COARSE, CONTACT, SCALARS, MATRICES = (2.5, 4.5), (2.0, -1.0), (3.0, 5.0), 3.5
+#: Entries of sparse factors of m motions divided by m^(4/3), and seconds to make them for `COUNTED` motions:
+#: L and U of the matrix of a face; L of the motions without contact, with the matrix reduced by them.
+LU, REDUCED, COUNTED = (64.0, 2.3), (22.0, 3.8), 24576
+#: Seconds in which a Newton step factors its reduced matrices, of size 1536.
+DENSE_STEP = 0.24
 #: Neighbours of a cube in a lattice.
 NEIGHBOURS = 26
 
@@ -139,7 +145,9 @@ class Lattice:
         filled, pressed = 25 * (3 * self.side - 2) ** 3, 36 * (3 * self.side - 2) ** 2
         bytes_ = 8 * (coarse * size + contact * self.contact_rows + 2 * scalars)
         bytes_ += dense * (8 * steps * ((MATRICES - 1) * filled + pressed) + matrices * size**2 / 8)
-        solving = 2 * size**2 if dense else 124 * size ** (4 / 3) / self.holders(ranks)
+        solving = 2 * size**2 if dense else 4 * LU[0] * size ** (4 / 3) / self.holders(ranks)
+        if self.reduced:
+            solving = 8 * REDUCED[0] * size ** (4 / 3) + 2 * self.pressed**2
         flops = products * self.local / ranks + coarse * solving + 4 * contact * self.contact_rows
         if ranks == 1:
             return PhaseCosts(flops=round(flops))
@@ -157,13 +165,28 @@ class Lattice:
             flops=round(flops),
         )
 
+    @property
+    def pressed(self) -> int:
+        """Rigid motions of subdomains with contact rows."""
+        return 6 * self.side**2
+
+    @property
+    def reduced(self) -> bool:
+        """Whether faces factor only the motions of subdomains with contact rows."""
+        return self.motions > DENSE_LIMIT and Elimination(np.zeros(0)).pays(self.motions, self.pressed)
+
     def holders(self, ranks: int) -> int:
         """Return the ranks that hold the factors of the coarse problem."""
-        return 1 if self.motions <= DENSE_LIMIT else min(ranks, -(-self.motions // ROWS_PER_RANK))
+        if self.motions <= DENSE_LIMIT or self.reduced:
+            return 1
+        return min(ranks, -(-self.motions // ROWS_PER_RANK))
 
     def coarse_factors(self, ranks: int) -> float:
-        """Return the seconds of all coarse factorisations, from one of 1.4 s for 24 576 motions on a core."""
-        return MATRICES * self.steps * 1.4 * (self.motions / 24576) ** 2 / self.holders(ranks)
+        """Return the seconds of all coarse factorisations: sparse ones grow with m², dense ones with c³."""
+        growth = (self.motions / COUNTED) ** 2
+        if self.reduced:
+            return REDUCED[1] * growth + self.steps * DENSE_STEP * (self.pressed / 1536) ** 3
+        return MATRICES * self.steps * LU[1] * growth / self.holders(ranks)
 
     def replicated(self) -> float:
         """Return the bytes that every rank holds of the whole problem, see `docs/scaling.md`."""

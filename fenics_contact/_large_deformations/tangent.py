@@ -332,6 +332,8 @@ class TangentSystem(DualSystem):
             columns of their own.
     """
 
+    whole_faces = False
+
     inverse: TangentInverse
     stiffness: sp.csr_matrix
     softened: int

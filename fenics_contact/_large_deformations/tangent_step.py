@@ -221,6 +221,7 @@ class _StiffFace:
             scaled_columns(tested, scale),
             scaled_columns(moving, scale),
             curvature=compliance * scale**2,
+            whole=False,
         )
         return None if coupled is None else cls(at, coupled, shared, soft)
 

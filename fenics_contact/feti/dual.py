@@ -23,6 +23,7 @@ from fenics_contact.feti.decomposition import DualNumbering
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.inverse import LocalKind, TornInverse
 from fenics_contact.feti.kernel_basis import TornModes, whole_motions
+from fenics_contact.feti.reduced_coarse import Elimination
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.quality import node_volumes
 from fenics_contact.qp.coarse import CoarseSpace
@@ -327,7 +328,10 @@ class DualSystem:
         problem: The problem for the dual solvers.
         products: F-products so far.
         kinds: Number of kinds of subdomains, those of each rank counted on their own.
+        whole_faces: Whether all equality rows are on every face.
     """
+
+    whole_faces = True
 
     inverse: TornInverse
     problem: DualProblem
@@ -422,7 +426,9 @@ class DualSystem:
         self._Bt_interface = self._B_interface.T
         with timer.phase("coarse space"):
             self.kernel = self._kernel(comm)
-            coarse = self._without_unheld(CoarseSpace(comm, self._coarse_columns(), self._resultants(comm)))
+            eliminate = Elimination(torn.layout.equality) if self.whole_faces else None
+            columns, load = self._coarse_columns(), self._resultants(comm)
+            coarse = self._without_unheld(CoarseSpace(comm, columns, load, eliminate=eliminate))
         with timer.phase("preconditioner"):
             preconditioner = DirichletPreconditioner(
                 self.inverse, self._B_interface, self._compliance(), torn.numbering, torn.n_gluing
@@ -596,7 +602,8 @@ class DualSystem:
         remaining = np.sort(order[k:])
         self.kernel = replace(self.kernel, coefficients=self.kernel.coefficients[:, remaining])
         self.points = self.points[:, remaining]
-        return CoarseSpace(coarse.comm, coarse.matrix[remaining], coarse.load[remaining])
+        held, load = coarse.matrix[remaining], coarse.load[remaining]
+        return CoarseSpace(coarse.comm, held, load, eliminate=coarse.eliminate)
 
     def _require_unloaded(self, unbalanced: float = 1e-8) -> None:
         """Reject loads on motions in the kernel of B. Collective.

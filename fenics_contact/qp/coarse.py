@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
 from functools import cached_property
 from typing import Protocol, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 import scipy.linalg
 import scipy.sparse as sp
 from scipy.linalg import lapack
 
 from fenics_contact._base.costs import count_flops
 from fenics_contact._base.libraries import MPI
-from fenics_contact._base.sparse import SharedFactor
+from fenics_contact._base.sparse import SHIFT, SharedFactor
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.qp.reductions import Vector, global_sum
 
@@ -40,12 +42,22 @@ class GramInverse:
         self.rank = len(matrix)
         self.null_space = np.zeros((len(matrix), 0))
         self._cholesky = _trusted_cholesky(_scaled(matrix, self._scale))
-        if self._cholesky is None:
+        if self._cholesky is None and len(matrix) > DENSE_LIMIT:
+            self._fill(_scaled(matrix, self._scale))
+        elif self._cholesky is None:
             values, vectors = scipy.linalg.eigh(_scaled(matrix, self._scale))
             keep = values > RANK_TOLERANCE * values.max(initial=0.0)
             self.rank = int(keep.sum())
             self.null_space = self._scale[:, None] * vectors[:, ~keep]
             self._root = vectors[:, keep] / np.sqrt(values[keep])
+
+    def _fill(self, scaled: Vector) -> None:
+        """Factor a large singular matrix with its null vectors filled, S + Z Zᵀ, which is regular."""
+        shifted = scipy.linalg.lu_factor(scaled + SHIFT * np.eye(len(scaled)))
+        null = _null_vectors(len(scaled), lambda columns: np.asarray(scipy.linalg.lu_solve(shifted, columns)))
+        self._cholesky = np.linalg.cholesky(scaled + null @ null.T)
+        self.rank -= null.shape[1]
+        self.null_space = self._scale[:, None] * null
 
     @property
     def flops(self) -> int:
@@ -98,7 +110,7 @@ class SparseGramInverse:
         scale = 1.0 / np.sqrt(np.where(diagonal > floor, diagonal, 1.0))
         self._factor = SharedFactor(comm, share, scale)
         self._scale = scale
-        self._null = self._null_vectors()
+        self._null = _null_vectors(len(diagonal), self._invert_scaled)
         self.rank = len(diagonal) - self._null.shape[1]
         self.null_space = scale[:, None] * self._null
 
@@ -116,23 +128,23 @@ class SparseGramInverse:
         solved = self._factor.solve(scaled / self._scale) / self._scale
         return self._scale * (solved - self._null @ (self._null.T @ solved))
 
-    def _null_vectors(self) -> Vector:
-        """Return orthonormal null vectors of the scaled matrix. Collective."""
-        m = len(self._scale)
-        count = min(8, m)  # a floating body has six null vectors
-        while True:
-            start = np.random.default_rng(0).standard_normal((m, count))
-            basis, _ = np.linalg.qr(self._invert_scaled(start))
-            inverse = basis.T @ self._invert_scaled(basis)
-            largest, turn = np.linalg.eigh(0.5 * (inverse + inverse.T))
-            null = largest > 1.0 / RANK_TOLERANCE
-            if not null.all() or count == m:
-                return np.asarray(basis @ turn[:, null])
-            count = min(2 * count, m)
-
     def _invert_scaled(self, columns: Vector) -> Vector:
         solved = [self._factor.solve(column / self._scale, refine=False) for column in columns.T]
         return np.column_stack(solved) / self._scale[:, None]
+
+
+def _null_vectors(m: int, invert: Callable[[Vector], Vector]) -> Vector:
+    """Return orthonormal null vectors of a scaled matrix of size m, whose shifted inverse is given."""
+    count = min(8, m)  # a floating body has six null vectors
+    while True:
+        start = np.random.default_rng(0).standard_normal((m, count))
+        basis, _ = np.linalg.qr(invert(start))
+        inverse = basis.T @ invert(basis)
+        largest, turn = np.linalg.eigh(0.5 * (inverse + inverse.T))
+        null = largest > 1.0 / RANK_TOLERANCE
+        if not null.all() or count == m:
+            return np.asarray(basis @ turn[:, null])
+        count = min(2 * count, m)
 
 
 #: Up to this number of rigid motions the coarse matrices are dense and factored on every rank.
@@ -157,12 +169,19 @@ class CoarseSpace:
     """
 
     def __init__(
-        self, comm: MPI.Comm, G: sp.spmatrix | sp.sparray, e: Vector, *, gram: Gram | None = None
+        self,
+        comm: MPI.Comm,
+        G: sp.spmatrix | sp.sparray,
+        e: Vector,
+        *,
+        gram: Gram | Callable[[], CoarseInverse] | None = None,
+        eliminate: Elimination | None = None,
     ) -> None:
         """Store this rank's columns.
 
         `G`: this rank's columns, sparse, shape (m, n_owned); `e`: right side, shape (m,), the same on every
-        rank.
+        rank; `gram`: G G^T where it is known, or what makes its inverse, collective; `eliminate`: reduces the
+        matrices of faces beyond `DENSE_LIMIT`.
         """
         self.comm = comm
         self.matrix = sp.csr_matrix(G, dtype=np.float64)
@@ -173,14 +192,29 @@ class CoarseSpace:
                 "assemble both from the same list of floating subdomains"
             )
         self._transposed = self.matrix.T  # shares its memory
-        self._gram_matrix = gram
+        self._gram, self.eliminate = gram, eliminate
+        self._reduced: list[FaceGrams | None] = []  # one at most, shared by all loads
 
     @cached_property
-    def gram(self) -> GramInverse | SparseGramInverse:
+    def gram(self) -> CoarseInverse:
         """Generalised inverse of G G^T, factored on first access. Collective then."""
-        gram = gram_matrix(self.comm, self.matrix) if self._gram_matrix is None else self._gram_matrix
-        self._gram_matrix = None  # of no use beside its factors
+        if callable(self._gram):
+            return self._gram()
+        if self._gram is None and self.eliminate is not None and self.faces is not None:
+            contact = np.setdiff1d(np.arange(self.matrix.shape[1]), self.eliminate.equality)
+            return self.faces.inverse(self.matrix[:, contact])
+        gram = gram_matrix(self.comm, self.matrix) if self._gram is None else self._gram
+        self._gram = None  # of no use beside its factors
         return GramInverse(gram) if isinstance(gram, np.ndarray) else SparseGramInverse(self.comm, gram)
+
+    @property
+    def faces(self) -> FaceGrams | None:
+        """Reduced matrices of faces, None where these are not worth it. Collective on first use."""
+        if self.eliminate is None or self.m <= DENSE_LIMIT:
+            return None
+        if not self._reduced:
+            self._reduced.append(self.eliminate(self.comm, self.matrix))
+        return self._reduced[0]
 
     def with_load(self, load: Vector) -> CoarseSpace:
         """Return the coarse space of another load e, shape (m,), replicated; factors are shared."""
@@ -243,14 +277,24 @@ class CoarseSpace:
         return basis @ (basis.T @ self.load)
 
     def restricted(
-        self, Z: sp.spmatrix | sp.sparray, load: Vector | None = None, *, gram: Gram | None = None
+        self,
+        Z: sp.spmatrix | sp.sparray,
+        load: Vector | None = None,
+        *,
+        gram: Gram | None = None,
+        whole: bool = False,
     ) -> CoarseSpace:
-        """Return the coarse space G Z of a face with dofs y, multiplier = fixed + Z y.
+        """Return the coarse space G Z of a face with dofs y, multiplier = fixed + Z y. Collective.
 
         `Z`: this rank's restriction, sparse, shape (n_owned, n_face); `load`: right side for the face, e - G
-        fixed, shape (m,), replicated; e itself by default.
+        fixed, shape (m,), replicated; e itself by default; `whole`: whether the face has all equality rows
+        and begins with them, Z = [I_E, Z_C].
         """
-        return CoarseSpace(self.comm, self.matrix @ Z, self.load if load is None else load, gram=gram)
+        columns, load = sp.csr_matrix(self.matrix @ Z), self.load if load is None else load
+        if not whole or self.eliminate is None or (faces := self.faces) is None:
+            return CoarseSpace(self.comm, columns, load, gram=gram)
+        contact = columns[:, len(self.eliminate.equality) :]
+        return CoarseSpace(self.comm, columns, load, gram=lambda: faces.inverse(contact))
 
 
 def gram_matrix(comm: MPI.Comm, columns: sp.csr_matrix) -> Gram:
@@ -282,6 +326,25 @@ def plus(gram: Gram, sparse: sp.csr_matrix) -> Gram:
     return gram
 
 
+class CoarseInverse(Protocol):
+    """Generalised inverse of G Gᵀ.
+
+    Attributes:
+        rank: Its rank.
+        null_space: Columns z with G Gᵀ z = 0, shape (m, m - rank).
+    """
+
+    rank: int
+    null_space: Vector
+
+    @property
+    def flops(self) -> int:
+        """Floating point operations of one solution on this rank."""
+
+    def solve(self, right_side: Vector) -> Vector:
+        """Return the inverse times a replicated array of shape (m,). Collective."""
+
+
 class SquareInverse(Protocol):
     """The inverse of a square matrix."""
 
@@ -291,6 +354,31 @@ class SquareInverse(Protocol):
 
     def solve(self, right_side: Vector) -> Vector:
         """Return the inverse times a replicated array of shape (m,). Collective."""
+
+
+class FaceGrams(Protocol):
+    """Inverses of the coarse matrices of faces that share their equality rows, A = G_E G_Eᵀ."""
+
+    def inverse(self, contact: sp.csr_matrix) -> CoarseInverse:
+        """Return that of A + C Cᵀ for this rank's columns C, shape (m, n). Collective."""
+
+    def square(self, moving: sp.csr_matrix, tested: sp.csr_matrix) -> SquareInverse | None:
+        """Return that of A + C_u C_sᵀ, shape (m, n) each; None if it is singular. Collective."""
+
+
+class Elimination(Protocol):
+    """Makes the coarse matrices of faces small.
+
+    Attributes:
+        equality: The equality rows among this rank's multipliers, which every face has.
+    """
+
+    @property
+    def equality(self) -> npt.NDArray[np.int64]:
+        """See above."""
+
+    def __call__(self, comm: MPI.Comm, columns: sp.csr_matrix) -> FaceGrams | None:
+        """Return them for this rank's columns of G, shape (m, n_owned); None: not worth it. Collective."""
 
 
 def invert_square(

@@ -10,7 +10,14 @@ import scipy.sparse as sp
 
 from fenics_contact._base.costs import count_flops
 from fenics_contact._base.libraries import MPI
-from fenics_contact.qp.coarse import CoarseSpace, SquareInverse, gram_matrix, invert_square, plus
+from fenics_contact.qp.coarse import (
+    CoarseSpace,
+    FaceGrams,
+    SquareInverse,
+    gram_matrix,
+    invert_square,
+    plus,
+)
 from fenics_contact.qp.face import Face
 from fenics_contact.qp.problem import DualProblem, FacePreconditioner, Operator, ShiftedOperator
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
@@ -92,18 +99,22 @@ class FaceSystems:
         """Prepare for ``problem`` with its (counted) operator F. Collective."""
         self._problem = problem
         self._operator = operator
-        # Kept without its zeros: dense, it would be one matrix more beside those of each face.
-        gluing = gram_matrix(problem.comm, problem.coarse.matrix[:, problem.layout.equality])
-        self._equality_gram = sp.csr_matrix(gluing)
+        self._equality_gram: sp.csr_matrix | None = None
+        if problem.coarse.faces is None:
+            # Kept without its zeros: dense, it would be one matrix more beside those of each face.
+            gluing = gram_matrix(problem.comm, problem.coarse.matrix[:, problem.layout.equality])
+            self._equality_gram = sp.csr_matrix(gluing)
 
     def build(self, face: Face) -> FaceSystem:
         """Return the system of a face. Collective."""
         problem, coarse = self._problem, self._problem.coarse
         n_equality = len(problem.layout.equality)
-        columns = coarse.matrix @ face.restriction[:, n_equality:]
-        gram = plus(gram_matrix(problem.comm, columns), self._equality_gram)
+        gram = None
+        if self._equality_gram is not None:
+            columns = coarse.matrix @ face.restriction[:, n_equality:]
+            gram = plus(gram_matrix(problem.comm, columns), self._equality_gram)
         load = coarse.load - coarse.apply(face.fixed)
-        restricted = coarse.restricted(face.restriction, load, gram=gram)
+        restricted = coarse.restricted(face.restriction, load, gram=gram, whole=True)
         preconditioner = problem.preconditioner
         if isinstance(preconditioner, FacePreconditioner):
             preconditioner = preconditioner.on_face(face.restriction)
@@ -125,8 +136,16 @@ class ObliqueProjector:
     inverse: SquareInverse
 
     @classmethod
-    def build(cls, tested: sp.csr_matrix, moving: CoarseSpace) -> ObliqueProjector | None:
-        """Factor G_u G_sᵀ; None if it is singular, when the face does not hold every body. Collective."""
+    def build(
+        cls, tested: sp.csr_matrix, moving: CoarseSpace, faces: FaceGrams | None = None, shared: int = 0
+    ) -> ObliqueProjector | None:
+        """Factor G_u G_sᵀ; None if it is singular, when the face does not hold every body. Collective.
+
+        `faces`: reduced matrices of faces, whose first ``shared`` columns are equality rows.
+        """
+        if faces is not None:
+            reduced = faces.square(moving.matrix[:, shared:], tested[:, shared:])
+            return None if reduced is None else cls(tested, moving, reduced)
         diagonal = global_sum(moving.comm, moving.matrix.power(2).sum(axis=1))
         scale = 1.0 / np.sqrt(np.maximum(diagonal, np.finfo(float).tiny))
         inverse = invert_square(moving.comm, (moving.matrix @ tested.T).tocsr(), scale)
@@ -208,24 +227,28 @@ class CoupledSystem:
         *,
         curvature: Vector | None = None,
         damped: bool = False,
+        whole: bool = True,
         least_damping: float = 1e-4,
     ) -> CoupledSystem | None:
         """Join both bases; None where the face does not hold every body. Collective.
 
         `tested`: W, shape (n_owned, n_face); `moving`: Z, shape (n_owned, n_face); `curvature`: κ, by default
-        that of the face; `least_damping`: lower bound on D, so that motions that only offsets resist stay
+        that of the face; `whole`: whether both begin with all equality rows, see `CoarseSpace.restricted`;
+        `least_damping`: lower bound on D, so that motions that only offsets resist stay
         distinct from unresisted ones.
         """
         on_face = tested is system.face.restriction
         columns = system.coarse.matrix if on_face else sp.csr_matrix(coarse.matrix @ tested)
-        oblique = ObliqueProjector.build(columns, coarse.restricted(moving))
+        faces, shared = coarse.faces if whole else None, len(system.face.layout.equality)
+        own = coarse.restricted(moving, whole=whole)
+        oblique = ObliqueProjector.build(columns, own, faces, shared)
         if oblique is None:
             return None
         kappa = system.face.curvature if curvature is None else curvature
         if not damped:
             return cls(system, tested, moving, kappa, oblique)
         damping = np.maximum(system.face.damping, least_damping)
-        spared = coarse.restricted(sp.csr_matrix(moving @ sp.diags(damping)))
+        spared = coarse.restricted(sp.csr_matrix(moving @ sp.diags(damping)), whole=whole)
         return cls(system, tested, moving, kappa, oblique, DampedEquilibrium(damping, spared))
 
     def transposed(self, coarse: CoarseSpace) -> CoupledSystem | None:

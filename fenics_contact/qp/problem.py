@@ -219,7 +219,8 @@ class Scaling:
     @classmethod
     def build(cls, factor: Vector, coarse: CoarseSpace) -> Scaling:
         """Scale a coarse space; its matrix is factored on first use."""
-        return cls(factor, CoarseSpace(coarse.comm, coarse.matrix @ sp.diags(factor), coarse.load))
+        scaled = coarse.matrix @ sp.diags(factor)
+        return cls(factor, CoarseSpace(coarse.comm, scaled, coarse.load, eliminate=coarse.eliminate))
 
     def with_load(self, load: Vector) -> Scaling:
         """Return the scaling of a problem with another right side e; factors are shared."""

@@ -92,7 +92,7 @@ def _floating_motions(problem: DualProblem) -> Vector:
     selection = sp.csr_matrix(
         (np.ones(len(equality)), (equality, columns)), shape=(problem.layout.size, len(equality))
     )
-    null = problem.coarse.restricted(selection).gram.null_space
+    null = problem.coarse.restricted(selection, whole=True).gram.null_space
     return np.asarray(np.linalg.qr(null)[0], dtype=np.float64)
 
 

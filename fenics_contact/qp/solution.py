@@ -362,7 +362,7 @@ def iterate_fitted(
     bound = (1.0 - margin) * problem.law.bound(multiplier)
     step = contact_step(problem.layout, problem.diagonal)
     face = classify(problem.layout, bound, multiplier, np.zeros_like(multiplier), step, problem.compliance)
-    free = problem.coarse.restricted(face.restriction)
+    free = problem.coarse.restricted(face.restriction, whole=True)
     alpha = free.coefficients(face.restrict(product - problem.rhs + problem.given_way(multiplier)))
     return iterate_at(problem, multiplier, product, alpha)
 

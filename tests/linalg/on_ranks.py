@@ -43,11 +43,14 @@ def rank_of_singular(comm: MPI.Comm) -> int:
 
 def potential(comm: MPI.Comm, limit: int, rows_per_rank: int) -> dict[str, Any]:
     """Solve two blocks in contact with the coarse problem kept as the limits say. Collective."""
+    scene, usual = two_blocks(Coulomb(0.38)), (coarse.DENSE_LIMIT, shared_factor.ROWS_PER_RANK)
     coarse.DENSE_LIMIT, shared_factor.ROWS_PER_RANK = limit, rows_per_rank
-    scene = two_blocks(Coulomb(0.38))
-    state = solve_scene(
-        scene, comm, partitions=partitions(scene, (2, 1, 1)), solver=FaceNewton(tolerance=1e-9)
-    )
+    try:
+        state = solve_scene(
+            scene, comm, partitions=partitions(scene, (2, 1, 1)), solver=FaceNewton(tolerance=1e-9)
+        )
+    finally:  # these processes run other scripts, too
+        coarse.DENSE_LIMIT, shared_factor.ROWS_PER_RANK = usual
     return {
         "kind": type(state.system.problem.coarse.gram).__name__,
         "potential": state.energies.total_potential,
