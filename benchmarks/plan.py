@@ -12,6 +12,8 @@ from fenics_contact.study.runner import Job
 #: Cells of the block by a name for their number.
 BLOCKS = {"28k": (32, 16, 16), "92k": (48, 24, 24), "212k": (64, 32, 32)}
 
+#: Largest edge of the tetrahedra of the drilled block.
+PART_SIZE = 0.033
 #: Solvers of one linear system that the state is held against.
 LINEAR = {"gamg": "CG + GAMG", "cholesky": "MUMPS's Cholesky"}
 #: Friction coefficients of the chain beside 0.3.
@@ -67,6 +69,11 @@ def block_runs() -> list[Job]:
             run(f"newton-{size}-ranks", "newton_block", mesh, repeats=1, limit=limit),
             run(f"newton-{size}-threads", "newton_block", mesh, 1, **newton),
         ]
+    # A part of a CAD file of 212 thousand unknowns, where no two subdomains are alike.
+    found += [
+        run("part", "sliding_block", {"size": PART_SIZE}, limit=1200.0),
+        run("gamg-part", "linear_block", {"size": PART_SIZE}, limit=1200.0),
+    ]
     # GetFEM's MUMPS has no MPI and bears none beside it.
     return [*found, run(OPTIONAL, "getfem_block", {"counts": list(BLOCKS["28k"])}, 0, threads=2)]
 

@@ -15,6 +15,9 @@ LOWER, UPPER = (0.0, 0.0, 0.0), (2.0, 1.0, 1.0)
 #: z of the rigid plane below the block.
 PLANE_HEIGHT = -0.02
 YOUNG_MODULUS, POISSON_RATIO = 1.0, 0.3
+#: Diameter of the bores of the drilled block, where they cross it, and along which axes they go.
+BORE = 0.4
+BORES = (((1.4, 0.0, 0.55), (0.0, 1.0, 0.0)), ((0.7, 0.5, 0.0), (0.0, 0.0, 1.0)))
 #: On the upper side of the block; the side x = 0 is clamped.
 TRACTION = (0.02, 0.01, -0.05)
 

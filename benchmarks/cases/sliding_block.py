@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+from functools import partial
 from time import perf_counter
 from typing import Any
 
@@ -9,7 +11,7 @@ from mpi4py import MPI
 
 from benchmarks.cases.measuring import nodal_forces, state_record
 from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, Counts
-from benchmarks.cases.scenes import block_mesh, block_on_plane
+from benchmarks.cases.scenes import block_mesh, block_on_plane, drilled_block
 from fenics_contact import box_partition, solve_scene
 from fenics_contact.qp import FaceNewton
 from fenics_contact.study.measuring import slowest
@@ -17,23 +19,26 @@ from fenics_contact.study.measuring import slowest
 
 def measure(
     comm: MPI.Comm,
-    counts: Counts,
+    counts: Counts | None = None,
     boxes: Counts | None = None,
     friction_coefficient: float = FRICTION_COEFFICIENT,
     tolerance: float = 1e-6,
+    size: float = 0.0,
 ) -> dict[str, Any]:
     """Return the record of the block's state. Collective.
 
     Args:
         comm: Communicator.
-        counts: Cells along x, y and z.
+        counts: Cells along x, y and z; None: the drilled block of tetrahedra.
         boxes: Subdomains along x, y and z; by default the block is cut as any body.
         friction_coefficient: Between block and plane.
         tolerance: Of every residual.
+        size: Largest edge of a tetrahedron; gmsh's seconds do not count.
     """
+    mesh_block = partial(block_mesh, counts) if counts else partial(copy, drilled_block(size))
     comm.Barrier()
     start = perf_counter()
-    mesh = block_mesh(counts)
+    mesh = mesh_block()
     scene = block_on_plane(mesh, friction_coefficient)
     solver = FaceNewton(tolerance=tolerance)
     partitions = {"block": box_partition(mesh, boxes)} if boxes else None

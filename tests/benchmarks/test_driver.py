@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
@@ -17,9 +18,10 @@ from benchmarks import effects, refinement, speed
 from benchmarks.__main__ import STUDIES, main, set_environment
 from benchmarks.cases.chain import cold_state
 from benchmarks.cases.linear_face import solve_face
-from benchmarks.cases.monolithic.elasticity import assemble_block
+from benchmarks.cases.monolithic.elasticity import assemble_block, assemble_part
 from benchmarks.cases.monolithic.linear import solve_linear
 from benchmarks.cases.refinement import MESHES, hertz
+from benchmarks.cases.scenes import block_on_plane, drilled_block
 from benchmarks.held import HELD
 from benchmarks.optimisation_tolerance import report as tolerance
 from benchmarks.plan import run, runs
@@ -124,6 +126,20 @@ def test_a_linear_solve_finds_the_same_by_either_solver() -> None:
     largest = found[1].displacement.norm()
     found[0].displacement.axpy(-1.0, found[1].displacement)
     assert found[0].displacement.norm() < 1e-7 * largest
+
+
+def test_a_part_of_tetrahedra_is_the_same_problem_for_both() -> None:
+    mesh = drilled_block(0.2)
+    assert {"x0", "z0", "z1"} == set(mesh.surfaces)
+    part = assemble_part(MPI.COMM_SELF, mesh)
+    assert part.stiffness.size[0] == mesh.points.size
+    assert len(part.nodes) == len(np.unique(mesh.surfaces["z0"])) - np.count_nonzero(
+        np.abs(mesh.points[:, [0, 2]]).max(axis=1) < 1e-9
+    )
+    solved = solve_linear(part, "cholesky", 1e-9)
+    free = replace(block_on_plane(mesh), contacts=[])
+    ours = solve_scene(free, MPI.COMM_SELF)
+    assert part.load.dot(solved.displacement) == pytest.approx(2.0 * ours.energies.strain, rel=1e-8)
 
 
 def test_a_case_that_fails_on_several_ranks_ends() -> None:

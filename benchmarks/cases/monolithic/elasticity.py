@@ -22,6 +22,9 @@ from benchmarks.cases.scene_data import (
     YOUNG_MODULUS,
     Counts,
 )
+from fenics_contact import BodyMesh
+from fenics_contact._dolfinx import rank_mesh
+from fenics_contact.mesh import bisection_partition
 
 #: Exact for trilinear hexahedra whose edges are parallel to the axes.
 QUADRATURE = {"quadrature_degree": 2}
@@ -56,7 +59,16 @@ def assemble_block(comm: MPI.Comm, counts: Counts) -> PressedBlock:
         comm: Communicator.
         counts: Cells along x, y and z.
     """
-    mesh = dolfinx.mesh.create_box(comm, [LOWER, UPPER], counts, dolfinx.mesh.CellType.hexahedron)
+    return _assembled(dolfinx.mesh.create_box(comm, [LOWER, UPPER], counts, dolfinx.mesh.CellType.hexahedron))
+
+
+def assemble_part(comm: MPI.Comm, mesh: BodyMesh) -> PressedBlock:
+    """Assemble a block of any cells, its nodes and cells the same on every rank. Collective."""
+    rank = bisection_partition(mesh, comm.size)
+    return _assembled(rank_mesh(comm, mesh.points, mesh.cells, rank, mesh.cell_type))
+
+
+def _assembled(mesh: Any) -> PressedBlock:
     V = _vector_space(mesh)
     a, L = _forms(mesh, V)
     clamped = dolfinx.fem.locate_dofs_geometrical(V, lambda x: np.isclose(x[0], LOWER[0]))
