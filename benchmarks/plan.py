@@ -13,7 +13,7 @@ from fenics_contact.study.runner import Job
 BLOCKS = {"28k": (32, 16, 16), "92k": (48, 24, 24), "212k": (64, 32, 32)}
 
 #: Largest edge of the tetrahedra of the drilled block.
-PART_SIZE = 0.033
+PART_SIZE = 0.028
 #: Solvers of one linear system that the state is held against.
 LINEAR = {"gamg": "CG + GAMG", "cholesky": "MUMPS's Cholesky"}
 #: Friction coefficients of the chain beside 0.3.
@@ -69,7 +69,7 @@ def block_runs() -> list[Job]:
             run(f"newton-{size}-ranks", "newton_block", mesh, repeats=1, limit=limit),
             run(f"newton-{size}-threads", "newton_block", mesh, 1, **newton),
         ]
-    # A part of a CAD file of 212 thousand unknowns, where no two subdomains are alike.
+    # A part of a CAD file of some 200 thousand unknowns, where no two subdomains are alike.
     found += [
         run("part", "sliding_block", {"size": PART_SIZE}, limit=1200.0),
         run("gamg-part", "linear_block", {"size": PART_SIZE}, limit=1200.0),
