@@ -68,7 +68,7 @@ def solve_nested(
         >>> state.scene.bodies  # on the last meshes  # doctest: +SKIP
     """
     with together(comm):
-        _check(scene, halvings, coarse_tolerance)
+        check_nested(scene, halvings, coarse_tolerance)
     problem = ContactProblem(scene, comm, solver=solver, tolerance=tolerance)
     warnings = problem.hold_warnings()
     state: LinearState | None = None
@@ -98,7 +98,7 @@ def _halved(scene: Scene) -> SceneRefinement:
     return refine_scene(scene, {name: np.arange(body.mesh.n_cells) for name, body in scene.deforming.items()})
 
 
-def _check(scene: Scene, halvings: int, coarse_tolerance: float) -> None:
+def check_nested(scene: Scene, halvings: int, coarse_tolerance: float = 0.1) -> None:
     """Reject what cannot be nested."""
     check_count(halvings, "halvings", least=0)
     check_numbers(coarse_tolerance=coarse_tolerance)

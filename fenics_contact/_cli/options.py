@@ -12,6 +12,7 @@ from typing import Annotated, TypeAlias
 import typer
 
 from fenics_contact._base.checkpoint import Checkpoint, interruptible
+from fenics_contact._base.display import counted
 from fenics_contact._base.progress import is_visible, show_progress
 from fenics_contact._cli.console import Console, console_of, facts, write_stderr
 from fenics_contact._scene_file.reading import SceneFile, read_scene_file
@@ -184,6 +185,11 @@ def _show_plan(console: Console, file: SceneFile, *, sensitivity: bool) -> None:
     rows = {line[:15].strip(): line[16:] for line in str(plan).splitlines()}
     if file.steps and not sensitivity:
         rows["load steps"] = str(len(file.steps))
+    halvings = file.document.solver.halvings
+    if halvings:
+        cells = 2 ** (halvings * file.scene.dim) * sum(b.mesh.n_cells for b in file.scene.deforming.values())
+        times = counted(halvings, "time")
+        rows["cells halved"] = f"{times}, to {cells} cells; all else is of the first meshes"
     asked = file.document.accuracy
     if asked is not None:
         words = asked.in_words

@@ -132,6 +132,10 @@ class SolverPart(Part):
         default="auto",
         description="subdomains of every body, or by body: a number, or boxes of a structured mesh",
     )
+    halvings: Annotated[int, Field(ge=0, le=20)] = Field(
+        default=0,
+        description="how often all cells are halved before the final solve; each mesh starts the next",
+    )
 
     def accuracy(self, scene: Scene) -> Tolerance:
         """Return the tolerance for solvers; None, their own, where errors of the mesh are not estimated."""

@@ -14,6 +14,7 @@ from pydantic import BaseModel
 
 from fenics_contact._adaptive.levels import AccurateResult, Level, Limits, solve_to
 from fenics_contact._adaptive.minimised import AccurateDesign, minimize_to
+from fenics_contact._adaptive.nested import check_nested, solve_nested
 from fenics_contact._adaptive.quantities import quantity
 from fenics_contact._base.checkpoint import Checkpoint
 from fenics_contact._base.checks import require_file
@@ -462,7 +463,7 @@ class SceneFile:
 
     @property
     def problem(self) -> ContactProblem:
-        """The scene with the solver of the file, nothing solved yet. Collective on first use."""
+        """The scene on its first meshes with the solver of the file, unsolved. Collective on first use."""
         solver = self.document.solver
         with self._at("solver"):
             chosen = solver.chosen(self.scene, self.partitions)
@@ -487,7 +488,14 @@ class SceneFile:
         if self.steps:
             sequence = self.sequence()
             return [sequence.advance(step) for step in self.steps][-1]
-        return self.problem.solve()
+        halvings, problem = self.document.solver.halvings, self.problem
+        if not halvings:
+            return problem.solve()
+        with self._at("solver", "halvings"):
+            check_nested(self.scene, halvings)
+        return solve_nested(
+            self.scene, halvings, self.comm, solver=problem.solver, tolerance=problem.tolerance
+        )
 
     def sequence(self, checkpoint: Checkpoint | None = None) -> LoadSequence:
         """Return the history of the scene before its first load step. Collective.

@@ -51,7 +51,32 @@ def wrong_names(source: Source, document: Document) -> list[Mistake]:
     wrong = [
         unknown(source, path, name, what, known[what]) for path, name, what in used if name not in known[what]
     ]
-    return wrong or [*_twice(source, document), *_unlike(source, document), *_wrong_pairs(source, document)]
+    return wrong or [
+        *_twice(source, document), *_unlike(source, document), *_wrong_pairs(source, document),
+        *_not_halved(source, document),
+    ]  # fmt: skip
+
+
+#: Parts of a scene file that do not go with halved cells, and why.
+NOT_HALVED = {
+    "steps": "load steps have a history on their meshes",
+    "accuracy": "it refines where that pays",
+    "design": "control points belong to a mesh",
+}
+
+
+def _not_halved(source: Source, document: Document) -> Iterator[Mistake]:
+    """Yield the keys that cannot be kept where all cells are halved."""
+    if not document.solver.halvings:
+        return
+    for key, why in NOT_HALVED.items():
+        if getattr(document, key):
+            words = f"{written((key,))} does not go with solver.halvings: {why}, leave one of both out"
+            yield source.mistake((key,), words)
+    if document.solver.subdomains != "auto":
+        path: Path = ("solver", "subdomains")
+        words = f"{written(path)} does not go with solver.halvings: every mesh is cut anew, leave it out"
+        yield source.mistake(path, words)
 
 
 def _names(parts: Iterable[Any]) -> list[str]:
