@@ -26,7 +26,6 @@ class Rates:
 
     Attributes:
         start: What a rank needs at first, whatever the scene.
-        heap: What a rank does not give back of the workspaces of factors.
         tables: Numbering, gluing rows and meshes, of each torn unknown on every rank.
         own: Kernels, coordinates and loads, of each torn unknown.
         system: Rows of B, coarse space and vectors, of each torn unknown.
@@ -35,12 +34,14 @@ class Rates:
         workspace: Of MUMPS and PETSc for each entry of a matrix that is condensed, for each of the condensed
             one, and relative to the factors of both.
         modes: Of each row of one that is stored compactly.
+        holes: What workspaces of condensed matrices leave in holes for a while, of each entry of one.
+        until: Subdomains after which holes return to the system.
+        factored: Of each unknown of a sparse factor in addition to its entries.
         inverting: Of each entry of a condensed matrix while it is inverted.
         vectors: Vectors of multipliers that iterations keep.
     """
 
     start: float = 9e6
-    heap: float = 8e6
     tables: float = 90.0
     own: float = 100.0
     system: float = 110.0
@@ -48,6 +49,9 @@ class Rates:
     whole: int = 8
     workspace: tuple[float, float, float] = (27.0, 24.0, 0.5)
     modes: float = 32.0
+    holes: float = 5.5
+    until: int = 8
+    factored: float = 300.0
     inverting: float = 18.0
     vectors: float = 130.0
 
@@ -143,7 +147,7 @@ def expected_memory(
     solving = rates.system * torn + 8.0 * rates.vectors * multipliers
     if compact:  # while the first ones are condensed all matrices are there
         assembled += workspaces
-    return steady + max(assembled, ranks * rates.heap + factors + max(workspaces, solving))
+    return steady + max(assembled, factors + max(workspaces, solving))
 
 
 def require_memory(
@@ -200,26 +204,31 @@ def _factors(
 ) -> tuple[float, float]:
     """Return the bytes of factors of some subdomains, and of the workspaces while the last are made."""
     _, first, members = np.unique(parts.kind[mine], return_index=True, return_counts=True)
-    held, largest, during = 0.0, 0.0, list[float]()
+    held, largest, during, condensed = 0.0, 0.0, list[float](), list[float]()
     by_matrix, by_condensed, by_factor = rates.workspace
     for index, count in zip(mine[first], members, strict=True):
-        n, b = int(parts.size[index]), int(parts.interface[index])
+        n, b, couplings = int(parts.size[index]), int(parts.interface[index]), parts.couplings[index]
+        whole = 2.0 if count >= rates.whole else 1.0
         if compact:
-            held += (4.0 if count >= rates.whole else 2.0) * b**2 + rates.modes * b
-            largest = max(largest, rates.inverting * b**2)
-            workspace = by_matrix * parts.couplings[index] * n + by_condensed * b**2
-            during.append(workspace + by_factor * factor_bytes(n, dim))
-            continue
-        coupled = parts.couplings[index] * b
-        held += factor_bytes(n - b, dim) + rates.entry * coupled
-        if not prefers_explicit(n, b):
-            held += factor_bytes(n, dim)
-            continue
-        held += (12.0 if count >= rates.whole else 6.0) * b**2
+            held += whole * 2.0 * b**2 + rates.modes * b
+        else:
+            held += _sparse(n - b, dim, rates) + rates.entry * couplings * b
+            if not prefers_explicit(n, b):
+                held += _sparse(n, dim, rates)
+                continue
+            held += whole * 6.0 * b**2
         largest = max(largest, rates.inverting * b**2)
-        workspace = by_matrix * parts.couplings[index] * n + by_condensed * b**2
-        during.append(workspace + by_factor * factor_bytes(n, dim))
-    return held, largest + max(during, default=0.0)
+        during.append(by_matrix * couplings * n + by_condensed * b**2 + by_factor * factor_bytes(n, dim))
+        condensed.append(b**2)
+    workspaces = largest + max(during, default=0.0)
+    if compact:  # elsewhere what stays fills the holes
+        workspaces += rates.holes * min(rates.until, len(condensed)) * float(np.mean(condensed))
+    return held, workspaces
+
+
+def _sparse(size: int, dim: int, rates: Rates) -> float:
+    """Return the bytes of the factor of a sparse matrix."""
+    return factor_bytes(size, dim) + rates.factored * size
 
 
 def _counted(

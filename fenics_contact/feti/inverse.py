@@ -464,6 +464,7 @@ class TornInverse:
         """Return (K⁺)_bb times an interface force, in double precision however it is stored."""
         if not self.is_rounded:
             return self.flex(force)
+        return_memory()  # where directions of a Krylov method were
         result = np.empty_like(force)
         for index in self._by_kind:
             part = self._parts[index]
