@@ -28,9 +28,10 @@ from fenics_contact.results import PhaseCosts
 from fenics_contact.study.report import table
 from fenics_contact.study.worker import peak_memory
 
-#: Reductions of each size that a solve takes: numbers for each product and for each step, as counted on 2, 4
-#: and 64 ranks. "coarse": vectors of all rigid motions. One of the matrices has contact rows only.
-COARSE, CONTACT, SCALARS, MATRICES = (2.5, 4.5), (2.0, -1.0), (3.0, 5.0), 3.5
+#: Calls of each size that a solve takes: numbers for each product and for each step, as counted on 2, 4 and
+#: 64 ranks. "coarse": sums of vectors of all rigid motions; "contact": solutions with the contact rows'
+#: factor. One of the matrices has contact rows only.
+COARSE, CONTACT, SCALARS, MATRICES = (2.5, 4.5), (2.0, -2.0), (3.0, 5.0), 3.5
 #: Entries of sparse factors of m motions divided by m^(4/3), and seconds to make them for `COUNTED` motions:
 #: L and U of the matrix of a face; L of the motions without contact, with the matrix reduced by them.
 LU, REDUCED, COUNTED = (64.0, 2.3), (22.0, 3.8), 24576
@@ -143,7 +144,10 @@ class Lattice:
         matrices, dense = MATRICES * steps, size <= DENSE_LIMIT
         # Two subdomains that share nodes fill 25 of 36 pairs of motions. Which ones is known by a bit each.
         filled, pressed = 25 * (3 * self.side - 2) ** 3, 36 * (3 * self.side - 2) ** 2
-        bytes_ = 8 * (coarse * size + contact * self.contact_rows + 2 * scalars)
+        # Of contact rows, those of other ranks are sent to the one with their matrix, and back.
+        owners = ranks if ranks <= self.side else round(ranks ** (2 / 3))
+        others = (1 - 1 / owners) * self.contact_rows
+        bytes_ = 8 * (coarse * size + 2 * scalars)
         bytes_ += dense * (8 * steps * ((MATRICES - 1) * filled + pressed) + matrices * size**2 / 8)
         solving = 2 * size**2 if dense else 4 * LU[0] * size ** (4 / 3) / self.holders(ranks)
         if self.reduced:
@@ -152,16 +156,17 @@ class Lattice:
         if ranks == 1:
             return PhaseCosts(flops=round(flops))
         return PhaseCosts(
-            messages=exchanges * neighbours,
-            message_bytes=round(exchanges * 8 * 3 * faces * (self.edge + 1) ** 2),
-            reductions=round(coarse + contact + scalars + 2 * matrices * dense),
+            messages=round(exchanges * neighbours + 2 * contact * (owners - 1)),
+            message_bytes=round(exchanges * 24 * faces * (self.edge + 1) ** 2 + 16 * contact * others),
+            reductions=round(coarse + scalars + 2 * matrices * dense),
             reduction_bytes=round(bytes_),
             copies=round(steps + coarse * (not dense)),
-            copy_bytes=round(20 * steps * self.contact_rows + 8 * coarse * size * (not dense)),
-            transfers=round(matrices * (not dense)),
-            meetings=3,
-            largest_reduction=8 * max(filled if dense else size, self.contact_rows),
-            largest_copy=max(20 * self.contact_rows, 0 if dense else 8 * size),
+            copy_bytes=round(8 * steps + 8 * coarse * size * (not dense)),
+            transfers=round(steps + matrices * (not dense)),
+            transfer_bytes=round(20 * steps * others),
+            meetings=3 + 2 * steps,
+            largest_reduction=8 * (filled if dense else size),
+            largest_copy=8 if dense else 8 * size,
             flops=round(flops),
         )
 
@@ -193,9 +198,9 @@ class Lattice:
         return REPLICATED * self.unknowns
 
 
-#: Bytes for each torn unknown of the whole problem that every rank holds: meshes 26, gluing rows 31,
-#: copies of nodes 13, multipliers and contact points 10.
-REPLICATED = 80.0
+#: Bytes for each torn unknown of the whole problem that every rank holds: meshes 26, numbers and owners of
+#: gluing rows 8, copies of nodes 13, numbering and contact points 8.
+REPLICATED = 55.0
 
 
 def extrapolated(machine: Machine, edge: int = 6, a_rank: int = 100_000, most: int = 10_000) -> str:

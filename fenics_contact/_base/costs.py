@@ -30,7 +30,8 @@ class PhaseCosts:
     What happens inside of libraries (MUMPS on several ranks, dolfinx) is not in it.
 
     Attributes:
-        messages: Those of multipliers that this rank sends to neighbours or receives from them.
+        messages: Those of multipliers that this rank sends to others or receives from them: to neighbours,
+            and of contact rows to the rank that holds their matrix.
         message_bytes: Bytes of these.
         reductions: Sums, largest and smallest values over all ranks, the same on each of them afterwards.
         reduction_bytes: Bytes of what this rank puts in.
@@ -273,6 +274,12 @@ def _kinds() -> tuple[type, type]:
         def Bcast(self, buf: Any, *more: Any, **named: Any) -> None:
             self._count("copy", "copies", buf)
             super().Bcast(buf, *more, **named)
+
+        def gather(self, sendobj: Any, *more: Any, **named: Any) -> Any:
+            parts = super().gather(sendobj, *more, **named)
+            others = [] if parts is None else [*parts[: self.rank], *parts[self.rank + 1 :]]
+            self._count("transfer", "transfers", *others)
+            return parts
 
         def alltoall(self, sendobj: Any) -> Any:
             parts = super().alltoall(sendobj)

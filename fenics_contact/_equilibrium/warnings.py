@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -129,9 +129,9 @@ class ContactWarnings:
         moved = state.torn_displacement.reshape(-1, state.torn.components)
         longest = float(comm.allreduce(np.linalg.norm(moved, axis=1).max(initial=0.0), op=MPI.MAX))
         for name, body in state.scene.deforming.items():
-            if body.deforms_much or name in self._given or longest * self._bound(name, body) <= FAR:
+            if body.deforms_much or name in self._given or longest * self._bound(state, name, body) <= FAR:
                 continue
-            angle = rotation_of(body.mesh, state.gather_displacement(name))
+            angle = rotation_of(comm, _moved_cells(state, name, body.mesh))
             if angle > FAR:
                 words = (
                     f"body {name!r} has turned by {angle:.2g} rad; its material is for small rotations, "
@@ -141,13 +141,17 @@ class ContactWarnings:
                 )
                 self._log(state, name, words)
 
-    def _bound(self, name: str, body: Body) -> float:
-        """Bound rotations by displacements of length one, [1/length]; computed once for a mesh."""
+    def _bound(self, state: State, name: str, body: Body) -> float:
+        """Bound rotations by displacements of length one, [1/length]; once for a mesh. Collective."""
         mesh = body.mesh
         if name not in self._rotations or self._rotations[name][0] is not mesh:
-            gradients = _Gradients.of(mesh)
-            by_turn = 1.0 / gradients.radius.min() if body.torsion else 0.0
-            self._rotations[name] = mesh, gradients.largest + by_turn
+            largest, turned = 0.0, 0.0
+            for gradients, _ in _moved_cells(state, name, mesh):
+                largest = max(largest, gradients.largest)
+                turned = max(turned, 1.0 / gradients.radius.min() if body.torsion else 0.0)
+            comm = state.torn.decomposition.comm
+            both = [comm.allreduce(part, op=MPI.MAX) for part in (largest, turned)]
+            self._rotations[name] = mesh, sum(both)
         return self._rotations[name][1]
 
     def _warn_of_passing_bodies(self, state: State) -> None:
@@ -196,9 +200,8 @@ class _Gradients:
     radius: np.ndarray
 
     @classmethod
-    def of(cls, mesh: BodyMesh) -> _Gradients:
-        corners = mesh.linear.cells
-        arms = mesh.points[corners]
+    def of(cls, points: np.ndarray, corners: np.ndarray) -> _Gradients:
+        arms = points[corners]
         radius = arms[..., 0].mean(axis=1)
         arms = arms - arms.mean(axis=1, keepdims=True)
         metric = np.einsum("nkd,nke->nde", arms, arms)
@@ -209,8 +212,8 @@ class _Gradients:
         """A bound on the rotation of any cell by displacements of length one, [1 / length]."""
         return float(np.linalg.norm(self.inverse, axis=2).sum(axis=1).max())
 
-    def rotation(self, displacement: np.ndarray) -> float:
-        """Return the root mean square of the rotations of cells, in radians.
+    def rotation(self, displacement: np.ndarray) -> np.ndarray:
+        """Return the sum of the squares of the rotations of cells, weighted by size, and that of sizes.
 
         `displacement`: of the nodes, shape (n_nodes, dim), [length].
         """
@@ -220,15 +223,29 @@ class _Gradients:
             around = np.stack([-turn[:, 2], np.zeros(len(turn)), turn[:, 0]], axis=1)
             gradient = np.concatenate([gradient, around[:, None]], axis=1)
         square = ((gradient - gradient.transpose(0, 2, 1)) ** 2).sum(axis=(1, 2)) / 8.0
-        return float(np.sqrt(np.average(square, weights=self.size)))
+        return np.array([square @ self.size, self.size.sum()])
 
 
-def rotation_of(mesh: BodyMesh, displacement: np.ndarray) -> float:
-    """Return by how much the cells of a body turn, as a root mean square, in radians.
+def _moved_cells(state: State, name: str, mesh: BodyMesh) -> Iterator[tuple[_Gradients, np.ndarray]]:
+    """Return for each of this rank's subdomains of a body its gradients and displacements of its nodes."""
+    decomposition, linear = state.torn.decomposition, mesh.linear.cells
+    corners = linear.reshape(mesh.n_cells, -1, linear.shape[1])  # of each cell's linear ones
+    for own, part in zip(decomposition.meshes, decomposition.parts, strict=True):
+        if own.body == name:
+            order = np.argsort(own.nodes)
+            nodes = own.nodes[order]
+            cells = np.searchsorted(nodes, corners[own.cells].reshape(-1, linear.shape[1]))
+            gradients = _Gradients.of(mesh.points[nodes], cells)
+            yield gradients, state.torn_displacement[part].reshape(len(nodes), -1)[order]
 
-    `displacement`: of the nodes, shape (n_nodes, dim), [length].
+
+def rotation_of(comm: MPI.Comm, parts: Iterable[tuple[_Gradients, np.ndarray]]) -> float:
+    """Return by how much the cells of a body turn, as a root mean square, in radians. Collective.
+
+    `parts`: gradients of cells of this rank and displacements of their nodes, shape (n_nodes, dim), [length].
     """
-    return _Gradients.of(mesh).rotation(displacement)
+    sums = comm.allreduce(sum((gradients.rotation(moved) for gradients, moved in parts), np.zeros(2)))
+    return float(np.sqrt(sums[0] / sums[1]))
 
 
 def _slid_far(state: State, number: int) -> list[tuple[int, str, str]]:

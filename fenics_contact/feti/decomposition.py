@@ -270,7 +270,8 @@ class GluingRows:
     """The equality rows that glue torn bodies together and fix them at their supports.
 
     Attributes:
-        rows: The rows; their right side is filled from the supports of a load, see `right_side`.
+        rows: The rows, with their entries on this rank's copies; their right side is filled from the supports
+            of a load, see `right_side`.
         dof: Node and component that each row belongs to, as node · dim + component, shape (n_rows,).
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         axes: Axes of nodes along which the components are; None: the coordinates' everywhere.
@@ -303,6 +304,7 @@ def gluing_rows(
     fixed: np.ndarray,
     axes: LocalAxes | None = None,
     hanging: np.ndarray | None = None,
+    rank: int | None = None,
 ) -> GluingRows:
     """Build the equality rows B_E u = c_E, for which B_E D⁻¹ B_Eᵀ is diagonal, D the stiffness of copies.
 
@@ -311,20 +313,24 @@ def gluing_rows(
     of nodes, which keeps them orthogonal. Hanging nodes have no rows, as each copy follows its masters.
 
     `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `hanging`: numbers of hanging
-    nodes, none of which is.
+    nodes, none of which is; `rank`: the one whose copies the entries are on; None: all entries.
     """
+    here = np.full(len(tearing.copy_subdomain), rank is None)
+    here |= tearing.subdomain_rank[tearing.copy_subdomain] == rank
+    touched = np.logical_or.reduceat(here, tearing.first_copy[:-1])[:, None]
     multiplicity = tearing.multiplicity.copy()
     if hanging is not None:
         multiplicity[hanging] = 1
     counts = np.where(fixed, multiplicity[:, None], multiplicity[:, None] - 1)
     start = np.concatenate([[0], np.cumsum(counts.ravel())])
-    parts = [_prescribed_entries(tearing, fixed, start)]
+    parts = [_prescribed_entries(tearing, fixed & touched, start)]
     for copies in np.unique(multiplicity[multiplicity > 1]):
-        glued = ~fixed & (multiplicity == copies)[:, None]
+        glued = touched & ~fixed & (multiplicity == copies)[:, None]
         parts.append(_glued_entries(tearing, glued, start, int(copies)))
     row, copy, component, entry = (np.concatenate(column) for column in zip(*parts, strict=True))
     if axes is not None:
         row, copy, component, entry = _turned_entries(tearing, axes, row, copy, component, entry)
+    row, copy, component, entry = (each[here[copy]] for each in (row, copy, component, entry))
 
     dof = np.repeat(np.arange(fixed.size), counts.ravel())  # (node, component) of each row
     within = np.arange(len(dof)) - start[dof]
@@ -385,7 +391,7 @@ class Decomposition:
         meshes: This rank's subdomain meshes, ascending by number.
         block_offset: First block of dofs of each of them in this rank's torn vector, and the total.
         copy_block: Block of each copy in this rank's torn vector, −1 if another rank holds it.
-        gluing: Gluing and Dirichlet rows of all subdomains.
+        gluing: Gluing and Dirichlet rows of all subdomains, with entries on this rank's.
         compact: Whether a state fits into memory only with subdomains stored as `LocalKind.COMPACT`.
     """
 
@@ -497,7 +503,8 @@ def decompose(
     with together(comm):
         meshes = tuple(_cut(scene, partitions, tearing, here))
         prescribed, axes = prescribed_along(scene, tearing)
-        gluing = gluing_rows(tearing, ~np.isnan(prescribed), axes, hanging_nodes(scene, tearing))
+        hanging = hanging_nodes(scene, tearing)
+        gluing = gluing_rows(tearing, ~np.isnan(prescribed), axes, hanging, comm.rank)
     block_offset = np.cumsum([0] + [len(mesh.nodes) for mesh in meshes])
     copy_block = _copy_blocks(tearing, meshes, block_offset)
     return Decomposition(
@@ -581,6 +588,7 @@ class DualNumbering:
         ghosts: Row numbers that it touches but does not own, ascending, shape (n_ghosts,).
         offset: Position of the first owned entry in the concatenation of all ranks' owned parts.
         total: Number of rows of all ranks.
+        owner: Owning rank of every row, shape (total,), replicated.
     """
 
     def __init__(self, comm: MPI.Comm, owner: np.ndarray, touched: np.ndarray) -> None:
@@ -591,7 +599,7 @@ class DualNumbering:
         """
         self.comm = comm
         self.total = len(owner)
-        self._owner, self._touched = owner, touched
+        self.owner, self._touched = owner, touched
         order = np.argsort(owner, kind="stable")
         self._position = np.empty(self.total, dtype=np.int64)
         self._position[order] = np.arange(self.total)
@@ -607,7 +615,7 @@ class DualNumbering:
 
     def serves(self, owner: np.ndarray, touched: np.ndarray) -> bool:
         """Return whether this rank's part is that of rows with these owners, touched as given."""
-        return np.array_equal(self._owner, owner) and np.array_equal(self._touched, touched)
+        return np.array_equal(self.owner, owner) and np.array_equal(self._touched, touched)
 
     @property
     def local_rows(self) -> np.ndarray:
@@ -664,6 +672,6 @@ class DualNumbering:
         """
         own, shares = local[: len(self.owned)], local[len(self.owned) :].tocoo()
         ghosts = self.ghosts[shares.row]
-        row, column, value = sent(self.comm, self._owner[ghosts], ghosts, shares.col, shares.data)
+        row, column, value = sent(self.comm, self.owner[ghosts], ghosts, shares.col, shares.data)
         received = sp.csr_matrix((value, (np.searchsorted(self.owned, row), column)), shape=own.shape)
         return (own + received).tocsr() if received.nnz else own

@@ -10,7 +10,6 @@ from typing import cast
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from fenics_contact._base.costs import count_flops
 from fenics_contact._base.libraries import MPI
@@ -19,8 +18,8 @@ from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._base.sparse import ROUNDING, scaled_columns, sweep
 from fenics_contact.errors import InfeasibleError, together
 from fenics_contact.feti.condensation import Condensations
+from fenics_contact.feti.contact_block import ContactBlock
 from fenics_contact.feti.decomposition import DualNumbering
-from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.inverse import LocalKind, TornInverse
 from fenics_contact.feti.kernel_basis import TornModes, whole_motions
 from fenics_contact.feti.reduced_coarse import Elimination
@@ -28,11 +27,6 @@ from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.quality import node_volumes
 from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.problem import DualProblem, Scaling
-from fenics_contact.qp.reductions import global_sum
-
-#: Fraction of its diagonal added to the contact block of B D⁻¹ Bᵀ. A node in two contact pairs has more rows
-#: than displacements, which makes the block singular; elsewhere so small a fraction has no effect.
-REGULARISATION = 1e-4
 
 
 class DirichletPreconditioner:
@@ -68,7 +62,7 @@ class DirichletPreconditioner:
         self._Bt = self._B.T  # shares its memory
         diagonal = numbering.to_owned(np.asarray(B.multiply(self._B).sum(axis=1)).ravel())
         self._equality = 1.0 / np.where(numbering.owned < n_gluing, diagonal, 1.0)
-        self._contact = _ContactBlock.of_rows(B, self._B, numbering, n_gluing)
+        self._contact = ContactBlock.of_rows(B, self._B, numbering, n_gluing)
 
     def __call__(self, residual: np.ndarray) -> np.ndarray:
         """Return M r for an owned vector. Collective."""
@@ -99,16 +93,16 @@ class DirichletPreconditioner:
         self._sprung = np.divide(1.0, give, where=soft, out=np.zeros(len(give)))
         self._contact = self._contact.softened(soft)
 
-    def _apply(self, residual: np.ndarray, contact: _ContactBlock) -> np.ndarray:
+    def _apply(self, residual: np.ndarray, contact: ContactBlock) -> np.ndarray:
         count_flops(self._numbering.comm, self._inverse.flops[1] + 4 * self._B.nnz)
         result = self._force(self._inverse.stiffen(self._jump(residual, contact)), contact)
         return result if self._sprung is None else result + self._sprung * residual
 
-    def _jump(self, residual: np.ndarray, contact: _ContactBlock) -> np.ndarray:
+    def _jump(self, residual: np.ndarray, contact: ContactBlock) -> np.ndarray:
         """Return D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹ r on the interface. Collective."""
         return self._Bt @ self._numbering.to_local(contact.solve(self._equality * residual))
 
-    def _force(self, stiffened: np.ndarray, contact: _ContactBlock) -> np.ndarray:
+    def _force(self, stiffened: np.ndarray, contact: ContactBlock) -> np.ndarray:
         """Return the transpose of `_jump` times an interface force, owned. Collective."""
         return self._equality * contact.solve(self._numbering.to_owned(self._B @ stiffened))
 
@@ -118,7 +112,7 @@ class PreconditionerOfFace:
     """The preconditioner where only rows of a face enter B D⁻¹ Bᵀ, and where these depend on each other."""
 
     _preconditioner: DirichletPreconditioner
-    _contact: _ContactBlock
+    _contact: ContactBlock
 
     def __call__(self, residual: np.ndarray) -> np.ndarray:
         """Return M r for an owned vector. Collective."""
@@ -137,7 +131,7 @@ class Lifting:
     """
 
     _preconditioner: DirichletPreconditioner
-    _contact: _ContactBlock
+    _contact: ContactBlock
 
     def jump(self, residual: np.ndarray) -> np.ndarray:
         """Return L r, the interface displacement that moves rows by r, shape (n_interface,). Collective."""
@@ -146,173 +140,6 @@ class Lifting:
     def multiplier(self, force: np.ndarray) -> np.ndarray:
         """Return Lᵀ times an interface force, owned. Collective."""
         return self._preconditioner._force(force, self._contact)
-
-
-class _ContactBlock:
-    """(B D⁻¹ Bᵀ)⁻¹ on rows of ties and contacts, by a sparse factor on every rank; others stay unchanged.
-
-    Contact points are replicated, too; one message with a number per contact row is cheaper than the many of
-    a factor that is distributed over the ranks.
-    """
-
-    def __init__(
-        self,
-        numbering: DualNumbering,
-        n_gluing: int,
-        gram: sp.csr_matrix,
-        basis: sp.csr_matrix | None = None,
-        soft: np.ndarray | None = None,
-    ) -> None:
-        """Take the matrix, or its part on the columns of a basis, shape (n_rows, n_face).
-
-        `soft`: marks of rows that give way, replicated, shape (n_rows,); None: none do.
-        """
-        self._numbering, self._n_gluing, self._gram, self._basis = numbering, n_gluing, gram, basis
-        self._soft = soft
-        self._owned = np.flatnonzero(numbering.owned >= n_gluing)
-        self._place = numbering.owned[self._owned] - n_gluing
-        matrix = gram if basis is None else (basis.T @ gram @ basis).tocsr()
-        self._size, self._matrix = matrix.shape[0], matrix
-        self._transposed = None if basis is None else basis.T.tocsr()
-
-    @cached_property
-    def _factor(self) -> Factor:
-        """Factors, on first use."""
-        return _regularised(self._matrix, self._sizes)
-
-    @cached_property
-    def _sizes(self) -> np.ndarray:
-        """Diagonal of the block; on the offset of a slipping disc that of the disc, of which it may be 0."""
-        diagonal = self._gram.diagonal()
-        if self._basis is None:
-            return diagonal
-        columns = self._basis.tocsc()
-        return np.maximum.reduceat(diagonal[columns.indices], columns.indptr[:-1])
-
-    @classmethod
-    def of_rows(
-        cls, B: sp.csr_matrix, weighted: sp.csr_matrix, numbering: DualNumbering, n_gluing: int
-    ) -> _ContactBlock:
-        """Gather B D⁻¹ Bᵀ of ties and contacts on every rank. Collective."""
-        mine = np.flatnonzero(numbering.local_rows >= n_gluing)
-        place = numbering.local_rows[mine] - n_gluing
-        share = (B[mine] @ weighted[mine].T).tocoo()
-        entries = (share.data, place[share.row], place[share.col])
-        value, row, column = (
-            np.concatenate(part) for part in zip(*numbering.comm.allgather(entries), strict=True)
-        )
-        count = numbering.total - n_gluing
-        return cls(numbering, n_gluing, sp.csr_matrix((value, (row, column)), shape=(count, count)))
-
-    def on_face(self, restriction: sp.csr_matrix) -> _ContactBlock:
-        """Return the block of the rows of a face. Collective."""
-        mine = restriction[self._owned].tocoo()
-        used, column = np.unique(mine.col, return_inverse=True)
-        parts = self._numbering.comm.allgather((self._place[mine.row], column.ravel(), mine.data, len(used)))
-        starts = np.cumsum([0] + [part[3] for part in parts])
-        row = np.concatenate([part[0] for part in parts])
-        where = np.concatenate([part[1] + start for part, start in zip(parts, starts, strict=False)])
-        value = np.concatenate([part[2] for part in parts])
-        basis = sp.csr_matrix((value, (row, where)), shape=(self._gram.shape[0], int(starts[-1])))
-        return _ContactBlock(self._numbering, self._n_gluing, self._gram, basis, self._soft)
-
-    def softened(self, soft: np.ndarray) -> _ContactBlock:
-        """Return the block with marks of rows that give way, owned, and contradict no other. Collective."""
-        return _ContactBlock(self._numbering, self._n_gluing, self._gram, None, self._gathered(soft) > 0.0)
-
-    def solve(self, x: np.ndarray) -> np.ndarray:
-        """Return the solution on these rows, zero on those that are not on the face. Collective."""
-        if self._gram.shape[0] == 0:
-            return x
-        right, solution = self._gathered(x), np.empty(self._size)
-        if self._size:
-            count_flops(self._numbering.comm, 4 * self._factor.entries)
-            self._factor.solve(right, solution)
-        result = x.copy()
-        result[self._owned] = self._scattered(solution)
-        return result
-
-    def contradiction(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int] | None:
-        """Return what no force on the columns of the face changes in x, see `qp.RowsOfFace`. Collective."""
-        if self._size == 0:
-            return None
-        right = self._gathered(x)
-        part = _dependent_part(self._matrix, self._factor, right, self._sizes)
-        # Beside their rows, slipping discs feel the stiffness of their circle, and depend on nothing.
-        alone = np.ones(self._size, dtype=bool)
-        if part is not None and self._basis is not None:
-            alone = np.diff(self._basis.tocsc().indptr) == 1
-        if part is not None and self._soft is not None:
-            soft = self._soft if self._transposed is None else self._transposed @ self._soft != 0.0
-            alone &= ~soft
-        if part is not None and not alone.all():
-            matrix, sizes = self._matrix[alone][:, alone].tocsr(), self._sizes[alone]
-            factor = _regularised(matrix, sizes) if alone.any() else None
-            part = None if factor is None else _dependent_part(matrix, factor, right[alone], sizes)
-        if part is None:
-            return None
-        excess, force, number = (np.full(self._size, empty) for empty in (0.0, 0.0, -1))
-        excess[alone], force[alone], number[alone] = part
-        count = int(number.max()) + 1
-        group = self._scattered(number + 1.0).astype(np.int64) - 1
-        parts = [np.zeros(len(x)), np.zeros(len(x)), np.full(len(x), -1)]
-        for whole, own in zip(parts, (self._scattered(excess), self._scattered(-force), group), strict=True):
-            whole[self._owned] = own
-        return parts[0], parts[1], parts[2], count
-
-    def _gathered(self, x: np.ndarray) -> np.ndarray:
-        """Return an owned vector on all columns of the face, replicated. Collective."""
-        right = np.zeros(self._gram.shape[0])
-        right[self._place] = x[self._owned]
-        right = global_sum(self._numbering.comm, right)
-        return right if self._transposed is None else np.asarray(self._transposed @ right)
-
-    def _scattered(self, columns: np.ndarray) -> np.ndarray:
-        """Return this rank's rows of a vector on the columns of the face."""
-        rows = columns if self._basis is None else self._basis @ columns
-        return np.asarray(rows[self._place])
-
-
-def _regularised(matrix: sp.csr_matrix, sizes: np.ndarray) -> Factor:
-    """Factor A + ε D; rows that supports alone determine are empty and become those of the identity.
-
-    `sizes`: D, at least the diagonal of A, shape (n,).
-    """
-    share = np.where(sizes > 0.0, REGULARISATION * sizes, 1.0)
-    return Factor((matrix + sp.diags(share)).tocsr())
-
-
-def _dependent_part(
-    matrix: sp.csr_matrix, regularised: Factor, right: np.ndarray, diagonal: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Return z = D N (Nᵀ D N)⁻¹ Nᵀ x with A N = 0, D⁻¹ z, and coupled rows; None for zero.
-
-    T = ε D (A + ε D)⁻¹ keeps D N and multiplies the rest by ε / (ε + its eigenvalues).
-
-    `matrix`: A, positive semidefinite, shape (n, n); `right`: x, shape (n,); `diagonal`: D, shape (n,).
-
-    Returns both vectors, shape (n,), and the number of the block of A that a row belongs to, −1 where z is
-    zero.
-    """
-    left = np.where(diagonal > 0.0, right, 0.0)
-    least, force = ROUNDING * np.abs(left).max(), np.zeros(len(left))
-    for _ in range(30):
-        before = left
-        regularised.solve(before, force)
-        left = REGULARISATION * diagonal * force
-        if np.abs(left).max() <= least:
-            return None
-        if np.abs(before - left).max() <= ROUNDING / REGULARISATION * np.abs(left).max():
-            break
-    count, number = connected_components(matrix, directed=False)
-    size, moved = np.zeros(count), np.zeros(count)
-    np.maximum.at(size, number, np.abs(left))
-    np.maximum.at(moved, number, np.abs(before - left))
-    dependent = (size > least) & (moved <= ROUNDING / REGULARISATION * size)
-    if not dependent.any():
-        return None
-    kept = dependent[number]
-    return np.where(kept, left, 0.0), np.where(kept, REGULARISATION * force, 0.0), np.where(kept, number, -1)
 
 
 class DualSystem:

@@ -29,7 +29,7 @@ from fenics_contact import (
     box_partition,
     solve_scene,
 )
-from fenics_contact._equilibrium.warnings import rotation_of
+from fenics_contact._equilibrium.warnings import _Gradients, rotation_of
 from fenics_contact._pairing.search import find_tied_points
 from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact._scene.pairs import Discretisation
@@ -428,5 +428,6 @@ def test_the_rotation_of_a_body_is_that_of_its_rigid_motion(dim: int) -> None:
     spin = np.zeros((3, 3))
     spin[0, 1], spin[2, 0], spin[1, 2] = (0.03, 0.0, 0.0) if dim == 2 else (0.03, 0.1, -0.2)
     moved = mesh.points @ (spin - spin.T)[:dim, :dim] + 5.0
-    assert rotation_of(mesh, moved) == pytest.approx(np.linalg.norm(spin), rel=1e-10)
-    assert rotation_of(mesh, 0.1 * mesh.points) == pytest.approx(0.0, abs=1e-12)
+    gradients = _Gradients.of(mesh.points, mesh.cells)
+    assert rotation_of(MPI.COMM_SELF, [(gradients, moved)]) == pytest.approx(np.linalg.norm(spin), rel=1e-10)
+    assert rotation_of(MPI.COMM_SELF, [(gradients, 0.1 * mesh.points)]) == pytest.approx(0.0, abs=1e-12)

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from fenics_contact import Body, ContactPair, Coulomb, RigidPlane, Scene, Support, Surface, box_partition
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
-from fenics_contact.feti.dual import REGULARISATION
+from fenics_contact.feti.contact_block import REGULARISATION
 from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.feti.kernel_basis import whole_motions
 from fenics_contact.gallery import block

@@ -69,6 +69,25 @@ def test_rows_are_orthonormal_where_the_stiffness_is_even(name: str, supports: A
     assert abs(B @ B.T - sp.identity(rows.count)).max() < 1e-14
 
 
+def test_each_rank_has_the_entries_on_its_copies() -> None:
+    scene, partitions = CUTS["ragged hexahedra"](supports=ROLLERS)
+    tearing = replace(torn((scene, partitions)), subdomain_rank=np.array([0, 0, 1, 1, 1, 2, 2]))
+    fixed = ~np.isnan(prescribed_displacements(scene, tearing))
+    every, parts = gluing_rows(tearing, fixed), [gluing_rows(tearing, fixed, rank=k) for k in range(3)]
+    for number, part in enumerate(parts):
+        assert 0 < len(part.rows.row) < 0.7 * len(every.rows.row)
+        assert (tearing.subdomain_rank[tearing.copy_subdomain[part.rows.copy]] == number).all()
+        for name in ("owner", "right"):
+            np.testing.assert_array_equal(getattr(part.rows, name), getattr(every.rows, name))
+        np.testing.assert_array_equal(part.dof, every.dof)
+
+    def listed(each: Rows) -> set[tuple[float, ...]]:
+        return set(zip(each.row, each.copy, each.component, each.value, strict=True))
+
+    assert set.union(*(listed(part.rows) for part in parts)) == listed(every.rows)
+    assert sum(len(part.rows.row) for part in parts) == len(every.rows.row)
+
+
 @pytest.mark.parametrize("supports", [(), ROLLERS], ids=["free", "supported"])
 @pytest.mark.parametrize("name", CUTS)
 def test_rows_are_orthogonal_weighted_by_uneven_stiffness(name: str, supports: Any) -> None:

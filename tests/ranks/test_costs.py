@@ -156,6 +156,36 @@ def test_sparse_factors_take_two_operations_for_each_entry_and_substitution() ->
     assert operator.flops == (4 * 19, 4 * 15 + 2 * 2 + 4 * 2)
 
 
+DRAGGED = """
+    import json
+    from mpi4py import MPI
+    from fenics_contact import box_partition, solve_scene
+    from tests.ranks.counted import pressed_block
+    comm, scene = MPI.COMM_WORLD, pressed_block((6, 4, 4))
+    parts = {"block": box_partition(scene.bodies["block"].mesh, (4, 2, 1))}
+    state = solve_scene(scene, comm, partitions=parts, tolerance=1e-10)
+    block, solve = state.system.preconditioner._contact, state.costs.solve
+    contradicted = block.contradiction(state.solution.multiplier)
+    owned = len(block._holder.owned)
+    mine = (owned, block._gram.nnz, solve.largest_copy, solve.transfer_bytes, contradicted is None)
+    force, every = sorted(map(tuple, state.contact.force.round(9).tolist())), comm.gather(mine)
+    if comm.rank == 0:
+        print(json.dumps([every, force]))
+"""
+
+
+def test_one_rank_holds_the_matrix_of_contact_rows(mpirun: Callable[..., str]) -> None:
+    (alone, force), (ranks, same) = (json.loads(mpirun(DRAGGED, number)) for number in (1, 3))
+    np.testing.assert_allclose(same, force, atol=2e-9)
+    owned, entries, copied, sent, none = zip(*ranks, strict=True)
+    assert min(owned) > 0
+    assert sum(owned) == alone[0][0]
+    assert sorted(entries) == [0, 0, alone[0][1]]
+    assert max(copied) <= 8, "no table is copied to all ranks"
+    assert np.count_nonzero(sent) == 1
+    assert set(none) == {alone[0][4]}
+
+
 SUMMED = """
     import numpy as np, scipy.sparse as sp
     from mpi4py import MPI
