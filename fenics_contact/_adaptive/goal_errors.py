@@ -103,6 +103,11 @@ class GoalError:
         """J − J_h, the sum of all parts."""
         return self.mesh + self.geometry + self.solver + self.friction
 
+    @property
+    def known(self) -> float:
+        """The sum of all parts; 0 where there is no adjoint, as nothing is known then."""
+        return 0.0 if self.without_adjoint else self.total
+
     def by_cell(self, body: str) -> np.ndarray:
         """Return the share of each cell of a body in the mesh's part, shape (n_cells,), replicated.
 

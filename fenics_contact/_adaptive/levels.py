@@ -298,7 +298,7 @@ class Way:
         self.without_adjoint = estimate.without_adjoint
         self._shares = {name: estimate.by_cell(name) for name in self._state.scene.bodies}
         self._sums.append(float(sum(share.sum() for share in self._shares.values())))
-        missing = 0.0 if estimate.without_adjoint else estimate.total
+        missing = estimate.known
         value = estimate.value + missing
         self._corrected.append(float("nan") if self._doubted else value)
         return estimate.value, value, self._error(missing, value)

@@ -227,7 +227,7 @@ class _Descent(Way):
             value, error = value_of(state, self.quantity), np.inf
         else:
             estimate = goal_error(state, self.quantity)
-            value, error = estimate.value, 0.0 if estimate.without_adjoint else abs(estimate.total)
+            value, error = estimate.value, abs(estimate.known)
         size = abs(value)
         enough = min(share * max(error, self.wanted * size), loosest * size)
         return enough / (self._method.size_of(value) + size) if size else self._method.tolerance

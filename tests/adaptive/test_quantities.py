@@ -223,6 +223,7 @@ def test_the_area_that_sticks_has_no_adjoint() -> None:
     assert found.value == pytest.approx(area, abs=0.2)
     assert 0.0 < found.value < 2.0
     assert found.without_adjoint.startswith("an area changes by the statuses")
+    assert (found.known, np.isnan(found.total)) == (0.0, True)
     assert np.all(found.by_cell("block") > 0.0)
     with pytest.raises(InvalidInputError, match="StickArea has no derivatives"):
         StickArea(0).partials(here, without_shape(here))
