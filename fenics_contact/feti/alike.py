@@ -178,12 +178,18 @@ class Kinds:
         self.all: list[Kind] = []
         # By counts and trace: kind, a subdomain of it with a numbering of its own, how it lies on the first.
         self._seen: dict[tuple[int, ...], Nearby[tuple[Kind, Kind, Motion | None]]] = defaultdict(Nearby)
+        self._matrices: set[int] = set()
 
     def add(self, kind: Kind) -> Kind:
         """Take a kind without comparing it with others."""
         self.all.append(kind)
         self._seen[kind.key].add(kind.size[0], (kind, kind, None))
+        self._matrices.add(id(kind.subdomain.matrix))
         return kind
+
+    def compares_with(self, subdomain: Subdomain) -> bool:
+        """Return whether those that follow may be compared with the matrix of a subdomain."""
+        return id(subdomain.matrix) in self._matrices
 
     def place(self, given: Kind) -> tuple[Kind, Motion | None]:
         """Return the kind of a subdomain, given as one of its own, and how it lies on the first one of it.
@@ -201,6 +207,8 @@ class Kinds:
                 found = self._motion(first, given)
                 if found is not None:  # others may be the same as this one dof by dof
                     seen.add(given.size[0], (kind, given, found))
+                    self._matrices.add(id(given.subdomain.matrix))
+                    given.forget()
                     return kind, found
         return self.add(given), None
 

@@ -401,11 +401,15 @@ class TornInverse:
         for kind in dict.fromkeys(each[0] for each in known if each is not None):
             kinds.add(kind)  # whatever others change to, these stay
         self._members: list[tuple[Kind, Motion | None]] = []
+        uses = Counter(id(subdomain.matrix) for subdomain in self._subdomains)
         for member, subdomain, local in zip(known, self._subdomains, self._local, strict=True):
             if member is None:
                 given = Kind(subdomain, local)
                 member = kinds.place(given) if shared else (kinds.add(given), None)
             self._members.append(member)
+            uses[id(subdomain.matrix)] -= 1
+            if not (uses[id(subdomain.matrix)] or kinds.compares_with(subdomain)):
+                subdomain.matrix.forget()
         kinds.forget()
         self.kinds = kinds.all
         needed = {id(each.subdomain.matrix) for each in self.kinds if each.operator is None}

@@ -25,10 +25,10 @@ from fenics_contact import (
     solve_scene,
 )
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
-from fenics_contact.feti.alike import Kind, Kinds
+from fenics_contact.feti.alike import Kind, Kinds, Motion
 from fenics_contact.feti.compact import CompactOperator
 from fenics_contact.feti.inverse import ExplicitOperator, FactoredOperator, LocalKind, TornInverse
-from fenics_contact.feti.subdomain import assemble
+from fenics_contact.feti.subdomain import Assembled, assemble
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
     Elasticity,
@@ -116,6 +116,27 @@ def _flexed(operator: Any, force: np.ndarray) -> np.ndarray:
 
 def moved(mesh: BodyMesh, Q: np.ndarray) -> BodyMesh:
     return mesh.moved(mesh.points @ Q.T + np.array([3.0, -2.0, 0.7]))
+
+
+def test_matrices_are_held_no_longer_than_others_are_compared_with_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    placed, held, place = list[Kind](), list[int](), Kinds.place
+
+    def recorded(self: Kinds, given: Kind) -> tuple[Kind, Motion | None]:
+        held.append(sum(each.subdomain.matrix.held for each in placed))
+        placed.append(given)
+        return place(self, given)
+
+    monkeypatch.setattr(Kinds, "place", recorded)
+    monkeypatch.setattr(Assembled, "same_as", lambda *given: None)  # each has a matrix of its own
+    mesh = bent()
+    meshes = [mesh, moved(mesh, np.eye(3)), moved(mesh, TURN), moved(mesh, TURN), renumbered(mesh)]
+    inverse = of_bodies([Body(each, STEEL) for each in meshes], ["x0"] * 5, LocalKind.EXPLICIT)
+    assert (len(inverse.kinds), inverse.factored) == (1, 1)
+    # Those of the first, and of the first turned one, with which others agree dof by dof.
+    assert held == [0, 1, 1, 2, 2]
+    assert not any("blocks" in vars(each) for each in placed)
 
 
 @pytest.mark.parametrize("way", WAYS)
