@@ -165,7 +165,10 @@ class Ledger:
 
     @property
     def _counts(self) -> Counter[str]:
-        return self._phases.setdefault(phase_under_way() or "other", Counter())
+        name = phase_under_way() or "other"
+        if name not in self._phases:
+            self._phases[name] = Counter()
+        return self._phases[name]
 
     def costs(self, ranks: int) -> Costs:
         """Return the counts so far."""

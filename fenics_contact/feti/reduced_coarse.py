@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -157,6 +158,11 @@ class Eliminated:
         reduced = np.tril(reduced) + np.tril(reduced, -1).T  # the other triangle is not formed
         return cls(factor, inside[:, touched].tocsr(), reduced)
 
+    @cached_property
+    def transposed(self) -> sp.csc_matrix:
+        """A_ci, which shares the memory of A_ic, shape (n_c, n_i)."""
+        return self.coupling.T
+
     def inner(self, right: Vector) -> Vector:
         """Return A_ii⁻¹ times a vector, shape (n_i,)."""
         self.factor.solve(right, solution := np.empty(len(right)))
@@ -210,7 +216,7 @@ class ReducedInverse:
         scale, touched = self._grams.scale, self._grams.touched
         right = scale * right_side
         solution, bent = np.empty(len(right)), inside.inner(right[~touched])
-        solution[touched] = block.solve(right[touched] - inside.coupling.T @ bent)
+        solution[touched] = block.solve(right[touched] - inside.transposed @ bent)
         solution[~touched] = bent - inside.inner(inside.coupling @ solution[touched])
         return scale * solution
 

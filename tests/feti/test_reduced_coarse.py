@@ -175,3 +175,11 @@ def test_any_number_of_ranks_finds_the_same(
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
     assert flops[0] > 0
     assert flops[1:] == [0] * (ranks - 1), "the first rank solves for all"
+
+
+def test_the_coupling_of_motions_is_transposed_once(reduced: ReducedGrams) -> None:
+    inside = reduced.eliminated
+    assert inside is not None
+    assert inside.coupling.nnz > 0
+    assert inside.transposed is inside.transposed
+    assert np.shares_memory(inside.transposed.data, inside.coupling.data)
