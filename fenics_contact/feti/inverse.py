@@ -519,11 +519,19 @@ class TornInverse:
         """Return bᵀ K⁺ b for each row b of a matrix with interface columns, shape (n_rows,)."""
         flexibility = np.zeros(rows.shape[0])
         columns = rows.tocsc()
-        for operator, part in zip(self.operators, self._parts, strict=True):
+        found: dict[Kind, list[tuple[np.ndarray, sp.csr_matrix]]] = {}
+        for (kind, _), operator, part in zip(self._members, self.operators, self._parts, strict=True):
             block = columns[:, part].tocsr()
             touched = np.flatnonzero(np.diff(block.indptr))
             if len(touched):
-                flexibility[touched] += operator.row_flexibility(block[touched])
+                block = block[touched]
+                block = operator.rows_there(block) if isinstance(operator, MovedOperator) else block
+                found.setdefault(kind, []).append((touched, block))
+        for kind, blocks in found.items():
+            touched, every = np.concatenate([each for each, _ in blocks]), sp.vstack([b for _, b in blocks])
+            every = every.tocsr()
+            first, same = _distinct_rows(every)  # subdomains alike mostly have the same rows
+            np.add.at(flexibility, touched, factored(kind).row_flexibility(every[first])[same])
         return flexibility
 
     def _factor(
@@ -550,6 +558,23 @@ class TornInverse:
         for shared, batch in self._batches:
             batch.scatter(at_once(shared)(batch.gather(given)), result)
         return result
+
+
+def _distinct_rows(rows: sp.csr_matrix) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first of the rows that are equal up to their sign, and which of these each one equals."""
+    rows.sort_indices()
+    counts = np.diff(rows.indptr)
+    signed = rows.data * np.repeat(np.where(rows.data[rows.indptr[:-1]] < 0.0, -1.0, 1.0), counts)
+    firsts: list[np.ndarray] = []
+    same = np.empty(len(counts), dtype=np.int64)
+    for count in np.unique(counts):
+        here = np.flatnonzero(counts == count)
+        entries = rows.indptr[here][:, None] + np.arange(count)
+        table = np.hstack([rows.indices[entries], signed[entries]])
+        _, first, which = np.unique(table, axis=0, return_index=True, return_inverse=True)
+        same[here] = which.ravel() + sum(len(each) for each in firsts)
+        firsts.append(here[first])
+    return np.concatenate(firsts), same
 
 
 def _by_pattern(kinds: Sequence[Kind]) -> list[Kind]:

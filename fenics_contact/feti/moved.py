@@ -103,7 +103,11 @@ class MovedOperator:
 
     def row_flexibility(self, rows: sp.csr_matrix) -> np.ndarray:
         """Return bᵀ (K⁺)_bb b for each row b of a matrix with interface columns, shape (n_rows,)."""
-        return self.first.row_flexibility((rows @ self.interface.matrix.T).tocsr())
+        return self.first.row_flexibility(self.rows_there(rows))
+
+    def rows_there(self, rows: sp.csr_matrix) -> sp.csr_matrix:
+        """Return rows with interface columns as they lie on the interface of the first one."""
+        return (rows @ self.interface.matrix.T).tocsr()
 
 
 def _there(vector: np.ndarray, motion: Motion | MovedInterface) -> np.ndarray:

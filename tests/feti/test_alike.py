@@ -27,7 +27,13 @@ from fenics_contact import (
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.feti.alike import Kind, Kinds, Motion
 from fenics_contact.feti.compact import CompactOperator
-from fenics_contact.feti.inverse import ExplicitOperator, FactoredOperator, LocalKind, TornInverse
+from fenics_contact.feti.inverse import (
+    ExplicitOperator,
+    FactoredOperator,
+    LocalKind,
+    TornInverse,
+    _distinct_rows,
+)
 from fenics_contact.feti.subdomain import Assembled, assemble
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
@@ -107,6 +113,11 @@ def require_operators_of_each(inverse: TornInverse) -> None:
     np.testing.assert_allclose(inverse.flex_exactly(forces), flexed, atol=1e-10 * size)
     np.testing.assert_allclose(inverse.flex(forces), flexed, atol=rounding * size)
     np.testing.assert_allclose(inverse.stiffen(forces), stiffened, atol=1e-5 * np.abs(stiffened).max())
+    across = np.round(random.normal(size=(4, len(forces)), scale=0.4))
+    across[1] = -across[0]
+    expected = [row @ inverse.flex_exactly(row) for row in across]
+    found = inverse.row_flexibility(csr_matrix(across))
+    np.testing.assert_allclose(found, expected, rtol=1e-5 if inverse.is_rounded else 1e-8)
 
 
 def _flexed(operator: Any, force: np.ndarray) -> np.ndarray:
@@ -147,6 +158,36 @@ def test_bodies_that_are_shifted_turned_and_renumbered_are_one_kind(cell: str, w
     inverse = of_bodies([Body(each, STEEL) for each in meshes], ["x0"] * 5, way)
     assert (len(inverse.kinds), inverse.factored) == (1, 1)
     require_operators_of_each(inverse)
+
+
+def test_rows_that_subdomains_alike_have_in_common_are_solved_for_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    mesh = bent()
+    inverse = of_bodies([Body(each, STEEL) for each in (mesh, moved(mesh, np.eye(3)))], ["x0"] * 2, WAYS[0])
+    assert len(inverse.kinds) == 1
+    operator, solved = inverse.kinds[0].operator, []
+    row = np.zeros(len(inverse.interface) // 2)
+    row[[1, 4]] = 0.0, 2.0
+    rows = csr_matrix(np.array([np.append(row, 0 * row), np.append(0 * row, -row), np.append(row, 2 * row)]))
+    whole = type(operator).row_flexibility
+
+    def counted(self: Any, rows: csr_matrix) -> np.ndarray:
+        solved.append(rows.shape[0])
+        return whole(self, rows)
+
+    monkeypatch.setattr(type(operator), "row_flexibility", counted)
+    found = inverse.row_flexibility(rows)
+    assert solved == [2]
+    np.testing.assert_allclose(found, found[0] * np.array([1.0, 1.0, 5.0]), rtol=1e-12)
+
+
+def test_a_stored_zero_makes_no_rows_equal() -> None:
+    rows = csr_matrix(
+        (np.array([0.0, 1.0, 0.0, 2.0, 0.0, -1.0]), np.array([0, 1] * 3), np.array([0, 2, 4, 6]))
+    )
+    first, same = _distinct_rows(rows)
+    assert (len(first), same[0] == same[1]) == (3, False)
 
 
 @pytest.mark.parametrize("way", WAYS)
