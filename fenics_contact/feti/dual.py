@@ -26,7 +26,7 @@ from fenics_contact.feti.reduced_coarse import Elimination
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.mesh.quality import node_volumes
 from fenics_contact.qp.coarse import CoarseSpace
-from fenics_contact.qp.problem import DualProblem, Scaling
+from fenics_contact.qp.problem import DualProblem, Operator, Scaling
 
 
 class DirichletPreconditioner:
@@ -236,13 +236,14 @@ class DualSystem:
             coarse = previous.problem.coarse.with_load(self._resultants(self.torn.numbering.comm))
             scaling = previous.problem.scaling
             scaling = None if scaling is None else scaling.with_load(coarse.load)
+        operator, exact = self._operators
         self.problem = replace(
             previous.problem,
-            operator=self.apply,
+            operator=operator,
+            exact=exact,
             coarse=coarse,
             scaling=scaling,
             reach=self.reach,
-            exact=self.apply_exactly if self.inverse.is_rounded else None,
         )
 
     def _set_up(self, timer: PhaseTimer) -> None:
@@ -265,9 +266,10 @@ class DualSystem:
             diagonal, supported = self._diagonal()
             scaling = self._scaling(coarse)
         nothing = np.zeros(len(torn.numbering.owned))
+        operator, exact = self._operators
         self.problem = DualProblem(
             comm,
-            self.apply,
+            operator,
             nothing,
             coarse,
             self.torn.layout,
@@ -276,16 +278,24 @@ class DualSystem:
             scaling,
             self.reach,
             supported,
-            exact=self.apply_exactly if self.inverse.is_rounded else None,
+            exact=exact,
         )
 
     def apply(self, multiplier: np.ndarray) -> np.ndarray:
-        """Return F λ = B K⁺ Bᵀ λ for an owned vector, with C λ on rows of springs. Collective."""
+        """Return F λ = B K⁺ Bᵀ λ for an owned vector, with C λ on rows of springs. Collective.
+
+        In double precision, however K⁺ is stored.
+        """
+        return self._applied(self.inverse.flex_exactly, multiplier)
+
+    def apply_rounded(self, multiplier: np.ndarray) -> np.ndarray:
+        """Return F λ in the precision in which K⁺ is stored. Collective."""
         return self._applied(self.inverse.flex, multiplier)
 
-    def apply_exactly(self, multiplier: np.ndarray) -> np.ndarray:
-        """Return F λ in double precision, however K⁺ is stored. Collective."""
-        return self._applied(self.inverse.flex_exactly, multiplier)
+    @property
+    def _operators(self) -> tuple[Operator, Operator | None]:
+        """What Krylov methods apply, and what confirms their answer where that is in single precision."""
+        return (self.apply_rounded, self.apply) if self.inverse.is_rounded else (self.apply, None)
 
     def _applied(self, flex: Callable[[np.ndarray], np.ndarray], multiplier: np.ndarray) -> np.ndarray:
         self.products += 1

@@ -251,6 +251,7 @@ class Safeguards:
         moves_held: Whether floating bodies are equilibrated also where the face holds them all.
         balanced: Imbalance up to which an iterate counts as in equilibrium; steps from others are not cut.
         stuck: Part of a step after which the next one is not cut on the same face.
+        rounded: Where products are in single precision, least tolerance of a face relative to the residual.
     """
 
     shorten: Callable[[DualProblem, Iterate, Iterate, Residuals | None], Damped[Iterate]] = shorten
@@ -260,6 +261,7 @@ class Safeguards:
     longest_cycle: int = 6
     balanced: float = 1e-6
     stuck: float = 0.01
+    rounded: float = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -379,6 +381,8 @@ class FaceSteps:
         # (a), (c) Its solution, as accurate as the last face's prediction warrants.
         expected = None if changed else state.mismatch
         tolerance = self.forcing.by_prediction(before.residuals, expected, care)
+        if self.problem.exact is not None:
+            tolerance = max(tolerance, self.safeguards.rounded * before.residuals.worst)
         solved = self._solve(face, before, tolerance, predicted=expected is not None)
         # (d) Rigid motions, then the damped step.
         alpha = self._motions(solved, before, step)
