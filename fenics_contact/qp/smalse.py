@@ -277,6 +277,7 @@ class Smalse:
         loosest: η: but not before ‖projected gradient‖ ≤ η‖b‖.
         balance_reduction: Factor on M when the Lagrangian increases too little.
         mpgp: Parameters of the inner iteration.
+        rounded: Least tolerance where products are in single precision.
 
     References:
         Z. Dostál, T. Kozubek, M. Sadowská, V. Vondrák, Scalable Algorithms for Contact Problems,
@@ -289,6 +290,7 @@ class Smalse:
     loosest: float = 0.1
     balance_reduction: float = 0.1
     mpgp: Mpgp = field(default_factory=Mpgp)
+    rounded: float = 1e-5
 
     def with_tolerance(self, tolerance: float) -> Smalse:
         """Return the solver with another tolerance."""
@@ -305,6 +307,12 @@ class Smalse:
             raise InvalidInputError(
                 "SMALSE needs surfaces that do not give way, got closure laws or a stick stiffness: "
                 "use FaceNewton"
+            )
+        if problem.exact is not None and self.tolerance < self.rounded:
+            raise InvalidInputError(
+                f"SMALSE needs products in double precision for residuals below {self.rounded:g}, got the "
+                f"tolerance {self.tolerance:g} with subdomains stored compactly, in single precision, to fit "
+                "into memory: use FaceNewton, which refines them, allow more memory, or loosen the tolerance"
             )
         if not isinstance(problem.law, TrescaLaw):
             raise InvalidInputError(

@@ -9,12 +9,13 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import Body
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.feti.compact import CompactOperator
 from fenics_contact.feti.inverse import ExplicitOperator, LocalKind
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials import IsotropicElasticity
-from fenics_contact.qp import DualSolution, FaceNewton, ProjectedCG, solve
+from fenics_contact.qp import DualSolution, FaceNewton, ProjectedCG, Smalse, solve
 from tests.feti.scenes import STEEL, clamped_block, touching_blocks
 
 
@@ -122,3 +123,14 @@ def test_a_linear_problem_needs_few_products_more_however_small_its_tolerance() 
         for kind in (LocalKind.EXPLICIT, LocalKind.COMPACT)
     )
     assert whole < compact <= 1.5 * whole
+
+
+def test_what_single_precision_does_not_reach_by_smalse_is_refused() -> None:
+    scene, partitions = clamped_block("tetrahedron")
+    system = DualSystem(
+        build_torn_system(scene, decompose(scene, partitions, MPI.COMM_SELF)), kind=LocalKind.COMPACT
+    )
+    message = "SMALSE needs products in double precision for residuals below 1e-05, got the tolerance 1e-06"
+    with pytest.raises(InvalidInputError, match=message):
+        solve(system.problem, None, Smalse(tolerance=1e-6))
+    assert solve(system.problem, None, Smalse(tolerance=1e-4)).residuals.within(1e-4)
