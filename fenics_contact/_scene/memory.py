@@ -42,7 +42,7 @@ class Rates:
     """
 
     start: float = 9e6
-    tables: float = 90.0
+    tables: float = 55.0
     own: float = 100.0
     system: float = 110.0
     entry: float = 12.0

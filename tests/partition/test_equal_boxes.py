@@ -59,8 +59,10 @@ def test_a_closed_ring_of_equal_cells_is_cut_into_equal_arcs() -> None:
 
 
 def test_what_is_not_alike_is_left_to_bisection() -> None:
-    graded = box_lattice(3 * [np.linspace(0, 1, 9) ** 1.5])
+    graded = box_lattice(3 * [np.linspace(0, 1, 9) ** 2.5])
     assert equal_boxes(graded, 8, 1) is None
+    assert equal_boxes(graded, 8, 1, members=1, slender=2.0) is None  # some are too long
+    assert equal_boxes(graded, 8, 1, members=1, slender=2.0, longest=9.0) is not None
     assert np.array_equal(default_partition(graded, nodes=5.0**3), bisection_partition(graded, 8))
     mesh = block((0, 0, 0), (2, 1, 1), (18, 9, 9))
     assert equal_boxes(mesh, 54, 1) is not None
