@@ -60,17 +60,26 @@ def bisection_partition(mesh: BodyMesh, parts: int) -> np.ndarray:
     return _bisected(mesh, parts, mesh.n_cells)
 
 
-def _bisected(mesh: BodyMesh, parts: int, usual: int, heavy: float = 3.0) -> np.ndarray:
+def _bisected(
+    mesh: BodyMesh,
+    parts: int,
+    usual: int,
+    faces: tuple[np.ndarray, np.ndarray] | None = None,
+    heavy: float = 3.0,
+) -> np.ndarray:
     """Return a partition into ``parts`` subdomains, and more where one has too many cells.
 
     Where cells are refined near a point, subdomains of the same weight may have very different numbers of
     cells. What has more than ``heavy`` times ``usual`` of them is cut on, into as many parts as are usual.
+
+    `faces`: pairs of cells that share a face, and its area, see `face_areas`.
     """
     check_parts(mesh, parts)
     if mesh.cuts:
-        return pieces(mesh, _bisected(closed(mesh), parts, usual, heavy))
+        return pieces(mesh, _bisected(closed(mesh), parts, usual, heavy=heavy))
     partition, count = np.zeros(mesh.n_cells, dtype=np.int64), 0
-    pending = [_whole(mesh, parts)] if parts > 1 else []
+    faces = face_areas(mesh) if faces is None else faces
+    pending = [_whole(mesh, parts, *faces)] if parts > 1 else []
     while pending:
         piece = pending.pop()
         if piece.parts > 1:
@@ -80,7 +89,7 @@ def _bisected(mesh: BodyMesh, parts: int, usual: int, heavy: float = 3.0) -> np.
         else:
             partition[piece.cells] = count
             count += 1
-    return kept_together(mesh, merge_pieces(mesh, partition))
+    return kept_together(mesh, merge_pieces(mesh, partition, pairs=faces[0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +114,7 @@ class _Piece:
     Attributes:
         cells: Its cells, (n,).
         places: Layers or coordinates of their centres, (n, 3 | 2).
+        orders: The cells in the order of each of these, (n,) each.
         turned: Whether it may be cut normal to its principal axes.
         weights: Weight of each cell, (n,), with 1 for a subdomain.
         pairs: Pairs of cells that share a face, in its own numbering, (n_pairs, 2).
@@ -113,6 +123,7 @@ class _Piece:
 
     cells: np.ndarray
     places: np.ndarray
+    orders: tuple[np.ndarray, ...]
     turned: bool
     weights: np.ndarray
     pairs: np.ndarray
@@ -137,24 +148,24 @@ class _Piece:
     def _best(self, between_layers: bool) -> _Cut | None:
         """Return the cheapest cut, the first of equivalent ones."""
         best: _Cut | None = None
-        for place in self._directions():
-            cut = self._across(place, between_layers)
+        for place, order in self._directions():
+            cut = self._across(place, order, between_layers)
             if cut is not None and (best is None or cut.cost < (1.0 - ALIKE) * best.cost):
                 best = cut
         return best
 
-    def _directions(self) -> list[np.ndarray]:
-        """List the positions of the cells along the directions, each (n,)."""
-        along = list(self.places.T)
+    def _directions(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """List the positions of the cells along the directions, and their orders, each (n,)."""
+        along = list(zip(self.places.T, self.orders, strict=True))
         if self.turned:
             arms = self.places - self.weights @ self.places / self.weights.sum()
             _, axes = np.linalg.eigh((arms * self.weights[:, None]).T @ arms)
-            along += list(np.round(arms @ axes).T)
+            turned = np.round(arms @ axes).T
+            along += [(place, np.argsort(place, kind="stable")) for place in turned]
         return along
 
-    def _across(self, place: np.ndarray, between_layers: bool) -> _Cut | None:
+    def _across(self, place: np.ndarray, order: np.ndarray, between_layers: bool) -> _Cut | None:
         """Return the cheapest cut normal to a direction, None if there is none between layers."""
-        order = np.argsort(place, kind="stable")
         n, total = len(order), self.weights.sum()
         cells, before = np.arange(1, n), np.cumsum(self.weights[order])[:-1]
         least = min(-(-self.parts // 3), self.parts // 2)
@@ -174,8 +185,9 @@ class _Piece:
         """Return the area of the faces between the first k cells and the others, k = 1 ... n - 1."""
         rank = np.empty_like(order)
         rank[order] = np.arange(len(order))
-        ends = np.sort(rank[self.pairs], axis=1)
-        begins, stops = (np.bincount(end, self.areas, minlength=len(order)) for end in ends.T)
+        first, other = rank[self.pairs[:, 0]], rank[self.pairs[:, 1]]
+        ends = np.minimum(first, other), np.maximum(first, other)
+        begins, stops = (np.bincount(end, self.areas, minlength=len(order)) for end in ends)
         return np.asarray(np.cumsum(begins - stops)[:-1])
 
     def _part(self, chosen: np.ndarray, parts: int) -> _Piece:
@@ -185,6 +197,7 @@ class _Piece:
         return _Piece(
             self.cells[chosen],
             self.places[chosen],
+            tuple(number[order[chosen[order]]] for order in self.orders),
             self.turned,
             self.weights[chosen],
             number[self.pairs[inside]],
@@ -193,7 +206,7 @@ class _Piece:
         )
 
 
-def _whole(mesh: BodyMesh, parts: int) -> _Piece:
+def _whole(mesh: BodyMesh, parts: int, pairs: np.ndarray, areas: np.ndarray) -> _Piece:
     """Return the whole mesh as a piece."""
     if mesh.grid is None:
         # In units above rounding, so that layers of cells are not split by the last bits.
@@ -203,7 +216,8 @@ def _whole(mesh: BodyMesh, parts: int) -> _Piece:
     else:
         places = mesh.grid
     cells, weights = np.arange(mesh.n_cells), parts * cell_weights(mesh)
-    return _Piece(cells, places, mesh.grid is None, weights, *face_areas(mesh), parts)
+    orders = tuple(np.argsort(place, kind="stable") for place in places.T)
+    return _Piece(cells, places, orders, mesh.grid is None, weights, pairs, areas, parts)
 
 
 TARGET_NODES = {3: 700, 2: 1000}
@@ -264,13 +278,14 @@ def default_partition(
     every rank.
     """
     check_count(ranks, "ranks")
-    check_one_piece(mesh, body)
+    faces = None if mesh.cuts else face_areas(mesh)
+    check_one_piece(mesh, body, None if faces is None else faces[0])
     target, least = target_parts(mesh, nodes), min(ranks, mesh.n_cells)
     boxes = equal_boxes(mesh, target, least)
     if boxes is not None:
         return boxes
     usual = -(-mesh.n_cells // target)
-    return _bisected(mesh, _often_halved(target, least, mesh.n_cells), usual)
+    return _bisected(mesh, _often_halved(target, least, mesh.n_cells), usual, faces)
 
 
 def _often_halved(target: int, least: int, most: int) -> int:

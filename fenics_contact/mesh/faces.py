@@ -156,7 +156,7 @@ def number_faces(faces: np.ndarray) -> np.ndarray:
 
 def _numbered(keys: np.ndarray) -> np.ndarray:
     """Return consecutive numbers of keys, (n, 2), in their order, the same for equal ones, (n,)."""
-    order = np.lexsort((keys[:, 1], keys[:, 0]))
+    order = _in_order(keys)
     changes = np.zeros(len(keys), dtype=bool)
     for column in keys.T:  # one after the other: keys are the largest arrays of a mesh
         ordered = column[order]
@@ -164,6 +164,17 @@ def _numbered(keys: np.ndarray) -> np.ndarray:
     numbers = np.empty(len(keys), dtype=np.int64)
     numbers[order] = np.cumsum(changes)
     return numbers
+
+
+def _in_order(keys: np.ndarray, bits: int = 21) -> np.ndarray:
+    """Return the lexical order of keys, (n,); of triangles with nodes below 2^bits by one integer each."""
+    most = keys.max(axis=0)
+    if most[0] >> 31 < 1 << bits and not np.any(keys[:, 1] & (1 << 31) - 1):
+        least = keys[:, 0] & (1 << 31) - 1
+        third = keys[:, 1] >> 31
+        if max(least.max(), third.max()) < 1 << bits:
+            return np.argsort(((keys[:, 0] >> 31) << 2 * bits) + (least << bits) + third, kind="stable")
+    return np.lexsort((keys[:, 1], keys[:, 0]))
 
 
 def _numbers_of_faces(cells: np.ndarray, dim: int) -> np.ndarray:

@@ -81,18 +81,20 @@ def _face_pieces(mesh: BodyMesh, partition: np.ndarray, pairs: np.ndarray) -> tu
     return piece, owner
 
 
-def merge_pieces(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> np.ndarray:
+def merge_pieces(
+    mesh: BodyMesh, partition: np.ndarray, body: str = "", pairs: np.ndarray | None = None
+) -> np.ndarray:
     """Make every subdomain connected through faces.
 
     The largest piece of each subdomain stays; every other piece goes to the subdomain with whose largest
     piece it shares most faces, those that touch none in a later round.
 
-    `partition`: (n_cells,) subdomain numbers.
+    `partition`: (n_cells,) subdomain numbers; `pairs`: of cells that share a face, if known, (n_pairs, 2).
 
     Returns (n_cells,) subdomain numbers, the same subdomains.
     """
     partition = _checked_partition(mesh, partition).copy()
-    pairs = neighbours(mesh.cells, mesh.dim, mesh.hanging)
+    pairs = neighbours(mesh.cells, mesh.dim, mesh.hanging) if pairs is None else pairs
     while True:
         piece, owner = _face_pieces(mesh, partition, pairs)
         by_size = np.lexsort((np.arange(owner.size), -np.bincount(piece)))
@@ -166,12 +168,14 @@ def _named(body: str) -> str:
     return f"body '{body}'" if body else "a mesh"
 
 
-def check_one_piece(mesh: BodyMesh, body: str = "") -> None:
-    """Reject a mesh that is not connected through faces, other than where a section cuts it."""
-    mesh = closed(mesh) if mesh.cuts else mesh
-    piece, owner = _face_pieces(
-        mesh, np.zeros(mesh.n_cells, dtype=np.int64), neighbours(mesh.cells, mesh.dim, mesh.hanging)
-    )
+def check_one_piece(mesh: BodyMesh, body: str = "", pairs: np.ndarray | None = None) -> None:
+    """Reject a mesh that is not connected through faces, other than where a section cuts it.
+
+    `pairs`: of cells that share a face, if known, (n_pairs, 2).
+    """
+    mesh, pairs = (closed(mesh), None) if mesh.cuts else (mesh, pairs)
+    pairs = neighbours(mesh.cells, mesh.dim, mesh.hanging) if pairs is None else pairs
+    piece, owner = _face_pieces(mesh, np.zeros(mesh.n_cells, dtype=np.int64), pairs)
     if owner.size > 1:
         sizes = np.sort(np.bincount(piece))[::-1]
         raise InvalidInputError(

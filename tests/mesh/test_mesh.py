@@ -648,3 +648,12 @@ def test_what_cannot_be_searched_is_refused() -> None:
         near_surfaces(meshes, 0)
     with pytest.raises(InvalidInputError, match="body 'low' must have no surface 'near high' yet"):
         near_surfaces(near_surfaces(meshes, 0.1)[0], 0.1)
+
+
+@pytest.mark.parametrize("corners", [2, 3, 4])
+def test_faces_have_the_same_numbers_however_large_those_of_nodes_are(corners: int) -> None:
+    faces = np.argsort(np.random.default_rng(0).random((400, 7)), axis=1)[:, :corners]
+    numbers = number_faces(faces)
+    assert numbers.max() + 1 == len({tuple(sorted(face)) for face in faces.tolist()}) < 400
+    for far in (2**21 - 4, 2**21, 2**30):  # one integer for a triangle, beyond that two
+        np.testing.assert_array_equal(number_faces(faces + far), numbers)
