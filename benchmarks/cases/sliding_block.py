@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
-from functools import partial
 from time import perf_counter
 from typing import Any
 
@@ -35,10 +33,12 @@ def measure(
         tolerance: Of every residual.
         size: Largest edge of a tetrahedron; gmsh's seconds do not count.
     """
-    mesh_block = partial(block_mesh, counts) if counts else partial(copy, drilled_block(size))
+    mesh = None if counts else drilled_block(size)
     comm.Barrier()
     start = perf_counter()
-    mesh = mesh_block()
+    if counts:
+        mesh = block_mesh(counts)
+    assert mesh is not None
     scene = block_on_plane(mesh, friction_coefficient)
     solver = FaceNewton(tolerance=tolerance)
     partitions = {"block": box_partition(mesh, boxes)} if boxes else None

@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from scipy.linalg import blas, lapack
 
 from fenics_contact._base.memory import return_memory
+from fenics_contact._scene.memory import Rates
 from fenics_contact.feti.condensation import pieces, regular_factor
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.subdomain import Subdomain
@@ -86,7 +87,7 @@ class CompactOperator:
         contracts: Whether refinement converges; not where S is too ill-conditioned for single precision.
     """
 
-    pays_from = 8
+    pays_from = Rates.whole  # what the plan counts with
 
     def __init__(
         self,

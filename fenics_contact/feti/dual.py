@@ -307,16 +307,16 @@ class DualSystem:
 
     def reach(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """Return abs(B) abs(u), the size of the displacements at each row, owned, [length]. Collective."""
-        count_flops(self.torn.numbering.comm, self.inverse.flops[0] + 2 * self._B_interface.nnz)
-        force = self._Bt_interface @ self.torn.numbering.to_local(multiplier)
-        moved = self._bent - self.inverse.flex(force) + (self.kernel @ alpha)[self.inverse.interface]
+        moved = self._bent_by(self.inverse.flex, multiplier) + (self.kernel @ alpha)[self.inverse.interface]
         return self.torn.numbering.to_owned(abs(self._B_interface) @ np.abs(moved))
 
     def bent(self, multiplier: np.ndarray) -> np.ndarray:
         """Return K⁺(f − Bᵀλ) on the interface, (n_interface,), [length]; one product. Collective."""
+        return self._bent_by(self.inverse.flex_exactly, multiplier)
+
+    def _bent_by(self, flex: Callable[[np.ndarray], np.ndarray], multiplier: np.ndarray) -> np.ndarray:
         count_flops(self.torn.numbering.comm, self.inverse.flops[0] + 2 * self._B_interface.nnz)
-        force = self._Bt_interface @ self.torn.numbering.to_local(multiplier)
-        return self._bent - self.inverse.flex_exactly(force)
+        return self._bent - flex(self._Bt_interface @ self.torn.numbering.to_local(multiplier))
 
     def force(self, multiplier: np.ndarray) -> np.ndarray:
         """Return Bᵀλ on this rank's torn dofs, [force]. Collective."""

@@ -281,7 +281,7 @@ def default_partition(
     faces = None if mesh.cuts else face_areas(mesh)
     check_one_piece(mesh, body, None if faces is None else faces[0])
     target, least = target_parts(mesh, nodes), min(ranks, mesh.n_cells)
-    boxes = equal_boxes(mesh, target, least)
+    boxes = equal_boxes(mesh, target, least, faces)
     if boxes is not None:
         return boxes
     usual = -(-mesh.n_cells // target)

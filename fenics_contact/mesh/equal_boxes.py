@@ -18,6 +18,7 @@ def equal_boxes(
     mesh: BodyMesh,
     target: int,
     least: int,
+    faces: tuple[np.ndarray, np.ndarray] | None = None,
     *,
     members: int = 8,
     near: float = 1.6,
@@ -39,6 +40,7 @@ def equal_boxes(
         mesh: Any mesh.
         target: Number of boxes of suitable size.
         least: Smallest number of boxes.
+        faces: Pairs of cells that share a face, and its area, if known, see `face_areas`.
         members: How many boxes there must be for each shape.
         near: Factor by which the number of boxes may miss the target.
         size: Weight of the size.
@@ -56,7 +58,7 @@ def equal_boxes(
     counts = mesh.grid.max(axis=0) + 1
     if len(np.unique(np.ravel_multi_index(tuple(mesh.grid.T), tuple(counts)))) < counts.prod():
         return None
-    crossed, surface = _areas(mesh, mesh.grid, counts)
+    crossed, surface = _areas(mesh, mesh.grid, counts, *(faces or face_areas(mesh)))
     n, differing = np.ones(1), np.zeros(1)
     along = []
     for count, areas in zip(counts, crossed, strict=True):
@@ -85,9 +87,10 @@ def _ends(count: int, boxes: int) -> np.ndarray:
     return np.flatnonzero(np.diff(box)) if boxes > 1 else np.zeros(0, dtype=np.int64)
 
 
-def _areas(mesh: BodyMesh, grid: np.ndarray, counts: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+def _areas(
+    mesh: BodyMesh, grid: np.ndarray, counts: np.ndarray, pairs: np.ndarray, areas: np.ndarray
+) -> tuple[list[np.ndarray], np.ndarray]:
     """Return the areas of faces behind each layer of cells in every direction, and of the boundary, (1,)."""
-    pairs, areas = face_areas(mesh)
     first, other = np.sort(grid[pairs], axis=1).transpose(1, 0, 2)
     crossed = []
     for d, count in enumerate(counts):
