@@ -87,7 +87,14 @@ def chain_scene(comm: MPI.Comm) -> tuple[Scene, SurfaceDesign]:
         {"link 1": Body(links.first.mesh, STEEL), "link 2": Body(links.second.mesh, STEEL)},
         supports=[Support("link 1", "grip")],
         loads=[TotalForce("link 2", "grip", (80e3, 0.0, 0.0))],
-        contacts=[ContactPair(Surface("link 2", "contact"), Surface("link 1", "contact"), Coulomb(0.3))],
+        contacts=[
+            ContactPair(
+                Surface("link 2", "contact"),
+                Surface("link 1", "contact"),
+                Coulomb(0.3),
+                discretisation="node",
+            )
+        ],
     )
     return scene, SurfaceDesign("link 1", links.first.crown, net=(5, 3))
 
