@@ -11,7 +11,8 @@ Laws of surfaces: Coulomb, Tresca, FrictionTable, FrictionCurve, SlipTable, Line
 Rigid obstacles: RigidPlane, RigidSphere, RigidCylinder, DistanceObstacle, MovingObstacle,
     RigidTool, ToolMotion
 
-Loads: Traction, Pressure, TotalForce, BodyForce, gravity, centrifugal, point_mass, ThermalStrain
+Loads: Traction, Pressure, TotalForce, PointForce, BodyForce, gravity, centrifugal, point_mass,
+    ThermalStrain
 
 Values of loads: SampledField, read_field, Ufl
 
@@ -89,6 +90,7 @@ if TYPE_CHECKING:
     from fenics_contact._scene.fluid import FluidPressure as FluidPressure
     from fenics_contact._scene.foundations import ElasticFoundation as ElasticFoundation
     from fenics_contact._scene.loads import BodyForce as BodyForce
+    from fenics_contact._scene.loads import PointForce as PointForce
     from fenics_contact._scene.loads import Pressure as Pressure
     from fenics_contact._scene.loads import ThermalStrain as ThermalStrain
     from fenics_contact._scene.loads import TotalForce as TotalForce

@@ -35,7 +35,7 @@ from fenics_contact._fem.templates import (
     volume_measure,
 )
 from fenics_contact._scene.fields import Ufl, evaluate
-from fenics_contact._scene.loads import Load, Pressure, ThermalStrain
+from fenics_contact._scene.loads import Load, PointForce, Pressure, ThermalStrain
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import together
 from fenics_contact.materials.elastic import Material, Transverse
@@ -78,6 +78,8 @@ class FormLibrary:
                 for material in body.materials:
                     self._check(material, body.cell_type)
         for load in as_tractions(scene):
+            if isinstance(load, PointForce):
+                continue
             body = scene.bodies[load.body]
             for materials in material_sets(body):
                 self._prepare_load(load, materials, body.cell_type)

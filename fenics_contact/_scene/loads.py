@@ -15,7 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
-from fenics_contact._scene.fields import ScalarValue, VectorValue, checked_scalar, checked_vector
+from fenics_contact._scene.fields import (
+    ScalarValue,
+    Ufl,
+    VectorValue,
+    checked_scalar,
+    checked_vector,
+    evaluate,
+)
 from fenics_contact.errors import InvalidInputError
 
 
@@ -172,12 +179,57 @@ class ThermalStrain:
         return self.temperature_change
 
 
+@dataclass(frozen=True)
+@checked("value")
+class PointForce:
+    """Dead forces at single nodes.
+
+    Under a force at a point an elastic body has no finite displacement or stress: both grow as its mesh is
+    refined, and only what is far away has a limit. Where the force comes through an area give a `TotalForce`.
+
+    Attributes:
+        body: Name of the body.
+        nodes: Name of a node set or of a surface of its mesh, each of whose nodes is loaded.
+        value: The force on each node, [force] (in the plane: per unit of thickness; on bodies of revolution:
+            per revolution). A function receives their points, shape (n, dim), and returns the forces there,
+            shape (n, dim).
+
+    Example:
+        >>> tip = PointForce("beam", "tip", (0.0, 0.0, -100.0))  # N
+    """
+
+    body: str
+    nodes: str
+    value: VectorValue
+
+    def __post_init__(self) -> None:
+        """Reject a value that is not a vector."""
+        value = checked_vector("PointForce.value", self.value)
+        if isinstance(value, Ufl):
+            raise InvalidInputError(
+                f"PointForce.value must be numbers or a function of the points, got {self.value!r}: UFL is "
+                "for loads that are integrated"
+            )
+        object.__setattr__(self, "value", value)
+
+    def at(self, points: np.ndarray, components: int) -> np.ndarray:
+        """Return the forces on nodes at points, (n, dim) to (n, components).
+
+        Raises:
+            InvalidInputError: If a function does not return one finite vector per point.
+        """
+        if callable(self.value):
+            name = f"PointForce on nodes {self.nodes!r} of body {self.body!r}"
+            return evaluate(name, self.value, points, (components,))
+        return np.tile(np.asarray(self.value, dtype=np.float64), (len(points), 1))
+
+
 #: What acts on a surface.
 SurfaceLoad = Traction | TotalForce | Pressure
 #: What acts in the volume of a body.
 VolumeLoad = BodyForce | ThermalStrain
 #: Any load of a scene.
-Load = SurfaceLoad | VolumeLoad
+Load = SurfaceLoad | VolumeLoad | PointForce
 
 
 def gravity(body: str, density: float, acceleration: Sequence[float]) -> BodyForce:

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact._base.display import counted, displayed
-from fenics_contact._scene.loads import BodyForce, Load, Pressure, ThermalStrain, TotalForce
+from fenics_contact._scene.loads import BodyForce, Load, PointForce, Pressure, ThermalStrain, TotalForce
 from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import in_words, surface_of
@@ -81,6 +81,8 @@ def _resultant(scene: SceneParts, load: Load) -> np.ndarray | None:
     body, value = scene.bodies[load.body], np.array(load.value)
     if isinstance(load, TotalForce):
         return value
+    if isinstance(load, PointForce):
+        return value * len(body.mesh.nodes_of(load.nodes))
     if isinstance(load, BodyForce):
         return value * body.volume
     points, facets = body.mesh.points, body.mesh.surfaces[load.surface]

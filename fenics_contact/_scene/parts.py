@@ -71,7 +71,7 @@ class SceneParts:
         self._require_one_dimension()
         for part in (*self.supports, *self.loads):
             surface = part.surface if isinstance(part, SurfaceLoad | AnySupport) else None
-            self._require(part.body, surface, type(part).__name__)
+            self._require(part.body, getattr(part, "nodes", surface), type(part).__name__)
         for preload in self.preloads:
             self._require(preload.body, None, "Preload")
         for foundation in self.foundations:
@@ -163,7 +163,8 @@ class SceneParts:
         if surface is None:
             return
         surfaces = self.bodies[body].mesh.surfaces
-        if surface not in surfaces:
+        nodes = self.bodies[body].mesh.node_sets if user in ("Support", "PointForce") else ()
+        if surface not in surfaces and surface not in nodes:
             raise InvalidInputError(
                 f"{user} names surface {surface!r} of body {body!r}, which has {sorted(surfaces)}: "
                 "use one of them"
@@ -647,6 +648,8 @@ def mirrored(scene: SceneParts, body: str) -> np.ndarray:
             continue
         given = [axis for axis, value in enumerate(support.value) if value is not None]
         if len(given) != 1 or callable(support.value[given[0]]) or given[0] >= scene.dim:
+            continue
+        if support.surface in mesh.node_sets:
             continue
         facets = mesh.surfaces[support.surface]
         areas = vector_areas(mesh.points, facets)

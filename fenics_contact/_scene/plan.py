@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact._base.display import counted, displayed
-from fenics_contact._scene.loads import BodyForce, ThermalStrain
+from fenics_contact._scene.loads import BodyForce, PointForce, ThermalStrain
 from fenics_contact._scene.memory import Subdomains, expected_memory
 from fenics_contact._scene.pairs import Coulomb, Surface, Tresca
 from fenics_contact._scene.parts import in_words
@@ -43,6 +43,7 @@ class EffectName(StrEnum):
     RIGID_TOOL = "rigid tool"
     BODY_FORCE = "body force"
     SURFACE_LOAD = "surface load"
+    POINT_FORCE = "force at nodes"
     FOLLOWING_PRESSURE = "following pressure"
     THERMAL_STRAIN = "thermal strain"
     TIE = "tied surfaces"
@@ -74,7 +75,7 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
     rigid, rolling = (sum(isinstance(s, kind) for s in scene.supports) for kind in (RigidSurface, Roller))
     held, rigid = len(scene.supports) - rigid - rolling, rigid - tools
     volume = sum(isinstance(load, BodyForce) for load in loads)
-    thermal = sum(isinstance(load, ThermalStrain) for load in loads)
+    thermal, single = (sum(isinstance(load, k) for load in loads) for k in (ThermalStrain, PointForce))
     rubbing = [pair.friction for pair in scene.contacts if pair.has_friction]
     tresca, coulomb = (sum(isinstance(law, kind) for law in rubbing) for kind in (Tresca, Coulomb))
     wetted = sum(pair.fluid is not None for pair in scene.contacts)
@@ -99,7 +100,9 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
         (names.SPRING, len(scene.springs), "spring acts between surfaces", "springs act between surfaces"),
         (names.RIGID_TOOL, tools, "tool moves as one piece", "tools move as one piece each"),
         (names.BODY_FORCE, volume, "load on a volume", "loads on volumes"),
-        (names.SURFACE_LOAD, len(loads) - volume - thermal, "load on a surface", "loads on surfaces"),
+        (names.SURFACE_LOAD, len(loads) - volume - thermal - single, "load on a surface",
+         "loads on surfaces"),
+        (names.POINT_FORCE, single, "set of nodes is loaded", "sets of nodes are"),
         (names.FOLLOWING_PRESSURE, len(scene.following_pressures), "pressure follows its surface",
          "pressures follow their surfaces"),
         (names.THERMAL_STRAIN, thermal, "change of temperature", "temperatures"),

@@ -21,11 +21,11 @@ Component = float | OfPosition | None
 @dataclass(frozen=True)
 @checked()
 class Support:
-    """Displacement prescribed on a surface, component by component.
+    """Displacement prescribed on a surface, or at single nodes, component by component.
 
     Attributes:
         body: Name of the body.
-        surface: Name of its surface.
+        surface: Name of its surface, or of a node set of its mesh.
         value: Displacement [length] for x, y, z (for x, y on a plane body), by default zero in all directions
             of the body's space. Of bodies of revolution with torsion it is along the radius, the axis and the
             way around it. None leaves a component free; a function receives points, shape (n, dim), and

@@ -19,7 +19,6 @@ from pydantic import (
 
 from fenics_contact._optimize.bundle_trust import BundleTrust
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.loads import SurfaceLoad
 from fenics_contact._scene.obstacles import DistanceObstacle
 from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.supports import Roller, Support
@@ -249,7 +248,8 @@ def check_formulas(part: Any, bodies: Mapping[str, Body]) -> None:
             part.master.distance(_nodes(bodies[part.slave.body], part.slave.name))
     elif callable(value := getattr(part, "value", None)):
         body = bodies[part.body]
-        value(_nodes(body, part.surface) if isinstance(part, SurfaceLoad) else body.mesh.points)
+        named = getattr(part, "surface", getattr(part, "nodes", None))
+        value(body.mesh.points if named is None else _nodes(body, named))
 
 
 def check_pair(pair: ContactPair, key: str, bodies: Mapping[str, Body]) -> None:
@@ -263,4 +263,4 @@ def check_pair(pair: ContactPair, key: str, bodies: Mapping[str, Body]) -> None:
 
 
 def _nodes(body: Body, surface: str) -> np.ndarray:
-    return np.asarray(body.mesh.points[np.unique(body.mesh.surfaces[surface])])
+    return np.asarray(body.mesh.points[body.mesh.nodes_of(surface)])

@@ -162,7 +162,11 @@ def share_areas(mesh: BodyMesh, name: str) -> np.ndarray:
     """Return areas by which the nodes of a surface share what is on it, (n_nodes of the mesh,), all positive.
 
     The nodal forces of a unit pressure; on quadratic triangles those on the linear facets between the nodes.
+    The nodes of a node set have one and the same.
     """
+    if name in mesh.node_sets:
+        size = mesh.volume / mesh.n_nodes
+        return np.where(np.isin(np.arange(mesh.n_nodes), mesh.node_sets[name]), size, 0.0)
     facets = mesh.surfaces[name]
     if has_midside_pressure(facets):
         facets = mesh.linear.surfaces[name]

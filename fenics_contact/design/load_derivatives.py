@@ -12,11 +12,11 @@ from fenics_contact import _dolfinx
 from fenics_contact._fem.load_forms import is_scalar, load_fields, load_parameters
 from fenics_contact._fem.loads import LinearTraction, spread_traction
 from fenics_contact._scene.fields import OfPosition, gradients_of
-from fenics_contact._scene.loads import Load, SurfaceLoad, ThermalStrain, TotalForce
+from fenics_contact._scene.loads import Load, PointForce, SurfaceLoad, ThermalStrain, TotalForce
 from fenics_contact._surfaces.facets import GaussPoint, gauss_points, surface_moments
 from fenics_contact.design.forms import ShapeForms, sets_in_use, sum_over_subdomains
 from fenics_contact.design.surface_derivatives import integral_pulled_back
-from fenics_contact.errors import together
+from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.subdomain import Subdomain
 from fenics_contact.feti.torn import TornSystem
@@ -176,7 +176,7 @@ def strain_work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: 
 def load_work_by_shape(forms: ShapeForms, torn: TornSystem, w: np.ndarray) -> np.ndarray:
     """Return ∂/∂X of L(w), the share of this rank, by all nodes, shape (n_nodes, dim). Collective."""
     loads = moving_loads(torn, forms.moving)
-    spread: list[Load] = [load for load in loads if not isinstance(load, TotalForce)]
+    spread: list[Load] = [load for load in loads if not isinstance(load, TotalForce | PointForce)]
     for load in spread:  # all ranks compile
         body = torn.scene.bodies[load.body]
         for materials in sets_in_use(torn, load.body):
@@ -234,4 +234,10 @@ def moving_loads(torn: TornSystem, moving: np.ndarray | None) -> list[Load]:
         nodes = mesh.surfaces[load.surface] if isinstance(load, SurfaceLoad) else np.arange(mesh.n_nodes)
         return moving is None or bool(moving[tearing.global_nodes(load.body, nodes)].any())
 
-    return [load for load in torn.scene.loads if moves(load)]
+    found = [load for load in torn.scene.loads if moves(load)]
+    if any(isinstance(load, PointForce) and callable(load.value) for load in found):
+        raise InvalidInputError(
+            "derivatives by the shape need forces at nodes as numbers, got a function of the points: give a "
+            "PointForce for each value"
+        )
+    return found

@@ -10,7 +10,7 @@ from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
 from fenics_contact._fem.load_forms import is_scalar
 from fenics_contact._scene.fields import Ufl, evaluate
-from fenics_contact._scene.loads import SurfaceLoad
+from fenics_contact._scene.loads import PointForce, SurfaceLoad
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import Roller, Support
 from fenics_contact.errors import together
@@ -63,6 +63,7 @@ def _nodes(scene: Scene, part: Any, compared: int = 8) -> np.ndarray:
     `compared`: number of nodes at which functions are compared: different functions differ nearly everywhere.
     """
     mesh = scene.bodies[part.body].mesh
-    on_surface = isinstance(part, Support | Roller | SurfaceLoad)
-    nodes = np.unique(mesh.surfaces[part.surface]) if on_surface else np.arange(mesh.n_nodes)
+    nodes = np.arange(mesh.n_nodes)
+    if isinstance(part, Support | Roller | SurfaceLoad | PointForce):
+        nodes = mesh.nodes_of(part.nodes if isinstance(part, PointForce) else part.surface)
     return mesh.points[nodes[np.linspace(0, len(nodes) - 1, min(compared, len(nodes))).astype(int)]]

@@ -19,7 +19,7 @@ from fenics_contact._fem.model_checks import check_kernel, kernel_of
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.fields import Ufl
 from fenics_contact._scene.foundations import ElasticFoundation
-from fenics_contact._scene.loads import Load, SurfaceLoad
+from fenics_contact._scene.loads import Load, PointForce, SurfaceLoad
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.factor import fixing_nodes
@@ -275,6 +275,9 @@ def assemble(
         return earlier
     force = np.zeros(mesh.size)
     for load in acting:
+        if isinstance(load, PointForce):
+            force += _at_points(load, mesh, body)
+            continue
         facets, acted = None, None
         if isinstance(load, SurfaceLoad):
             facets = mesh.facets_of(body, load.surface)
@@ -290,9 +293,24 @@ def assemble(
     return replace(earlier, loads=acting, load=force)
 
 
+def _at_points(load: PointForce, mesh: SubdomainMesh, body: Body) -> np.ndarray:
+    """Return the share of a subdomain in forces at nodes, by dof: that of its cells among those at a node."""
+    loaded = np.isin(mesh.nodes, body.mesh.nodes_of(load.nodes))
+    nodes = mesh.nodes[loaded]
+    own, every = (
+        np.bincount(cells.ravel(), minlength=body.mesh.n_nodes)[nodes]
+        for cells in (body.mesh.cells[mesh.cells], body.mesh.cells)
+    )
+    force = np.zeros((len(mesh.nodes), body.components))
+    force[loaded] = load.at(body.mesh.points[nodes], body.components) * (own / every)[:, None]
+    return force.ravel()
+
+
 def _acts(load: Load, mesh: SubdomainMesh, body: Body) -> bool:
     if load.body != mesh.body:
         return False
+    if isinstance(load, PointForce):
+        return bool(np.isin(body.mesh.nodes_of(load.nodes), mesh.nodes).any())
     return not isinstance(load, SurfaceLoad) or len(mesh.facets_of(body, load.surface)[0]) > 0
 
 

@@ -242,6 +242,25 @@ def checked_regions(regions: Mapping[str, ArrayLike], n_cells: int) -> dict[str,
     return checked
 
 
+def checked_node_sets(
+    sets: Mapping[str, ArrayLike], n_nodes: int, surfaces: Mapping[str, object]
+) -> dict[str, np.ndarray]:
+    """Return named ascending node numbers, int64 each."""
+    checked: dict[str, np.ndarray] = {}
+    for name, nodes in sets.items():
+        array = _integers(nodes, f"node set '{name}'")
+        _check_range(array, n_nodes, f"node set '{name}'")
+        checked[name] = np.unique(array)
+        checked[name].setflags(write=False)
+        if array.size == 0 or array.ndim != 1 or len(checked[name]) < len(array) or name in surfaces:
+            given = "the name of a surface" if name in surfaces else f"an array of shape {array.shape}"
+            raise InvalidInputError(
+                f"node set '{name}' must hold one or more node numbers, each once, and have a name of its "
+                f"own, got {given}: leave out a set that is empty, or rename it"
+            )
+    return checked
+
+
 def check_hanging(hanging: HangingNodes, points: np.ndarray, n_cells: int) -> None:
     """Reject hanging nodes that are not at the mean of masters which do not hang.
 
@@ -312,6 +331,8 @@ class BodyMesh:
             makes; by default none.
         chart: The map whose images the nodes are, which `refined` and `quadratic` follow, as of chain links;
             by default none.
+        node_sets: Name to ascending node numbers, int64, for supports and forces at single nodes; by default
+            none.
 
     Raises:
         InvalidInputError: If an array has the wrong shape or type, a coordinate is not finite, a node
@@ -337,6 +358,7 @@ class BodyMesh:
     shapes: Mapping[str, SurfaceShape] = field(default_factory=dict)
     hanging: HangingNodes | None = None
     chart: Chart | None = None
+    node_sets: Mapping[str, np.ndarray] = field(default_factory=dict)
     _origin: BodyMesh | None = field(default=None, init=False, repr=False)
     _off_shapes: Mapping[str, np.ndarray] = field(default_factory=dict, init=False, repr=False)
     _cuts: Mapping[Hashable, Cut] = field(default_factory=dict, init=False, repr=False)
@@ -364,6 +386,7 @@ class BodyMesh:
         if self.hanging is not None:
             check_hanging(self.hanging, points, len(cells))
         self._set(surfaces=checked_surfaces(self.surfaces, cells, *points.shape, hanging=self.hanging))
+        self._set(node_sets=checked_node_sets(self.node_sets, len(points), self.surfaces))
         self._set(_off_shapes=self._checked_shapes(self.shapes))
         if self.chart is not None:
             check_chart(self.chart, points)
@@ -386,6 +409,7 @@ class BodyMesh:
             "extent": " × ".join(f"{a:.6g} to {b:.6g}" for a, b in zip(low, high, strict=True)),
             "surfaces": _sizes(self.surfaces),
             "regions": _sizes(self.regions),
+            **({"node sets": _sizes(self.node_sets)} if self.node_sets else {}),
             "shapes": {name: type(shape).__name__ for name, shape in self.shapes.items()},
         }
 
@@ -561,12 +585,20 @@ class BodyMesh:
                 points = np.concatenate([points, np.asarray(points)[cut.pairs[:, 1]]])
         return points
 
+    def nodes_of(self, name: str) -> np.ndarray:
+        """Return the nodes of a surface or of a node set, ascending."""
+        return self.node_sets[name] if name in self.node_sets else np.unique(self.surfaces[name])
+
     def nodes_to_hold(self, surface: str) -> np.ndarray:
-        """Return the nodes by which a support holds a surface, ascending: hanging ones follow their masters.
+        """Return the nodes by which a support holds a surface or a node set, ascending.
+
+        Hanging ones follow their masters.
 
         Raises:
             InvalidInputError: If the surface contains a hanging node, but not all its masters.
         """
+        if surface in self.node_sets:
+            return nodes_to_hold(self.hanging, surface, self.node_sets[surface])
         return nodes_to_hold(self.hanging, surface, self.surfaces[surface])
 
     @cached_property

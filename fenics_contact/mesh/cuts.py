@@ -44,7 +44,7 @@ def cut_between(mesh: BodyMesh, name: Hashable, before: np.ndarray, behind: np.n
         surfaces[surface] = np.where((side[cell] > 0.0)[:, None], renumbered[facets], facets)
     result = BodyMesh(
         np.vstack([mesh.points, mesh.points[shared]]), cells, surfaces, mesh.grid, mesh.regions,
-        coincident_nodes=True, shapes=mesh.shapes,
+        coincident_nodes=True, shapes=mesh.shapes, node_sets=mesh.node_sets,
     )  # fmt: skip
     facets, _ = boundary_faces(cells, mesh.dim)
     number = match_faces(corners_of(between, mesh.dim), corners_of(facets, mesh.dim))
@@ -79,8 +79,9 @@ def sewn(mesh: BodyMesh) -> BodyMesh:
     kept = mesh.n_nodes - sum(len(cut.pairs) for cut in mesh.cuts.values())
     surfaces = {name: node[facets] for name, facets in mesh.surfaces.items()}
     result = BodyMesh(
-        mesh.points[:kept], node[mesh.cells], surfaces, mesh.grid, mesh.regions, shapes=mesh.shapes
-    )
+        mesh.points[:kept], node[mesh.cells], surfaces, mesh.grid, mesh.regions, shapes=mesh.shapes,
+        node_sets=mesh.node_sets,
+    )  # fmt: skip
     result._set(
         chart=mesh.chart and mesh.chart.of(np.arange(kept)[:, None]),
         _origin=None if mesh.origin is mesh else sewn(mesh.origin),

@@ -67,7 +67,10 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
         images = np.concatenate([mesh.points, chart.points(mesh.n_nodes)])
         points = kept_valid(images, points, cells, (surfaces[name] for name in mesh.shapes))
     check_jacobians(points, cells, "refine the mesh along its curved surfaces, or leave their shapes away")
-    result = BodyMesh(points, cells, surfaces, mesh.grid, mesh.regions, mesh.coincident_nodes, mesh.shapes)
+    result = BodyMesh(
+        points, cells, surfaces, mesh.grid, mesh.regions, mesh.coincident_nodes, mesh.shapes,
+        node_sets=mesh.node_sets,
+    )  # fmt: skip
     return result.with_chart(chart)
 
 

@@ -167,8 +167,19 @@ def _checked(
     remedy = "see whether shapes of surfaces cross each other or other sides of the body, or leave them away"
     check_jacobians(points, cells, remedy)
     regions = {name: np.flatnonzero(np.isin(parents, inside)) for name, inside in mesh.regions.items()}
-    fine = BodyMesh(points, cells, surfaces, None, regions, shapes=mesh.shapes, hanging=hanging)
+    fine = BodyMesh(
+        points, cells, surfaces, None, regions, shapes=mesh.shapes, hanging=hanging,
+        node_sets=_carried_nodes(mesh, points),
+    )  # fmt: skip
     return Refinement(fine.with_chart(chart), parents, positions)
+
+
+def _carried_nodes(mesh: BodyMesh, points: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the node sets with the numbers of their nodes on the fine mesh, where they have their places."""
+    if not mesh.node_sets:
+        return {}
+    number = cKDTree(points).query(mesh.points)[1]
+    return {name: number[nodes] for name, nodes in mesh.node_sets.items()}
 
 
 def _checked_marks(mesh: BodyMesh, marked: ArrayLike) -> np.ndarray:

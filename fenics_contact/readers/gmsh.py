@@ -170,7 +170,16 @@ def refilled(mesh: BodyMesh) -> BodyMesh:
     row = np.full(mesh.n_nodes, -1, dtype=np.int64)
     row[facets] = number
     points[number] = mesh.points[facets]
-    return BodyMesh(points, cells, {name: row[surface] for name, surface in mesh.surfaces.items()})
+    inside = [name for name, nodes in mesh.node_sets.items() if (row[nodes] < 0).any()]
+    if inside:
+        raise InvalidInputError(
+            f"a body that is meshed anew keeps the nodes of its boundary alone, node set {inside[0]!r} has "
+            "others: leave it out"
+        )
+    surfaces, sets = (
+        {name: row[nodes] for name, nodes in named.items()} for named in (mesh.surfaces, mesh.node_sets)
+    )
+    return BodyMesh(points, cells, surfaces, node_sets=sets)
 
 
 def _filled(points: np.ndarray, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -505,8 +505,10 @@ def _rolled(scene: Scene, roller: Roller, numbers: NodeNumbers) -> tuple[np.ndar
 
 
 def centroid(scene: Scene, surface: Surface) -> np.ndarray:
-    """Return the centroid of a surface, shape (dim,)."""
+    """Return the centroid of a surface, of a node set the mean of its points, shape (dim,)."""
     mesh = scene.bodies[surface.body].mesh
+    if surface.name in mesh.node_sets:
+        return np.asarray(mesh.points[mesh.node_sets[surface.name]].mean(axis=0))
     return surface_moments(mesh.points, mesh.surfaces[surface.name], scene.axisymmetric).centroid
 
 

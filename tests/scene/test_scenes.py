@@ -29,6 +29,7 @@ from fenics_contact import (
     LinearClosure,
     LoadStep,
     MovingObstacle,
+    PointForce,
     Preload,
     Pressure,
     RigidCylinder,
@@ -113,6 +114,7 @@ def test_an_unknown_body_is_refused_by_whoever_names_it(user: str, parts: dict[s
         ("Support", {"supports": [Support("lower", "top")]}),
         ("Traction", {"loads": [Traction("lower", "top", (0, 0, 1))]}),
         ("TotalForce", {"loads": [TotalForce("lower", "top", (0, 0, 1))]}),
+        ("PointForce", {"loads": [PointForce("lower", "top", (0, 0, 1))]}),
         ("ContactPair.slave", {"contacts": [ContactPair(Surface("lower", "top"), BASE)]}),
         ("ContactPair.master", {"contacts": [ContactPair(BASE, Surface("lower", "top"))]}),
     ],
@@ -247,6 +249,7 @@ def test_a_support_must_prescribe_something(value: Any) -> None:
         ("Traction", lambda value: Traction("body", "side", value)),
         ("TotalForce", lambda value: TotalForce("body", "side", value)),
         ("BodyForce", lambda value: BodyForce("body", value)),
+        ("PointForce", lambda value: PointForce("body", "tip", value)),
     ],
 )
 def test_a_load_must_be_a_vector(name: str, make: Callable[[Any], Any], value: Any) -> None:
@@ -331,7 +334,7 @@ SAMPLES: dict[type, Any] = {
         BodyForce("a", DOWN), ThermalStrain("a", 1.0), Ufl(lambda x: x), LoadStep("a"), Scene({"a": BODY}),
         RigidSphere((0, 0, 0), 1.0), RigidCylinder((0, 0, 0), (0, 0, 1), 1.0),
         ElasticFoundation("a", "b", 1.0), Spring(Surface("a", "b"), DOWN, 1.0), Section((0, 0, 0), DOWN),
-        Preload("a", Section((0, 0, 0), DOWN)),
+        Preload("a", Section((0, 0, 0), DOWN)), PointForce("a", "b", DOWN),
         AutomaticContact(Coulomb(0.3)), MovingObstacle(PLANE, lambda time: (None, DOWN)),
         DistanceObstacle(lambda x: x[:, 0]), PlaneStrain(1.0, 0.3), PlaneStress(1.0, 0.3),
         OrthotropicPlaneStress((1.0, 1.0), 0.3, 1.0),
