@@ -45,6 +45,10 @@ if TYPE_CHECKING:
     from fenics_contact._surfaces.continued import Neighbour
 
 
+_ON_NODES = ("Support", "PointForce", "Spring.first", "Spring.second")
+"""What may act on the nodes of a node set."""
+
+
 @dataclass(frozen=True)
 @checked()
 class SceneParts:
@@ -163,7 +167,7 @@ class SceneParts:
         if surface is None:
             return
         surfaces = self.bodies[body].mesh.surfaces
-        nodes = self.bodies[body].mesh.node_sets if user in ("Support", "PointForce") else ()
+        nodes = self.bodies[body].mesh.node_sets if user in _ON_NODES else ()
         if surface not in surfaces and surface not in nodes:
             raise InvalidInputError(
                 f"{user} names surface {surface!r} of body {body!r}, which has {sorted(surfaces)}: "

@@ -42,32 +42,35 @@ class Spring:
     """A spring between two surfaces, or between a surface and a fixed point.
 
     It acts on the mean displacements ū = ∫ u dA / ∫ dA of its ends, with forces spread over them as an even
-    traction, and resists no rotation of an end about its centroid. A number k acts along the unit vector n
+    traction, and resists no rotation of an end about its centroid. An end may be a node set of a mesh: of n
+    nodes ū = Σ u / n, and each gets an n-th of the force. A number k acts along the unit vector n
     from the centroid of the first end to that of the second one, with the tension N = N₀ + k n·(ū₂ − ū₁). A
     vector acts along each axis, with the forces k_d (ū₂ − ū₁)_d on the first end. Both count displacements
     from the undeformed bodies, and axes and n stay as they are. Surfaces may belong to one body, and one may
     be that of a `RigidTool`, whose name for it is "tool". Bodies may be held by springs alone.
 
     Attributes:
-        first: A named surface.
+        first: A named surface, or a node set.
         second: Another one, or the coordinates of a fixed point.
         stiffness: k > 0, [force / length] (in the plane: per unit of thickness; on bodies of revolution: per
             revolution): a number along the line between the ends, or one of at least zero along each axis.
-            With a plane of symmetry through the spring that of the part which is modelled.
+            With a plane of symmetry through the spring that of the part which is modelled. Infinity ties the
+            means in a direction: of two nodes it is the equation u_d = w_d.
         tension: N₀ of a spring along its line, before anything moves, negative in compression, [force].
         name: Name in results; by default both ends.
 
     Raises:
-        InvalidInputError: If a stiffness is negative, all are zero, numbers are not finite, both ends are
-            the same, or there is a tension without a line. When the scene is made: if the ends of a spring
-            along its line have the same centroid, or bodies deform much, in which the line would turn; if
-            numbers do not suit the space of the bodies, or bodies of revolution, which have springs along
-            their axis alone.
+        InvalidInputError: If a stiffness is negative or not a number, all are zero, other numbers are not
+            finite, both ends are the same, or there is a tension without a line, or of a rigid one. When
+            the scene is made: if the ends of a spring along its line have the same centroid, or bodies
+            deform much, in which the line would turn; if numbers do not suit the space of the bodies, or
+            bodies of revolution, which have springs along their axis alone.
 
     Example:
         >>> rod = Spring(Surface("lid", "rim"), Surface("pot", "rim"), 2e4, tension=500.0)  # N/mm, N
         >>> bushing = Spring(Surface("arm", "eye"), Surface("frame", "pin"), (900.0, 900.0, 150.0))
         >>> mount = Spring(Surface("engine", "foot"), (0, 0, -80), 400.0)
+        >>> alike = Spring(Surface("beam", "n5"), Surface("beam", "n28"), (0, 0, float("inf")))  # u_z = w_z
     """
 
     first: Surface
@@ -79,15 +82,16 @@ class Spring:
     def __post_init__(self) -> None:
         """Reject what holds nothing, or pushes away."""
         numbers = np.asarray(self.stiffness, dtype=np.float64)
-        if not np.isfinite(numbers).all() or (numbers < 0).any() or not numbers.any():
+        if np.isnan(numbers).any() or (numbers < 0).any() or not numbers.any():
             raise InvalidInputError(
                 f"Spring.stiffness of {self.label!r} must be positive, or numbers of at least zero along the "
                 f"axes, got {self.stiffness!r}: give the force that a unit of displacement causes"
             )
-        if not np.isfinite(self.tension) or (self.tension and numbers.ndim):
+        if not np.isfinite(self.tension) or (self.tension and (numbers.ndim or numbers == np.inf)):
             raise InvalidInputError(
                 f"Spring.tension of {self.label!r} must be a finite number, zero with a stiffness for each "
-                f"axis, got {self.tension!r}: give a stiffness along the line between the ends"
+                f"axis or an infinite one, got {self.tension!r}: give a finite stiffness along the line "
+                "between the ends"
             )
         if self.first == self.second:
             raise InvalidInputError(
@@ -137,8 +141,8 @@ class Spring:
         """Reject numbers of another space, springs without a line, and motions that bodies do not have."""
         dim, revolved = scene.dim, scene.axisymmetric
         for name in ("stiffness", "second"):
-            given = getattr(self, name)
-            if isinstance(given, tuple) and (len(given) != dim or not np.isfinite(given).all()):
+            given, known = getattr(self, name), np.isfinite if name == "second" else np.ones_like
+            if isinstance(given, tuple) and (len(given) != dim or not np.all(known(given))):
                 raise InvalidInputError(
                     f"Spring.{name} of {self.label!r} must have {dim} finite numbers, got {given!r}: give "
                     "one for each axis"
@@ -169,6 +173,9 @@ class Spring:
 def mean_weights(scene: Around, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     """Return the nodes of a surface in its body, shape (n,), and their weights in its mean, (n,), sum one."""
     mesh = scene.bodies[surface.body].mesh
+    if surface.name in mesh.node_sets:
+        nodes = mesh.node_sets[surface.name]
+        return nodes, np.full(len(nodes), 1.0 / len(nodes))
     facets = mesh.surfaces[surface.name]
     weights = np.zeros(facets.shape)
     for at in gauss_points(mesh.points, facets, scene.axisymmetric):
@@ -182,4 +189,6 @@ def _centre(scene: Around, end: Surface | GivenVector) -> np.ndarray:
     if not isinstance(end, Surface):
         return np.asarray(end, dtype=np.float64)
     mesh = scene.bodies[end.body].mesh
+    if end.name in mesh.node_sets:
+        return np.asarray(mesh.points[mesh.node_sets[end.name]].mean(axis=0))
     return surface_moments(mesh.points, mesh.surfaces[end.name], scene.axisymmetric).centroid

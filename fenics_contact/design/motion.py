@@ -242,7 +242,9 @@ def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign)
     ends = [end for spring in scene.springs for end in spring.surfaces.values()]
     places = [(each.body, each.surface) for each in (*scene.supports, *scene.foundations)]
     for own, surface in (*places, *((end.body, end.name) for end in ends)):
-        if own == name:
+        if own == name and surface in body.mesh.node_sets:
+            held[body.mesh.node_sets[surface]] = True
+        elif own == name:
             facets = body.mesh.surfaces[surface]
             held[facets[~cut[facets].all(axis=1).any(axis=1)]] = True
     for section in body.mesh.cuts.values():

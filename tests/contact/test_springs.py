@@ -14,6 +14,7 @@ from fenics_contact import (
     ContactProblem,
     Coulomb,
     LoadStep,
+    PointForce,
     Preload,
     RigidSphere,
     RigidTool,
@@ -346,3 +347,44 @@ def test_scene_files_results_and_tables_have_springs(tmp_path) -> None:
         _ = read_scene_file(_file(stiffness=1.0), MPI.COMM_SELF).scene
     with pytest.raises(InvalidInputError, match="springs of the scene are 'rod', got 'bar'"):
         state.springs()["bar"]
+
+
+def corners_alike(stiffness, held=()) -> Scene:
+    """A block drawn at one corner of its end, whose displacement along x is that of the other corner."""
+    mesh = block((0, 0, 0), (3, 1, 1), (3, 1, 1))
+    near, far = (int(np.flatnonzero((mesh.points == (3, y, 1)).all(axis=1))[0]) for y in (0, 1))
+    body = Body(replace(mesh, node_sets={"near": [near], "far": [far]}), STEEL)
+    springs = [Spring(Surface("a", "near"), Surface("a", "far"), stiffness)] if stiffness else []
+    supports = [Support("a", "x0"), *held]
+    return Scene({"a": body}, supports, [PointForce("a", "far", (5.0, 4.0, 1.0))], springs=springs)
+
+
+def test_infinite_stiffness_makes_two_nodes_move_alike_and_nothing_else() -> None:
+    scene = corners_alike((np.inf, 0.0, 0.0))
+    state = solve_scene(scene, MPI.COMM_WORLD, tolerance=1e-12)
+    mesh, u = scene.bodies["a"].mesh, state.gather_displacement("a")
+    near, far = (mesh.node_sets[name][0] for name in ("near", "far"))
+    assert u[near, 0] == pytest.approx(u[far, 0], rel=1e-9)
+    assert abs(u[near, 1] - u[far, 1]) > 1e-3 * abs(u[far, 0])
+    # Held at that displacement both nodes together feel the load, and all others have the same equilibrium.
+    given = [Support("a", name, (float(u[near, 0]), None, None)) for name in ("near", "far")]
+    again = solve_scene(corners_alike(None, given), MPI.COMM_WORLD, tolerance=1e-12)
+    np.testing.assert_allclose(again.gather_displacement("a"), u, atol=1e-9 * np.abs(u).max())
+    needed = sum(again.reactions()[number].force[0] for number in (1, 2))
+    assert abs(needed) <= 1e-8 * 5.0
+    (link,) = state.springs().values()
+    assert link.elongation == pytest.approx(0.0, abs=1e-12)
+    assert link.tension[0] < -1.0
+
+
+def test_rigid_spring_is_the_limit_of_stiff_ones() -> None:
+    ends = [
+        solve_scene(corners_alike((k, 0.0, 0.0)), MPI.COMM_WORLD, tolerance=1e-12).gather_displacement("a")
+        for k in (1e9, np.inf)
+    ]
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-5 * np.abs(ends[1]).max())
+
+
+def test_rigid_spring_has_no_tension_of_its_own() -> None:
+    with pytest.raises(InvalidInputError, match="or an infinite one"):
+        Spring(FIRST, SECOND, np.inf, tension=1.0)
