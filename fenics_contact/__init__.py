@@ -44,11 +44,11 @@ known by formula), `qp` (dual solvers) and `feti` (subdomains).
 
 from __future__ import annotations
 
-import ast
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from fenics_contact._base import requirements
+from fenics_contact._base.late_names import homes
 
 if TYPE_CHECKING:
     from fenics_contact._adaptive.goal_errors import GoalError as GoalError
@@ -155,15 +155,8 @@ _ROOMS = (
     "design errors feti gallery materials mesh output pictures qp readers results shapes study theory".split()
 )
 
-
-def _read_homes() -> dict[str, str]:
-    """Return the module of each name that the imports for type checkers list; so names are listed once."""
-    tree = ast.parse(__spec__.loader.get_source(__name__))  # type: ignore[union-attr]
-    statements = [each for each in ast.walk(tree) if isinstance(each, ast.ImportFrom)]
-    return {name.asname: str(each.module) for each in statements for name in each.names if name.asname}
-
-
-_HOME = _read_homes()
+#: Modules of the names that users take from here.
+_HOME = homes(__name__)
 
 __all__ = [*_HOME, *_ROOMS, "__version__"]
 

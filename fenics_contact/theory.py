@@ -19,13 +19,11 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import ellipe, ellipkm1, elliprd
 
 from fenics_contact.errors import InvalidInputError
 
@@ -198,6 +196,8 @@ def hertz_point(force: float, curvatures: Sequence[float], modulus: float) -> Po
             f"curvatures must differ by less than a factor of {SLENDEREST:g}, got {low} and {high}: take "
             "hertz_line, the surfaces touch along a line"
         )
+    from scipy.special import ellipe, ellipkm1  # bodies without curved contact do without
+
     k = _axes_ratio(high / low)
     mean_integral = ellipe((1.0 - k) * (1.0 + k))
     a = np.cbrt(3.0 * force * mean_integral / (np.pi * k**2 * modulus * (low + high)))
@@ -210,6 +210,7 @@ def hertz_point(force: float, curvatures: Sequence[float], modulus: float) -> Po
 
 def _axes_ratio(ratio: float) -> float:
     """Return b/a ≤ 1 for κ_b/κ_a ≥ 1."""
+    from scipy.special import elliprd
 
     def excess(logarithm: float) -> float:
         square = np.exp(2.0 * logarithm)
@@ -217,7 +218,14 @@ def _axes_ratio(ratio: float) -> float:
 
     # The ratio of curvatures grows faster than a/b, and both are 1 together, up to rounding.
     lowest = -np.log(ratio) - 1.0
-    return 1.0 if excess(0.0) >= 0.0 else float(np.exp(brentq(excess, lowest, 0.0, xtol=1e-15)))
+    return 1.0 if excess(0.0) >= 0.0 else float(np.exp(_root(excess, lowest, 0.0)))
+
+
+def _root(function: Callable[[float], float], lowest: float, highest: float) -> float:
+    """Return where a function crosses zero between two places."""
+    from scipy.optimize import brentq  # as much to load as a small scene to assemble
+
+    return float(brentq(function, lowest, highest, xtol=1e-15))
 
 
 def hertz_line(force: float, curvature: float, modulus: float) -> LineContact:
@@ -306,7 +314,7 @@ def pin_in_hole(force: float, radius: float, clearance: float, modulus: float) -
 
     # The right side decreases; it exceeds 1 / (π b²) for b² < 1/4, and is negative for b = 1.
     lowest = -0.5 * float(np.log(np.pi * wanted + 4.0))
-    b = np.exp(brentq(excess, lowest, 0.0, xtol=1e-15))
+    b = np.exp(_root(excess, lowest, 0.0))
     return PinContact(float(2.0 * np.arctan(b)), float(force / radius))
 
 

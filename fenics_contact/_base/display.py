@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from html import escape
 from typing import Any, TypeVar
 
 import numpy as np
@@ -62,6 +61,8 @@ def in_lines(shown: Any, most: int = LINES, columns: int = COLUMNS) -> str:
 
 def _in_table(shown: Any) -> str:
     """Return the facts as a table in HTML, as notebooks show it."""
+    from html import escape
+
     rows = "".join(
         f'<tr><th style="text-align: left">{escape(name)}</th>'
         f'<td style="text-align: left">{escape(in_short(value, 2 * COLUMNS))}</td></tr>'

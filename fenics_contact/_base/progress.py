@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import importlib.util
 import logging
 import math
@@ -415,10 +414,12 @@ class Notebook:
 
     def show(self, works: list[Work]) -> None:
         """Replace the output."""
+        from html import escape
+
         from IPython.display import display  # available in notebooks
 
         text = "\n".join([*self._over, *(work.line for work in works)])
-        content = {"text/plain": text, "text/html": f"<pre>{html.escape(text)}</pre>"}
+        content = {"text/plain": text, "text/html": f"<pre>{escape(text)}</pre>"}
         if self._output is None:
             self._output = display(content, raw=True, display_id=True)
         else:

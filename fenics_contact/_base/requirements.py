@@ -14,8 +14,9 @@ import re
 import signal
 import sys
 import threading
+from contextlib import suppress
 from dataclasses import dataclass
-from importlib import metadata
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
@@ -43,10 +44,7 @@ class Requirement:
 
     def version(self) -> str | None:
         """Return the installed version without importing the library; None if it has no metadata."""
-        try:
-            return metadata.version(self.module)
-        except metadata.PackageNotFoundError:
-            return None
+        return installed_versions(tuple(sys.path)).get(self.module)
 
     def error(self, found: str) -> MissingRequirementError:
         """Return the error that states what is needed, what was found and how to install it."""
@@ -97,6 +95,23 @@ _NUMERICAL = [
     Requirement("threadpoolctl", "3.1"),
 ]
 _GMSH = Requirement("gmsh", "4.8", f"{_APT} python3-gmsh", "python-gmsh")
+
+
+@cache
+def installed_versions(places: tuple[str, ...]) -> dict[str, str]:
+    """Return versions by distribution, read off the names of their metadata's folders.
+
+    `importlib.metadata` reads the metadata themselves, with the parser of electronic mail: 25 ms a start.
+    """
+    found: dict[str, str] = {}
+    for place in places:
+        with suppress(OSError):  # of an archive, or a place that does not exist
+            for entry in os.listdir(place or "."):
+                stem, _, kind = entry.rpartition(".")
+                if kind in ("dist-info", "egg-info") and "-" in stem:
+                    name, version = stem.split("-")[:2]
+                    found.setdefault(name.lower(), version)
+    return found
 
 
 def for_the_program() -> bool:

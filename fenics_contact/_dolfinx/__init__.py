@@ -8,6 +8,7 @@ of VTK. Triangles and quadrilaterals lie in the plane: their points have two coo
 components.
 """
 
+from fenics_contact._base import form_language  # noqa: F401 (imports UFL at less cost)
 from fenics_contact._dolfinx.assembly import (
     assemble_csr,
     assemble_matrix,

@@ -12,6 +12,7 @@ from functools import cache
 from types import ModuleType
 from typing import TYPE_CHECKING
 
+from fenics_contact._base.form_language import without_setuptools
 from fenics_contact._base.libraries import Late
 from fenics_contact._base.requirements import load_dolfinx
 
@@ -69,7 +70,7 @@ def side_effects_undone() -> Iterator[None]:
 
 def _load() -> ModuleType:
     """Import dolfinx with the submodules that are used."""
-    with side_effects_undone():
+    with side_effects_undone(), without_setuptools():
         load_dolfinx()
         import dolfinx
         import dolfinx.fem

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.interpolate import RBFInterpolator
 from scipy.spatial import KDTree
 from ufl.core.expr import Expr
 
@@ -19,7 +18,6 @@ from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.errors.ranks import made_once
-from fenics_contact.readers.meshio import read_with_meshio
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -235,6 +233,8 @@ class SampledField:
 
 def _through(known: np.ndarray, values: np.ndarray, points: np.ndarray, neighbours: int = 32) -> np.ndarray:
     """Return the values at points, interpolated through some nearest known ones."""
+    from scipy.interpolate import RBFInterpolator  # most scenes have no fields
+
     # A kernel of distances alone, with a constant: solvable however the points lie.
     form = RBFInterpolator(known, values, min(neighbours, len(known)), kernel="linear", degree=0)
     return np.asarray(form(points))
@@ -336,6 +336,8 @@ def _numbers(path: Path, rows: Sequence[Sequence[str]], count: int) -> np.ndarra
 
 def _of_mesh(path: Path) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Return points and values of every field of a mesh by name."""
+    from fenics_contact.readers.meshio import read_with_meshio  # most scenes have no fields
+
     mesh = read_with_meshio(path)
     places = dict.fromkeys(mesh.point_data, np.asarray(mesh.points, dtype=np.float64))
     fields = dict(mesh.point_data)

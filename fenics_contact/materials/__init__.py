@@ -1,27 +1,42 @@
 """Material models, written in UFL."""
 
-from fenics_contact.materials.elastic import (
-    Elasticity,
-    IsotropicElasticity,
-    Material,
-    PlaneStrain,
-    PlaneStress,
-    Thermoelastic,
-    Transverse,
-    strain,
-)
-from fenics_contact.materials.hyperelastic import (
-    EnergyModel,
-    Hyperelasticity,
-    MooneyRivlin,
-    NearlyIncompressible,
-    NeoHooke,
-    Ogden,
-    StVenantKirchhoff,
-)
-from fenics_contact.materials.kernels import rigid_body_modes
-from fenics_contact.materials.orthotropic import OrthotropicElasticity, OrthotropicPlaneStress, material_axes
-from fenics_contact.materials.plastic import FinitePlasticity, HistoryMaterial, J2Plasticity, MaterialResponse
+from typing import TYPE_CHECKING
+
+from fenics_contact._base import form_language  # noqa: F401 (imports UFL at less cost)
+from fenics_contact._base.late_names import late_names
+
+if TYPE_CHECKING:
+    from fenics_contact.materials.elastic import (
+        Elasticity,
+        IsotropicElasticity,
+        Material,
+        PlaneStrain,
+        PlaneStress,
+        Thermoelastic,
+        Transverse,
+        strain,
+    )
+    from fenics_contact.materials.hyperelastic import (
+        EnergyModel,
+        Hyperelasticity,
+        MooneyRivlin,
+        NearlyIncompressible,
+        NeoHooke,
+        Ogden,
+        StVenantKirchhoff,
+    )
+    from fenics_contact.materials.kernels import rigid_body_modes
+    from fenics_contact.materials.orthotropic import (
+        OrthotropicElasticity,
+        OrthotropicPlaneStress,
+        material_axes,
+    )
+    from fenics_contact.materials.plastic import (
+        FinitePlasticity,
+        HistoryMaterial,
+        J2Plasticity,
+        MaterialResponse,
+    )
 
 __all__ = [
     "Elasticity",
@@ -48,3 +63,5 @@ __all__ = [
     "rigid_body_modes",
     "strain",
 ]
+
+__getattr__, __dir__ = late_names(__name__)

@@ -1,14 +1,19 @@
 """Meshes of bodies: cells, faces, named sides, quality, local refinement; independent of forms."""
 
-from fenics_contact.mesh.bisection import bisection_partition
-from fenics_contact.mesh.cell_types import CellType
-from fenics_contact.mesh.chart import Chart
-from fenics_contact.mesh.faces import boundary_faces, merge_duplicate_nodes
+from typing import TYPE_CHECKING
+
+from fenics_contact._base.late_names import late_names
 from fenics_contact.mesh.quadratic import quadratic
-from fenics_contact.mesh.quadratic_nodes import in_vtk_order
-from fenics_contact.mesh.quality import scaled_jacobian
-from fenics_contact.mesh.refinement import Refinement, refined
-from fenics_contact.mesh.transfer import MeshTransfer
+
+if TYPE_CHECKING:
+    from fenics_contact.mesh.bisection import bisection_partition
+    from fenics_contact.mesh.cell_types import CellType
+    from fenics_contact.mesh.chart import Chart
+    from fenics_contact.mesh.faces import boundary_faces, merge_duplicate_nodes
+    from fenics_contact.mesh.quadratic_nodes import in_vtk_order
+    from fenics_contact.mesh.quality import scaled_jacobian
+    from fenics_contact.mesh.refinement import Refinement, refined
+    from fenics_contact.mesh.transfer import MeshTransfer
 
 __all__ = [
     "CellType",
@@ -23,3 +28,5 @@ __all__ = [
     "refined",
     "scaled_jacobian",
 ]
+
+__getattr__, __dir__ = late_names(__name__)

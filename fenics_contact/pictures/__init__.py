@@ -17,19 +17,24 @@ All raise `InvalidInputError` if an option or the name of the file cannot be use
 `MissingRequirementError` if this machine cannot render.
 """
 
+from typing import TYPE_CHECKING
+
+from fenics_contact._base.late_names import late_names
 from fenics_contact.pictures import _libraries  # noqa: F401
-from fenics_contact.pictures.canvas import Picture, Units
-from fenics_contact.pictures.curves import plot_curves
-from fenics_contact.pictures.designs import plot_before_after, plot_control_net, plot_convergence
-from fenics_contact.pictures.levels import plot_levels, plot_meshes
-from fenics_contact.pictures.states import (
-    plot_contact_pressure,
-    plot_contact_status,
-    plot_decomposition,
-    plot_error,
-    plot_field,
-    plot_stress,
-)
+
+if TYPE_CHECKING:
+    from fenics_contact.pictures.canvas import Picture, Units
+    from fenics_contact.pictures.curves import plot_curves
+    from fenics_contact.pictures.designs import plot_before_after, plot_control_net, plot_convergence
+    from fenics_contact.pictures.levels import plot_levels, plot_meshes
+    from fenics_contact.pictures.states import (
+        plot_contact_pressure,
+        plot_contact_status,
+        plot_decomposition,
+        plot_error,
+        plot_field,
+        plot_stress,
+    )
 
 __all__ = [
     "Picture",
@@ -47,3 +52,5 @@ __all__ = [
     "plot_meshes",
     "plot_stress",
 ]
+
+__getattr__, __dir__ = late_names(__name__)

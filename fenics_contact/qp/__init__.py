@@ -5,14 +5,19 @@ The problem (`DualProblem`) is an operator, a coarse space and a layout; a solve
 distributed over the ranks of the problem's communicator.
 """
 
-from fenics_contact.qp.cones import FeasibleSet, SlipLaw
-from fenics_contact.qp.face import Face
-from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG, SlidingError
-from fenics_contact.qp.krylov import Stop
-from fenics_contact.qp.problem import DualProblem, FacePreconditioner
-from fenics_contact.qp.smalse import Smalse
-from fenics_contact.qp.solution import DualSolution, Residuals, Start, measure
+from typing import TYPE_CHECKING
+
+from fenics_contact._base.late_names import late_names
 from fenics_contact.qp.solve import DualSolver, Equilibrium, solve
+
+if TYPE_CHECKING:
+    from fenics_contact.qp.cones import FeasibleSet, SlipLaw
+    from fenics_contact.qp.face import Face
+    from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG, SlidingError
+    from fenics_contact.qp.krylov import Stop
+    from fenics_contact.qp.problem import DualProblem, FacePreconditioner
+    from fenics_contact.qp.smalse import Smalse
+    from fenics_contact.qp.solution import DualSolution, Residuals, Start, measure
 
 __all__ = [
     "DualProblem",
@@ -33,3 +38,5 @@ __all__ = [
     "measure",
     "solve",
 ]
+
+__getattr__, __dir__ = late_names(__name__)

@@ -1,11 +1,16 @@
 """Meshes of other programs: gmsh, CAD, meshio, dolfinx, XDMF."""
 
-from fenics_contact.readers.cad import CadFace, InBox, OnCylinder, OnPlane
-from fenics_contact.readers.dolfinx import DolfinxBodies, from_dolfinx, read_xdmf
-from fenics_contact.readers.gmsh import from_gmsh_model, read_msh, refilled
-from fenics_contact.readers.gmsh_session import gmsh_model
-from fenics_contact.readers.meshio import from_meshio
-from fenics_contact.readers.triangulation import read_triangulation
+from typing import TYPE_CHECKING
+
+from fenics_contact._base.late_names import late_names
+
+if TYPE_CHECKING:
+    from fenics_contact.readers.cad import CadFace, InBox, OnCylinder, OnPlane
+    from fenics_contact.readers.dolfinx import DolfinxBodies, from_dolfinx, read_xdmf
+    from fenics_contact.readers.gmsh import from_gmsh_model, read_msh, refilled
+    from fenics_contact.readers.gmsh_session import gmsh_model
+    from fenics_contact.readers.meshio import from_meshio
+    from fenics_contact.readers.triangulation import read_triangulation
 
 __all__ = [
     "CadFace",
@@ -22,3 +27,5 @@ __all__ = [
     "read_xdmf",
     "refilled",
 ]
+
+__getattr__, __dir__ = late_names(__name__)

@@ -10,16 +10,19 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import BSpline, RectBivariateSpline, make_interp_spline
 from scipy.spatial import cKDTree
 
 from fenics_contact._base.checks import GivenVector, checked
 from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.shapes.simple import ROUNDING
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline, RectBivariateSpline
 
 #: Tangents are degenerate if their area, relative to the product of their lengths, is below this.
 FLAT = 1e-10
@@ -393,6 +396,8 @@ class SplinePatch(Patch):
 
     @cached_property
     def _spline(self) -> BSpline | list[RectBivariateSpline]:
+        from scipy.interpolate import RectBivariateSpline, make_interp_spline  # few bodies need them
+
         axes = [np.arange(float(count)) for count in self.grid.shape[:-1]]
         if len(axes) == 1:
             return make_interp_spline(axes[0], self.grid, k=DEGREE)
@@ -402,10 +407,10 @@ class SplinePatch(Patch):
         """Return a derivative of the position, (n, k) -> (n, k + 1)."""
         _, _, periodic = self._range
         u = np.where(periodic, u % (np.array(self.grid.shape[:-1]) - 1), u)
-        if isinstance(self._spline, BSpline):
-            return np.asarray(self._spline(u[:, 0], orders[0]))
-        dx, dy = orders
-        return np.stack([spline.ev(u[:, 0], u[:, 1], dx=dx, dy=dy) for spline in self._spline], axis=1)
+        if isinstance(self._spline, list):
+            dx, dy = orders
+            return np.stack([spline.ev(u[:, 0], u[:, 1], dx=dx, dy=dy) for spline in self._spline], axis=1)
+        return np.asarray(self._spline(u[:, 0], orders[0]))
 
     def _position(self, u: np.ndarray) -> np.ndarray:
         return self._derivative(u, *[0] * (self.dim - 1))

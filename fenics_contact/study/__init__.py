@@ -4,16 +4,16 @@
 of your own is a Python file that defines ``study``, a `StudyScene`.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from fenics_contact.study.report import accuracy_table, cost_table, write_report
-from fenics_contact.study.results import Errors, Results, Run, read_study
-from fenics_contact.study.runner import Settings, run_study
-from fenics_contact.study.study import BALANCED, Parameters, Problem, Quantity, StudyScene, Sweep
+from fenics_contact._base.late_names import late_names
 
 if TYPE_CHECKING:
     from fenics_contact.study import figures
+    from fenics_contact.study.report import accuracy_table, cost_table, write_report
+    from fenics_contact.study.results import Errors, Results, Run, read_study
+    from fenics_contact.study.runner import Settings, run_study
+    from fenics_contact.study.study import BALANCED, Parameters, Problem, Quantity, StudyScene, Sweep
 
 __all__ = [
     "BALANCED",
@@ -34,9 +34,4 @@ __all__ = [
     "write_report",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    """Load the figures on first use: they need matplotlib."""
-    if name == "figures":
-        return import_module(f"{__name__}.figures")
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__ = late_names(__name__)

@@ -32,7 +32,7 @@ from tests.conftest import ROOT, launch
 
 LIBRARIES = ["numpy", "scipy", "clarabel", "mpi4py", "petsc4py", "dolfinx"]
 find_spec = importlib.util.find_spec
-version_of = metadata.version
+versions = _requirements.installed_versions
 import_module = importlib.import_module
 
 
@@ -54,14 +54,11 @@ def with_version(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str | None],
     """Return a function that gives a distribution another version, or none."""
 
     def pretend(distribution: str, version: str | None) -> None:
-        def answer(name: str) -> str:
-            if name != distribution:
-                return version_of(name)
-            if version is None:
-                raise metadata.PackageNotFoundError(name)
-            return version
+        def answer(places: tuple[str, ...]) -> dict[str, str]:
+            others = {name: each for name, each in versions(places).items() if name != distribution}
+            return others if version is None else {**others, distribution: version}
 
-        monkeypatch.setattr(metadata, "version", answer)
+        monkeypatch.setattr(_requirements, "installed_versions", answer)
 
     return pretend
 
@@ -106,6 +103,13 @@ def test_what_is_installed_here_will_do(caplog: pytest.LogCaptureFixture) -> Non
     _requirements.load_petsc()
     _requirements.check_gmsh()
     assert caplog.messages == []
+
+
+def test_versions_are_those_of_the_metadata() -> None:
+    found = _requirements.installed_versions(tuple(sys.path))
+    for name in ("numpy", "scipy", "clarabel", "threadpoolctl", "mpi4py", "petsc4py"):
+        assert found[name] == metadata.version(name)
+    assert _requirements.installed_versions(("/nowhere",)) == {}
 
 
 @pytest.mark.parametrize("module", LIBRARIES)
@@ -386,8 +390,9 @@ EXTRAS = {"matplotlib", "pydantic", "pyvista", "rich", "tomlkit", "typer"}
 
 
 def test_what_solves_loads_no_extra() -> None:
-    imports = "; ".join(f"import fenics_contact.{name}" for name in SOLVING)
-    solving = f"import sys; {imports}; fenics_contact.solve_scene; sys.stdout.write(' '.join(sys.modules))"
+    imports = "; ".join(f"from fenics_contact.{name} import *" for name in SOLVING)
+    imports += "; from fenics_contact import solve_scene"
+    solving = f"import sys; {imports}; sys.stdout.write(' '.join(sys.modules))"
     answer = launch(1, "-c", solving)
     loaded = {name.partition(".")[0] for name in answer.stdout.split()}
     assert "scipy" in loaded, answer.stderr

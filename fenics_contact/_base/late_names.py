@@ -1,0 +1,55 @@
+"""Names of a package that are loaded on first use, listed once: by its imports for type checkers."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from importlib.abc import InspectLoader
+from typing import Any
+
+__all__ = ["homes", "late_names"]
+
+
+@cache
+def homes(package: str) -> dict[str, str]:
+    """Return the module of each name that the imports for type checkers of a package list."""
+    spec = sys.modules[package].__spec__
+    assert spec is not None
+    assert isinstance(spec.loader, InspectLoader)
+    tree = ast.parse(spec.loader.get_source(package) or "")
+    parts = [part for part in tree.body if isinstance(part, ast.If)]
+    for_types = [part for part in parts if ast.unparse(part.test) == "TYPE_CHECKING"]
+    statements = [each for part in for_types for each in part.body if isinstance(each, ast.ImportFrom)]
+    return {name.asname or name.name: str(each.module) for each in statements for name in each.names}
+
+
+def late_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """Return ``__getattr__`` and ``__dir__`` of a package whose names stand below ``if TYPE_CHECKING``.
+
+    A name that a submodule has, too, must be imported at once: the import of that submodule would hide it.
+
+    Example::
+
+        if TYPE_CHECKING:
+            from fenics_contact.shapes.profile import Profile
+
+        __all__ = ["Profile"]
+        __getattr__, __dir__ = late_names(__name__)
+    """
+    module = sys.modules[package]
+
+    def load(name: str) -> Any:
+        """Load a public name on first use."""
+        if name not in module.__all__:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        home = homes(package)[name]
+        if home == package:  # a submodule
+            return import_module(f"{package}.{name}")
+        value = getattr(import_module(home), name)
+        setattr(module, name, value)
+        return value
+
+    return load, lambda: sorted({*vars(module), *module.__all__})
