@@ -37,9 +37,9 @@ Long runs: show_progress, Checkpoint, CheckpointError, interruptible, Interrupte
 Tests of material models: check_hyperelastic, check_history_material
 
 Public modules with more: `materials`, `gallery` (meshes of simple bodies), `readers` (gmsh, CAD, dolfinx,
-meshio), `mesh`, `shapes` (true surfaces), `design` (objectives, constraints, optimisers), `results` (what
-states consist of), `pictures`, `output` (files), `study` (what accuracy costs), `errors`, `theory` (contacts
-known by formula), `qp` (dual solvers) and `feti` (subdomains).
+meshio), `decks` (of CalculiX and Abaqus), `mesh`, `shapes` (true surfaces), `design` (objectives,
+constraints, optimisers), `results` (what states consist of), `pictures`, `output` (files), `study` (what
+accuracy costs), `errors`, `theory` (contacts known by formula), `qp` (dual solvers) and `feti` (subdomains).
 """
 
 from __future__ import annotations
@@ -152,8 +152,9 @@ __version__ = "0.2.0"
 
 #: Public modules.
 _ROOMS = (
-    "design errors feti gallery materials mesh output pictures qp readers results shapes study theory".split()
-)
+    "decks design errors feti gallery materials mesh output pictures qp "
+    "readers results shapes study theory"
+).split()
 
 #: Modules of the names that users take from here.
 _HOME = homes(__name__)

@@ -67,7 +67,8 @@ FLOORS = [
         Room("pictures", "PNG", "beside"),
     ],
     [
-        Room("_page", "web pages of results", "top"),
+        Room("_page", "web pages", "top"),
+        Room("decks", "CalculiX, Abaqus", "top"),
         Room("study", "what accuracy costs in time", "top"),
     ],
     [Room("_cli", "the command fenics-contact", "top")],

@@ -19,6 +19,8 @@ from fenics_contact._scene_file.reading import SceneFile, read_scene_file
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
 
 Command: TypeAlias = Callable[..., None]
+#: Suffixes of decks of CalculiX and Abaqus.
+DECKS = (".inp",)
 
 
 def scene_command(
@@ -37,7 +39,9 @@ def scene_command(
     def command(
         context: typer.Context,
         scene: Annotated[
-            Path, typer.Argument(metavar="SCENE.toml", help="The scene file.", show_default=False)
+            Path, typer.Argument(
+                metavar="SCENE.toml", help="The scene file, or a deck (.inp).", show_default=False
+            ),
         ],
         output: Annotated[
             Path | None,
@@ -97,6 +101,7 @@ def scene_command(
             bool,
             typer.Option(
                 "--dry-run",
+                "--plan",
                 help="Only report what would be built and written. Python files that the scene names are "
                 "run.",
             ),
@@ -163,6 +168,10 @@ def _read(
         if not is_visible(str(output)):
             raise InvalidInputError(f"--output must be a path that can be shown, got {str(output)!r}")
         overrides.append(f"output.folder={json.dumps(str(output), ensure_ascii=False)}")
+    if scene.suffix.lower() in DECKS:
+        from fenics_contact.decks.file import read_deck_file
+
+        return read_deck_file(scene, console.comm, overrides)
     return read_scene_file(scene, console.comm, overrides=overrides, python=python)
 
 
@@ -196,6 +205,8 @@ def _show_plan(console: Console, file: SceneFile, *, sensitivity: bool) -> None:
         rows["accuracy"] = f"objective{words.removeprefix(str(asked.quantity))}" if sensitivity else words
     console.write(f"{file.title}: {file.source.name} on {console.ranks}")
     console.write(facts(rows))
+    for words in file.notes:
+        console.write(f"! {words}")
 
 
 def _show_outputs(console: Console, file: SceneFile, *, draws: bool, meshes: bool) -> None:

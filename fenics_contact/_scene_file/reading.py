@@ -430,6 +430,11 @@ class SceneFile:
         """Folder of the results, relative to where the program runs."""
         return Path(self.document.output.folder or f"output/{self.name}")
 
+    @property
+    def notes(self) -> Sequence[str]:
+        """What the plan says besides, none of a scene file."""
+        return ()
+
     @cached_property
     def _complete(self) -> Document:
         """The document with the fields of its files."""

@@ -29,6 +29,7 @@ class TaggedMesh:
         words: Names of its labels, for messages: ``"physical volume"``, ``"physical surface"``.
         node_sets: Label to node numbers, in any order: the facets on the boundary of a body all of whose
             corners are among them.
+        point_sets: Label to node numbers of sets of single nodes.
     """
 
     source: str
@@ -38,6 +39,7 @@ class TaggedMesh:
     facets: Mapping[Label, Sequence[np.ndarray]]
     words: tuple[str, str]
     node_sets: Mapping[Label, np.ndarray] = field(default_factory=dict)
+    point_sets: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def dim(self) -> int:
@@ -235,8 +237,10 @@ def _body(
         if (there := np.unique(np.concatenate(members))).size:
             surfaces[surface] = boundary[there]
     named = {} if regions is None else {label: np.flatnonzero(region == n) for n, label in enumerate(regions)}
+    held = {label: number[inside][number[inside] >= 0] for label, inside in mesh.point_sets.items()}
+    held = {label: inside for label, inside in held.items() if len(inside) and label not in surfaces}
     try:
-        return BodyMesh(mesh.points[nodes], local, surfaces, regions=named)
+        return BodyMesh(mesh.points[nodes], local, surfaces, regions=named, node_sets=held)
     except InvalidInputError as error:
         raise InvalidInputError(f"body '{name}' of {mesh.source} is no sound mesh: {error}") from error
 

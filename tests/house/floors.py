@@ -18,7 +18,7 @@ FLOORS = [
     {"design"},
     {"_adaptive"},
     {"_scene_file", "output", "pictures", "_responses"},
-    {"_page", "study"},
+    {"_page", "decks", "study"},
     {"_cli"},
     {"__main__"},
 ]

@@ -1,0 +1,259 @@
+"""Bodies of a deck: elements that share nodes, with the sections that give them materials."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from fenics_contact.decks.cards import Card
+from fenics_contact.decks.mesh import Block, DeckMesh, Faces
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.cell_types import CELL_TYPES
+from fenics_contact.mesh.quality import thickness
+from fenics_contact.readers.bodies import Label, TaggedMesh, bodies_of
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """A section: elements, their material, its axes, and the thickness of plane ones."""
+
+    card: Card
+    name: str
+    material: str
+    orientation: str
+    thickness: float
+
+
+def read_sections(cards: Sequence[Card], mesh: DeckMesh) -> tuple[list[Section], np.ndarray]:
+    """Return the sections of a deck, and the number of the section of each element, −1 without one."""
+    sections: list[Section] = []
+    of_element = np.full(len(mesh.element_numbers), -1)
+    for card in cards:
+        if card.name == "SOLIDSECTION":
+            name = card.required("ELSET")
+            of_element[mesh.elements_named(name, card)] = len(sections)
+            thick = card.floats(0)[0] if card.lines else 1.0
+            if not thick > 0:
+                raise card.error(f"the thickness must be above zero, got {thick:g}: correct it", 0)
+            material, axes = card.required("MATERIAL"), card.name_of("ORIENTATION")
+            sections.append(Section(card, name, material, axes, thick))
+    lost = np.flatnonzero(of_element < 0)
+    if len(lost):
+        block = mesh.blocks[mesh.block_of[lost[0]]]
+        raise block.card.error(
+            f"element {mesh.element_numbers[lost[0]]} and {len(lost) - 1} others have no *SOLID SECTION: "
+            "give every element one, which names its material"
+        )
+    return sections, of_element
+
+
+@dataclass(frozen=True, eq=False)
+class Component:
+    """Elements that share nodes.
+
+    Attributes:
+        elements: Their positions, ascending.
+        sections: Numbers of their sections, in the order of the deck.
+    """
+
+    name: str
+    elements: np.ndarray
+    sections: Sequence[int]
+
+
+def components(mesh: DeckMesh, sections: Sequence[Section], of_element: np.ndarray) -> list[Component]:
+    """Return the bodies of a deck by their elements, each with a name of its own."""
+    rows = [
+        np.repeat(block.first + np.arange(len(block.nodes)), block.element.count) for block in mesh.blocks
+    ]
+    row, column = np.concatenate(rows), np.concatenate([block.nodes.ravel() for block in mesh.blocks])
+    count = len(mesh.element_numbers)
+    graph = sp.coo_matrix((np.ones(len(row)), (row, count + column)), shape=(count + len(mesh.points),) * 2)
+    _, label = connected_components(graph, directed=False)
+    _, first, number = np.unique(label[:count], return_index=True, return_inverse=True)
+    names: list[str] = []
+    found = []
+    for part in np.argsort(first):
+        elements = np.flatnonzero(number.ravel() == part)
+        used = sorted(set(of_element[elements].tolist()))
+        name = _name(mesh, elements, [sections[k].name for k in used], names)
+        names.append(name)
+        found.append(Component(name, elements, used))
+    return found
+
+
+def _name(mesh: DeckMesh, elements: np.ndarray, of_sections: Sequence[str], taken: Sequence[str]) -> str:
+    """Return that of a set with just these elements, else those of the sections, with a number if taken."""
+    exact = [name for name, inside in mesh.element_sets.items() if np.array_equal(inside, elements)]
+    best = [name for name in of_sections if name in exact] or exact or ["+".join(dict.fromkeys(of_sections))]
+    free = [name for name in best if name not in taken]
+    if free:
+        return free[0]
+    return next(f"{best[0]} {k}" for k in range(2, len(taken) + 3) if f"{best[0]} {k}" not in taken)
+
+
+@dataclass(frozen=True, eq=False)
+class Exterior:
+    """The faces that belong to one element alone.
+
+    Attributes:
+        faces: The faces.
+        nodes: Positions of their nodes, −1 behind the last, (n, most nodes of a face).
+    """
+
+    mesh: DeckMesh
+    faces: Faces
+    nodes: np.ndarray
+
+    @staticmethod
+    def of(mesh: DeckMesh) -> Exterior:
+        """Return that of a mesh."""
+        elements, sides = [], []
+        for block in mesh.blocks:
+            count = len(block.element.faces)
+            elements.append(np.repeat(block.first + np.arange(len(block.nodes)), count))
+            sides.append(np.tile(np.arange(count), len(block.nodes)))
+        every = Faces(np.concatenate(elements), np.concatenate(sides))
+        corners = np.full((len(every), 4), -1)
+        nodes = np.full((len(every), 9), -1)
+        for mine, element, side, members in mesh.parts_of(every):
+            nodes[mine[:, None], np.arange(members.shape[1])] = members
+            width = len(element.faces[side])
+            corners[mine[:, None], np.arange(width)] = members[:, :width]
+        _, number, count = np.unique(
+            np.sort(corners, axis=1), axis=0, return_inverse=True, return_counts=True
+        )
+        single = count[number.ravel()] == 1
+        return Exterior(mesh, Faces(every.elements[single], every.sides[single]), nodes[single])
+
+    def holds(self, faces: Faces) -> np.ndarray:
+        """Return which faces are exterior ones."""
+        known = self.faces.elements * 8 + self.faces.sides
+        return np.isin(faces.elements * 8 + faces.sides, known)
+
+    def within(self, nodes: np.ndarray) -> Faces:
+        """Return the faces all of whose nodes are among some."""
+        mark = np.append(np.zeros(len(self.mesh.points), dtype=bool), True)  # −1 counts as one of them
+        mark[nodes] = True
+        inside = mark[self.nodes].all(axis=1)
+        return Faces(self.faces.elements[inside], self.faces.sides[inside])
+
+    def covering(self, nodes: np.ndarray) -> Faces | None:
+        """Return faces that have these nodes and no others, None if there are none."""
+        inside = self.within(nodes)
+        mine = np.concatenate([part.ravel() for _, _, _, part in self.mesh.parts_of(inside)] or [nodes[:0]])
+        return inside if len(nodes) and np.array_equal(np.unique(mine), np.unique(nodes)) else None
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """The meshes of a deck's bodies.
+
+    Attributes:
+        meshes: Name -> mesh, its regions named by their sections if there are several.
+        nodes: Name -> positions in the deck of the nodes of its mesh, −1 for nodes that the deck has not.
+    """
+
+    components: Sequence[Component]
+    meshes: Mapping[str, BodyMesh]
+    nodes: Mapping[str, np.ndarray]
+
+
+def build_bodies(
+    mesh: DeckMesh,
+    parts: Sequence[Component],
+    of_element: np.ndarray,
+    sections: Sequence[Section],
+    surfaces: Mapping[str, Faces],
+    node_sets: Mapping[str, np.ndarray],
+    source: str,
+) -> Parts:
+    """Return the meshes of the bodies with named surfaces and sets of nodes."""
+    dims = {block.element.kind for block in mesh.blocks}
+    if len(dims) > 1:
+        block = next(b for b in mesh.blocks if b.element.kind != mesh.blocks[0].element.kind)
+        raise block.card.error(
+            f"all elements must be of one kind, got {mesh.blocks[0].element.name} and {block.element.name}: "
+            "make two decks of them"
+        )
+    dim = mesh.blocks[0].element.dim
+    points = np.ascontiguousarray(mesh.points[:, :dim])
+    for block in mesh.blocks:
+        _check_block(block, points, mesh)
+    cells: dict[str, list[np.ndarray]] = {}
+    place = np.zeros(len(mesh.element_numbers), dtype=np.int64)  # of each element among those of its cells
+    for block in mesh.blocks:
+        known = cells.setdefault(block.element.cell, [])
+        start = sum(map(len, known))
+        place[block.first : block.first + len(block.nodes)] = start + np.arange(len(block.nodes))
+        known.append(block.nodes)
+    kinds = np.array([block.element.cell for block in mesh.blocks])[mesh.block_of]
+    groups: dict[Label, dict[str, np.ndarray]] = {}
+    chosen: dict[str, dict[str, str]] = {}
+    for part in parts:
+        for section in part.sections:
+            mine = part.elements[of_element[part.elements] == section]
+            label = f"{part.name}/{section}"
+            groups[label] = {str(kind): place[mine[kinds[mine] == kind]] for kind in np.unique(kinds[mine])}
+            region = _region(sections, part, section)
+            chosen.setdefault(part.name, {})[region] = label
+    tagged = TaggedMesh(
+        source,
+        points,
+        {kind: np.concatenate(rows) for kind, rows in cells.items()},
+        groups,
+        {name: mesh.corners(faces) for name, faces in surfaces.items()},
+        ("element set", "surface"),
+        point_sets=node_sets,
+    )
+    wanted = {
+        name: regions if len(regions) > 1 else next(iter(regions.values()))
+        for name, regions in chosen.items()
+    }
+    meshes = bodies_of(tagged, wanted, list(surfaces))
+    nodes = {}
+    for part in parts:
+        mine = np.unique(
+            np.concatenate(
+                [
+                    tagged.cells[k][rows].ravel()
+                    for g in chosen[part.name].values()
+                    for k, rows in groups[g].items()
+                ]
+            )
+        )
+        nodes[part.name] = mine
+    return Parts(parts, meshes, nodes)
+
+
+def _region(sections: Sequence[Section], part: Component, section: int) -> str:
+    names = [sections[k].name for k in part.sections]
+    name = sections[section].name
+    return name if names.count(name) == 1 else f"{name} {part.sections.index(section) + 1}"
+
+
+def regions_of(sections: Sequence[Section], part: Component) -> dict[str, Section]:
+    """Return the sections of a body by the names of its regions."""
+    return {_region(sections, part, number): sections[number] for number in part.sections}
+
+
+def _check_block(block: Block, points: np.ndarray, mesh: DeckMesh) -> None:
+    if block.element.cell not in CELL_TYPES:
+        raise block.card.error(
+            f"elements of type {block.element.name} are not read yet: there are no cells with their "
+            "nodes; mesh the body with linear elements, or quadratic tetrahedra"
+        )
+    bad = np.flatnonzero(thickness(points, block.nodes) <= 0.0)
+    if len(bad):
+        numbers = ", ".join(map(str, block.numbers[bad[:5]])) + (", ..." if len(bad) > 5 else "")
+        ends = np.cumsum([line.strip().rstrip(",").count(",") + 1 for line in block.card.lines])
+        row = int(np.searchsorted(ends, bad[0] * (1 + block.element.count), side="right"))
+        raise block.card.error(
+            f"every element must have a positive Jacobian, {len(bad)} of {len(block.nodes)} of type "
+            f"{block.element.name} are inverted or flat: {numbers}; see the order of their nodes, and their "
+            "coordinates", row,
+        )  # fmt: skip

@@ -1,0 +1,253 @@
+"""The cards of a deck: keywords with their parameters and data lines, each with the line where it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from fenics_contact._base.checks import require_file
+from fenics_contact._base.progress import visible
+from fenics_contact.errors import InvalidInputError
+
+
+class DeckError(InvalidInputError):
+    """A deck cannot be used as it is; the message says where and what would be accepted.
+
+    Attributes:
+        card: Keyword of the card, such as ``"*SOLID SECTION"``; "" where there is none.
+        line: Its line, or that of the data that is wrong, from 1; 0 where there is none.
+        file: Name of the file.
+    """
+
+    def __init__(self, words: str, file: str = "", line: int = 0, card: str = "") -> None:
+        """Build the message."""
+        self.card, self.line, self.file = card, line, file
+        place = f"{file}, line {line}" if line else file
+        super().__init__(": ".join(part for part in (place, card, words) if part))
+
+    def __reduce__(self) -> tuple[type[DeckError], tuple[str]]:
+        """Pickle it by its message: other ranks raise it, too."""
+        return type(self), (str(self),)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where something in a deck is said.
+
+    Attributes:
+        card: Keyword of the card, such as ``"*SOLID SECTION"``.
+        line: Its line, from 1.
+        file: Name of the file.
+    """
+
+    card: str
+    line: int
+    file: str
+
+    def __str__(self) -> str:
+        """Return card, file and line."""
+        return f"{self.card}, {self.file} line {self.line}"
+
+    def error(self, words: str, line: int = 0) -> DeckError:
+        """Return an error there, or at a data line of the card."""
+        return DeckError(words, self.file, line or self.line, self.card)
+
+
+@dataclass(frozen=True, eq=False)
+class Card:
+    """A keyword, its parameters and its data.
+
+    Attributes:
+        name: The keyword in capitals without blanks: "SOLIDSECTION".
+        parameters: Names in capitals without blanks -> values as written, "" for flags.
+        lines: Data lines without comments and blank lines.
+        first: Number of the line behind the keyword, and which of these are data lines.
+    """
+
+    name: str
+    written: str
+    parameters: Mapping[str, str]
+    lines: Sequence[str]
+    numbers: Sequence[int]
+    line: int
+    file: str
+
+    @property
+    def origin(self) -> Origin:
+        """Where it is."""
+        return Origin(f"*{self.written}", self.line, self.file)
+
+    def error(self, words: str, row: int | None = None) -> DeckError:
+        """Return an error at the keyword, or at a data line, numbered from 0."""
+        return self.origin.error(words, 0 if row is None else self.numbers[row])
+
+    def name_of(self, parameter: str) -> str:
+        """Return the name that a parameter gives, in capitals, "" without it."""
+        return plain(self.parameters.get(parameter, ""))
+
+    def required(self, parameter: str) -> str:
+        """Return the name that a parameter must give, in capitals."""
+        if not self.name_of(parameter):
+            raise self.error(f"needs the parameter {parameter}=, got {self.given}: add it")
+        return self.name_of(parameter)
+
+    def number_of(self, parameter: str, default: float = 0.0) -> float:
+        """Return the number that a parameter gives."""
+        text = self.parameters.get(parameter)
+        return default if text is None else self._number(text, f"the parameter {parameter}=", None)
+
+    @property
+    def given(self) -> str:
+        """The parameters as given, in words."""
+        pairs = (f"{name}={value}" if value else name for name, value in self.parameters.items())
+        return visible(", ".join(pairs)) or "none"
+
+    def _number(self, text: str, what: str, row: int | None) -> float:
+        try:
+            return float(text.upper().replace("D", "E"))
+        except ValueError:
+            raise self.error(f"{what} must be a number, got {text!r}: correct it", row) from None
+
+    @cached_property
+    def rows(self) -> list[list[str]]:
+        """The entries of each data line, without blanks around them; an empty last one is dropped."""
+        split = [[entry.strip() for entry in line.split(",")] for line in self.lines]
+        return [row[:-1] if len(row) > 1 and not row[-1] else row for row in split]
+
+    def floats(self, row: int, start: int = 0) -> list[float]:
+        """Return the entries of a data line as numbers, zero where one is empty."""
+        entries = self.rows[row][start:]
+        return [
+            self._number(text, f"entry {start + k + 1}", row) if text else 0.0
+            for k, text in enumerate(entries)
+        ]
+
+    def all_floats(self) -> list[float]:
+        """Return the numbers of all data lines one after the other."""
+        return [number for row in range(len(self.rows)) for number in self.floats(row)]
+
+    def table(self, columns: int) -> np.ndarray:
+        """Return data lines of numbers, shape (n, columns), zero where entries are missing.
+
+        Whole blocks are read at once; line by line only where lines are not alike.
+        """
+        text = [line.rstrip().rstrip(",") for line in self.lines]
+        count = {line.count(",") for line in text}
+        if len(count) == 1:
+            values = _numbers(",".join(text), float)
+            width = count.pop() + 1
+            if values is not None and values.size == width * len(text):
+                found = values.reshape(len(text), width)[:, :columns]
+                return np.pad(found, ((0, 0), (0, columns - found.shape[1])))
+        result = np.zeros((len(text), columns))
+        for row in range(len(text)):
+            entries = self.floats(row)[:columns]
+            result[row, : len(entries)] = entries
+        return result
+
+    def integers(self, width: int) -> np.ndarray:
+        """Return records of a number of integers each, which may go over several lines, shape (n, width)."""
+        text = [line.strip().rstrip(",") for line in self.lines]
+        values = _numbers(",".join(text), np.int64)
+        ends = np.cumsum([line.count(",") + 1 for line in text])
+        if values is None:
+            row = next(k for k, line in enumerate(text) if _numbers(line, np.int64) is None)
+            raise self.error(
+                f"must list whole numbers, got {self.lines[row].strip()!r}: correct the line", row
+            )
+        records = np.arange(width, ends[-1] + 1, width) if len(ends) else ends
+        lost = np.flatnonzero(~np.isin(records, ends))
+        if lost.size or (len(ends) and ends[-1] % width):
+            start = records[lost[0]] - width if lost.size else ends[-1] // width * width
+            row = int(np.searchsorted(ends, start, side="right"))
+            raise self.error(
+                f"needs {width} numbers for each element, its number and its nodes, which this line and "
+                "those that continue it do not have: see whether TYPE= is right",
+                row,
+            )
+        return values.reshape(-1, width)
+
+
+def plain(text: str) -> str:
+    """Return a name as both programs read it: in capitals, without quotes and blanks around it."""
+    return text.strip().strip('"').strip().upper()
+
+
+def _numbers(text: str, kind: type) -> np.ndarray | None:
+    """Return numbers between commas, None if something else is among them."""
+    if not text:
+        return np.zeros(0, dtype=kind)
+    if kind is float and ("D" in text or "d" in text):
+        text = text.replace("D", "E").replace("d", "e")
+    try:
+        return np.array(text.split(","), dtype=np.float64 if kind is float else np.int64)
+    except (ValueError, OverflowError):
+        return None
+
+
+#: Most files that include each other, one inside the other.
+DEEPEST = 20
+
+
+def read_cards(path: Path) -> list[Card]:
+    """Return the cards of a deck and of the files that it includes, in their order."""
+    return list(_cards(path, path.parent, ()))
+
+
+def _cards(path: Path, folder: Path, inside: tuple[Path, ...]) -> Iterator[Card]:
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    heads = [k for k, line in enumerate(lines) if line[:1] == "*" and line[:2] != "**"]
+    if not heads and not inside:
+        raise DeckError(
+            "a deck must have cards that begin with an asterisk, such as *NODE, it has none: is it an input "
+            "file of CalculiX or Abaqus?",
+            path.name,
+        )
+    before = [k for k in range(heads[0] if heads else len(lines)) if _is_data(lines[k])]
+    if before and not inside:
+        raise DeckError(
+            f"data must follow a card, got {lines[before[0]].strip()[:40]!r}", path.name, before[0] + 1
+        )
+    for head, end in zip(heads, [*heads[1:], len(lines)], strict=True):
+        keyword, start = lines[head].rstrip(), head + 1
+        while keyword.endswith(",") and start < end:
+            keyword, start = keyword + lines[start].strip(), start + 1
+        inner = [k for k in range(start, end) if _is_data(lines[k])]
+        card = _card(keyword, [lines[k] for k in inner], [k + 1 for k in inner], head + 1, path.name)
+        if card.name == "INCLUDE":
+            yield from _included(card, folder, (*inside, path))
+        else:
+            yield card
+
+
+def _is_data(line: str) -> bool:
+    return line[:2] != "**" and not line.isspace() and bool(line)
+
+
+def _card(keyword: str, lines: list[str], numbers: list[int], line: int, file: str) -> Card:
+    written, *rest = keyword[1:].split(",")
+    parameters = {}
+    for part in rest:
+        name, _, value = part.partition("=")
+        if name.strip():
+            parameters[name.replace(" ", "").replace("\t", "").upper()] = value.strip()
+    shown = " ".join(written.split()).upper()
+    return Card(shown.replace(" ", ""), visible(shown), parameters, lines, numbers, line, file)
+
+
+def _included(card: Card, folder: Path, inside: tuple[Path, ...]) -> Iterator[Card]:
+    given = card.parameters.get("INPUT", "").strip().strip('"')
+    if not given:
+        raise card.error(f"needs the parameter INPUT=, got {card.given}: name the file")
+    path = folder / given
+    if len(inside) > DEEPEST or path in inside:
+        raise card.error(f"file {given!r} includes itself: leave one of the two out")
+    try:
+        require_file(path, "an included file")
+    except InvalidInputError as error:
+        raise card.error(str(error)) from error
+    yield from _cards(path, folder, inside)

@@ -1,0 +1,75 @@
+"""A deck where the command line expects a scene file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact._scene_file.bodies import Shaped
+from fenics_contact._scene_file.reading import SceneFile
+from fenics_contact._scene_file.source import Source
+from fenics_contact._scene_file.validation import validated
+from fenics_contact.decks.deck import Deck, read_deck
+from fenics_contact.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+#: Tables of a scene file that a deck does not have; what it has are those of how it is solved and written.
+OWN = ("meshes", "materials", "bodies", "supports", "loads", "contacts", "ties", "steps", "design")
+_NOTHING: dict[str, Any] = {
+    "meshes": {"deck": {"file": "deck.inp"}},
+    "materials": {"deck": {"young_modulus": 1.0, "poisson_ratio": 0.0}},
+    "bodies": {"deck": {"mesh": "deck", "material": "deck"}},
+}
+
+
+@dataclass(frozen=True, eq=False)
+class DeckFile(SceneFile):
+    """A deck with what scene files say of solver, accuracy and output.
+
+    Attributes:
+        deck: The deck.
+    """
+
+    deck: Deck
+
+    @property
+    def name(self) -> str:
+        """The file's name without suffix."""
+        return Path(self.deck.name).stem
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """What is done otherwise than the deck says, and known cards without effect."""
+        return self.deck.notes
+
+    @cached_property
+    def _built(self) -> tuple[Scene, dict[str, Shaped]]:
+        scene = self.deck.scene
+        if len(self.deck.steps) == 1:
+            scene = self.deck.steps[0].applied_to(scene)
+        return scene, {name: Shaped(body.mesh) for name, body in scene.bodies.items()}
+
+    @cached_property
+    def steps(self) -> tuple[LoadStep, ...]:
+        """The load steps if there are several; a single one acts at once."""
+        return tuple(self.deck.steps) if len(self.deck.steps) > 1 else ()
+
+
+def read_deck_file(path: Path, comm: MPI.Comm, overrides: Sequence[str]) -> DeckFile:
+    """Read a deck for the command line. Collective on ``comm``."""
+    for override in overrides:
+        key = override.partition("=")[0].strip().partition(".")[0]
+        if key in OWN:
+            raise InvalidInputError(
+                f"--set changes solver, accuracy, output, units and title of a deck, got {override!r}: "
+                "change the deck, or make a scene file of it with `fenics-contact convert`"
+            )
+    source = Source(path.name, path.parent, _NOTHING).with_overrides(overrides)
+    document = validated(source)
+    return DeckFile(source, document, comm, read_deck(path, comm))

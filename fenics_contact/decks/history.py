@@ -1,0 +1,438 @@
+"""Load steps of a deck: what is held and loaded at the end of each, node by node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fenics_contact.decks.cards import Card, plain
+from fenics_contact.decks.mesh import DeckMesh
+from fenics_contact.decks.vocabulary import KNOWN, PRINT_CARDS, PROCEDURES
+
+
+@dataclass(frozen=True, eq=False)
+class Amplitude:
+    """A factor over time: linear between values, constant beyond them.
+
+    Attributes:
+        total: Whether time counts from the first step on, else from the start of each.
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+    total: bool
+
+    def at(self, step_time: float, total_time: float) -> float:
+        """Return the factor at a time."""
+        return float(np.interp(total_time if self.total else step_time, self.times, self.values))
+
+
+def read_amplitudes(cards: Sequence[Card]) -> dict[str, Amplitude]:
+    """Return the amplitudes of a deck by name."""
+    found = {}
+    for card in cards:
+        if card.name != "AMPLITUDE":
+            continue
+        if card.name_of("DEFINITION") not in ("", "TABULAR") or "USER" in card.parameters:
+            raise card.error(f"only tables are read, got {card.given}: give pairs of time and value")
+        numbers = card.all_floats()
+        if len(numbers) < 2 or len(numbers) % 2:
+            raise card.error(f"needs pairs of a time and a value, got {len(numbers)} numbers: complete them")
+        times, values = np.array(numbers).reshape(-1, 2).T
+        if (np.diff(times) < 0).any():
+            raise card.error("times must ascend: sort the pairs")
+        total = card.name_of("TIME").startswith("TOTAL") or card.name_of("VALUE") == "TOTALTIME"
+        shift = card.number_of("SHIFTX"), card.number_of("SHIFTY")
+        found[card.required("NAME")] = Amplitude(times + shift[0], values + shift[1], total)
+    return found
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """A pressure on faces.
+
+    Attributes:
+        where: Element set or element, and face: ("TOP", "P2"); of a surface its name alone.
+        value: Pressure at the time, [force / length²].
+    """
+
+    where: tuple[str, ...]
+    card: Card
+    row: int
+    value: float
+
+
+@dataclass(frozen=True)
+class Weight:
+    """A load on the volume: acceleration, or the square of an angular velocity about an axis."""
+
+    where: str
+    card: Card
+    row: int
+    kind: str
+    value: float
+    numbers: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """What acts at a time of a step.
+
+    Attributes:
+        time: Time from the first step on.
+        held: What nodes are held at, NaN where they are free, (n_nodes, 3), along their local axes.
+        forces: Forces on nodes, (n_nodes, 3), along their local axes.
+        temperatures: (n_nodes,), or None where none are given.
+    """
+
+    time: float
+    held: np.ndarray
+    forces: np.ndarray
+    pressures: Sequence[Pressed]
+    weights: Sequence[Weight]
+    temperatures: np.ndarray | None
+    more_forces: Mapping[tuple[int, int], float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One load step of a deck.
+
+    Attributes:
+        large: Whether it has NLGEOM.
+        moments: What acts at times of it, the last one at its end.
+    """
+
+    card: Card
+    name: str
+    large: bool
+    moments: Sequence[Moment]
+
+
+@dataclass(frozen=True)
+class Held:
+    """Nodes that a card holds.
+
+    Attributes:
+        label: Name of the set, or number of the node.
+        components: Components from zero.
+    """
+
+    label: str
+    nodes: np.ndarray
+    components: tuple[int, ...]
+    card: Card
+    row: int
+
+
+class _Course:
+    """What acts now, changed by one card after the other."""
+
+    def __init__(self, mesh: DeckMesh, amplitudes: Mapping[str, Amplitude], dim: int) -> None:
+        shape = (len(mesh.points), 3)
+        self.mesh, self.amplitudes, self.dim = mesh, amplitudes, dim
+        self.held, self.held_before = np.full(shape, np.nan), np.zeros(shape)
+        self.force, self.force_before = np.zeros(shape), np.zeros(shape)
+        self.held_by, self.force_by = np.zeros(shape, dtype=int), np.zeros(shape, dtype=int)
+        self.factors: list[Amplitude | None] = [None]
+        self.names: list[str] = [""]
+        self.pressures: dict[tuple[str, ...], tuple[Pressed, int, float]] = {}
+        self.weights: dict[tuple[str, str], tuple[Weight, int, float]] = {}
+        self.temperature: np.ndarray | None = None
+        self.temperature_before: np.ndarray | None = None
+        self.temperature_by = 0
+        self.targets: list[Held] = []
+        self.rotations: dict[tuple[int, int], tuple[float, Card, int]] = {}
+
+    def _by(self, card: Card) -> int:
+        name = card.name_of("AMPLITUDE")
+        if not name:
+            return 0
+        if name not in self.amplitudes:
+            raise card.error(
+                f"amplitude {name!r} is not there; the deck has {', '.join(self.amplitudes) or 'none'}"
+            )
+        if name not in self.names:
+            self.names.append(name)
+            self.factors.append(self.amplitudes[name])
+        return self.names.index(name)
+
+    def boundary(self, card: Card, fresh: bool) -> None:
+        """Hold nodes."""
+        if card.name_of("OP") == "NEW" and fresh:
+            self.held[:] = np.nan
+        for name in ("SUBMODEL", "USER", "LOADCASE", "TYPE"):
+            if name in card.parameters and card.name_of(name) != "DISPLACEMENT":
+                raise card.error(f"the parameter {name} is not read: prescribe displacements")
+        fixed, by = "FIXED" in card.parameters, self._by(card)
+        for row, entries in enumerate(card.rows):
+            nodes = self.mesh.nodes_named(entries[0], card, row)
+            components, value = _components(card, row, entries)
+            if max(components, default=0) > 2:
+                self._beyond(card, row, nodes, components, value)
+            inside = tuple(k for k in components if k < self.dim)
+            if not inside:
+                continue
+            self.targets.append(Held(plain(entries[0]), nodes, inside, card, row))
+            for k in inside:
+                self.held[nodes, k] = self.held_before[nodes, k] if fixed else value
+                self.held_by[nodes, k] = by
+
+    def _beyond(
+        self, card: Card, row: int, nodes: np.ndarray, components: Sequence[int], value: float
+    ) -> None:
+        """Take rotations of nodes that drive rigid surfaces; others have none, if they are held at zero."""
+        if max(components) > 5:
+            raise card.error(
+                f"component {max(components) + 1} is no displacement: 1 to 3, of nodes that drive rigid "
+                "surfaces 4 to 6", row,
+            )  # fmt: skip
+        for k in components:
+            if k > 2:
+                for node in nodes.tolist():
+                    self.rotations[node, k] = (value, card, row)
+
+    def forces(self, card: Card, fresh: bool, touched: np.ndarray) -> None:
+        """Load nodes. Forces of one step add up, those of earlier steps are replaced.
+
+        `touched`: what the step has loaded, (n_nodes, 3), changed in place.
+        """
+        if card.name_of("OP") == "NEW" and fresh:
+            self.force[:] = 0.0
+        by = self._by(card)
+        for row, entries in enumerate(card.rows):
+            nodes = self.mesh.nodes_named(entries[0], card, row)
+            numbers = card.floats(row, 1)
+            if len(numbers) < 2 or not 1 <= numbers[0] <= 6:
+                raise card.error("needs node or set, component and force: complete the line", row)
+            component = int(numbers[0]) - 1
+            if component > 2:
+                for node in nodes.tolist():
+                    self.rotations[node, component + 10] = (numbers[1], card, row)
+                continue
+            kept = np.where(touched[nodes, component], self.force[nodes, component], 0.0)
+            self.force[nodes, component] = kept + numbers[1]
+            self.force_by[nodes, component] = by
+            touched[nodes, component] = True
+
+    def distributed(self, card: Card, fresh: bool) -> None:
+        """Load faces and volumes."""
+        if card.name_of("OP") == "NEW" and fresh:
+            self.pressures.clear()
+            self.weights.clear()
+        by = self._by(card)
+        for row, entries in enumerate(card.rows):
+            label = plain(entries[1]) if len(entries) > 1 else ""
+            numbers = tuple(card.floats(row, 2))
+            where = plain(entries[0])
+            if card.name == "DSLOAD":
+                self.mesh.surface_named(where, card, row)
+                if label != "P" or not numbers:
+                    raise card.error(
+                        f"a surface is loaded by P and a pressure, got {label!r}: give these", row
+                    )
+                self._press((where,), card, row, numbers[0], by)
+            elif label in ("GRAV", "CENTRIF"):
+                needed = 4 if label == "GRAV" else 7
+                if len(numbers) != needed:
+                    raise card.error(f"{label} needs {needed} numbers behind it, got {len(numbers)}", row)
+                self.mesh.elements_named(where, card, row)
+                before = self.weights.get((where, label), (None, 0, 0.0))[0]
+                load = Weight(where, card, row, label, numbers[0], numbers[1:])
+                self.weights[where, label] = load, by, before.value if before else 0.0
+            elif label[:1] == "P" and label[1:].isdecimal() and numbers:
+                self.mesh.faces_of(self.mesh.elements_named(where, card, row), label, card, row)
+                self._press((where, label), card, row, numbers[0], by)
+            else:
+                raise card.error(
+                    f"load {label!r} is not read: P1, P2, ... on faces of elements, GRAV and CENTRIF are", row
+                )
+
+    def _press(self, where: tuple[str, ...], card: Card, row: int, value: float, by: int) -> None:
+        before = self.pressures.get(where)
+        self.pressures[where] = Pressed(where, card, row, value), by, before[0].value if before else 0.0
+
+    def heat(self, card: Card, initial: np.ndarray, fresh: bool) -> None:
+        """Give nodes temperatures."""
+        for name in ("FILE", "BSTEP", "USER"):
+            if name in card.parameters:
+                raise card.error(f"the parameter {name} is not read: list nodes and their temperatures")
+        if self.temperature is None or (card.name_of("OP") == "NEW" and fresh):
+            self.temperature = initial.copy()
+        if self.temperature_before is None:
+            self.temperature_before = initial.copy()
+        self.temperature_by = self._by(card)
+        for row, entries in enumerate(card.rows):
+            self.temperature[self.mesh.nodes_named(entries[0], card, row)] = card.floats(row, 1)[0]
+
+    def at(self, step_time: float, period: float, start: float) -> Moment:
+        """Return what acts at a time of the step: what has no amplitude grows in proportion to the time."""
+        ramp = step_time / period
+        factor = np.array(
+            [np.nan, *(each.at(step_time, start + step_time) for each in self.factors[1:] if each)]
+        )
+
+        def now(target: np.ndarray, before: np.ndarray, by: np.ndarray) -> np.ndarray:
+            grown = before + ramp * (target - before)
+            return np.where(by == 0, grown, target * factor[by])
+
+        held = now(self.held, np.nan_to_num(self.held_before), self.held_by)
+        pressures = [
+            replace(each, value=float(now(np.array(each.value), np.array(old), np.array(by))))
+            for each, by, old in self.pressures.values()
+        ]
+        weights = [
+            replace(each, value=float(now(np.array(each.value), np.array(old), np.array(by))))
+            for each, by, old in self.weights.values()
+        ]
+        heat = None
+        if self.temperature is not None:
+            before = self.temperature if self.temperature_before is None else self.temperature_before
+            heat = now(self.temperature, before, np.full(len(self.temperature), self.temperature_by))
+        forces = now(self.force, self.force_before, self.force_by)
+        return Moment(start + step_time, held, forces, pressures, weights, heat)
+
+    def times(self, period: float, start: float) -> list[float]:
+        """Return the times of a step at which something changes its slope, and its end."""
+        used = np.unique(np.concatenate([
+            self.held_by[~np.isnan(self.held)], self.force_by[self.force != 0.0],
+            [by for _, by, _ in self.pressures.values()], [by for _, by, _ in self.weights.values()],
+            [self.temperature_by],
+        ])).astype(int)  # fmt: skip
+        inner = set()
+        for by in used[used > 0]:
+            factor = self.factors[by]
+            assert factor is not None
+            inner |= {float(t) - (start if factor.total else 0.0) for t in factor.times}
+        return [*sorted(t for t in inner if 1e-9 * period < t < period * (1 - 1e-9)), period]
+
+    def finish(self, last: Moment) -> None:
+        """Take the end of a step as the start of the next."""
+        self.held_before, self.force_before = np.nan_to_num(last.held), last.forces.copy()
+        # What had an amplitude keeps it; what was ramped has its value at the start of the next step.
+        for where, (each, by, _) in list(self.pressures.items()):
+            self.pressures[where] = each, by, next(p.value for p in last.pressures if p.where == where)
+        for key, (load, by, _) in list(self.weights.items()):
+            self.weights[key] = load, by, next(w.value for w in last.weights if (w.where, w.kind) == key)
+        if last.temperatures is not None:
+            self.temperature_before = last.temperatures.copy()
+
+
+def _components(card: Card, row: int, entries: Sequence[str]) -> tuple[range | tuple[int, ...], float]:
+    """Return the components, from zero, that a line of *BOUNDARY holds, and their value."""
+    named = {"XSYMM": (0,), "YSYMM": (1,), "ZSYMM": (2,), "PINNED": (0, 1, 2), "ENCASTRE": (0, 1, 2)}
+    if len(entries) > 1 and plain(entries[1]) in named:
+        return named[plain(entries[1])], 0.0
+    numbers = card.floats(row, 1)
+    if not numbers or numbers[0] < 1:
+        raise card.error(
+            "needs a node or set and the first component to hold, from 1: complete the line", row
+        )
+    first = int(numbers[0])
+    last = int(numbers[1]) if len(numbers) > 1 and numbers[1] else first
+    return range(first - 1, last), numbers[2] if len(numbers) > 2 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """The load steps of a deck.
+
+    Attributes:
+        targets: What is held, in the order of the deck, before and in all steps.
+        prints: Cards that ask for results, with the number of their step.
+    """
+
+    steps: Sequence[Step]
+    targets: Sequence[Held]
+    prints: Sequence[tuple[int, Card]]
+    rotations: Mapping[tuple[int, int], tuple[float, Card, int]]
+    initial: np.ndarray
+
+
+def read_history(
+    cards: Sequence[Card], mesh: DeckMesh, dim: int, note: Callable[[Card, str], None]
+) -> History:
+    """Return the load steps of a deck."""
+    course = _Course(mesh, read_amplitudes(cards), dim)
+    initial = _initial(cards, mesh)
+    steps: list[Step] = []
+    prints: list[tuple[int, Card]] = []
+    start = 0.0
+    inside: list[Card] | None = None
+    for card in cards:
+        if card.name == "STEP":
+            if inside is not None:
+                raise card.error("the step before has no *END STEP: add it")
+            inside = [card]
+        elif card.name == "ENDSTEP":
+            if inside is None:
+                raise card.error("there is no *STEP before it: add one, or leave it out")
+            step, start = _step(inside, course, initial, start, len(steps), note)
+            steps.append(step)
+            prints += [(len(steps) - 1, each) for each in inside if each.name in PRINT_CARDS]
+            inside = None
+        elif inside is not None:
+            inside.append(card)
+        elif card.name == "BOUNDARY":
+            course.boundary(card, fresh=True)
+        elif card.name in ("CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE", "STATIC", *PROCEDURES):
+            raise card.error("must be between *STEP and *END STEP: move it there")
+    if inside is not None:
+        raise inside[0].error("has no *END STEP: add it")
+    return History(steps, course.targets, prints, course.rotations, initial)
+
+
+def _initial(cards: Sequence[Card], mesh: DeckMesh) -> np.ndarray:
+    """Return the initial temperatures of all nodes."""
+    found = np.zeros(len(mesh.points))
+    for card in cards:
+        if card.name == "INITIALCONDITIONS":
+            if card.name_of("TYPE") != "TEMPERATURE":
+                raise card.error(f"TYPE={card.name_of('TYPE')} is not read: only temperatures are")
+            for row, entries in enumerate(card.rows):
+                found[mesh.nodes_named(entries[0], card, row)] = card.floats(row, 1)[0]
+    return found
+
+
+def _step(
+    cards: Sequence[Card],
+    course: _Course,
+    initial: np.ndarray,
+    start: float,
+    number: int,
+    note: Callable[[Card, str], None],
+) -> tuple[Step, float]:
+    """Return a step and the time at its end."""
+    head, seen, period = cards[0], set[str](), 1.0
+    loaded = np.zeros(course.force.shape, dtype=bool)
+    if "PERTURBATION" in head.parameters:
+        raise head.error("PERTURBATION is not read: a step here has all loads, give them in full")
+    static = False
+    for card in cards[1:]:
+        fresh = card.name not in seen
+        seen.add(card.name)
+        if card.name in PROCEDURES:
+            raise card.error("only *STATIC is solved here: take the steps of statics alone")
+        if card.name == "STATIC":
+            static = True
+            numbers = card.floats(0) if card.lines else []
+            period = numbers[1] if len(numbers) > 1 and numbers[1] > 0 else 1.0
+        elif card.name == "BOUNDARY":
+            course.boundary(card, fresh)
+        elif card.name == "CLOAD":
+            course.forces(card, fresh, loaded)
+        elif card.name in ("DLOAD", "DSLOAD"):
+            course.distributed(card, fresh)
+        elif card.name == "TEMPERATURE":
+            course.heat(card, initial, fresh)
+        elif card.name not in KNOWN:
+            raise card.error("this card is not known: see the list of cards in the guide")
+    if not static:
+        raise head.error("needs *STATIC: nothing else is solved here, add it")
+    times = course.times(period, start)
+    moments = [course.at(time, period, start) for time in times]
+    course.finish(moments[-1])
+    large = plain(head.parameters.get("NLGEOM", "NO")) in ("", "YES") and "NLGEOM" in head.parameters
+    return Step(head, f"step {number + 1}", large, moments), start + period

@@ -1,0 +1,271 @@
+"""Materials of a deck."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fenics_contact.decks.cards import Card
+from fenics_contact.decks.vocabulary import MATERIAL_CARDS, WITHOUT_EFFECT
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials.elastic import IsotropicElasticity, Material, PlaneStrain, PlaneStress
+from fenics_contact.materials.hyperelastic import MooneyRivlin, Ogden, StVenantKirchhoff
+from fenics_contact.materials.orthotropic import OrthotropicElasticity, OrthotropicPlaneStress, material_axes
+from fenics_contact.materials.plastic import FinitePlasticity, J2Plasticity
+
+
+@dataclass(eq=False)
+class MaterialCards:
+    """The cards of one material, by their keywords."""
+
+    card: Card
+    parts: dict[str, Card] = field(default_factory=dict)
+
+    @property
+    def density(self) -> float:
+        """Mass per volume, zero if none is given."""
+        card = self.parts.get("DENSITY")
+        return 0.0 if card is None else card.floats(0)[0]
+
+
+def read_materials(cards: Sequence[Card]) -> tuple[dict[str, MaterialCards], dict[str, Card]]:
+    """Return materials and orientations by name. Cards of a material follow its *MATERIAL."""
+    found: dict[str, MaterialCards] = {}
+    axes: dict[str, Card] = {}
+    now: MaterialCards | None = None
+    for card in cards:
+        if card.name == "MATERIAL":
+            now = found[card.required("NAME")] = MaterialCards(card)
+        elif card.name == "ORIENTATION":
+            axes[card.required("NAME")] = card
+        elif card.name in MATERIAL_CARDS:
+            if now is None:
+                raise card.error("must follow a *MATERIAL, none is before it: add one with NAME=")
+            now.parts[card.name] = card
+        elif card.name not in WITHOUT_EFFECT:
+            now = None
+    return found, axes
+
+
+def _axes(card: Card | None) -> tuple[tuple[float, float, float], ...]:
+    """Return the axes of a rectangular orientation as rows."""
+    if card is None:
+        return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    if card.name_of("SYSTEM") not in ("", "RECTANGULAR", "R"):
+        raise card.error(
+            f"SYSTEM={card.name_of('SYSTEM')} is not read for materials that are not isotropic, whose "
+            "axes are the same everywhere: give rectangular axes, or sections of few elements"
+        )
+    numbers = card.floats(0)
+    if len(numbers) < 6 or len(card.lines) > 1:
+        raise card.error("needs one line with two points of three coordinates each: correct it", 0)
+    try:
+        return material_axes(numbers[:3], numbers[3:6])
+    except InvalidInputError as error:
+        raise card.error(str(error), 0) from error
+
+
+def row_at(card: Card, width: int, temperature: float, what: str) -> list[float]:
+    """Return the numbers of a table of rows with a temperature behind each, at one temperature.
+
+    Linear between rows, constant beyond them.
+    """
+    table = _table(card, width)
+    if not len(table):
+        raise card.error(f"needs {what}, it has no data line: add it")
+    table = table[np.argsort(table[:, -1], kind="stable")]
+    return [float(np.interp(temperature, table[:, -1], table[:, k])) for k in range(width)]
+
+
+def _table(card: Card, width: int) -> np.ndarray:
+    """Return the rows of a table, (n, width + 1), each over as many lines of eight numbers as it needs."""
+    lines = [card.floats(k) for k in range(len(card.lines))]
+    per = -(-(width + 1) // 8)
+    joined = [[n for line in lines[k : k + per] for n in line] for k in range(0, len(lines), per)]
+    return np.array([[*row, *[0.0] * (width + 1)][: width + 1] for row in joined]).reshape(-1, width + 1)
+
+
+def depends_on_temperature(card: Card, width: int) -> bool:
+    """Return whether a table has rows for several temperatures that differ."""
+    table = _table(card, width)
+    return bool(len(table) > 1 and np.ptp(table[:, :width], axis=0).any())
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What materials are built for.
+
+    Attributes:
+        kind: That of the elements, see `Element.kind`.
+        large: Whether a step has NLGEOM.
+        temperature: The one temperature of all steps, None where it varies.
+        dilatation: Whether cells are linear hexahedra or quadrilaterals, whose changes of volume are means.
+    """
+
+    kind: str
+    large: bool
+    temperature: float | None
+    dilatation: bool
+
+
+def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> Material:
+    """Return a material of a deck."""
+    parts = cards.parts
+    try:
+        if "HYPERELASTIC" in parts:
+            return _hyperelastic(parts["HYPERELASTIC"], of)
+        if "ELASTIC" not in parts:
+            raise cards.card.error(
+                "needs *ELASTIC or *HYPERELASTIC behind it, has "
+                f"{', '.join('*' + part.written for part in parts.values()) or 'nothing'}: add one"
+            )
+        kind = parts["ELASTIC"].name_of("TYPE") or "ISO"
+        if kind in ("ISO", "ISOTROPIC"):
+            return _isotropic(parts, of)
+        if "PLASTIC" in parts or of.large:
+            what = "*PLASTIC" if "PLASTIC" in parts else "NLGEOM"
+            raise parts["ELASTIC"].error(
+                f"TYPE={kind} with {what} has no counterpart: give isotropic constants"
+            )
+        return _orthotropic(parts, kind, axes, of)
+    except InvalidInputError as error:
+        if getattr(error, "card", ""):
+            raise
+        raise cards.card.error(str(error)) from error
+
+
+def _row(card: Card, width: int, of: Conditions, what: str) -> list[float]:
+    if of.temperature is None and depends_on_temperature(card, width):
+        raise card.error(
+            "constants that depend on the temperature are read for one temperature of all nodes and "
+            "steps, this deck has several: give constants for the mean temperature"
+        )
+    return row_at(card, width, of.temperature or 0.0, what)
+
+
+def _expansion(parts: Mapping[str, Card], of: Conditions, count: int) -> list[float] | None:
+    if "EXPANSION" not in parts:
+        return None
+    card = parts["EXPANSION"]
+    kind = card.name_of("TYPE") or "ISO"
+    if kind not in ("ISO", "ORTHO") or (kind == "ORTHO" and count == 1):
+        raise card.error(
+            f"TYPE={kind} is not read for this material: give ISO, or ORTHO with *ELASTIC of that type"
+        )
+    width = 3 if kind == "ORTHO" else 1
+    if of.temperature is None and depends_on_temperature(card, width):
+        raise card.error(
+            "an expansion that depends on the temperature is not read: give the mean one of the temperatures "
+            "of the deck"
+        )
+    values = row_at(card, width, of.temperature or 0.0, "an expansion")
+    return values if len(values) == count else values * count
+
+
+def _isotropic(parts: Mapping[str, Card], of: Conditions) -> Material:
+    young, poisson = _row(parts["ELASTIC"], 2, of, "Young's modulus and Poisson's ratio")
+    alpha = _expansion(parts, of, 1)
+    if "PLASTIC" in parts:
+        return _plastic(parts["PLASTIC"], young, poisson, of)
+    expansion = None if alpha is None else alpha[0]
+    if of.large:
+        if expansion is not None:
+            card = parts["EXPANSION"]
+            raise card.error("thermal expansion with NLGEOM has no counterpart: leave one of the two out")
+        if of.kind == "plane stress":
+            raise parts["ELASTIC"].error("plane stress with NLGEOM has no counterpart: take solid elements")
+        return StVenantKirchhoff(young, poisson)
+    kind = {"plane strain": PlaneStrain, "plane stress": PlaneStress}.get(of.kind, IsotropicElasticity)
+    return kind(young, poisson, expansion)
+
+
+def _plastic(card: Card, young: float, poisson: float, of: Conditions) -> Material:
+    if of.kind == "plane stress":
+        raise card.error(
+            "plane stress with plasticity has no counterpart: take solid or plane strain elements"
+        )
+    rows = np.array([[*card.floats(k), 0.0, 0.0, 0.0][:3] for k in range(len(card.lines))])
+    rows = rows[rows[:, 2] == rows[0, 2]] if len(rows) else np.zeros((0, 3))
+    kind = card.name_of("HARDENING") or "ISOTROPIC"
+    if kind not in ("ISOTROPIC", "KINEMATIC") or not len(rows):
+        raise card.error(
+            f"HARDENING must be ISOTROPIC or KINEMATIC with a table, got {kind} with {len(rows)} rows"
+        )
+    slopes = np.diff(rows[:, 0]) / np.diff(rows[:, 1]) if len(rows) > 1 else np.zeros(1)
+    if len(slopes) > 1 and np.ptp(slopes) > 1e-6 * max(abs(slopes).max(), 1e-300):
+        raise card.error(
+            "a hardening curve of one straight line is read, this one has several slopes, "
+            f"{', '.join(f'{s:.4g}' for s in slopes[:4])}: give two points"
+        )
+    slope = float(slopes[0])
+    if kind == "KINEMATIC":
+        if of.large:
+            raise card.error("kinematic hardening with NLGEOM has no counterpart: take isotropic hardening")
+        return J2Plasticity(
+            young, poisson, float(rows[0, 0]), kinematic_hardening=slope, mean_dilatation=of.dilatation
+        )
+    if of.large:
+        return FinitePlasticity(young, poisson, float(rows[0, 0]), isotropic_hardening=slope)
+    return J2Plasticity(
+        young, poisson, float(rows[0, 0]), isotropic_hardening=slope, mean_dilatation=of.dilatation
+    )
+
+
+def _orthotropic(parts: Mapping[str, Card], kind: str, axes: Card | None, of: Conditions) -> Material:
+    card = parts["ELASTIC"]
+    if kind in ("ENGINEERINGCONSTANTS", "ENGINEERING CONSTANTS"):
+        e1, e2, e3, n12, n13, n23, g12, g13, g23 = _row(card, 9, of, "nine constants")
+    elif kind in ("ORTHO", "ORTHOTROPIC"):
+        d11, d12, d22, d13, d23, d33, g12, g13, g23 = _row(card, 9, of, "nine stiffnesses")
+        c = np.linalg.inv(np.array([[d11, d12, d13], [d12, d22, d23], [d13, d23, d33]]))
+        e1, e2, e3 = (float(v) for v in 1.0 / np.diag(c))
+        n12, n13, n23 = float(-c[0, 1] * e1), float(-c[0, 2] * e1), float(-c[1, 2] * e2)
+    else:
+        raise card.error(f"TYPE={kind} is not read: give ISO, ORTHO or ENGINEERING CONSTANTS")
+    alpha = _expansion(parts, of, 3)
+    rows = _axes(axes)
+    if of.kind == "plane stress":
+        if abs(rows[2][2]) < 1.0 - 1e-9:
+            raise card.error("axes of a plane material must lie in the plane: correct *ORIENTATION")
+        angle = float(np.arctan2(rows[0][1], rows[0][0]))
+        return OrthotropicPlaneStress(
+            (e1, e2), n12, g12, angle, None if alpha is None else (alpha[0], alpha[1])
+        )
+    if of.kind == "plane strain":
+        raise card.error(f"TYPE={kind} in plane strain has no counterpart: take solid elements")
+    thermal = None if alpha is None else (alpha[0], alpha[1], alpha[2])
+    return OrthotropicElasticity((e1, e2, e3), (n12, n13, n23), (g12, g13, g23), rows, thermal)  # type: ignore[arg-type]
+
+
+def _hyperelastic(card: Card, of: Conditions) -> Material:
+    if not of.large:
+        raise card.error("needs NLGEOM in its *STEP, as rubber is for large deformations: add it")
+    if of.kind == "plane stress":
+        raise card.error("plane stress with rubber has no counterpart: take solid or plane strain elements")
+    flags, order = set(card.parameters), int(card.number_of("N", 1.0))
+    if flags & {"NEOHOOKE"}:
+        c10, d1 = _row(card, 2, of, "C10 and D1")
+        c01 = 0.0
+    elif flags & {"MOONEY-RIVLIN"}:
+        c10, c01, d1 = _row(card, 3, of, "C10, C01 and D1")
+    elif flags & {"OGDEN"}:
+        values = _row(card, 3 * order, of, "μ, α and D of each term")
+        pairs, volumes = np.array(values[: 2 * order]).reshape(-1, 2), values[2 * order :]
+        if any(volumes[1:]):
+            raise card.error("D2, D3, ... of *HYPERELASTIC, OGDEN have no counterpart: give them as zero")
+        moduli = tuple(float(2 * mu / alpha) for mu, alpha in pairs)
+        bulk = _bulk(volumes[0], float(sum(pairs[:, 0])))
+        return Ogden(moduli, tuple(map(float, pairs[:, 1])), bulk, mean_dilatation=of.dilatation)
+    else:
+        raise card.error(
+            f"the model {', '.join(sorted(flags)) or 'POLYNOMIAL'} has no counterpart: NEO HOOKE, "
+            "MOONEY-RIVLIN and OGDEN have"
+        )
+    return MooneyRivlin(c10, c01, _bulk(d1, 2.0 * (c10 + c01)), mean_dilatation=of.dilatation)
+
+
+def _bulk(d1: float, shear: float, poisson: float = 0.475) -> float:
+    """Return the bulk modulus 2/D1; where D1 is zero that of CalculiX, with Poisson's ratio 0.475."""
+    return 2.0 / d1 if d1 > 0 else 2.0 * shear * (1 + poisson) / (3.0 * (1 - 2 * poisson))

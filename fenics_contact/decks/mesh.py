@@ -1,0 +1,393 @@
+"""Nodes, elements, sets and surfaces of a deck."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+
+from fenics_contact.decks.cards import Card, DeckError, plain
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """One type of elements.
+
+    Attributes:
+        name: Its name, "C3D20R".
+        kind: "solid", "plane stress", "plane strain" or "axisymmetric".
+        cell: Name of the type of cells that has its nodes.
+        count: Number of its nodes.
+        variant: Letters behind the number: "R" for reduced integration, "I" for incompatible modes.
+    """
+
+    name: str
+    kind: str
+    cell: str
+    count: int
+    variant: str
+
+    @property
+    def dim(self) -> int:
+        """Dimension of its space."""
+        return 3 if self.kind == "solid" else 2
+
+    @property
+    def shape(self) -> str:
+        """Name of the linear cell of its shape."""
+        return re.sub(r"\d+$", "", self.cell)
+
+    @property
+    def faces(self) -> Sequence[Sequence[int]]:
+        """Positions of the corners of its faces S1, S2, ..., without regard to their sense."""
+        return _FACES[self.shape]
+
+    @cached_property
+    def face_nodes(self) -> Sequence[Sequence[int]]:
+        """Positions of all nodes of its faces: corners, then those in the middle of edges."""
+        edges, inner = _EDGES[self.shape], range(_CORNERS[self.shape], self.count)
+        return [
+            [*face, *(n for n, edge in zip(inner, edges, strict=False) if set(edge) <= set(face))]
+            for face in self.faces
+        ]
+
+
+_KINDS = {"C3D": "solid", "CPS": "plane stress", "CPE": "plane strain", "CAX": "axisymmetric"}
+_CELLS = {
+    3: {
+        4: "tetrahedron",
+        10: "tetrahedron10",
+        8: "hexahedron",
+        20: "hexahedron20",
+        6: "wedge",
+        15: "wedge15",
+    },
+    2: {3: "triangle", 6: "triangle6", 4: "quadrilateral", 8: "quadrilateral8"},
+}
+#: Corners of the faces of elements as CalculiX and Abaqus number them, from zero.
+_FACES: dict[str, Sequence[Sequence[int]]] = {
+    "tetrahedron": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "hexahedron": (
+        (0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0),
+    ),
+    "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quadrilateral": ((0, 1), (1, 2), (2, 3), (3, 0)),
+}  # fmt: skip
+#: Ends of the edges on which nodes beyond the corners lie, in their order.
+_EDGES: dict[str, Sequence[tuple[int, int]]] = {
+    "tetrahedron": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
+    "hexahedron": (
+        (0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7),
+    ),
+    "wedge": ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quadrilateral": ((0, 1), (1, 2), (2, 3), (3, 0)),
+}  # fmt: skip
+_CORNERS = {"tetrahedron": 4, "hexahedron": 8, "wedge": 6, "triangle": 3, "quadrilateral": 4}
+_TYPE = re.compile(r"(C3D|CPS|CPE|CAX)(\d+)([RIHMT]*)")
+
+
+def element_of(card: Card) -> Element:
+    """Return the type of the elements of a card."""
+    name = card.required("TYPE")
+    match = _TYPE.fullmatch(name)
+    kind = _KINDS[match.group(1)] if match else ""
+    count = int(match.group(2)) if match else 0
+    cell = _CELLS[3 if kind == "solid" else 2].get(count)
+    if match is None or cell is None:
+        raise card.error(
+            f"elements of type {name} have no counterpart: solid (C3D4, 6, 8, 10, 15, 20), plane (CPS, "
+            "CPE 3, 4, 6, 8) and axisymmetric ones (CAX) have; shells, beams, springs and others do not"
+        )
+    return Element(name, kind, cell, count, match.group(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Elements of one card.
+
+    Attributes:
+        nodes: Positions of their nodes in the deck, (n, nodes of an element).
+        first: Position of the first of them among all elements.
+    """
+
+    element: Element
+    card: Card
+    numbers: np.ndarray
+    nodes: np.ndarray
+    first: int
+
+
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """Faces of elements: the element of each, and which of its faces, from zero, both (n,)."""
+
+    elements: np.ndarray
+    sides: np.ndarray
+
+    def __len__(self) -> int:
+        """Return the number of faces."""
+        return len(self.elements)
+
+
+@dataclass(frozen=True, eq=False)
+class Named:
+    """A surface by its card: faces of elements, or nodes."""
+
+    card: Card
+    faces: Faces | None
+    nodes: np.ndarray | None
+
+
+@dataclass(eq=False)
+class DeckMesh:
+    """What a deck says of its mesh.
+
+    Attributes:
+        numbers: Numbers of the nodes in the deck, ascending, (n,); nodes are known by their positions here.
+        points: Their coordinates, (n, 3), [length].
+        element_numbers: Numbers of the elements in the order of the blocks.
+        node_sets: Name -> ascending positions of nodes.
+        element_sets: Name -> ascending positions of elements.
+        surfaces: Name -> faces or nodes.
+        origins: Name of a set -> its first card.
+    """
+
+    numbers: np.ndarray
+    points: np.ndarray
+    blocks: list[Block]
+    element_numbers: np.ndarray
+    node_sets: dict[str, np.ndarray] = field(default_factory=dict)
+    element_sets: dict[str, np.ndarray] = field(default_factory=dict)
+    surfaces: dict[str, Named] = field(default_factory=dict)
+    origins: dict[str, Card] = field(default_factory=dict)
+
+    @property
+    def block_of(self) -> np.ndarray:
+        """Number of the block of each element, (n_elements,)."""
+        return np.repeat(np.arange(len(self.blocks)), [len(block.numbers) for block in self.blocks])
+
+    def nodes_named(self, token: str, card: Card, row: int | None = None) -> np.ndarray:
+        """Return the positions of the nodes of a set, or of one node by its number."""
+        if token.isdecimal():
+            return self.positions(np.array([int(token)]), "node", card, row)
+        return _known(self.node_sets, token, "node set", card, row)
+
+    def elements_named(self, token: str, card: Card, row: int | None = None) -> np.ndarray:
+        """Return the positions of the elements of a set, or of one element by its number."""
+        if token.isdecimal():
+            return self.positions(np.array([int(token)]), "element", card, row)
+        return _known(self.element_sets, token, "element set", card, row)
+
+    def surface_named(self, token: str, card: Card, row: int | None = None) -> Named:
+        """Return a surface."""
+        return _known(self.surfaces, token, "surface", card, row)
+
+    def positions(self, numbers: np.ndarray, what: str, card: Card, row: int | None = None) -> np.ndarray:
+        """Return the positions of nodes or elements by their numbers."""
+        known = self.numbers if what == "node" else self.element_numbers
+        order = np.argsort(known, kind="stable")
+        place = np.minimum(np.searchsorted(known[order], numbers), len(known) - 1)
+        found = order[place] if len(known) else place
+        lost = numbers if not len(known) else numbers[known[found] != numbers]
+        if len(lost):
+            raise card.error(f"{what} {lost[0]} is not there: correct the number, or add it", row)
+        return np.asarray(found)
+
+    def corners(self, faces: Faces) -> list[np.ndarray]:
+        """Return the corners of faces, arrays of (n, 4 | 3 | 2) positions of nodes."""
+        return [nodes[:, : len(element.faces[side])] for _, element, side, nodes in self.parts_of(faces)]
+
+    def parts_of(self, faces: Faces) -> Iterator[tuple[np.ndarray, Element, int, np.ndarray]]:
+        """Yield faces of one type and side: their positions, the type, the side and their nodes."""
+        block_of = self.block_of[faces.elements]
+        for number in np.unique(block_of):
+            block = self.blocks[number]
+            for side in np.unique(faces.sides[block_of == number]):
+                mine = np.flatnonzero((block_of == number) & (faces.sides == side))
+                local = np.array(block.element.face_nodes[side])
+                yield (
+                    mine,
+                    block.element,
+                    int(side),
+                    block.nodes[faces.elements[mine] - block.first][:, local],
+                )
+
+    def faces_of(self, elements: np.ndarray, label: str, card: Card, row: int | None) -> Faces:
+        """Return one face of each of some elements, by its label: "S3", "P3"."""
+        side = int(label[1:]) - 1 if label[1:].isdecimal() else -1
+        block_of = self.block_of
+        for number in np.unique(block_of[elements]):
+            element = self.blocks[number].element
+            if not 0 <= side < len(element.faces):
+                raise card.error(
+                    f"face {label!r} is not one of element type {element.name}, whose faces are "
+                    f"{label[:1]}1 to {label[:1]}{len(element.faces)}: correct the label",
+                    row,
+                )
+        return Faces(elements, np.full(len(elements), side))
+
+
+T = TypeVar("T")
+
+
+def _known(named: Mapping[str, T], token: str, what: str, card: Card, row: int | None) -> T:
+    name = plain(token)
+    if name not in named:
+        close = get_close_matches(name, list(named), n=1, cutoff=0.6)
+        hint = f"did you mean {close[0]}? " if close else ""
+        there = ", ".join(sorted(named)[:8]) + (", ..." if len(named) > 8 else "")
+        raise card.error(f"{what} {name!r} is not there; {hint}the deck has {there or 'none'}", row)
+    return named[name]
+
+
+def read_mesh_cards(cards: Sequence[Card]) -> DeckMesh:
+    """Return nodes, elements, sets and surfaces of a deck."""
+    numbers, points, numbers_of = _nodes([card for card in cards if card.name == "NODE"])
+    mesh = DeckMesh(numbers, points, [], np.zeros(0, dtype=np.int64))
+    _elements(mesh, [card for card in cards if card.name == "ELEMENT"])
+    for card in cards:
+        if card.name == "NODE" and card.name_of("NSET"):
+            _add(
+                mesh,
+                mesh.node_sets,
+                card,
+                card.name_of("NSET"),
+                mesh.positions(numbers_of[id(card)], "node", card),
+            )
+        elif card.name == "ELEMENT" and card.name_of("ELSET"):
+            block = next(block for block in mesh.blocks if block.card is card)
+            _add(
+                mesh,
+                mesh.element_sets,
+                card,
+                card.name_of("ELSET"),
+                block.first + np.arange(len(block.numbers)),
+            )
+    for card in cards:
+        if card.name == "NSET":
+            _add(mesh, mesh.node_sets, card, card.required("NSET"), _members(mesh, card, "node"))
+        elif card.name == "ELSET":
+            _add(mesh, mesh.element_sets, card, card.required("ELSET"), _members(mesh, card, "element"))
+        elif card.name == "SURFACE":
+            mesh.surfaces[card.required("NAME")] = _surface(mesh, card)
+    return mesh
+
+
+def _nodes(cards: Sequence[Card]) -> tuple[np.ndarray, np.ndarray, dict[int, np.ndarray]]:
+    """Return numbers and coordinates of all nodes, and the numbers of each card."""
+    if not cards:
+        raise DeckError("a deck must have nodes, under *NODE; it has none")
+    tables = {}
+    for card in cards:
+        if card.name_of("SYSTEM") not in ("", "R"):
+            raise card.error(f"SYSTEM={card.name_of('SYSTEM')} is not read: give coordinates x, y and z")
+        tables[id(card)] = card.table(4)
+    every = np.concatenate(list(tables.values()))
+    # The last definition of a node counts.
+    numbers, last = np.unique(every[::-1, 0].astype(np.int64), return_index=True)
+    return numbers, every[::-1][last, 1:], {key: rows[:, 0].astype(np.int64) for key, rows in tables.items()}
+
+
+def _elements(mesh: DeckMesh, cards: Sequence[Card]) -> None:
+    first = 0
+    for card in cards:
+        element = element_of(card)
+        records = card.integers(1 + element.count)
+        nodes = mesh.positions(records[:, 1:].ravel(), "node", card).reshape(-1, element.count)
+        mesh.blocks.append(Block(element, card, records[:, 0], nodes, first))
+        first += len(records)
+    if not first:
+        raise DeckError("a deck must have elements, under *ELEMENT; it has none")
+    mesh.element_numbers = np.concatenate([block.numbers for block in mesh.blocks])
+    again = np.flatnonzero(np.diff(np.sort(mesh.element_numbers)) == 0)
+    if len(again):
+        number = np.sort(mesh.element_numbers)[again[0]]
+        card = [block.card for block in mesh.blocks if number in block.numbers][-1]
+        raise card.error(f"element {number} is there already: give each element a number of its own")
+
+
+def _add(mesh: DeckMesh, sets: dict[str, np.ndarray], card: Card, name: str, members: np.ndarray) -> None:
+    """Add members to a set: one name may be given several times."""
+    sets[name] = np.union1d(sets.get(name, members), members)
+    mesh.origins.setdefault(name, card)
+
+
+def _members(mesh: DeckMesh, card: Card, what: str) -> np.ndarray:
+    known = mesh.numbers if what == "node" else mesh.element_numbers
+    if "GENERATE" in card.parameters:
+        return _generated(mesh, card, what, known)
+    if what == "node" and card.name_of("ELSET"):
+        return nodes_of(mesh, mesh.elements_named(card.name_of("ELSET"), card))
+    found, single = [np.zeros(0, dtype=np.int64)], list[int]()
+    for row, entries in enumerate(card.rows):
+        for entry in entries:
+            if entry.isdecimal():
+                single.append(int(entry))
+            elif entry:
+                named = mesh.nodes_named if what == "node" else mesh.elements_named
+                found.append(named(entry, card, row))
+    return np.concatenate([*found, mesh.positions(np.array(single, dtype=np.int64), what, card)])
+
+
+def _generated(mesh: DeckMesh, card: Card, what: str, known: np.ndarray) -> np.ndarray:
+    """Return what is there of the numbers from, to, by; as in the other programs gaps are allowed."""
+    wanted = []
+    for row in range(len(card.rows)):
+        first, last, *step = card.floats(row)[:3] if len(card.rows[row]) > 1 else (*card.floats(row), 0)
+        by = int(step[0]) if step and step[0] else 1
+        if last < first or by < 1:
+            raise card.error(
+                f"GENERATE needs a first number, a last one that is not smaller, and an increment above "
+                f"zero, got {card.lines[row].strip()!r}", row,
+            )  # fmt: skip
+        wanted.append(np.arange(int(first), int(last) + 1, by))
+    return np.flatnonzero(np.isin(known, np.concatenate(wanted)))
+
+
+def nodes_of(mesh: DeckMesh, elements: np.ndarray) -> np.ndarray:
+    """Return the ascending positions of the nodes of elements."""
+    inside = [
+        block.nodes[
+            elements[(elements >= block.first) & (elements < block.first + len(block.numbers))] - block.first
+        ]
+        for block in mesh.blocks
+    ]
+    return np.unique(np.concatenate([nodes.ravel() for nodes in inside]))
+
+
+def _surface(mesh: DeckMesh, card: Card) -> Named:
+    kind = card.name_of("TYPE") or "ELEMENT"
+    if kind == "NODE":
+        found = [mesh.nodes_named(row[0], card, k) for k, row in enumerate(card.rows)]
+        return Named(card, None, np.unique(np.concatenate(found)) if found else np.zeros(0, dtype=np.int64))
+    if kind != "ELEMENT":
+        raise card.error(f"TYPE must be ELEMENT or NODE, got {kind}: give faces of elements, or nodes")
+    parts = []
+    for k, row in enumerate(card.rows):
+        elements = mesh.elements_named(row[0], card, k)
+        label = row[1].upper() if len(row) > 1 else ""
+        if label[:1] != "S":
+            raise card.error(
+                f"needs a face S1, S2, ... behind the elements, got {label or 'nothing'!r}: add it", k
+            )
+        parts.append(mesh.faces_of(elements, label, card, k))
+    if not parts:
+        raise card.error("needs a line for each set of elements and its face, it has none: add them")
+    return Named(card, joined(parts), None)
+
+
+def joined(parts: Iterable[Faces]) -> Faces:
+    """Return faces of several parts, each once."""
+    parts = list(parts)
+    rows = np.column_stack(
+        [np.concatenate([each.elements for each in parts]), np.concatenate([each.sides for each in parts])]
+    )
+    once = np.unique(rows, axis=0)
+    return Faces(once[:, 0], once[:, 1])

@@ -1,0 +1,58 @@
+"""The cards that are known, and what is done with them."""
+
+from __future__ import annotations
+
+#: Cards of a material, behind *MATERIAL.
+MATERIAL_CARDS = {
+    "ELASTIC", "PLASTIC", "HYPERELASTIC", "EXPANSION", "DENSITY", "CONDUCTIVITY", "SPECIFICHEAT",
+}  # fmt: skip
+#: Cards of nodes, elements and sets.
+MESH_CARDS = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"}
+#: Cards of the model that are read.
+MODEL_CARDS = {
+    "SOLIDSECTION", "MATERIAL", "ORIENTATION", "AMPLITUDE", "INITIALCONDITIONS", "TRANSFORM",
+    "CONTACTPAIR", "SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION", "CLEARANCE", "TIE", "RIGIDBODY",
+    "COUPLING", "KINEMATIC", "DISTRIBUTING", "DISTRIBUTINGCOUPLING", "EQUATION", "PRE-TENSIONSECTION",
+}  # fmt: skip
+#: Cards of load steps that are read.
+STEP_CARDS = {"STEP", "ENDSTEP", "STATIC", "BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE"}
+#: Cards that ask for results.
+PRINT_CARDS = {"NODEPRINT", "ELPRINT", "CONTACTPRINT", "NODEFILE", "ELFILE", "CONTACTFILE"}
+#: Known cards that change nothing of what is solved here, and why.
+WITHOUT_EFFECT = {
+    "HEADING": "a title",
+    "PREPRINT": "output",
+    "OUTPUT": "output",
+    "NODEOUTPUT": "output",
+    "ELEMENTOUTPUT": "output",
+    "CONTACTOUTPUT": "output",
+    "ELEMENTFILE": "output",
+    "ENERGYOUTPUT": "output",
+    "ENERGYPRINT": "output",
+    "ELOUTPUT": "output",
+    "SECTIONPRINT": "output",
+    "MONITOR": "output",
+    "TIMEPOINTS": "times of output",
+    "NODALTHICKNESS": "thickness of shells, of which there are none",
+    "CONTROLS": "how the other program iterates",
+    "SOLUTIONTECHNIQUE": "how the other program iterates",
+    "CONTACTCONTROLS": "how the other program iterates",
+    "PHYSICALCONSTANTS": "of radiation and fluids, of which there are none",
+    "CONDUCTIVITY": "of heat that is conducted, which there is not",
+    "SPECIFICHEAT": "of heat that is conducted, which there is not",
+    "DAMPING": "of motions in time, of which there are none",
+}
+#: Every card that is known.
+KNOWN = MATERIAL_CARDS | MESH_CARDS | MODEL_CARDS | STEP_CARDS | PRINT_CARDS | set(WITHOUT_EFFECT)
+#: Known cards that are not read yet.
+NOT_YET = {
+    "TRANSFORM", "CONTACTPAIR", "SURFACEINTERACTION", "SURFACEBEHAVIOR", "FRICTION", "CLEARANCE", "TIE",
+    "RIGIDBODY", "COUPLING", "KINEMATIC", "DISTRIBUTING", "DISTRIBUTINGCOUPLING", "EQUATION",
+    "PRE-TENSIONSECTION",
+}  # fmt: skip
+#: Known procedures of other programs that have no counterpart here.
+PROCEDURES = {
+    "FREQUENCY", "DYNAMIC", "HEATTRANSFER", "COUPLEDTEMPERATURE-DISPLACEMENT", "BUCKLE", "MODALDYNAMIC",
+    "STEADYSTATEDYNAMICS", "VISCO", "CFD", "GREEN", "SENSITIVITY", "ELECTROMAGNETICS", "COMPLEXFREQUENCY",
+    "UNCOUPLEDTEMPERATURE-DISPLACEMENT", "SUBSTRUCTUREGENERATE", "CRACKPROPAGATION", "FEASIBLEDIRECTION",
+}  # fmt: skip

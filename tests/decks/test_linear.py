@@ -1,0 +1,180 @@
+"""Decks of linear solids: their answers are those of theory, and of CalculiX."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import PointForce, Pressure, Support, ThermalStrain
+from fenics_contact.decks import Deck, read_deck
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, PlaneStress
+from fenics_contact.mesh import quadratic
+from tests.decks.texts import STEEL, deck, mesh_cards
+
+SECTION = "*SOLID SECTION, ELSET=BAR, MATERIAL=STEEL\n"
+#: A corner, a line and a side hold a bar so that it may contract.
+FREE_TO_CONTRACT = "*BOUNDARY\nBAR_X0, 1\nBAR_Y0, 2\nBAR_Z0, 3\n"
+BAR = mesh_cards({"BAR": block((0, 0, 0), (3, 1, 1), (3, 2, 1))}) + STEEL + SECTION
+
+
+def step(cards: str, more: str = "") -> str:
+    return f"*STEP{more}\n*STATIC\n{cards}*END STEP\n"
+
+
+def displacement(found: Deck, body: str = "BAR", number: int = -1) -> np.ndarray:
+    return found.solve(MPI.COMM_SELF, tolerance=1e-12)[number].gather_displacement(body)
+
+
+def stretched(points: np.ndarray, stress: float) -> np.ndarray:
+    """Return the displacement of a bar under tension along x."""
+    strain = stress / 210000.0
+    return points * [strain, -0.3 * strain, -0.3 * strain][: points.shape[1]]
+
+
+PULLED = "*DLOAD\nEND, P4, -100.\n"
+END = "*ELSET, ELSET=END\n5, 6\n"
+
+
+@pytest.mark.parametrize(
+    "loads",
+    [
+        PULLED,
+        "*SURFACE, NAME=TIP\nEND, S4\n*STEP\n*STATIC\n*DSLOAD\nTIP, P, -100.\n*END STEP\n",
+    ],
+)
+def test_a_bar_under_pressure_is_that_of_theory(loads: str, tmp_path: Path) -> None:
+    text = loads if "*STEP" in loads else step(loads)
+    found = read_deck(deck(tmp_path, BAR + END + FREE_TO_CONTRACT + text))
+    points = found.scene.bodies["BAR"].mesh.points
+    np.testing.assert_allclose(displacement(found), stretched(points, 100.0), atol=1e-13)
+
+
+def test_tetrahedra_with_nodes_on_edges_are_read_in_their_order(tmp_path: Path) -> None:
+    mesh = quadratic(block((0, 0, 0), (3, 1, 1), (2, 1, 1), "tetrahedron"))
+    surface = "*SURFACE, NAME=TIP, TYPE=NODE\nBAR_X1,\n"
+    text = mesh_cards({"BAR": mesh}) + STEEL + SECTION + surface + FREE_TO_CONTRACT
+    found = read_deck(deck(tmp_path, text + step("*CLOAD\nBAR_X1, 1, 0.\n")))
+    read = found.scene.bodies["BAR"].mesh
+    assert read.cell_type == "tetrahedron10"
+    assert read.volume == pytest.approx(3.0)
+    assert set(read.surfaces) >= {"BAR_X0", "BAR_Y0", "BAR_Z0", "BAR_X1", "TIP"}
+    assert found.source("surface", "TIP").card == "*SURFACE"
+
+
+def test_a_plate_of_a_thickness_is_loaded_by_whole_forces(tmp_path: Path) -> None:
+    """CPS4 of 2 mm: three nodes with the forces of 10 N/mm² on 1 mm by 2 mm."""
+    mesh = rectangle((0, 0), (3, 1), (3, 2))
+    section = "*SOLID SECTION, ELSET=BAR, MATERIAL=STEEL\n2.0\n"
+    corners = [k + 1 for k in np.unique(mesh.surfaces["x1"])]
+    forces = "".join(f"{node}, 1, {5.0 * (1 + (k == 1))}\n" for k, node in enumerate(corners))
+    text = mesh_cards({"BAR": mesh}) + STEEL + section + "*BOUNDARY\nBAR_X0, 1\nBAR_Y0, 2\n"
+    found = read_deck(deck(tmp_path, text + step("*CLOAD\n" + forces)))
+    assert found.thickness == 2.0
+    assert found.scene.bodies["BAR"].material == PlaneStress(210000.0, 0.3)
+    np.testing.assert_allclose(displacement(found), stretched(mesh.points, 10.0), atol=1e-14)
+
+
+def test_a_turning_ring_is_that_of_lame(tmp_path: Path) -> None:
+    """u(a) of a thin ring that turns, ρ ω² r³ / E; the square of the angular velocity is given."""
+    mesh = rectangle((100.0, 0.0), (100.2, 0.2), (1, 1))
+    density = "*DENSITY\n7.8E-9\n"
+    text = mesh_cards({"BAR": mesh}, "CAX4") + STEEL + density + SECTION
+    spin = step("*DLOAD\nBAR, CENTRIF, 1.D6, 0., 0., 0., 0., 1., 0.\n")
+    found = read_deck(deck(tmp_path, text + "*BOUNDARY\nBAR_Y0, 2\n" + spin))
+    assert found.scene.axisymmetric
+    mean = displacement(found)[:, 0].mean()
+    assert mean == pytest.approx(7.8e-9 * 1e6 * 100.1**3 / 210000.0, rel=2e-3)
+
+
+def test_weight_hangs_as_in_theory(tmp_path: Path) -> None:
+    text = mesh_cards({"BAR": block((0, 0, 0), (1, 1, 8), (1, 1, 8))}) + STEEL.replace("0.3", "0.0")
+    text += "*DENSITY\n1.E-3,\n" + SECTION + "*BOUNDARY\nBAR_Z1, 1, 3\n"
+    found = read_deck(deck(tmp_path, text + step("*DLOAD\nBAR, GRAV, 1000., 0., 0., -1.\n")))
+    # ρ g L² / (2 E), exact at nodes of linear cells.
+    assert displacement(found)[:, 2].min() == pytest.approx(-1.0 * 64 / 2 / 210000.0, rel=1e-9)
+
+
+def test_temperature_counts_from_the_initial_one(tmp_path: Path) -> None:
+    text = BAR.replace("210000., 0.3\n", "210000., 0.3\n*EXPANSION\n1.2E-5\n") + FREE_TO_CONTRACT
+    text += "*NSET, NSET=ALL, GENERATE\n1, 24\n*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 20.\n"
+    found = read_deck(deck(tmp_path, text + step("*TEMPERATURE\nALL, 120.\n")))
+    (heat,) = found.steps[0].loads
+    assert isinstance(heat, ThermalStrain)
+    assert heat.temperature_change == 100.0
+    points = found.scene.bodies["BAR"].mesh.points
+    np.testing.assert_allclose(displacement(found), 1.2e-3 * points, atol=1e-13)
+
+
+def test_a_temperature_by_nodes_strains_as_it_varies(tmp_path: Path) -> None:
+    text = BAR.replace("210000., 0.3\n", "210000., 0.\n*EXPANSION\n1.E-3\n") + "*BOUNDARY\nBAR_X0, 1, 3\n"
+    text += "*NSET, NSET=ALL, GENERATE\n1, 24\n*BOUNDARY\nALL, 2, 3\n"
+    heat = "*TEMPERATURE\nBAR_X1, 30.\n"
+    found = read_deck(deck(tmp_path, text + step(heat)))
+    points, moved = found.scene.bodies["BAR"].mesh.points, displacement(found)
+    tip = moved[points[:, 0] == 3.0, 0]
+    assert tip.mean() == pytest.approx(1e-3 * 15.0, rel=1e-6)  # the last cell has 15 degrees in the mean
+
+
+def test_steps_keep_replace_and_add_loads(tmp_path: Path) -> None:
+    """Forces of a step add up, those of earlier ones are replaced, OP=NEW removes the others."""
+    first = "*CLOAD\nBAR_X1, 1, 1.\n24, 1, 2.\n"
+    steps = step(first) + step("*CLOAD\n24, 1, 7.\n") + step("*CLOAD, OP=NEW\n24, 2, 5.\n") + step("")
+    found = read_deck(deck(tmp_path, BAR + "*BOUNDARY\nBAR_X0, 1, 3\n" + steps))
+    total = []
+    for each in found.steps:
+        force = np.zeros(3)
+        for load in each.loads:
+            assert isinstance(load, PointForce)
+            mesh = found.scene.bodies["BAR"].mesh
+            force += load.at(mesh.points[mesh.nodes_of(load.nodes)], 3).sum(axis=0)
+        total.append(force.tolist())
+    # CalculiX 2.20 prints reactions of 5 + 3 and 7 + 5 for the first two of these steps on one element.
+    assert total == [[8.0, 0.0, 0.0], [12.0, 0.0, 0.0], [0.0, 5.0, 0.0], [0.0, 5.0, 0.0]]
+    reactions = [state.reactions()[0].force for state in found.solve(MPI.COMM_SELF, tolerance=1e-10)]
+    np.testing.assert_allclose(reactions, -np.array(total), atol=1e-6)
+
+
+def test_an_amplitude_cuts_a_step_where_it_turns(tmp_path: Path) -> None:
+    text = BAR + END + "*AMPLITUDE, NAME=CYCLE\n0., 0., 0.25, 1., 0.5, -1., 1., 0.\n" + FREE_TO_CONTRACT
+    moved = "*BOUNDARY, AMPLITUDE=CYCLE\nBAR_X1, 1, 1, 0.1\n"
+    found = read_deck(deck(tmp_path, text + step(moved)))
+    assert [each.time for each in found.steps] == [0.25, 0.5, 1.0]
+    pulls = [s.value[0] for each in found.steps for s in each.supports if s.surface == "BAR_X1"]
+    assert pulls == pytest.approx([0.1, -0.1, 0.0])
+    assert list(found.step_of) == [0, 0, 0]
+    assert len(found.solve(MPI.COMM_SELF)) == 1, "one state for a step of the deck"
+
+
+def test_nodes_that_are_no_face_are_held_as_nodes(tmp_path: Path) -> None:
+    held = "*BOUNDARY\n1, 1, 3\n5, 2\nBAR_X0, 1, 1\n3, 2, 6\n"
+    found = read_deck(deck(tmp_path, BAR + END + held + step(PULLED)))
+    mesh = found.scene.bodies["BAR"].mesh
+    names = {
+        support.surface: support.value for support in found.scene.supports if isinstance(support, Support)
+    }
+    assert names["BAR_X0"] == (0.0, None, None)
+    assert names["BOUNDARY 1 2 3"] == (0.0, 0.0, 0.0)
+    assert names["BOUNDARY 2"] == (None, 0.0, None)
+    assert set(mesh.node_sets) >= {"BOUNDARY 1 2 3", "BOUNDARY 2"}
+    (pressed,) = found.steps[0].loads
+    assert pressed == Pressure("BAR", "END P4", -100.0)
+
+
+def test_bodies_are_elements_that_share_nodes_and_regions_are_sections(tmp_path: Path) -> None:
+    lower, upper = block((0, 0, 0), (2, 1, 1), (2, 1, 1)), block((0, 0, 1), (2, 1, 2), (2, 1, 1))
+    text = mesh_cards({"LOW": lower, "UP": upper}) + STEEL + "*MATERIAL, NAME=TIN\n*ELASTIC\n50000., 0.3\n"
+    text += "*ELSET, ELSET=LEFT\n1\n*ELSET, ELSET=RIGHT\n2\n*SOLID SECTION, ELSET=LEFT, MATERIAL=STEEL\n"
+    text += "*SOLID SECTION, ELSET=RIGHT, MATERIAL=TIN\n*SOLID SECTION, ELSET=UP, MATERIAL=TIN\n"
+    found = read_deck(deck(tmp_path, text + "*BOUNDARY\nLOW_Z0, 1, 3\nUP_Z1, 1, 3\n" + step("")))
+    assert list(found.scene.bodies) == ["LOW", "UP"]
+    assert found.scene.bodies["LOW"].material == {
+        "LEFT": IsotropicElasticity(210000.0, 0.3), "RIGHT": IsotropicElasticity(50000.0, 0.3),
+    }  # fmt: skip
+    assert found.scene.bodies["UP"].material == IsotropicElasticity(50000.0, 0.3)
+    np.testing.assert_array_equal(found.node_numbers["UP"], 13 + np.arange(12))
+    np.testing.assert_array_equal(found.element_numbers["UP"], [3, 4])
+    assert str(found.source("body", "UP")).startswith("*SOLID SECTION, model.inp line")

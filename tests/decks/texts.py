@@ -1,0 +1,46 @@
+"""Small decks for tests, written from meshes of the gallery."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from fenics_contact import BodyMesh
+
+#: Name of the elements of each type of cells.
+ELEMENTS = {
+    "hexahedron": "C3D8", "tetrahedron": "C3D4", "tetrahedron10": "C3D10",
+    "quadrilateral": "CPS4", "triangle": "CPS3", "triangle6": "CPS6",
+}  # fmt: skip
+
+
+def mesh_cards(meshes: Mapping[str, BodyMesh], element: str = "", sets: bool = True) -> str:
+    """Return nodes, elements and sets of bodies: each side z1 of body A is the node set A_Z1."""
+    nodes, rest, first, count = [], [], 1, 1
+    for name, mesh in meshes.items():
+        points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.dim)))
+        nodes += [f"{first + k}, {x:.17g}, {y:.17g}, {z:.17g}" for k, (x, y, z) in enumerate(points)]
+        rest.append(f"*ELEMENT, TYPE={element or ELEMENTS[mesh.cell_type]}, ELSET={name}")
+        for cell in mesh.cells:
+            rest.append(f"{count}, " + ", ".join(str(first + node) for node in cell))
+            count += 1
+        for side, facets in mesh.surfaces.items() if sets else ():
+            rest.append(f"*NSET, NSET={name}_{side.upper()}")
+            rest += [f"{first + node}," for node in np.unique(facets)]
+        first += mesh.n_nodes
+    return "\n".join(["*NODE", *nodes, *rest, ""])
+
+
+STEEL = """*MATERIAL, NAME=STEEL
+*ELASTIC
+210000., 0.3
+"""
+
+
+def deck(folder: Path, text: str, name: str = "model.inp") -> Path:
+    """Write a deck."""
+    path = folder / name
+    path.write_text(text)
+    return path
