@@ -80,10 +80,10 @@ def _shares(leaving: np.ndarray, there: np.ndarray, count: int) -> sp.csr_matrix
 
 
 def _followed(scene: Scene) -> sp.csr_matrix:
-    """Return T on the nodes of all bodies, those that hang as the means of their masters."""
+    """Return T on the nodes of all bodies, dependent ones by their masters'."""
     meshes = [body.mesh for body in scene.bodies.values()]
     parts = [
-        sp.identity(mesh.n_nodes) if mesh.hanging is None else mesh.hanging.followed(mesh.n_nodes)
+        sp.identity(mesh.n_nodes) if mesh.followers is None else mesh.followers.followed(mesh.n_nodes)
         for mesh in meshes
     ]
     return sp.block_diag(parts, format="csr")

@@ -303,7 +303,7 @@ class DesignGeometry:
         """
         for name, body in scene.bodies.items():
             require_none(
-                body.mesh.hanging, f"a design with body {name!r}", "refine it everywhere, or take simplices"
+                body.mesh.followers, f"a design with body {name!r}", "refine it everywhere, or take simplices"
             )
         if scene.sectors:
             raise InvalidInputError(

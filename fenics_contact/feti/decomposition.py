@@ -24,7 +24,7 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import Roller, ToolMotion
 from fenics_contact._scene.tools import with_tool_parts
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.feti.following import hanging_nodes
+from fenics_contact.feti.following import dependent_nodes
 from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.subdomain import SubdomainMesh, cut_out
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -303,24 +303,25 @@ def gluing_rows(
     tearing: Tearing,
     fixed: np.ndarray,
     axes: LocalAxes | None = None,
-    hanging: np.ndarray | None = None,
+    dependent: np.ndarray | None = None,
     rank: int | None = None,
 ) -> GluingRows:
     """Build the equality rows B_E u = c_E, for which B_E D⁻¹ B_Eᵀ is diagonal, D the stiffness of copies.
 
     A free component of a node with m copies has m − 1 gluing rows of unit length (see `weighted_helmert`, c =
     0). A prescribed one has m rows, one for each copy, which glue it as well. Components are along the `axes`
-    of nodes, which keeps them orthogonal. Hanging nodes have no rows, as each copy follows its masters.
+    of nodes, which keeps them orthogonal. Dependent nodes have no rows, as each copy follows its masters.
 
-    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `hanging`: numbers of hanging
-    nodes, none of which is; `rank`: the one whose copies the entries are on; None: all entries.
+    `fixed`: whether a component of a node is prescribed, shape (n_nodes, dim); `dependent`: numbers of
+    nodes that hang or are centres, none of which is; `rank`: the one whose copies the entries are on; None:
+    all entries.
     """
     here = np.full(len(tearing.copy_subdomain), rank is None)
     here |= tearing.subdomain_rank[tearing.copy_subdomain] == rank
     touched = np.logical_or.reduceat(here, tearing.first_copy[:-1])[:, None]
     multiplicity = tearing.multiplicity.copy()
-    if hanging is not None:
-        multiplicity[hanging] = 1
+    if dependent is not None:
+        multiplicity[dependent] = 1
     counts = np.where(fixed, multiplicity[:, None], multiplicity[:, None] - 1)
     start = np.concatenate([[0], np.cumsum(counts.ravel())])
     parts = [_prescribed_entries(tearing, fixed & touched, start)]
@@ -423,7 +424,7 @@ class Decomposition:
 
     @cached_property
     def following(self) -> sp.csr_matrix | None:
-        """T on this rank's torn vectors, what hanging nodes do at others' displacement; None without any."""
+        """T on this rank's torn vectors: dependent nodes at the displacement of others; None without any."""
         if all(mesh.following is None for mesh in self.meshes):
             return None
         parts = [
@@ -503,8 +504,8 @@ def decompose(
     with together(comm):
         meshes = tuple(_cut(scene, partitions, tearing, here))
         prescribed, axes = prescribed_along(scene, tearing)
-        hanging = hanging_nodes(scene, tearing)
-        gluing = gluing_rows(tearing, ~np.isnan(prescribed), axes, hanging, comm.rank)
+        dependent = dependent_nodes(scene, tearing)
+        gluing = gluing_rows(tearing, ~np.isnan(prescribed), axes, dependent, comm.rank)
     block_offset = np.cumsum([0] + [len(mesh.nodes) for mesh in meshes])
     copy_block = _copy_blocks(tearing, meshes, block_offset)
     return Decomposition(

@@ -1,11 +1,11 @@
-"""Hanging nodes of a subdomain: their displacement is the mean of that of their masters in the subdomain.
+"""Dependent nodes of a subdomain, hanging ones or centres, which follow their masters in the subdomain.
 
 With u_h = W u_m, written u = T u, the energy of a subdomain is that of Tᵀ K T and Tᵀ f. A stiffness between
-hanging nodes and the means of their masters keeps them as unknowns, whose number and numbering stay:
+dependent nodes and the means of their masters keeps them as unknowns, whose number and numbering stay:
 
     K' = Tᵀ K T + s Cᵀ C,    C u = u_h − W u_m.
 
-Its kernel is that of K, as rigid motions satisfy C u = 0. No row of B acts on hanging nodes, and so the
+Its kernel is that of K, as rigid motions satisfy C u = 0. No row of B acts on dependent nodes, and so the
 equation K' u = Tᵀ f − Bᵀ λ gives C u = 0 exactly, whatever s is. Gluing the masters of two subdomains glues
 what hangs on them.
 """
@@ -24,7 +24,7 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 
 @dataclass(frozen=True, eq=False)
 class Following:
-    """The hanging nodes of a subdomain.
+    """The dependent nodes of a subdomain.
 
     Attributes:
         means: T, shape (n, n).
@@ -37,18 +37,18 @@ class Following:
     @classmethod
     def of(cls, mesh: BodyMesh, nodes: np.ndarray, components: int) -> Following | None:
         """Return those among the nodes of a subdomain, given by block; None without any."""
-        hanging = mesh.hanging
-        if hanging is None:
+        followers = mesh.followers
+        if followers is None:
             return None
         block = np.full(mesh.n_nodes, -1)
         block[nodes] = np.arange(len(nodes))
-        here = block[hanging.nodes] >= 0
+        here = block[followers.nodes] >= 0
         if not here.any():
             return None
-        own, masters = block[hanging.nodes[here]], block[hanging.masters[here]]
+        own, masters = block[followers.nodes[here]], block[followers.masters[here]]
         assert (masters >= 0).all()  # siblings are kept together
         count, width = masters.shape
-        row, weight = np.repeat(np.arange(count), width), np.full(masters.size, 1.0 / width)
+        row, weight = np.repeat(np.arange(count), width), followers.weights[here].ravel()
         one, size = np.ones(count), len(nodes)
         chosen = sp.csr_matrix((one, (np.arange(count), own)), shape=(count, size))
         apart = chosen - sp.csr_matrix((weight, (row, masters.ravel())), shape=(count, size))
@@ -66,12 +66,10 @@ class Following:
         return np.asarray(self.means.T @ force)
 
 
-def hanging_nodes(scene: Scene, numbers: NodeNumbers) -> np.ndarray | None:
-    """Return the numbers of the hanging nodes of all bodies, shape (n,); None without any."""
-    meshes = {name: scene.bodies[name].mesh for name in numbers.body_names}
+def dependent_nodes(scene: Scene, numbers: NodeNumbers) -> np.ndarray | None:
+    """Return the numbers of the dependent nodes of all bodies, shape (n,); None without any."""
+    followers = {name: scene.bodies[name].mesh.followers for name in numbers.body_names}
     found = [
-        numbers.global_nodes(name, mesh.hanging.nodes)
-        for name, mesh in meshes.items()
-        if mesh.hanging is not None
+        numbers.global_nodes(name, each.nodes) for name, each in followers.items() if each is not None
     ]
     return np.concatenate(found) if found else None

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from fenics_contact.mesh.quadratic_nodes import in_vtk_order
     from fenics_contact.mesh.quality import scaled_jacobian
     from fenics_contact.mesh.refinement import Refinement, refined
+    from fenics_contact.mesh.serendipity_cells import completed, serendipity
     from fenics_contact.mesh.transfer import MeshTransfer
 
 __all__ = [
@@ -22,11 +23,13 @@ __all__ = [
     "Refinement",
     "bisection_partition",
     "boundary_faces",
+    "completed",
     "in_vtk_order",
     "merge_duplicate_nodes",
     "quadratic",
     "refined",
     "scaled_jacobian",
+    "serendipity",
 ]
 
 __getattr__, __dir__ = late_names(__name__)

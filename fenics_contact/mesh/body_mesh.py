@@ -18,6 +18,7 @@ from fenics_contact.mesh import quality
 from fenics_contact.mesh.cell_types import cell_type_of
 from fenics_contact.mesh.chart import Chart, check_chart
 from fenics_contact.mesh.faces import (
+    LAST_BITS,
     boundary_faces,
     check_no_coincident_nodes,
     coordinate_rounding,
@@ -25,12 +26,14 @@ from fenics_contact.mesh.faces import (
     match_faces,
     start_at_smallest,
 )
-from fenics_contact.mesh.hanging import HangingNodes, nodes_to_hold
+from fenics_contact.mesh.hanging import Centres, DependentNodes, HangingNodes, nodes_to_hold
 from fenics_contact.mesh.quadratic_nodes import check_node_order
 from fenics_contact.mesh.quality import check_shapes, jacobian_ratio, similarity, thickness
 from fenics_contact.shapes.combined import placed
 from fenics_contact.shapes.simple import SurfaceShape
 
+_FOLLOWING = ("quadratic", "serendipity")
+"""How cells are called, and how those whose centres follow."""
 RESOLVED = 1e3
 """Smallest ratio of a cell's thickness to the rounding of its coordinates."""
 
@@ -289,6 +292,19 @@ def check_hanging(hanging: HangingNodes, points: np.ndarray, n_cells: int) -> No
         )
 
 
+def check_centres(centres: Centres, points: np.ndarray) -> None:
+    """Reject centres that do not lie where the nodes are that they follow.
+
+    `points`: coordinates, (n_nodes, 3 | 2).
+    """
+    away = np.abs(points - centres.placed(points)).max(axis=1)
+    if (worst := float(away.max())) > LAST_BITS * coordinate_rounding(points):
+        raise InvalidInputError(
+            f"centres that follow other nodes must lie where these say, node {int(away.argmax())} does not "
+            f"by {worst:.3g}: let mesh.serendipity place them"
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Cut:
     """Faces of cells along which a mesh is cut.
@@ -333,6 +349,8 @@ class BodyMesh:
             by default none.
         node_sets: Name to ascending node numbers, int64, for supports and forces at single nodes; by default
             none.
+        centres: Nodes in the centres of faces and cells that follow the others, so that cells of 27 nodes
+            are those of 20, and of 9 those of 8, which `serendipity` makes; by default none.
 
     Raises:
         InvalidInputError: If an array has the wrong shape or type, a coordinate is not finite, a node
@@ -359,6 +377,7 @@ class BodyMesh:
     hanging: HangingNodes | None = None
     chart: Chart | None = None
     node_sets: Mapping[str, np.ndarray] = field(default_factory=dict)
+    centres: Centres | None = None
     _origin: BodyMesh | None = field(default=None, init=False, repr=False)
     _off_shapes: Mapping[str, np.ndarray] = field(default_factory=dict, init=False, repr=False)
     _cuts: Mapping[Hashable, Cut] = field(default_factory=dict, init=False, repr=False)
@@ -385,6 +404,8 @@ class BodyMesh:
             check_no_coincident_nodes(points)
         if self.hanging is not None:
             check_hanging(self.hanging, points, len(cells))
+        if self.centres is not None:
+            check_centres(self.centres, points)
         self._set(surfaces=checked_surfaces(self.surfaces, cells, *points.shape, hanging=self.hanging))
         self._set(node_sets=checked_node_sets(self.node_sets, len(points), self.surfaces))
         self._set(_off_shapes=self._checked_shapes(self.shapes))
@@ -397,7 +418,7 @@ class BodyMesh:
 
     def _checked_shapes(self, shapes: Mapping[str, SurfaceShape]) -> dict[str, np.ndarray]:
         return check_shapes(
-            self.points, self.surfaces, shapes, None if self.hanging is None else self.hanging.nodes
+            self.points, self.surfaces, shapes, None if self.followers is None else self.followers.nodes
         )
 
     def _facts(self) -> dict[str, Any]:
@@ -406,6 +427,7 @@ class BodyMesh:
             "cells": self.cells_in_words,
             "nodes": self.n_nodes,
             **({} if self.hanging is None else {"hanging nodes": len(self.hanging.nodes)}),
+            **({} if self.centres is None else {"centres that follow": len(self.centres.nodes)}),
             "extent": " × ".join(f"{a:.6g} to {b:.6g}" for a, b in zip(low, high, strict=True)),
             "surfaces": _sizes(self.surfaces),
             "regions": _sizes(self.regions),
@@ -416,8 +438,13 @@ class BodyMesh:
     @property
     def cells_in_words(self) -> str:
         """Number and type of the cells: "24 hexahedra"."""
-        kind = cell_type_of(self.cells, self.dim)
-        return f"{self.n_cells} {kind.plural}"
+        plural = cell_type_of(self.cells, self.dim).plural
+        return f"{self.n_cells} {plural if self.centres is None else plural.replace(*_FOLLOWING)}"
+
+    @property
+    def followers(self) -> DependentNodes | None:
+        """The nodes that are no unknowns of their own, `hanging` ones or `centres`; None without any."""
+        return self.hanging if self.centres is None else self.centres
 
     @property
     def cell_type(self) -> str:
@@ -519,7 +546,7 @@ class BodyMesh:
 
         Args:
             points: New coordinates, (n_nodes, 3 | 2); of a mesh with `cuts` those before it was cut will do.
-                Those of `hanging` nodes follow from their masters'.
+                Those of `hanging` nodes and `centres` follow from their masters'.
 
         Returns:
             The moved mesh.
@@ -566,8 +593,8 @@ class BodyMesh:
 
     def _at(self, points: np.ndarray) -> BodyMesh:
         new_points = checked_points(self._on_both_sides(points), self.points.shape)
-        if self.hanging is not None:
-            new_points = checked_points(self.hanging.placed(new_points))
+        if self.followers is not None:
+            new_points = checked_points(self.followers.placed(new_points))
         check_jacobians(
             new_points,
             self.cells,
@@ -598,8 +625,8 @@ class BodyMesh:
             InvalidInputError: If the surface contains a hanging node, but not all its masters.
         """
         if surface in self.node_sets:
-            return nodes_to_hold(self.hanging, surface, self.node_sets[surface])
-        return nodes_to_hold(self.hanging, surface, self.surfaces[surface])
+            return nodes_to_hold(self.followers, surface, self.node_sets[surface])
+        return nodes_to_hold(self.followers, surface, self.surfaces[surface])
 
     @cached_property
     def linear(self) -> BodyMesh:

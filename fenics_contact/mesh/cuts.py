@@ -27,7 +27,7 @@ def cut_between(mesh: BodyMesh, name: Hashable, before: np.ndarray, behind: np.n
 
     `before`, `behind`: cells on both sides, shape (n,) each.
     """
-    require_none(mesh.hanging, "a section", "refine no cells there, or take simplices")
+    require_none(mesh.followers, "a section", "refine no cells there, or take simplices")
     shared = nodes_between(mesh, before, behind)
     faces, sides = shared_faces(mesh.cells, mesh.dim)
     side = np.zeros(mesh.n_cells)

@@ -1,4 +1,4 @@
-"""Hanging nodes: those of small cells on an edge or a face of a larger neighbour, which they follow."""
+"""Nodes that follow others: hanging ones, of small cells on the faces of larger neighbours, and centres."""
 
 from __future__ import annotations
 
@@ -11,9 +11,46 @@ from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 
 
+class DependentNodes:
+    """Nodes whose displacement is a combination of that of others, u_h = Σ w_j u_j.
+
+    Attributes:
+        nodes: Their numbers, ascending, shape (n,).
+        masters: The nodes that each follows, none of which depends on others, shape (n, k).
+    """
+
+    nodes: np.ndarray
+    masters: np.ndarray
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Weights of the masters, which add up to one, shape (n, k)."""
+        return np.full(self.masters.shape, 1.0 / self.masters.shape[1])
+
+    def placed(self, points: np.ndarray) -> np.ndarray:
+        """Return values at all nodes, those of dependent ones by their masters', (n_nodes, ...)."""
+        result = np.array(points, dtype=np.float64)
+        result[self.nodes] = np.einsum("nk,nk...->n...", self.weights, result[self.masters])
+        return result
+
+    def means(self, n_nodes: int) -> sp.csr_matrix:
+        """Return W with u_h = W u, shape (n, n_nodes)."""
+        row = np.repeat(np.arange(len(self.nodes)), self.masters.shape[1])
+        entries = self.weights.ravel(), (row, self.masters.ravel())
+        return sp.csr_matrix(entries, shape=(len(self.nodes), n_nodes))
+
+    def followed(self, n_nodes: int) -> sp.csr_matrix:
+        """Return T with T u = u but at dependent nodes, where it is W u, shape (n_nodes, n_nodes)."""
+        stays = np.ones(n_nodes)
+        stays[self.nodes] = 0.0
+        chosen = np.ones(len(self.nodes)), (self.nodes, np.arange(len(self.nodes)))
+        spread = sp.csr_matrix(chosen, shape=(n_nodes, len(self.nodes)))
+        return (sp.diags(stays) + spread @ self.means(n_nodes)).tocsr()
+
+
 @displayed
 @dataclass(frozen=True, eq=False)
-class HangingNodes:
+class HangingNodes(DependentNodes):
     """Nodes whose displacement is the mean of that of others, u_h = 1/k Σ u_j, so that bodies do not gape.
 
     They lie at the mean of their masters, also where a surface is curved: on the larger facet, not on a shape
@@ -30,26 +67,6 @@ class HangingNodes:
     nodes: np.ndarray
     masters: np.ndarray
     levels: np.ndarray
-
-    def placed(self, points: np.ndarray) -> np.ndarray:
-        """Return values at all nodes, those of hanging ones the means of their masters, (n_nodes, ...)."""
-        result = np.array(points, dtype=np.float64)
-        result[self.nodes] = result[self.masters].mean(axis=1)
-        return result
-
-    def means(self, n_nodes: int) -> sp.csr_matrix:
-        """Return W with u_h = W u, shape (n, n_nodes)."""
-        row = np.repeat(np.arange(len(self.nodes)), self.masters.shape[1])
-        weights = np.full(self.masters.size, 1.0 / self.masters.shape[1])
-        return sp.csr_matrix((weights, (row, self.masters.ravel())), shape=(len(self.nodes), n_nodes))
-
-    def followed(self, n_nodes: int) -> sp.csr_matrix:
-        """Return T with T u = u but at hanging nodes, where it is W u, shape (n_nodes, n_nodes)."""
-        stays = np.ones(n_nodes)
-        stays[self.nodes] = 0.0
-        chosen = np.ones(len(self.nodes)), (self.nodes, np.arange(len(self.nodes)))
-        spread = sp.csr_matrix(chosen, shape=(n_nodes, len(self.nodes)))
-        return (sp.diags(stays) + spread @ self.means(n_nodes)).tocsr()
 
     def filled_in(self, values: np.ndarray, facets: np.ndarray, known: np.ndarray) -> np.ndarray:
         """Return nodal values, those of hanging nodes of facets that are not known by their masters'.
@@ -77,7 +94,39 @@ class HangingNodes:
         return sp.csr_matrix((weight, (row, column)), shape=2 * (len(nodes),))
 
 
-def nodes_to_hold(hanging: HangingNodes | None, surface: str, facets: np.ndarray) -> np.ndarray:
+@displayed
+@dataclass(frozen=True, eq=False)
+class Centres(DependentNodes):
+    """Centres of faces and cells that follow the other nodes of these by the serendipity shape functions.
+
+    Cells of 9 and 27 nodes are those of 8 and 20 nodes then: on quadrilaterals u_c = ½ Σ midpoints − ¼ Σ
+    corners, in hexahedra u_c = ¼ Σ midpoints − ¼ Σ corners.
+
+    Attributes:
+        nodes: Their numbers, ascending, shape (n,).
+        masters: Corners and midpoints that each follows, shape (n, 8 | 20); those of faces are repeated, with
+            weights of zero.
+        given: Their weights, shape (n, 8 | 20).
+    """
+
+    nodes: np.ndarray
+    masters: np.ndarray
+    given: np.ndarray
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Weights of the masters, which add up to one, shape (n, k)."""
+        return self.given
+
+    def without(self, nodes: np.ndarray) -> Centres | None:
+        """Return those that are not among some nodes; None without any."""
+        stays = ~np.isin(self.nodes, nodes)
+        if not stays.any():
+            return None
+        return Centres(self.nodes[stays], self.masters[stays], self.given[stays])
+
+
+def nodes_to_hold(hanging: DependentNodes | None, surface: str, facets: np.ndarray) -> np.ndarray:
     """Return the nodes by which a support holds a surface, ascending: hanging ones follow their masters."""
     nodes = np.unique(facets)
     if hanging is None:
@@ -94,9 +143,14 @@ def nodes_to_hold(hanging: HangingNodes | None, surface: str, facets: np.ndarray
     return np.setdiff1d(nodes, hanging.nodes)
 
 
-def require_none(hanging: HangingNodes | None, what: str, remedy: str) -> None:
-    """Reject the hanging nodes of a mesh for what cannot deal with them."""
-    if hanging is not None:
+def require_none(dependent: DependentNodes | None, what: str, remedy: str) -> None:
+    """Reject the hanging nodes or following centres of a mesh for what cannot deal with them."""
+    if isinstance(dependent, Centres):
         raise InvalidInputError(
-            f"{what} needs a mesh without hanging nodes, this one has {len(hanging.nodes)}: {remedy}"
+            f"{what} needs complete cells, this mesh has {len(dependent.nodes)} centres that follow other "
+            "nodes: make these unknowns by mesh.completed"
+        )
+    if dependent is not None:
+        raise InvalidInputError(
+            f"{what} needs a mesh without hanging nodes, this one has {len(dependent.nodes)}: {remedy}"
         )

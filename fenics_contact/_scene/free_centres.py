@@ -1,0 +1,39 @@
+"""Serendipity cells in contact: the centres of their facets there are unknowns.
+
+By the functions of 8 nodes a uniform pressure pulls at the corners of a facet, by 1/12 of the force each, by
+those of 9 nodes it presses at all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from weakref import WeakKeyDictionary
+
+from fenics_contact._scene.body import Body
+from fenics_contact._scene.pairs import Surface
+from fenics_contact._scene.parts import SceneParts
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.serendipity_cells import completed
+
+_FREED: WeakKeyDictionary[BodyMesh, dict[tuple[str, ...], BodyMesh]] = WeakKeyDictionary()
+"""Meshes with centres as unknowns: scenes made of the same bodies have the same meshes."""
+
+
+def with_free_centres(scene: SceneParts) -> Mapping[str, Body]:
+    """Return the bodies of a scene, the centres of facets in contact or tied as unknowns."""
+    bodies = dict(scene.bodies)
+    for name, body in scene.bodies.items():
+        if body.mesh.centres is None:
+            continue
+        sides = (side for pair in (*scene.contacts, *scene.ties) for side in (pair.slave, pair.master))
+        touching = tuple(
+            sorted({side.name for side in sides if isinstance(side, Surface) and side.body == name})
+        )
+        if touching:
+            known = _FREED.setdefault(body.mesh, {})
+            if touching not in known:
+                known[touching] = completed(body.mesh, *touching)
+            if known[touching] is not body.mesh:
+                bodies[name] = replace(body, mesh=known[touching])
+    return bodies

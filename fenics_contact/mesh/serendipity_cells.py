@@ -1,0 +1,110 @@
+"""Serendipity cells: quadrilaterals of 8 and hexahedra of 20 nodes, as complete ones whose centres follow."""
+
+from __future__ import annotations
+
+from copy import copy
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.body_mesh import BodyMesh, check_jacobians
+from fenics_contact.mesh.cell_types import HEXAHEDRON27, QUADRILATERAL9, cell_type_of
+from fenics_contact.mesh.hanging import Centres
+
+_OF_A_FACE = np.array([-0.25, -0.25, -0.25, -0.25, 0.5, 0.5, 0.5, 0.5])
+"""Serendipity functions of the corners and midpoints of a quadrilateral in its centre."""
+_OF_A_CELL = np.concatenate([np.full(8, -0.25), np.full(12, 0.25)])
+"""Those of a hexahedron in its centre."""
+
+
+def centres_of(cells: np.ndarray, dim: int) -> Centres | None:
+    """Return the centres of faces and cells, which follow the other nodes; None of cells without centres.
+
+    `cells`: node numbers of complete quadratic cells, (n_cells, nodes of a cell).
+    """
+    kind = cell_type_of(cells, dim)
+    if kind is QUADRILATERAL9:
+        return _once(cells[:, 8], cells[:, :8], _OF_A_FACE)
+    if kind is not HEXAHEDRON27:
+        return None
+    faces = cells[:, kind.faces].reshape(-1, 9)
+    masters = np.column_stack([faces[:, :8], np.repeat(faces[:, :1], 12, axis=1)])
+    weights = np.concatenate([_OF_A_FACE, np.zeros(12)])
+    on_faces, inside = _once(faces[:, 8], masters, weights), _once(cells[:, 26], cells[:, :20], _OF_A_CELL)
+    nodes = np.concatenate([on_faces.nodes, inside.nodes])
+    order = np.argsort(nodes)
+    return Centres(
+        nodes[order],
+        np.concatenate([on_faces.masters, inside.masters])[order],
+        np.concatenate([on_faces.given, inside.given])[order],
+    )
+
+
+def _once(nodes: np.ndarray, masters: np.ndarray, weights: np.ndarray) -> Centres:
+    nodes, first = np.unique(nodes, return_index=True)
+    return Centres(nodes, masters[first], np.tile(weights, (len(nodes), 1)))
+
+
+def serendipity(mesh: BodyMesh) -> BodyMesh:
+    """Return the mesh with cells of 8 nodes in the plane, of 20 in space: their centres follow the others.
+
+    The nodes in the centres of faces and cells stay, so that surfaces, results and files are those of
+    complete cells, but they are no unknowns: u_c = ½ Σ midpoints − ¼ Σ corners on faces, ¼ Σ midpoints − ¼ Σ
+    corners in cells. The stiffness is Tᵀ K T with that of the complete cells, exactly that of the serendipity
+    cells. They are placed alike. On surfaces in contact or tied the centres become unknowns again, as a
+    uniform pressure pulls at the corners of facets without them; a `Scene` sees to that.
+
+    Args:
+        mesh: Quadrilaterals of 9 nodes or hexahedra of 27.
+
+    Raises:
+        InvalidInputError: If the cells are others, or a cell is inverted.
+
+    References:
+        O. C. Zienkiewicz, R. L. Taylor: The Finite Element Method, vol. 1 (serendipity functions).
+
+    Example:
+        >>> from fenics_contact.gallery import block
+        >>> from fenics_contact.mesh import quadratic, serendipity
+        >>> box = serendipity(quadratic(block((0.0, 0.0, 0.0), (1.0, 1.0, 2.0), (1, 1, 2))))
+        >>> box.cells_in_words
+        '2 serendipity hexahedra'
+    """
+    centres = centres_of(mesh.cells, mesh.dim)
+    if centres is None:
+        raise InvalidInputError(
+            "serendipity needs quadrilaterals of 9 nodes or hexahedra of 27, got "
+            f"{cell_type_of(mesh.cells, mesh.dim).plural}: make them quadratic first (mesh.quadratic); "
+            "simplices have no centres"
+        )
+    result = copy(mesh)
+    result.__dict__.pop("linear", None)
+    points = centres.placed(mesh.points)
+    check_jacobians(points, mesh.cells, "refine the mesh along its curved surfaces, or keep complete cells")
+    result._set(points=points, centres=centres, chart=None)
+    return result
+
+
+def completed(mesh: BodyMesh, *surfaces: str) -> BodyMesh:
+    """Return the mesh with complete cells: its centres are unknowns again, where they are now.
+
+    Args:
+        mesh: Any mesh; one without serendipity cells is returned as it is.
+        surfaces: Names of surfaces on which alone centres become unknowns; all centres if none is given.
+
+    Example:
+        >>> from fenics_contact.gallery import block
+        >>> from fenics_contact.mesh import completed, quadratic, serendipity
+        >>> box = serendipity(quadratic(block((0.0, 0.0, 0.0), (1.0, 1.0, 2.0), (1, 1, 2))))
+        >>> completed(box).cells_in_words
+        '2 quadratic hexahedra'
+    """
+    if mesh.centres is None:
+        return mesh
+    facets = [mesh.surfaces[name].ravel() for name in surfaces]
+    freed = np.concatenate(facets) if surfaces else mesh.centres.nodes
+    if not np.isin(mesh.centres.nodes, freed).any():
+        return mesh
+    result = copy(mesh)
+    result._set(centres=mesh.centres.without(freed))
+    return result

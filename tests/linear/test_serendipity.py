@@ -1,0 +1,131 @@
+"""Cells of 8 and 20 nodes: those of 9 and 27 whose centres follow; patch tests, CalculiX, contact, ranks."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import Body, ContactPair, Scene, Support, Surface, Tie, Traction, solve_scene
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
+from fenics_contact.mesh import bisection_partition, completed, quadratic, serendipity
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.cuts import cut_between
+from tests.linear.graded import pulled
+from tests.linear.serendipity import bent, bent_bar
+
+#: Displacements of two nodes of `bent_bar` by CalculiX 2.20, elements C3D20 and forces at nodes.
+BAR = {23: [-0.004937768, 0.005703146, 0.0231773], 35: [-0.0002680208, 0.0002864461, 0.001039807]}
+
+
+def shaken(mesh: BodyMesh, size: float) -> BodyMesh:
+    inside = (np.abs(mesh.points - mesh.points.mean(axis=0)) < 0.499 * np.ptp(mesh.points, axis=0)).all(
+        axis=1
+    )
+    points = mesh.points.copy()
+    points[inside] += size * np.random.default_rng(3).uniform(-1, 1, (inside.sum(), mesh.dim))
+    return mesh.moved(points)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("subdomains", [1, 4])
+def test_an_even_stress_is_even_in_distorted_cells(dim: int, subdomains: int) -> None:
+    whole = rectangle((0, 0), (1, 1), (3, 2)) if dim == 2 else block((0, 0, 0), (1, 1, 1), (2, 2, 2))
+    mesh = shaken(serendipity(quadratic(whole)), 0.03)
+    material = IsotropicElasticity(100.0, 0.3) if dim == 3 else PlaneStrain(100.0, 0.3)
+    partition = {"bar": bisection_partition(mesh, subdomains)}
+    state = solve_scene(pulled(mesh, material), MPI.COMM_SELF, partitions=partition, tolerance=1e-12)
+    exact = mesh.points * ([0.01, -0.003, -0.003] if dim == 3 else [0.0091, -0.0039])
+    np.testing.assert_allclose(state.gather_displacement("bar"), exact, atol=1e-12 * np.abs(exact).max())
+    stress = state.gather_nodal_stress("bar")[0]
+    np.testing.assert_allclose(stress, np.broadcast_to(stress[0], stress.shape), atol=1e-9)
+
+
+def test_a_bent_bar_of_distorted_cells_moves_as_in_calculix() -> None:
+    """Complete cells are softer: the test would not pass with these."""
+    mesh, state = bent(3)
+    assert mesh.cells_in_words == "6 serendipity hexahedra"
+    moved = state.gather_displacement("bar")
+    for node, by_calculix in BAR.items():
+        np.testing.assert_allclose(moved[node], by_calculix, atol=1e-6 * np.abs(moved).max())
+    complete = bent_bar(completed(mesh), 1)
+    assert np.abs(complete.gather_displacement("bar") - moved).max() > 1e-3 * np.abs(moved).max()
+
+
+SCRIPT = """
+import json
+from mpi4py import MPI
+from tests.linear.serendipity import bent
+moved = bent(4, MPI.COMM_WORLD)[1].gather_displacement("bar")
+if MPI.COMM_WORLD.rank == 0:
+    print(json.dumps(moved.tolist()))
+"""
+
+
+def test_every_number_of_ranks_has_the_same_answer(mpirun) -> None:  # type: ignore[no-untyped-def]
+    alone = bent(4)[1].gather_displacement("bar")
+    for ranks in (2, 4):
+        answer = np.array(json.loads(mpirun(SCRIPT, ranks)))
+        np.testing.assert_allclose(answer, alone, atol=1e-9 * np.abs(alone).max())
+
+
+@pytest.mark.parametrize("pair", [ContactPair, Tie])
+def test_an_even_pressure_passes_between_surfaces_whose_centres_are_unknowns(pair: type) -> None:
+    lower = serendipity(quadratic(block((0, 0, 0), (1, 1, 1), (2, 2, 1))))
+    upper = serendipity(quadratic(block((0, 0, 1), (1, 1, 2), (2, 2, 1))))
+    steel = IsotropicElasticity(100.0, 0.0)
+    scene = Scene(
+        {"lower": Body(lower, steel), "upper": Body(upper, steel)},
+        [
+            Support("lower", "z0"),
+            Support("upper", "x0", (0.0, None, None)),
+            Support("upper", "y0", (None, 0.0, None)),
+        ],
+        [Traction("upper", "z1", (0.0, 0.0, -1.0))],
+        **{
+            "contacts" if pair is ContactPair else "ties": [
+                pair(Surface("upper", "z0"), Surface("lower", "z1"))
+            ]
+        },
+    )
+    for name, surface in (("lower", "z1"), ("upper", "z0")):
+        mesh = scene.bodies[name].mesh
+        assert mesh.centres is not None
+        assert not np.isin(mesh.centres.nodes, mesh.surfaces[surface]).any()
+        assert np.isin(mesh.centres.nodes, mesh.surfaces["x0"]).any()
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-11)
+    exact = upper.points * [0.0, 0.0, -0.01]
+    np.testing.assert_allclose(state.gather_displacement("upper"), exact, atol=1e-11)
+    if pair is ContactPair:
+        np.testing.assert_allclose(state.contact.pressure, 1.0, rtol=1e-8)
+    # The scene of a scene has the same meshes.
+    again = Scene(scene.bodies, scene.supports, scene.loads, scene.contacts, scene.ties)
+    assert again.bodies["lower"].mesh is scene.bodies["lower"].mesh
+
+
+def test_large_strains_are_even_as_well() -> None:
+    mesh = serendipity(quadratic(block((0, 0, 0), (1, 1, 1), (2, 1, 1))))
+    state = solve_scene(pulled(mesh, NeoHooke(100.0, 0.3), 30.0), MPI.COMM_SELF, tolerance=1e-9)
+    moved = state.gather_displacement("bar")
+    rate = moved[np.argmax(mesh.points.sum(axis=1))]
+    np.testing.assert_allclose(moved, mesh.points * rate, atol=1e-7)
+
+
+def test_cells_without_centres_are_refused_and_complete_ones_stay() -> None:
+    ten = quadratic(block((0, 0, 0), (1, 1, 1), (1, 1, 1), "tetrahedron"))
+    with pytest.raises(
+        InvalidInputError, match=r"needs quadrilaterals of 9 nodes or hexahedra of 27, got quad"
+    ):
+        serendipity(ten)
+    assert completed(ten) is ten
+    box = serendipity(quadratic(block((0, 0, 0), (1, 1, 1), (1, 1, 1))))
+    assert completed(box).centres is None
+    with pytest.raises(InvalidInputError, match=r"must lie where these say, node \d+ does not by 0\.1"):
+        BodyMesh(box.points + 0.1 * np.eye(27)[26][:, None], box.cells, centres=box.centres)
+    two = serendipity(quadratic(block((0, 0, 0), (1, 1, 1), (2, 1, 1))))
+    with pytest.raises(InvalidInputError, match=r"a section needs complete cells, .* mesh\.completed"):
+        cut_between(two, "cut", np.array([0]), np.array([1]))
