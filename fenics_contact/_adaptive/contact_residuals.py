@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface
-from fenics_contact._scene.parts import surface_of
+from fenics_contact._scene.parts import slave_of, surface_of
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import FacetedSurface, has_midside_pressure, heights, shape_functions
 from fenics_contact._surfaces.projection import Projection, interpolated_normal, node_weights, project
@@ -72,7 +72,7 @@ class _Slave:
     def __init__(self, state: LinearState, index: int) -> None:
         """Find the nodes of the points of a pair."""
         torn, pair = state.torn, state.torn.scene.contacts[index]
-        self.surface = surface_of(torn.scene, pair.slave, pair.geometry)
+        self.surface = slave_of(torn.scene, pair, pair.geometry)
         self.nodes = torn.decomposition.tearing.global_nodes(pair.slave.body, self.surface.nodes)
         self.mine = np.flatnonzero(torn.points.pair == index)
         self.place = np.searchsorted(self.nodes, torn.points.slave[self.mine])
@@ -124,7 +124,7 @@ def _of_pair(
 ) -> float:
     torn, slave = state.torn, _Slave(state, index)
     decomposition, points, field = torn.decomposition, torn.points, state.conforming_displacement
-    if has_midside_pressure(slave.surface.facets if slave.surface.whole is None else slave.surface.whole):
+    if has_midside_pressure(slave.surface.bearing):
         return 0.0  # without forces at the corners; the error of quadratic facets is small
     weight = slave.at_nodes(pressing / points.area)
     # Where a pair gives other gaps than the measured ones, the difference is interpolated.

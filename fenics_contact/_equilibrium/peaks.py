@@ -59,15 +59,13 @@ def coarse_peak(
 
 
 def unmatched_nodes(state: State, number: int, alone: float = 0.99) -> UnmatchedNodes | None:
-    """Return the doubt about a pair by nodes on linear meshes that do not match, if it is one.
+    """Return the doubt about a pair by nodes on meshes that do not match, if it is one.
 
     `alone`: weight of a node of the master above which a point lies on it.
     """
-    contact, scene, pair = state.contact, state.scene, state.scene.contacts[number]
+    contact, pair = state.contact, state.scene.contacts[number]
     if pair.by_mortar or pair.within_body or not isinstance(pair.master, Surface):
         return None
-    if any(scene.bodies[side.body].mesh.order > 1 for side in (pair.slave, pair.master)):
-        return None  # they have no mortar
     mine = contact.on_pair(number)
     weights = contact.points.master[mine[contact.normal_force[mine] > 0.0]]
     between = weights.max(axis=1).toarray() < alone

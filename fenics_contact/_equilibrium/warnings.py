@@ -350,7 +350,7 @@ def _passing_nodes(state: State, number: int, moved: float) -> list[tuple[int, s
     words = (
         f"nodes of the master of {pair.place} pass between those of the slave, which is too coarse, by up to "
         f"{deep:.2g}, where surfaces move by {moved:.2g} against each other: refine the slave, or let the "
-        "finer surface be the slave; linear cells have discretisation='mortar', which has no such error"
+        "finer surface be the slave; discretisation='mortar' has no such error"
     )
     return [(number, "between nodes", words)]
 
@@ -454,9 +454,7 @@ def _on_contact(scene: Scene) -> str:
     """
 
     def by_nodes(pair: ContactPair) -> bool:
-        if pair.by_mortar or pair.within_body or not isinstance(pair.master, Surface):
-            return False
-        return all(scene.bodies[side.body].mesh.order == 1 for side in (pair.slave, pair.master))
+        return isinstance(pair.master, Surface) and not pair.by_mortar and not pair.within_body
 
     if not any(map(by_nodes, scene.contacts)):
         return ""

@@ -160,7 +160,7 @@ def warn_of_uneven_pressure(
 ) -> None:
     """Say by how much a uniform pressure will be missed, and whether less with slave and master swapped.
 
-    Only of quadratic cells: linear ones have mortar. Collective.
+    Only of quadratic cells, where that of single nodes is several times larger. Collective.
 
     `comm`: communicator of the ranks that share the work; rank 0 logs; `even`: errors of a uniform pressure
     up to this are not reported.
@@ -180,7 +180,7 @@ def warn_of_uneven_pressure(
         _LOG.warning,
         "%s are by nodes, of quadratic cells, and their meshes do not match: where a pressure is uniform, "
         "that of single nodes is off by up to about %.0f %%, and by %.0f %% with slave and master swapped: "
-        "%s; meshes that match have no such error, and linear cells have mortar",
+        "%s; discretisation='mortar' has no such error",
         f"surfaces of {pair.place}", 100.0 * error, 100.0 * swapped, better,
     )  # fmt: skip
 
@@ -218,7 +218,7 @@ def _areas(surface: FacetedSurface, places: np.ndarray, met: np.ndarray) -> tupl
     `places`: places of its nodes on that surface between which areas are measured, shape (n, dim); `met`:
     which of its nodes meet the other surface, shape (n,).
     """
-    facets = surface.facets if surface.whole is None else surface.whole
+    facets = surface.bearing
     full = met[facets].all(axis=1)
     bearing = bearing_areas(places, facets[full], surface.axisymmetric)
     areas = np.bincount(facets[full].ravel(), bearing.ravel(), minlength=len(met))

@@ -66,8 +66,9 @@ class ClosableGaps:
         value: The gaps, shape (n,), [length].
         kept: Whether it is the coupling's own mean, shape (n,).
         share: Part of each that comes from the nodes of the master, s or zero, shape (n,).
-        here: Projections of the slave nodes onto the master, numbered as the coupling's nodes.
+        here: Projections of slave nodes onto the master, numbered as ``slave.nodes``.
         there: Projections of master nodes onto the slave, numbered as ``master.nodes``.
+        own: Gaps of the slave nodes, zero where there is none, shape (len(slave.nodes),), [length].
         opposite: Their gaps, zero where there is none, shape (len(master.nodes),), [length].
     """
 
@@ -76,6 +77,7 @@ class ClosableGaps:
     share: np.ndarray
     here: Projection
     there: Projection
+    own: np.ndarray
     opposite: np.ndarray
 
 
@@ -89,22 +91,26 @@ def closable_gaps(
 ) -> ClosableGaps:
     """Return the gaps that linear displacements can close. Collective.
 
-    `comm`: communicator of the ranks that share the work; `alone`: whether a point has no node of the slave
-    but its own, shape (n,); others keep their mean.
+    `comm`: communicator of the ranks that share the work; `alone`: whether a point has no dual function but
+    its own, shape (n,); others keep their mean.
     """
-    weight = coupling.weight
+    weight, mine = coupling.weight, coupling.node
+    if coupling.own is not None:
+        mine = np.flatnonzero(np.bincount(coupling.own.indices, minlength=len(slave.nodes)))
     nodes = np.flatnonzero(np.bincount(weight.indices, minlength=weight.shape[1]))
     if master.followed is not None:
         nodes = np.union1d(nodes, master.followed[nodes].indices)
-    here = shared_projection(slave, coupling.node, master, comm)
+    here = shared_projection(slave, mine, master, comm)
     there = shared_projection(master, nodes, slave, comm)
-    there = replace(there, point=nodes[there.point], lost=nodes[there.lost])
-    own, opposite = np.full(len(coupling.node), np.nan), np.full(weight.shape[1], np.nan)
-    own[here.point], opposite[there.point] = here.gap, there.gap
+    here, there = (
+        replace(hit, point=chosen[hit.point], lost=chosen[hit.lost])
+        for hit, chosen in ((here, mine), (there, nodes))
+    )
+    gaps, opposite = np.full(len(slave.nodes), np.nan), np.full(weight.shape[1], np.nan)
+    gaps[here.point], opposite[there.point] = here.gap, there.gap
     if slave.followed is not None:  # displacements can close the mean of their masters' gaps there
-        every = np.full(len(slave.nodes), np.nan)
-        every[coupling.node] = own
-        own = (slave.followed @ every)[coupling.node]
+        gaps = slave.followed @ gaps
+    own = coupling.of_slave(gaps)
     if master.followed is not None:
         opposite = master.followed @ opposite
     lost = abs(weight) @ np.isnan(opposite).astype(np.float64) > 0
@@ -113,7 +119,8 @@ def closable_gaps(
     closable = (1.0 - share) * own + share * across
     kept = np.isnan(closable) | ~alone
     value = np.where(kept, coupling.gap, closable)
-    return ClosableGaps(value, kept, np.where(lost | kept, 0.0, share), here, there, opposite)
+    shares = np.where(lost | kept, 0.0, share)
+    return ClosableGaps(value, kept, shares, here, there, np.nan_to_num(gaps), opposite)
 
 
 _LOG = logging.getLogger(__name__)
@@ -241,10 +248,10 @@ class MortarPoints:
         the node. Rows add up to one, shape (n, len(slave.nodes) + len(master.nodes)).
         """
         count, n_slave = len(self.coupling.node), len(self.slave.nodes)
-        lacking = sp.csr_matrix((count, n_slave))
-        if self.gathering is not None:
+        lacking, own = sp.csr_matrix((count, n_slave)), self.coupling.own
+        if own is not None:
             entries = np.ones(count), self.coupling.node, np.arange(count + 1)
-            lacking = sp.csr_matrix(entries, shape=lacking.shape) - self.gathering.weights(n_slave)
+            lacking = sp.csr_matrix(entries, shape=lacking.shape) - own
             lacking.eliminate_zeros()
         return sp.hstack([lacking, self.coupling.weight], format="csr")
 
@@ -261,9 +268,9 @@ class MortarPoints:
         by_whole = gathering.pulled_back(coupling, by, places)
         by_slave, by_master = mortar_pulled_back(slave, master, whole, by_whole, comm)
         along = by.gap[:, None] * coupling.normal
-        apart = gathering.own @ slave.points[whole.node] - coupling.weight @ master.points + coupling.relief
+        apart = coupling.of_slave(slave.points) - coupling.weight @ master.points + coupling.relief
         by_slave.normals[coupling.node] -= by.normal + by.gap[:, None] * apart
-        by_slave.points[whole.node] += gathering.own.T @ along
+        by_slave.points[:] += coupling.of_slave_pulled_back(along, len(slave.nodes))
         by_master.points[:] -= coupling.weight.T @ along
         return by_slave, by_master
 
@@ -385,6 +392,8 @@ def _measured(
     fixed, axes = supported
     numbers = NodeNumbers.of(scene)
     slave = _Side.of(scene, pair.slave, pair.geometry, numbers, finer)
+    if pair.discretisation == "mortar":
+        slave = replace(slave, surface=slave.surface.with_areas_of_pieces())
     movable = ~fixed[slave.nodes].all(axis=1)
     if isinstance(pair, CyclicSymmetry):
         axial = pair.axial_nodes(scene.bodies[pair.slave.body].mesh, pair.slave.name)

@@ -140,8 +140,8 @@ class ContactPair:
         discretisation: ``"node"`` keeps the gap of every slave node non-negative; ``"mortar"`` does so for
             weighted means of the gap. The former is simple. The latter (dual basis, integration over the
             common segments of both meshes) passes the contact patch test on non-matching meshes. By default,
-            ``"best"``, the scene takes mortar between bodies of linear cells whose meshes do not match, and
-            nodes elsewhere. Contact with a rigid obstacle is always nodal.
+            ``"best"``, the scene takes mortar between bodies whose meshes do not match, and nodes elsewhere.
+            Contact with a rigid obstacle is always nodal.
         geometry: What gaps and normals are measured between: ``"best"``, true shapes that the meshes know,
             else smooth surfaces through the nodes; ``"reconstructed"``, always the latter; ``"faceted"``, the
             flat facets, for comparison. Between round bodies the error of facets is often larger than the

@@ -113,7 +113,6 @@ class SceneParts:
                 self._require(pair.master.body, pair.master.name, f"{kind}.master")
                 if isinstance(pair, CyclicSymmetry):
                     self._require_sector(pair)
-                self._require_linear(pair, pair.master)
             else:
                 self._require_dimension(pair.master)
         _require_different(self.contacts)
@@ -312,16 +311,6 @@ class SceneParts:
         """Return the angle that turns the master of a sector onto its slave, in radians."""
         slave, master = (self.bodies[s.body].mesh.origin for s in (sector.slave, sector.master))
         return sector.measured_angle(slave, master)
-
-    def _require_linear(self, pair: ContactPair | AnyTie, master: Surface) -> None:
-        """Reject mortar coupling of quadratic facets, unless a scene of other meshes chose it."""
-        orders = {side.name: self.bodies[side.body].mesh.order for side in (pair.slave, master)}
-        if pair.discretisation == "mortar" and not pair.reason and max(orders.values()) > 1:
-            raise InvalidInputError(
-                f"{type(pair).__name__} with discretisation='mortar' needs linear cells on both sides, got "
-                f"cells of order {orders}: mean gaps of linear facets do not pass the patch test between "
-                "quadratic cells; use discretisation='node', or linear cells"
-            )
 
     def _require_expansion(self, load: ThermalStrain) -> None:
         stiff = [material for material in self.bodies[load.body].materials if not can_expand(material)]
@@ -582,27 +571,26 @@ def _choice(scene: SceneParts, pair: ContactPair | AnyTie) -> tuple[Discretisati
         return "node", "as the body meets itself"
     sides = pair.slave, pair.master
     slave, master = (scene.bodies[side.body].mesh.origin for side in sides)
-    if max(slave.order, master.order) > 1:
-        return "node", "as there is no mortar for quadratic cells"
     known = _KNOWN.setdefault(slave, WeakKeyDictionary()).setdefault(master, {})
     names = pair.slave.name, pair.master.name
     if isinstance(pair, CyclicSymmetry):
         match = _sides_match(scene, pair, slave, master)
         return ("node", "as the meshes match") if match else ("mortar", "as the meshes do not match")
     if names not in known:
-        known[names] = surfaces_match(*map(_faceted, (slave, master), names))
+        alike = slave.order == master.order
+        known[names] = alike and surfaces_match(*map(_faceted, (slave, master), names))
     return ("node", "as the meshes match") if known[names] else ("mortar", "as the meshes do not match")
 
 
 def _sides_match(scene: SceneParts, sector: CyclicSymmetry, slave: BodyMesh, master: BodyMesh) -> bool:
     """Return whether the meshes of both sides of a sector do."""
     turned = sector.turned(master.points, scene.sector_angle(sector))
-    facets = slave.surfaces[sector.slave.name], master.surfaces[sector.master.name]
+    facets = slave.linear.surfaces[sector.slave.name], master.linear.surfaces[sector.master.name]
     return surfaces_match(faceted_surface(slave.points, facets[0]), faceted_surface(turned, facets[1]))
 
 
 def _faceted(mesh: BodyMesh, surface: str) -> FacetedSurface:
-    return faceted_surface(mesh.points, mesh.surfaces[surface])
+    return faceted_surface(mesh.points, mesh.linear.surfaces[surface])
 
 
 #: Directions are the same if the cosine of the angle between them differs from one by no more than this.
@@ -681,6 +669,12 @@ def surface_of(
     if geometry == "faceted" and not finer:
         return continued(found, neighbours, order=None)
     return continued(found, neighbours, order=3 if finer and geometry != "faceted" else 2)
+
+
+def slave_of(scene: SceneParts, pair: ContactPair | AnyTie, geometry: Geometry) -> FacetedSurface:
+    """Return the slave of a pair, as `surface_of`; by mortar with the areas of the pieces of its facets."""
+    surface = surface_of(scene, pair.slave, geometry)
+    return surface.with_areas_of_pieces() if pair.discretisation == "mortar" else surface
 
 
 def _neighbours(scene: SceneParts, body: str) -> tuple[Neighbour, ...]:

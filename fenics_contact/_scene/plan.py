@@ -13,7 +13,7 @@ import numpy as np
 from fenics_contact._base.display import counted, displayed
 from fenics_contact._scene.loads import BodyForce, PointForce, ThermalStrain
 from fenics_contact._scene.memory import Subdomains, expected_memory
-from fenics_contact._scene.pairs import Coulomb, Surface, Tresca
+from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tresca
 from fenics_contact._scene.parts import in_words
 from fenics_contact._scene.supports import RigidSurface, Roller
 from fenics_contact._scene.tools import ToolBody, with_tool_parts
@@ -341,7 +341,7 @@ def _cone(names: set[EffectName]) -> ConeKind:
 def _multipliers(scene: SceneParts, unknowns: int) -> dict[str, int]:
     nodes = sum(body.mesh.n_nodes for body in scene.bodies.values())
     fixed = sum(int(np.count_nonzero(scene.fixed(name))) for name in scene.body_names)
-    slaves = [_bearing_nodes(scene, pair.slave) for pair in scene.contacts]
+    slaves = [_bearing_nodes(scene, pair) for pair in scene.contacts]
     rubbing = [count for pair, count in zip(scene.contacts, slaves, strict=True) if pair.has_friction]
     tied = [(1 if tie.sliding else scene.components) * _slave_nodes(scene, tie.slave) for tie in scene.ties]
     return {
@@ -355,9 +355,10 @@ def _multipliers(scene: SceneParts, unknowns: int) -> dict[str, int]:
     }
 
 
-def _bearing_nodes(scene: SceneParts, surface: Surface) -> int:
-    facets = scene.bodies[surface.body].mesh.surfaces[surface.name]
-    return len(np.unique(facets[:, 3:])) if has_midside_pressure(facets) else _slave_nodes(scene, surface)
+def _bearing_nodes(scene: SceneParts, pair: ContactPair) -> int:
+    facets = scene.bodies[pair.slave.body].mesh.surfaces[pair.slave.name]
+    at_midpoints = has_midside_pressure(facets) and not pair.by_mortar
+    return len(np.unique(facets[:, 3:])) if at_midpoints else _slave_nodes(scene, pair.slave)
 
 
 def _slave_nodes(scene: SceneParts, surface: Surface) -> int:

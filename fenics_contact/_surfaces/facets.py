@@ -9,7 +9,7 @@ uniform pressure is found exactly.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -342,6 +342,8 @@ class FacetedSurface:
         planes: Unit normals of the planes of symmetry, shape (n_planes, dim); None: they are the axes.
         followed: What makes values at hanging nodes the means of their masters', shape (n, n); None without
             any.
+        by_pieces: Whether the areas of nodes are those of the linear pieces around them, all of them
+            positive, as of slaves of mortar contact.
     """
 
     nodes: np.ndarray
@@ -355,6 +357,7 @@ class FacetedSurface:
     axisymmetric: bool = False
     planes: np.ndarray | None = None
     followed: sp.csr_matrix | None = None
+    by_pieces: bool = False
 
     def within(self, vectors: np.ndarray, mirrored: np.ndarray) -> np.ndarray:
         """Return vectors without their components across planes of symmetry, both (n, dim), (n, n_planes)."""
@@ -382,14 +385,26 @@ class FacetedSurface:
         """Dimension of the space around it: 3 or 2."""
         return int(self.points.shape[1])
 
+    @property
+    def bearing(self) -> np.ndarray:
+        """The facets whose areas belong to nodes, quadratic ones or linear pieces, (n_facets, nodes)."""
+        return self.facets if self.whole is None or self.by_pieces else self.whole
+
+    def with_areas_of_pieces(self) -> FacetedSurface:
+        """Return the surface with the areas that belong to nodes as a slave of mortar contact."""
+        if self.whole is None:
+            return self
+        surface = replace(self, by_pieces=True)
+        return replace(surface, areas=surface.areas_at(self.points))
+
     def areas_at(self, points: np.ndarray) -> np.ndarray:
         """Return the areas that belong to the nodes where these lie elsewhere, shape (n,).
 
         `points`: coordinates of the nodes, shape (n, dim), [length].
         """
-        if self.whole is None and not self.axisymmetric:
+        facets = self.bearing
+        if facets is self.facets and not self.axisymmetric:
             return self.widths_at(points)
-        facets = self.facets if self.whole is None else self.whole
         bearing = bearing_areas(points, facets, self.axisymmetric)
         return np.bincount(facets.ravel(), bearing.ravel(), minlength=len(points))
 

@@ -19,7 +19,7 @@ from fenics_contact._scene.fields import gradients_of
 from fenics_contact._scene.obstacles import RigidObstacle, RigidTool
 from fenics_contact._scene.pair_geometry import master_share
 from fenics_contact._scene.pairs import ContactPair, Surface, Tie, Tresca
-from fenics_contact._scene.parts import surface_of
+from fenics_contact._scene.parts import slave_of, surface_of
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import Projection
@@ -188,7 +188,7 @@ def mortar_by_shape(
     """
     tearing, scene = torn.decomposition.tearing, torn.scene
     assert isinstance(pair.master, Surface)
-    slave, master = (surface_of(scene, side, pair.geometry) for side in (pair.slave, pair.master))
+    slave, master = slave_of(scene, pair, pair.geometry), surface_of(scene, pair.master, pair.geometry)
     nodes, opposite = (
         tearing.global_nodes(side.body, surface.nodes)
         for side, surface in ((pair.slave, slave), (pair.master, master))
@@ -222,19 +222,21 @@ def mortar_points_pulled_back(
         across = gaps.share * by.gap
         by_own = np.where(gaps.kept, 0.0, by.gap) - across
         here, there = gaps.here, gaps.there
-        at_slave, at_master = _gaps_pulled_back(master, here, by_own[here.point])
-        by_slave[coupling.node[here.point]] += at_slave
+        by_nodes = coupling.of_slave_pulled_back(by_own, len(slave.nodes))
+        at_slave, at_master = _gaps_pulled_back(master, here, by_nodes[here.point])
+        by_slave[here.point] += at_slave
         by_master += at_master
         at_master, at_slave = _gaps_pulled_back(slave, there, (coupling.weight.T @ across)[there.point])
         by_master[there.point] += at_master
         by_slave += at_slave
-        own = None if by.own is None else np.pad(by.own, ((0, 0), (0, 1)))
+        own = np.zeros((len(slave.nodes), by.left.shape[1])) if by.own is None else by.own
+        none = np.zeros(len(slave.nodes)), np.zeros(len(master.nodes))
         by = replace(
             by,
-            own=own,
+            own=np.column_stack([own, none[0], -gaps.own]),
             gap=np.where(gaps.kept, by.gap, 0.0),
-            left=np.column_stack([by.left, across]),
-            right=np.column_stack([by.right, gaps.opposite]),
+            left=np.column_stack([by.left, across, by_own]),
+            right=np.column_stack([by.right, gaps.opposite, none[1]]),
         )
     parts = points.pulled_back(by, comm)
     for surface, part, result in zip((slave, master), parts, (by_slave, by_master), strict=True):
@@ -314,7 +316,7 @@ def add_areas(
     pair = torn.scene.contacts[index]
     slave, given = torn.points.of_surface(index, by_area)
     if given.any():
-        surface = surface_of(torn.scene, pair.slave, "faceted")
+        surface = slave_of(torn.scene, pair, "faceted")
         nodes = torn.decomposition.tearing.global_nodes(pair.slave.body, surface.nodes)
         if places is not None:
             surface = replace(surface, points=places[nodes])

@@ -88,8 +88,8 @@ def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarr
 
     `by_areas`: derivative by each nodal area, shape (n,).
     """
-    if surface.whole is not None or surface.axisymmetric:
-        facets = surface.facets if surface.whole is None else surface.whole
+    facets = surface.bearing
+    if facets is not surface.facets or surface.axisymmetric:
         by_nodal = bearing_pulled_back(by_areas[facets])
         if surface.axisymmetric and facets.shape[1] == 3:
             on_axis = surface.points[facets[:, :2], 0] <= computed_rounding(surface.points)

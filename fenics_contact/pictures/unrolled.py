@@ -242,7 +242,9 @@ def _patch(state: State, pair: int, reach: float | None, unrolling: Unrolling | 
     if mesh.hanging is not None:
         of_points = every - state.torn.decomposition.tearing.first_of(slave.body)
         pressure = mesh.hanging.filled_in(pressure, mesh.surfaces[slave.name], of_points)
-    pressure = np.maximum(filled_at_corners(mesh.surfaces[slave.name], pressure)[node], 0.0)
+    if not state.scene.contacts[pair].by_mortar:
+        pressure = filled_at_corners(mesh.surfaces[slave.name], pressure)
+    pressure = np.maximum(pressure[node], 0.0)
     slip = contact.slip_in_space[chosen]
     return ContactPatch(
         view, unrolling, f"{slave.body}, {slave.name}", places, rows.reshape(-1, facets.shape[1]), pressure,

@@ -190,26 +190,30 @@ def _slave_surface(state: State, which: int | str, inside: np.ndarray, apart: np
     if hanging is not None:
         fill = hanging.filled(surface.nodes, np.isin(np.arange(len(nodes)), place))
         pressure, spread = fill @ pressure, fill @ spread
-    pressure, spread = filled_at_corners(whole, pressure), np.maximum(filled_at_corners(whole, spread), 0.0)
+    by_mortar = scene.contacts[pair].by_mortar
+    if not by_mortar:
+        pressure, spread = (filled_at_corners(whole, each) for each in (pressure, spread))
+        spread = np.maximum(spread, 0.0)
     on_axis = scene.bodies[slave.body].on_axis[surface.nodes]
-    if scene.axisymmetric:
+    if scene.axisymmetric and not by_mortar:
         pressure = np.maximum(filled_on_axis(whole, pressure, on_axis), 0.0)
     places = surface.points
     if scene.bodies[slave.body].deforms_much:
         places = places + state.gather_displacement(slave.body)[surface.nodes]
     # Nodes that supports hold have no contact point either.
-    held, by_mortar = scene.fixed(slave.body)[surface.nodes].all(axis=1), scene.contacts[pair].by_mortar
+    held = scene.fixed(slave.body)[surface.nodes].all(axis=1)
     facing = held.astype(float)
     facing[place] = 1.0
     if by_mortar:
-        areas = nodal_areas(surface.points, whole, scene.axisymmetric).ravel()
-        of_nodes = np.bincount(whole.ravel(), areas)
+        areas = nodal_areas(surface.points, surface.facets, scene.axisymmetric).ravel()
+        of_nodes = np.bincount(surface.facets.ravel(), areas)
         of_nodes = of_nodes if fill is None else fill.T @ of_nodes
         whole_area = np.bincount(point, of_nodes[place], points.count)
         facing[place] = contact.nominal_area[point] / whole_area[point]
     facing = facing if fill is None else fill @ facing
-    facing = np.maximum(filled_at_corners(whole, facing), 0.0)
-    if scene.axisymmetric:
+    if not by_mortar:
+        facing = np.maximum(filled_at_corners(whole, facing), 0.0)
+    if scene.axisymmetric and not by_mortar:
         facing = np.clip(filled_on_axis(whole, facing, on_axis), 0.0, 1.0)
     facets, beyond = surface.facets[:, : surface.corners], 0.0 if by_mortar else 0.5
     return _SlaveSurface(places, facets, pressure, spread, facing, beyond)

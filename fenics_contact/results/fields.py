@@ -290,7 +290,7 @@ def contact_fields(
     Returns ``contact_status``, (n_nodes,) int: the value of `Status`, −1 on nodes that are not contact
     points; and, zero on those, ``contact_pressure``, (n_nodes,), [force / length²], ``contact_force`` on the
     slave and ``contact_slip``, (n_nodes, 3), [force] and [length]; where a body of the scene deforms much
-    ``contact_nominal_pressure``, too. At the corners of quadratic triangles pressures and slip are
+    ``contact_nominal_pressure``, too. By nodes pressures and slip at the corners of quadratic triangles are
     interpolated, see `filled_at_corners`, and pressures at the ends of quadratic edges on an axis of
     revolution. A node that belongs to several pairs has their sum, and the status of the last; one whose
     force is that of a point elsewhere, as on one of both sides of a sector, has the pressure there.
@@ -313,8 +313,9 @@ def contact_fields(
             facets = mesh.surfaces[scene.contacts[pair].slave.name]
             if filled and mesh.hanging is not None:
                 field = mesh.hanging.filled_in(field, facets, nodes[own])
-            field = filled_at_corners(facets, field) if filled else field
-            if filled and scene.axisymmetric and field.ndim == 1:  # slip is zero there
+            filled_in = filled and not scene.contacts[pair].by_mortar
+            field = filled_at_corners(facets, field) if filled_in else field
+            if filled_in and scene.axisymmetric and field.ndim == 1:  # slip is zero there
                 field = filled_on_axis(facets, field, scene.bodies[body].on_axis)
             total += field
         return total

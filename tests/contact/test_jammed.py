@@ -273,7 +273,7 @@ def test_the_depth_between_coarse_nodes_is_told(caplog: pytest.LogCaptureFixture
     state, (words,) = solved(caplog, scene)
     told = float(words.split("by up to ")[1].split(",")[0])
     assert told == pytest.approx(depth(state), rel=0.3)
-    assert ": refine the slave, or let the finer surface be the slave; linear cells have " in words
+    assert ": refine the slave, or let the finer surface be the slave; discretisation='mortar' has " in words
 
 
 @pytest.mark.parametrize(

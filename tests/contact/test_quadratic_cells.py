@@ -164,20 +164,6 @@ def test_files_and_pictures_show_quadratic_cells(tmp_path: Path) -> None:
             assert Path(picture).stat().st_size > 2000
 
 
-def test_mean_gaps_between_quadratic_facets_are_refused() -> None:
-    low, high = rectangle((0, -1), (1, 0), (1, 1)), rectangle((0, 0), (1, 1), (2, 2))
-    bodies = {"low": Body(quadratic(low), PlaneStrain(1.0, 0.3)), "high": Body(high, PlaneStrain(1.0, 0.3))}
-    surfaces = Surface("high", "y0"), Surface("low", "y1")
-    by_means = {"discretisation": "mortar"}
-    for part in ({"contacts": [ContactPair(*surfaces, **by_means)]}, {"ties": [Tie(*surfaces, **by_means)]}):
-        with pytest.raises(InvalidInputError, match=r"discretisation='mortar' needs linear cells .* 'y1': 2"):
-            Scene(bodies, [Support("low", "y0", (0.0, 0.0))], **part)
-    load = [TotalForce("high", "y1", (0.0, -1.0))]
-    guides = [Support("low", "y0", (0.0, 0.0)), Support("high", "x0", (0.0, None))]
-    state = solved(Scene(bodies, guides, load, [ContactPair(*surfaces)]), parts=1)
-    assert state.contact.normal_force.sum() == pytest.approx(1.0)
-
-
 # Two bodies of quadratic cells by nodes: the master moves as its quadratic facets do.
 
 #: Young's modulus, and Lamé's constants for Poisson's ratio 0.3.

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fenics_contact import Body, BodyMesh, ContactPair, Pressure, Scene, Support, Surface
+from fenics_contact._scene.pairs import AnyDiscretisation
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import quadratic
@@ -42,3 +45,13 @@ def pressed(meshes: dict[str, BodyMesh], slave: str = "a", stiff: float = 1.0) -
         [Pressure("a", high, PRESSURE)],
         [ContactPair(*(sides if slave == "a" else sides[::-1]), discretisation="node")],
     )
+
+
+def chosen(scene: Scene, discretisation: AnyDiscretisation = "best") -> Scene:
+    """The scene by nodes with another discretisation."""
+    return replace(scene, contacts=[replace(pair, discretisation=discretisation) for pair in scene.contacts])
+
+
+def unevenly() -> Scene:
+    """A square on a wider one, which is the slave."""
+    return chosen(pressed(boxes("triangle", 3, 4, wide=1.6), "b"), "mortar")

@@ -23,16 +23,23 @@ def arched(points: np.ndarray, radius: float = 1.5) -> np.ndarray:
 
 
 def on_arch(
-    kind: str, *, master_cells: int = 8, radius: float = 1.5, geometry: str = "best", order: int = 1
+    kind: str,
+    *,
+    master_cells: int = 8,
+    slave_cells: int = 5,
+    radius: float = 1.5,
+    geometry: str = "best",
+    order: int = 1,
 ) -> Scene:
     """Return a small slave above an arched master that is longer and wider."""
     if kind in ("hexahedron", "tetrahedron"):
         low = block((-1.0, -0.6, -0.5), (1.0, 0.6, 0.0), (master_cells, 5, 1), kind)
-        high = block((-0.43, -0.35, 0.03), (0.37, 0.33, 0.4), (5, 4, 1), kind)
+        cells = (slave_cells, slave_cells - 1, 1)
+        high = block((-0.43, -0.35, 0.03), (0.37, 0.33, 0.4), cells, kind)
         material, top, under = IsotropicElasticity(10.0, 0.3), "z1", "z0"
     else:
         low = rectangle((-1.0, -0.5), (1.0, 0.0), (master_cells, 1), kind)
-        high = rectangle((-0.43, 0.03), (0.37, 0.4), (5, 1), kind)
+        high = rectangle((-0.43, 0.03), (0.37, 0.4), (slave_cells, 1), kind)
         material, top, under = PlaneStrain(10.0, 0.3), "y1", "y0"
     if order > 1:
         low, high = quadratic(low), quadratic(high)

@@ -16,18 +16,24 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 from fenics_contact._pairing.mortar.cells import Cells, clip, simplices
 from fenics_contact._pairing.mortar.coupling import (
     CORNERS,
+    DualBasis,
     MortarCoupling,
     _heights_along,
-    dual_integrals,
     mortar_coupling,
 )
 from fenics_contact._pairing.mortar.derivatives import weight_derivatives
 from fenics_contact._pairing.mortar.planes import local_coordinates, measure, rule
-from fenics_contact._surfaces.facets import FacetedSurface, Relief, facet_shape_values, faceted_surface
+from fenics_contact._surfaces.facets import (
+    FacetedSurface,
+    Relief,
+    facet_shape_values,
+    faceted_surface,
+    nodal_areas,
+)
 from fenics_contact.errors import InvalidInputError
 from tests.conftest import run_on_ranks
 from tests.pairing.mortar_on_ranks import collect, message_for_a_folded_facet
-from tests.pairing.mortar_surfaces import KINDS, SOLID, moved, plate, rotation, shell
+from tests.pairing.mortar_surfaces import CURVED, KINDS, SOLID, moved, plate, rotation, shell
 
 kinds = pytest.mark.parametrize(("slave_kind", "master_kind"), KINDS)
 solid = pytest.mark.parametrize(("slave_kind", "master_kind"), SOLID)
@@ -91,6 +97,65 @@ def test_constant_tractions_arrive_on_any_overlap(slave_kind: str, master_kind: 
     on_master[back.node] = back.area
     np.testing.assert_allclose(there.area @ there.weight, on_master, atol=1e-12)
     assert there.area.sum() == pytest.approx(back.area.sum(), rel=1e-12)
+
+
+# Quadratic facets: dual functions of their pieces, displacements of the whole facets.
+curved = pytest.mark.parametrize(("slave_kind", "master_kind"), CURVED)
+
+
+def pressed_by_one(surface: FacetedSurface) -> np.ndarray:
+    """Nodal forces of a unit pressure."""
+    facets = surface.facets if surface.whole is None else surface.whole
+    areas = nodal_areas(surface.points, facets)
+    return np.bincount(facets.ravel(), areas.ravel(), minlength=len(surface.points))
+
+
+@curved
+def test_constant_tractions_are_those_of_whole_quadratic_facets(slave_kind: str, master_kind: str) -> None:
+    """On both sides, of a slave inside its master, up to the degree of quadrature on bent quadrilaterals."""
+    slave = plate(slave_kind, 4, up=False, skew=1.0, height=0.1)
+    master = plate(master_kind, 3, low=-0.2, high=1.3, skew=0.4)
+    coupling = mortar_coupling(slave, master)
+    assert np.all(coupling.area > 0.0)
+    own = coupling.of_slave_pulled_back(coupling.area, len(slave.nodes))
+    np.testing.assert_allclose(own, pressed_by_one(slave), atol=1e-11)
+    np.testing.assert_allclose(
+        coupling.of_slave(slave.points),
+        coupling.weight @ master.points + [*[0.0] * (slave.dim - 1), 0.1],
+        atol=1e-11,
+    )
+    np.testing.assert_allclose(coupling.gap, 0.1, atol=1e-12)
+    quadratic = [side.points[:, 0] ** 2 for side in (slave, master)]
+    if "quads" not in slave_kind + master_kind and len(slave_kind) == len(master_kind):
+        np.testing.assert_allclose(
+            coupling.of_slave(quadratic[0]), coupling.weight @ quadratic[1], atol=1e-11
+        )
+
+
+@curved
+def test_constant_tractions_arrive_on_a_quadratic_master_inside_the_slave(
+    slave_kind: str, master_kind: str
+) -> None:
+    slave = plate(slave_kind, 6, up=False, low=-0.3, high=1.2)
+    master = plate(master_kind, 5, turn=0.25)
+    coupling = mortar_coupling(slave, master)
+    np.testing.assert_allclose(coupling.area @ coupling.weight, pressed_by_one(master), atol=1e-12)
+    np.testing.assert_allclose(coupling.of_slave(slave.points), coupling.weight @ master.points, atol=1e-9)
+
+
+@curved
+def test_means_of_the_slave_are_close_to_its_nodes(slave_kind: str, master_kind: str) -> None:
+    """The spectrum of the symmetric part, in terms of the areas: multipliers are determined on any mesh."""
+    coupling = mortar_coupling(
+        plate(slave_kind, 4, up=False, skew=1.0), plate(master_kind, 3, low=-0.2, high=1.3)
+    )
+    if coupling.own is None:
+        assert "edges" == slave_kind or slave_kind in ("quads", "triangles")
+        return
+    root = np.sqrt(coupling.area)
+    matrix = root[:, None] * coupling.own.toarray() / root
+    values = np.linalg.eigvalsh((matrix + matrix.T) / 2)
+    assert 0.6 < values.min() < values.max() < 1.45
 
 
 def square_overlap(low: float, high: float, turn: float) -> float:
@@ -392,7 +457,8 @@ def covered(corners: int, parts: np.ndarray, share_of_pairs: np.ndarray) -> Cell
 
 def without_field(cells: Cells) -> tuple[np.ndarray, np.ndarray]:
     """Integrals of shape functions alone."""
-    return dual_integrals(cells, np.zeros(cells.weight.shape))[:2]
+    basis = DualBasis.on(cells)
+    return basis.coverage, basis.integrals(cells.master)
 
 
 def inside(corners: int, seed: int, count: int, width: float) -> np.ndarray:
@@ -459,12 +525,6 @@ def test_facets_do_not_mix() -> None:
     coverage, integrals = without_field(cells)
     np.testing.assert_allclose(coverage, np.concatenate([a[0] for a in alone]), rtol=1e-12)
     np.testing.assert_allclose(integrals, np.concatenate([a[1] for a in alone]), atol=1e-10)
-
-
-def test_a_field_is_integrated_as_a_shape_function_is() -> None:
-    cells = covered(4, inside(4, 3, 4, 0.4), np.array([0, 0, 1, 2]))
-    _, integrals, of_field = dual_integrals(cells, cells.master @ [3.0, -1.0, 2.0, 0.5])
-    np.testing.assert_allclose(of_field, integrals @ [3.0, -1.0, 2.0, 0.5], rtol=1e-10)
 
 
 # Clipped polygons are the intersections that half-planes give; local coordinates and rules are exact.

@@ -16,7 +16,7 @@ from fenics_contact._pairing.mortar.derivatives import mortar_pulled_back
 from fenics_contact._pairing.mortar.planes import Planes
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface, slopes
 from fenics_contact._surfaces.true_surface import reconstructed
-from tests.pairing.mortar_surfaces import KINDS, lattice, plate, shell
+from tests.pairing.mortar_surfaces import CURVED, KINDS, lattice, plate, shell
 
 STEP = 1e-7
 TOLERANCE = {"plates": 1e-7, "shells": 1e-7, "matching": 1e-6, "nested": 1e-6}
@@ -26,7 +26,13 @@ TERMS = ("area", "weight", "normal", "gap")
 def warped(surface: FacetedSurface, size: float, seed: int) -> FacetedSurface:
     """A surface whose nodes are moved a little, each in its own direction."""
     by = size * np.random.default_rng(seed).standard_normal(surface.points.shape)
-    return faceted_surface(surface.points + by, surface.facets, surface.mirrored)
+    return placed(surface, surface.points + by)
+
+
+def placed(surface: FacetedSurface, points: np.ndarray) -> FacetedSurface:
+    """A surface with its nodes elsewhere, without what lay over it."""
+    plain = replace(faceted_surface(points, surface.facets, surface.mirrored), whole=surface.whole)
+    return plain.with_areas_of_pieces()
 
 
 def plates(kinds: tuple[str, str]) -> tuple[FacetedSurface, FacetedSurface]:
@@ -99,20 +105,23 @@ def setting(name: str, kinds: tuple[str, str]) -> Setting:
         rng.standard_normal((len(master.nodes), 3)),
         rng.standard_normal(coupling.normal.shape),
         rng.standard_normal(count),
+        rng.standard_normal((len(slave.nodes), 3)),
     )
     return Setting(slave, master, coupling, by)
 
 
 def moved(surface: FacetedSurface, by: np.ndarray) -> FacetedSurface:
     """The surface with other nodes; what lies over the facets goes with them."""
-    plain = faceted_surface(surface.points + by, surface.facets, surface.mirrored)
-    return replace(plain, relief=surface.relief)
+    return replace(placed(surface, surface.points + by), relief=surface.relief)
 
 
 def scalar(slave: FacetedSurface, master: FacetedSurface, here: Setting, by: CouplingDerivatives) -> float:
     found = mortar_coupling(slave, master)
     assert np.array_equal(found.node, here.coupling.node)
-    weights = np.einsum("nr,nr->", by.left, found.weight @ by.right)
+    means = found.weight @ by.right
+    if slave.whole is not None:
+        means = means - found.of_slave(by.own)
+    weights = np.einsum("nr,nr->", by.left, means)
     return float(by.area @ found.area + weights + np.sum(by.normal * found.normal) + by.gap @ found.gap)
 
 
@@ -155,6 +164,16 @@ def test_each_term_agrees_with_central_differences(
     # Where edges lie over one another the second derivative jumps, and the quotient is of the first order.
     assert abs(found - quotient) < TOLERANCE[name] * size + 3e-8
     assert size > 1e-3 or (which == "master" and term in ("normal", "area"))
+
+
+@pytest.mark.parametrize("which", ["slave", "master"])
+@pytest.mark.parametrize("term", TERMS)
+@pytest.mark.parametrize("kinds", CURVED, ids="-".join)
+@pytest.mark.parametrize("name", ["plates", "shells"])
+def test_each_term_agrees_with_central_differences_on_quadratic_facets(
+    name: str, kinds: tuple[str, str], term: str, which: str
+) -> None:
+    test_each_term_agrees_with_central_differences(name, kinds, term, which)
 
 
 @pytest.mark.parametrize(

@@ -376,11 +376,14 @@ def test_coordinates_that_are_none_are_refused() -> None:
 
 # Mortar contact where bodies lie now: derivatives of gaps and forces, slip, and turned scenes.
 STEP = 1e-6
+QUADRATIC = ["quadratic tetrahedron", "quadratic quadrilateral"]
 
 
 @cache
 def by_mortar(kind: str) -> tuple[SlidingContact, np.ndarray]:
-    scene = on_arch(kind)
+    cell, order = (kind.removeprefix("quadratic "), 2) if kind in QUADRATIC else (kind, 1)
+    few = {} if order == 1 else {"order": 2, "master_cells": 3, "slave_cells": 2}
+    scene = on_arch(cell, **few)
     scene = replace(scene, contacts=[replace(scene.contacts[0], discretisation="mortar")])
     return sliding(scene), shaken(scene)
 
@@ -405,7 +408,7 @@ def forces(now: SlidingPoints) -> tuple[np.ndarray, np.ndarray]:
 error = partial(derivative_error, STEP)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [*KINDS, *QUADRATIC])
 def test_rows_and_what_they_lack_are_the_derivative_of_the_gap(kind: str) -> None:
     now, plus, minus, way = beside(kind)
     rows = spread(now.points.normal, now.points.jump)
@@ -414,7 +417,7 @@ def test_rows_and_what_they_lack_are_the_derivative_of_the_gap(kind: str) -> Non
     assert error(rows @ way, plus.points.gap, minus.points.gap) > 1e-3
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [*KINDS, *QUADRATIC])
 def test_stiffness_is_the_derivative_of_the_forces(kind: str) -> None:
     now, plus, minus, way = beside(kind)
     normal, friction = forces(now)
@@ -427,7 +430,7 @@ def test_stiffness_is_the_derivative_of_the_forces(kind: str) -> None:
     assert error(found.left @ (found.right.T @ way), force(plus), force(minus)) < 1e-7
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [*KINDS, *QUADRATIC])
 def test_rows_of_slip_are_its_derivative(kind: str) -> None:
     contact, x = by_mortar(kind)
     before = x.copy()
@@ -442,7 +445,7 @@ def test_rows_of_slip_are_its_derivative(kind: str) -> None:
     assert np.column_stack(rows).ravel() + lacking == pytest.approx(found.ravel(), abs=1e-12)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [*KINDS, *QUADRATIC])
 def test_turned_scenes_have_the_turned_answer(kind: str) -> None:
     contact, x = by_mortar(kind)
     later = x.copy()

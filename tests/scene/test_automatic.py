@@ -218,11 +218,9 @@ def test_the_choice_is_the_same_turned_and_in_other_units() -> None:
             assert chosen(scene_of(moved)) == chosen(scene_of(blocks(3, cells)))
 
 
-def test_what_was_given_stays_and_rigid_masters_and_quadratic_cells_have_nodes() -> None:
+def test_what_was_given_stays_and_rigid_masters_have_nodes() -> None:
     for given in ("node", "mortar"):
         assert chosen(scene_of(blocks(3, 4), discretisation=given)) == (given, "")
-    curved = [quadratic(mesh) for mesh in blocks(2, 3)]
-    assert chosen(scene_of(curved))[1] == "node, as there is no mortar for quadratic cells"
     pair = ContactPair(Surface("a", "z0"), RigidPlane((0, 0, 0), (0, 0, 1)), discretisation="best")
     scene = replace(scene_of(blocks(3, 4)), contacts=[pair])
     assert chosen(scene)[1] == "node, as the master is rigid"

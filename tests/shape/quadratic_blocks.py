@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 
 from fenics_contact import Body, BodyForce, ContactPair, Coulomb, Scene, Support, Surface, Traction, Tresca
+from fenics_contact._scene.pairs import Discretisation
 from fenics_contact.gallery import block
 from fenics_contact.mesh import quadratic
 from tests.contact.gallery import FLOOR, Friction, crowned
@@ -27,7 +29,7 @@ def on_floor(friction: Friction, cell: str) -> Scene:
     )
 
 
-def on_one_another(friction: Friction, cell: str) -> Scene:
+def on_one_another(friction: Friction, cell: str, discretisation: Discretisation = "node") -> Scene:
     """A crowned block that only the rounded one under it holds; no node lies over an edge of a facet."""
     lower = quadratic(block((0.0, 0.0, -1.0), (2.0, 1.2, 0.0), (3, 2, 1), cell))
     x, y, z = lower.points.T
@@ -37,8 +39,13 @@ def on_one_another(friction: Friction, cell: str) -> Scene:
         {"lower": Body(lower, PLASTIC), "block": Body(crowned(upper, 0.04), RUBBER)},
         [Support("lower", "z0")],
         [Traction("block", "z1", (0.6, 0.12, -2.0)), BodyForce("block", (0.1, 0.0, -1.0))],
-        [ContactPair(Surface("block", "z0"), Surface("lower", "z1"), friction)],
+        [ContactPair(Surface("block", "z0"), Surface("lower", "z1"), friction, discretisation)],
     )
+
+
+def by_mortar(scene: Scene) -> Scene:
+    """The scene with means of its gaps."""
+    return replace(scene, contacts=[replace(pair, discretisation="mortar") for pair in scene.contacts])
 
 
 SCENES: dict[str, Callable[[], Scene]] = {
@@ -49,6 +56,9 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "floor, Tresca": lambda: on_floor(Tresca(0.6), "hexahedron"),
     "blocks": lambda: on_one_another(Coulomb(0.38), "hexahedron"),
     "blocks, tetrahedra": lambda: on_one_another(Coulomb(0.38), "tetrahedron"),
+    "plane blocks by mortar": lambda: by_mortar(on_block(Coulomb(0.38), "triangle", 2)),
+    "blocks by mortar": lambda: on_one_another(Coulomb(0.38), "hexahedron", "mortar"),
+    "blocks by mortar, tetrahedra": lambda: on_one_another(Tresca(0.8), "tetrahedron", "mortar"),
 }
 OBJECTIVES = objectives("block")
 

@@ -1,4 +1,4 @@
-"""Derivatives of bodies of quadratic cells, of all types, with contact by nodes."""
+"""Derivatives of bodies of quadratic cells, of all types, with contact by nodes and by mortar."""
 
 from __future__ import annotations
 

@@ -341,6 +341,7 @@ class Overlaps:
         pair: Pair of each piece, ascending, shape (n,).
         pieces: Simplices, shape (n, dim, dim − 1).
         corner: Which vertices of the intersection the corners of each piece are, shape (n, dim).
+        degree: Degree of the quadrature rule on each piece.
     """
 
     facets: np.ndarray
@@ -351,6 +352,7 @@ class Overlaps:
     pair: np.ndarray
     pieces: np.ndarray
     corner: np.ndarray
+    degree: int = 5
 
     @property
     def slave(self) -> np.ndarray:
@@ -366,10 +368,10 @@ class Overlaps:
         alike = {
             each.name: np.concatenate([getattr(self, each.name)] * times)
             for each in fields(self)
-            if each.name not in {"facet", "pair"}
+            if each.name not in {"facet", "pair", "degree"}
         }
         facet, pair = shifted(self.facet, len(self.facets)), shifted(self.pair, len(self.master))
-        return Overlaps(facet=facet, pair=pair, **alike)
+        return Overlaps(facet=facet, pair=pair, degree=self.degree, **alike)
 
 
 def overlaps_of(
@@ -377,11 +379,12 @@ def overlaps_of(
     pair_slave: np.ndarray,
     pair_master: np.ndarray,
     master: FacetedSurface,
+    degree: int = 5,
 ) -> Overlaps:
     """Clip pairs of facets.
 
     `pair_slave`: slave facet of each pair, ascending, shape (n,); `pair_master`: master facet of each pair,
-    shape (n,).
+    shape (n,); `degree`: of the quadrature rule on their intersections.
     """
     subject, heights = laid_flat(master.points[master.facets[pair_master]], planes, pair_slave)
     window = planes.flat[pair_slave]
@@ -399,7 +402,7 @@ def overlaps_of(
     facets, facet = np.unique(pair_slave[used], return_inverse=True)
     return Overlaps(
         facets, facet.ravel(), pair_master[used], subject[used], window[used],
-        pair.ravel(), pieces[real], corner[real],
+        pair.ravel(), pieces[real], corner[real], degree,
     )  # fmt: skip
 
 
@@ -412,7 +415,7 @@ def cells_of(overlaps: Overlaps) -> Cells:
     """Place quadrature points on the pieces of overlaps."""
     pair, pieces = overlaps.pair, overlaps.pieces
     window, subject = overlaps.window, overlaps.subject
-    barycentric, share = rule(pieces.shape[1])
+    barycentric, share = rule(pieces.shape[1], overlaps.degree)
     points = barycentric @ pieces
     on_slave, on_master = (local_coordinates(points, flat[pair]) for flat in (window, subject))
     return Cells(
@@ -430,6 +433,10 @@ class CellDerivatives:
     opposite: np.ndarray
     slave: np.ndarray
     master: np.ndarray
+
+    def with_traces(self, more: tuple[np.ndarray, np.ndarray]) -> CellDerivatives:
+        """Return the same with more added to those by the slave's and the master's shape functions."""
+        return replace(self, slave=self.slave + more[0], master=self.master + more[1])
 
     def grown(self, chosen: np.ndarray, more: CellDerivatives) -> CellDerivatives:
         """Return the same with more added to those of some cells."""
@@ -452,7 +459,7 @@ def cells_pulled_back(overlaps: Overlaps, cells: Cells, by: CellDerivatives) -> 
     by_window = over_pairs(by_corners)
     more, by_corners = local_coordinates_pulled_back(cells.opposite, subject[pair], by_opposite)
     by_subject = over_pairs(by_corners)
-    barycentric, share = rule(pieces.shape[1])
+    barycentric, share = rule(pieces.shape[1], overlaps.degree)
     by_pieces = barycentric.T @ (by_points + more) + measure_pulled_back(pieces, by.weight @ share)
     width = int(overlaps.corner.max(initial=1)) + 1
     over_vertices = SumsBy((pair[:, None] * width + overlaps.corner).ravel(), len(subject) * width)

@@ -32,6 +32,7 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import scaled_rows
 from fenics_contact._pairing.mortar.cells import Cells, candidate_pairs, cells_of, overlaps_of
 from fenics_contact._pairing.mortar.planes import SumsBy, check_convex, planes_of
+from fenics_contact._pairing.mortar.traces import Traces, trace_functions, trace_nodes
 from fenics_contact._surfaces.facets import FacetedSurface, heights
 from fenics_contact._surfaces.projection import interpolated_normal
 from fenics_contact.errors import InvalidInputError, together
@@ -47,20 +48,6 @@ CORNERS = {
     3: np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]),
     4: np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),
 }
-
-
-def dual_integrals(cells: Cells, field: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Integrate the dual functions with the slave's and the master's shape functions and with a field.
-
-    `field`: values v at the quadrature points, shape (n, q).
-
-    Returns D_e = ∫ N_i over the covered part of each facet, shape (n_facets, corners), ∫ ψ_i N_j of each
-    pair, shape (n_pairs, corners, master corners), both [length²] or [length], and ∫ ψ_i v of each pair,
-    shape (n_pairs, corners).
-    """
-    basis = DualBasis.on(cells)
-    integrals = basis.integrals(np.concatenate([cells.master, field[:, :, None]], axis=2))
-    return basis.coverage, integrals[:, :, :-1], integrals[:, :, -1]
 
 
 @dataclass(frozen=True)
@@ -219,12 +206,31 @@ def _heights_along(
     """Return heights along a direction whose angle to the normal is less than a facet's turn."""
     if surface.relief is None:
         return np.zeros(local.shape[:2])
+    if surface.whole is not None:
+        bulge = bulges_along(surface, facet, values, direction)
     points = local.shape[1]
     facet, direction = np.repeat(facet, points), np.repeat(direction, points, axis=0)
     values = values.reshape(len(facet), values.shape[-1])
     normal, _ = interpolated_normal(values, surface.normals[surface.facets[facet]])
     height = heights(surface, facet, local.reshape(len(facet), local.shape[-1])).value
-    return np.asarray(height / np.einsum("nd,nd->n", normal, direction)).reshape(local.shape[:2])
+    raised = np.asarray(height / np.einsum("nd,nd->n", normal, direction)).reshape(local.shape[:2])
+    return raised if surface.whole is None else raised - bulge
+
+
+def bulges_along(
+    surface: FacetedSurface, facet: np.ndarray, values: np.ndarray, direction: np.ndarray
+) -> np.ndarray:
+    """Return heights of quadratic facets over their linear pieces along directions, shape (n, q), [length].
+
+    `facet`: piece of each group of points, shape (n,); `values`: its shape functions, shape (n, q, corners);
+    `direction`: shape (n, dim).
+    """
+    curved = trace_functions(surface, facet, values)
+    along, straight = (
+        np.einsum("nkd,nd->nk", surface.points[nodes], direction)
+        for nodes in (trace_nodes(surface, facet), surface.facets[facet])
+    )
+    return np.asarray(np.einsum("nqk,nk->nq", curved, along) - np.einsum("nqk,nk->nq", values, straight))
 
 
 #: Pairs of facets per chunk: its arrays stay below about 50 MB, and mostly in the cache.
@@ -248,6 +254,10 @@ class MortarCoupling:
         relief: Weighted mean height of the true surfaces over their facets, slave less master, along the
             slave facets' normals, shape (n, dim), [length].
         gap: n_i · (x_i − Σ_j weight_ij x_j + relief_i), positive when open, shape (n,), [length].
+        own: Weights of the slave's nodes in its mean that takes the place of x_i, shape (n,
+            len(slave.nodes)); rows add up to one. None where the mean is the node. On quadratic facets these
+            are ∫ ψ_i N_j / D_i with the quadratic functions, close to the identity: the spectrum of its
+            symmetric part, in terms of D, lies between 0.69 and 1.37 on all of them.
     """
 
     node: np.ndarray
@@ -256,10 +266,24 @@ class MortarCoupling:
     normal: np.ndarray
     relief: np.ndarray
     gap: np.ndarray
+    own: sparse.csr_matrix | None = None
 
     def part(self, chosen: np.ndarray) -> MortarCoupling:
         """Return some of the nodes, by indices or a mask."""
-        return MortarCoupling(**{each.name: getattr(self, each.name)[chosen] for each in fields(self)})
+        names = [each.name for each in fields(self) if getattr(self, each.name) is not None]
+        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
+
+    def of_slave(self, values: np.ndarray) -> np.ndarray:
+        """Return the slave's means of values at its nodes, shape (len(slave.nodes), ...), shape (n, ...)."""
+        return np.asarray(values[self.node] if self.own is None else self.own @ values)
+
+    def of_slave_pulled_back(self, by: np.ndarray, n_nodes: int) -> np.ndarray:
+        """Vector-Jacobian product of `of_slave` with respect to the values, shape (n_nodes, ...)."""
+        if self.own is not None:
+            return np.asarray(self.own.T @ by)
+        result = np.zeros((n_nodes, *by.shape[1:]))
+        result[self.node] = by
+        return result
 
 
 def mortar_coupling(
@@ -286,7 +310,7 @@ def mortar_coupling(
     """
     comm = comm or MPI.COMM_SELF
     mine = np.arange(comm.rank, len(slave.facets), comm.size)
-    part: tuple[np.ndarray, sparse.csr_matrix, np.ndarray] | None = None
+    part: tuple[np.ndarray, sparse.csr_matrix, np.ndarray, sparse.csr_matrix] | None = None
     with together(comm):
         if slave.dim != master.dim:
             raise InvalidInputError(
@@ -305,6 +329,7 @@ def _coupling(
     area: np.ndarray,
     integrals: sparse.csr_matrix,
     relief: np.ndarray,
+    means: sparse.csr_matrix,
     least_share: float = 1e-8,
 ) -> MortarCoupling:
     """Keep the nodes that face the master, and divide by their areas.
@@ -312,51 +337,82 @@ def _coupling(
     `least_share`: fraction of a node's area that must face the master for the node to carry a multiplier.
     """
     node = np.flatnonzero(area > least_share * slave.areas)
-    chosen = integrals[node]
-    # The row sums are the areas, and dividing by them cancels their rounding errors.
-    weight = scaled_rows(chosen, 1 / np.asarray(chosen.sum(axis=1)).ravel())
-    weight.sort_indices()
+    weight, own = _scaled(integrals[node]), None if slave.whole is None else _scaled(means[node])
     normal = -slave.normals[node]
     raised = relief[node] / area[node, None]
-    gap = np.einsum("nd,nd->n", normal, slave.points[node] - weight @ master.points + raised)
-    return MortarCoupling(node, area[node], weight, normal, raised, gap)
+    coupling = MortarCoupling(node, area[node], weight, normal, raised, np.zeros(len(node)), own)
+    apart = coupling.of_slave(slave.points) - weight @ master.points + raised
+    return replace(coupling, gap=np.einsum("nd,nd->n", normal, apart))
+
+
+def _scaled(integrals: sparse.csr_matrix) -> sparse.csr_matrix:
+    """Divide by the row sums: they are the areas, and this cancels their rounding errors."""
+    weight = scaled_rows(integrals, 1 / np.asarray(integrals.sum(axis=1)).ravel())
+    weight.sort_indices()
+    return weight
+
+
+def degree_on(slave: FacetedSurface, master: FacetedSurface) -> int:
+    """Return the degree of quadrature: 8 with a quadratic quadrilateral, else 5.
+
+    On parallelograms 6 is enough, for bilinear dual functions and biquadratic shape functions. On other
+    quadrilaterals they are no polynomials in the plane: a uniform pressure misses the nodal forces by up to
+    9e-8 with degree 5, 2e-10 with 6 and 5e-13 with 8.
+    """
+    sides = [side.whole.shape[1] for side in (slave, master) if side.whole is not None]
+    return 8 if max(sides, default=0) > 6 else 5
 
 
 def _integrals(
     slave: FacetedSurface, master: FacetedSurface, chosen: np.ndarray
-) -> tuple[np.ndarray, sparse.csr_matrix, np.ndarray]:
+) -> tuple[np.ndarray, sparse.csr_matrix, np.ndarray, sparse.csr_matrix]:
     """Integrate over the chosen facets.
 
-    Returns D, shape (slave nodes,), M, shape (slave nodes, master nodes), and ∫ ψ_i times the height of the
-    true surfaces over their facets, slave less master, shape (slave nodes, dim).
+    Returns D, shape (slave nodes,), M, shape (slave nodes, master nodes), ∫ ψ_i times the height of the
+    true surfaces over their facets, slave less master, shape (slave nodes, dim), and of quadratic slaves
+    ∫ ψ_i N_j with their own functions, shape (slave nodes, slave nodes), else zero.
     """
-    area, shape = np.zeros(len(slave.nodes)), (len(slave.nodes), len(master.nodes))
-    total, relief = sparse.csr_matrix(shape), np.zeros_like(slave.points)
+    count, area, relief = len(slave.nodes), np.zeros(len(slave.nodes)), np.zeros_like(slave.points)
+    total, means = Entries((count, len(master.nodes))), Entries((count, count))
     if len(chosen) == 0 or len(master.facets) == 0:
-        return area, total, relief
+        return area, total.matrix(), relief, means.matrix()
     planes = planes_of(slave, chosen)
     check_convex(planes, chosen)
     pairs = candidate_pairs(planes, planes_of(master, np.arange(len(master.facets))))
-    rows, columns, values = [], [], []
-    # Entries of M are collected and summed once: adding sparse matrices chunk by chunk would copy them all.
+    degree = degree_on(slave, master)
     for pair_slave, pair_master in chunks(*pairs):
-        overlaps = overlaps_of(planes, pair_slave, pair_master, master)
-        cells, at_slave, at_master = cells_of(overlaps), overlaps.slave, overlaps.master
+        overlaps = overlaps_of(planes, pair_slave, pair_master, master, degree)
+        cells, at_slave, both = cells_of(overlaps), overlaps.slave, (chosen[overlaps.slave], overlaps.master)
         if slave.axisymmetric:
-            cells = revolved(cells, slave, chosen[at_slave])
-        closer = relief_of_cells(cells, slave, master, (chosen[at_slave], at_master), planes.normal[at_slave])
-        coverage, integrals, of_relief = dual_integrals(cells, closer)
-        np.add.at(area, slave.facets[chosen[overlaps.facets]], coverage)
-        along = planes.normal[at_slave][:, None]
-        np.add.at(relief, slave.facets[chosen[at_slave]], of_relief[:, :, None] * along)
-        row, column = slave.facets[chosen[at_slave]][:, :, None], master.facets[at_master][:, None]
-        rows.append(np.broadcast_to(row, integrals.shape).ravel())
-        columns.append(np.broadcast_to(column, integrals.shape).ravel())
-        values.append(integrals.ravel())
-    if values:
-        entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-        total = sparse.csr_matrix(entries, shape=shape)
-    return area, total, relief
+            cells = revolved(cells, slave, both[0])
+        closer = relief_of_cells(cells, slave, master, both, planes.normal[at_slave])
+        traces, basis = Traces.of(cells, (slave, master), both), DualBasis.on(cells)
+        integrals = basis.integrals(np.concatenate([traces.functions, closer[:, :, None]], axis=2))
+        np.add.at(area, slave.facets[chosen[overlaps.facets]], basis.coverage)
+        row, width = slave.facets[both[0]], traces.master.shape[1]
+        np.add.at(relief, row, integrals[:, :, -1:] * planes.normal[at_slave][:, None])
+        total.add(row, traces.master, integrals[:, :, :width])
+        means.add(row, traces.slave, integrals[:, :, width:-1])
+    return area, total.matrix(), relief, means.matrix()
+
+
+class Entries:
+    """Entries of a sparse matrix, summed once: adding matrices chunk by chunk would copy them all."""
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self.shape, self._parts = shape, list[tuple[np.ndarray, np.ndarray, np.ndarray]]()
+
+    def add(self, row: np.ndarray, column: np.ndarray, values: np.ndarray) -> None:
+        """Add blocks, shape (n, k, m), in rows (n, k) and columns (n, m)."""
+        rows, columns = np.broadcast_arrays(row[:, :, None], column[:, None])
+        self._parts.append((values.ravel(), rows.ravel(), columns.ravel()))
+
+    def matrix(self) -> sparse.csr_matrix:
+        """Return the sum."""
+        if not self._parts:
+            return sparse.csr_matrix(self.shape)
+        values, row, column = (np.concatenate(part) for part in zip(*self._parts, strict=True))
+        return sparse.csr_matrix((values, (row, column)), shape=self.shape)
 
 
 def revolved(cells: Cells, slave: FacetedSurface, facet: np.ndarray) -> Cells:

@@ -24,11 +24,18 @@ from fenics_contact._pairing.mortar.coupling import (
     DualBasis,
     MortarCoupling,
     chunks,
+    degree_on,
     inverted_pulled_back,
     relief_of_cells,
     revolved,
 )
 from fenics_contact._pairing.mortar.planes import Planes, SumsBy, planes_of, planes_pulled_back
+from fenics_contact._pairing.mortar.traces import (
+    Traces,
+    trace_functions,
+    trace_functions_pulled_back,
+    trace_nodes,
+)
 from fenics_contact._surfaces.facets import FacetedSurface, heights
 from fenics_contact._surfaces.projection import interpolated_normal
 from fenics_contact.errors import together
@@ -36,18 +43,16 @@ from fenics_contact.mesh.faces import computed_rounding
 
 
 def integrals_pulled_back(
-    basis: DualBasis, field: np.ndarray, by_coverage: np.ndarray, by_integrals: np.ndarray
+    basis: DualBasis, functions: np.ndarray, by_coverage: np.ndarray, by_integrals: np.ndarray
 ) -> tuple[CellDerivatives, np.ndarray]:
-    """Vector-Jacobian product of `dual_integrals` with respect to the cells and the field.
+    """Vector-Jacobian product of `DualBasis.integrals` with respect to the cells and the functions.
 
-    `field`: values at the quadrature points, shape (n, q); `by_coverage`: derivative by D_e, shape (n_facets,
-    corners); `by_integrals`: by the integrals with the master's shape functions and, last, with the field,
-    shape (n_pairs, corners, master corners + 1).
+    `functions`: values at the quadrature points, shape (n, q, f); `by_coverage`: derivative by D_e, shape
+    (n_facets, corners); `by_integrals`: by the integrals, shape (n_pairs, corners, f).
 
-    Derivatives by the cells, and by the field, shape (n, q).
+    Derivatives by the cells, and by the functions, in their shape.
     """
     cells, facet = basis.cells, basis.facet
-    functions = np.concatenate([cells.master, field[:, :, None]], axis=2)
     moments = basis.moments(functions)
     over_facet, area = SumsBy(facet, len(basis.area)), basis.area
     by_coverage = by_coverage + over_facet((by_integrals * basis.values(moments)).sum(axis=2))
@@ -70,15 +75,13 @@ def integrals_pulled_back(
     by_weight += np.einsum("nqk,nk->nq", cells.slave, by_coverage[cells.facet])
     by_weight += (by_area + more)[cells.facet][:, None]
     by_local, by_centring = _modes_pulled_back(basis, by_modes, by_corners)
-    weighted = (
-        np.concatenate([np.ones_like(field)[:, :, None], basis.modes], axis=2) * cells.weight[:, :, None]
-    )
-    by_functions = weighted @ at_points
+    weighted = np.concatenate([np.ones_like(basis.modes[:, :, :1]), basis.modes], axis=2)
+    by_functions = (weighted * cells.weight[:, :, None]) @ at_points
     by = CellDerivatives(
         by_weight + by_centring, by_local, np.zeros_like(cells.opposite),
-        cells.weight[:, :, None] * by_coverage[cells.facet][:, None], by_functions[:, :, :-1],
+        cells.weight[:, :, None] * by_coverage[cells.facet][:, None], np.zeros_like(cells.master),
     )  # fmt: skip
-    return by, by_functions[:, :, -1]
+    return by, by_functions
 
 
 def _by_second_moments(basis: DualBasis, by_inverse: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -189,6 +192,7 @@ def _heights_pulled_back(
     height = heights(surface, facet, local.reshape(len(facet), -1))
     cosine = np.einsum("nd,nd->n", normal, direction)
     by_value = by_height / cosine
+    straight, more = _bulges_pulled_back(surface, facet, weights, direction, -by_height, into)
     by_cosine = (-by_value * height.value / cosine)[:, None]
     by_normal = by_cosine * direction
     by_mean = (by_normal - np.einsum("nd,nd->n", by_normal, normal)[:, None] * normal) / length[:, None]
@@ -196,8 +200,33 @@ def _heights_pulled_back(
     np.add.at(into.slopes, facet, by_value[:, None, None] * height.by_slopes)
     by_weights = np.einsum("nkd,nd->nk", normals, by_mean)
     by_local = by_value[:, None] * height.by_local
-    by_direction = (by_cosine * normal).reshape(cells, points, -1).sum(axis=1)
+    by_weights = by_weights + straight
+    by_direction = (by_cosine * normal + more).reshape(cells, points, -1).sum(axis=1)
     return by_local.reshape(local.shape), by_weights.reshape(values.shape), by_direction
+
+
+def _bulges_pulled_back(
+    surface: FacetedSurface,
+    facet: np.ndarray,
+    values: np.ndarray,
+    direction: np.ndarray,
+    by_bulge: np.ndarray,
+    into: SurfaceDerivatives,
+) -> tuple[np.ndarray, np.ndarray] | tuple[float, float]:
+    """Return the derivatives of `bulges_along` at points by linear shape functions and directions."""
+    if surface.whole is None:
+        return 0.0, 0.0
+    curved = trace_functions(surface, facet, values[:, None])[:, 0]
+    nodes, corners = trace_nodes(surface, facet), surface.facets[facet]
+    for number, shares in ((nodes, curved), (corners, -values)):
+        np.add.at(into.points, number, (by_bulge[:, None] * shares)[..., None] * direction[:, None])
+    along = np.einsum("nkd,nd->nk", surface.points[nodes], direction)
+    by_curved = (by_bulge[:, None] * along)[:, None]
+    by_values = trace_functions_pulled_back(surface, facet, values[:, None], by_curved)[:, 0]
+    by_values = by_values - by_bulge[:, None] * np.einsum("nkd,nd->nk", surface.points[corners], direction)
+    raised = np.einsum("nk,nkd->nd", curved, surface.points[nodes])
+    raised -= np.einsum("nk,nkd->nd", values, surface.points[corners])
+    return by_values, by_bulge[:, None] * raised
 
 
 def mortar_pulled_back(
@@ -232,9 +261,9 @@ def mortar_pulled_back(
             _add_integrals(slave, moved_aside(master), part, sums, into)
     by_slave, by_master = (side.summed(comm) for side in into)
     along = by.gap[:, None] * coupling.normal
-    apart = slave.points[coupling.node] - coupling.weight @ master.points + coupling.relief
+    apart = coupling.of_slave(slave.points) - coupling.weight @ master.points + coupling.relief
     by_slave.normals[coupling.node] -= by.normal + by.gap[:, None] * apart
-    by_slave.points[coupling.node] += along
+    by_slave.points[:] += coupling.of_slave_pulled_back(along, len(slave.nodes))
     by_master.points[:] -= coupling.weight.T @ along
     return by_slave, by_master
 
@@ -257,17 +286,30 @@ class _BySums:
         left: Factors of the derivatives by M, shape (n, r).
         right: Factors at each master node, shape (n_master, r).
         relief: By ∫ ψ_i times the heights, shape (n, dim).
+        mean: Factors of the derivatives by the integrals with the slave's functions, shape (n, r).
+        own: Factors at each slave node, shape (n, r); None where its means are its nodes.
     """
 
     area: np.ndarray
     left: np.ndarray
     right: np.ndarray
     relief: np.ndarray
+    mean: np.ndarray
+    own: np.ndarray | None
 
     @property
     def felt(self) -> np.ndarray:
         """Nodes with a derivative, shape (n,)."""
-        return (self.area != 0.0) | self.left.any(axis=1) | self.relief.any(axis=1)
+        moved = self.left.any(axis=1) | self.mean.any(axis=1) | self.relief.any(axis=1)
+        return np.asarray((self.area != 0.0) | moved)
+
+    def by_integrals(self, nodes: np.ndarray, traces: Traces) -> np.ndarray:
+        """Return the derivatives by the integrals with the functions of traces, (n_pairs, corners, f)."""
+        by_weights = self.left[nodes] @ self.right[traces.master].transpose(0, 2, 1)
+        if self.own is None:
+            return by_weights
+        by_means = self.mean[nodes] @ self.own[traces.slave].transpose(0, 2, 1)
+        return np.concatenate([by_weights, by_means], axis=2)
 
 
 def _sums_pulled_back(
@@ -278,9 +320,13 @@ def _sums_pulled_back(
     along = by.gap[:, None] * coupling.normal
     left = np.concatenate([by.left, -along], axis=1)
     right = np.concatenate([by.right, master.points - middle], axis=1)
-    mean = np.einsum("nr,nr->n", left, coupling.weight @ right)
-    left = np.concatenate([left, -mean[:, None]], axis=1) / coupling.area[:, None]
-    right = np.concatenate([right, np.ones((len(right), 1))], axis=1)
+    own = None
+    if coupling.own is not None and slave.whole is not None:
+        given = np.zeros((len(slave.nodes), by.right.shape[1])) if by.own is None else by.own
+        own = np.concatenate([given, slave.points - middle], axis=1)
+    of_slave, own = _of_shares(-left, own, coupling.own, coupling.area)
+    left, every = _of_shares(left, right, coupling.weight, coupling.area)
+    assert every is not None
     by_relief = along if by.relief is None else along + by.relief
     by_area = by.area - np.einsum("nd,nd->n", by_relief, coupling.relief) / coupling.area
 
@@ -289,7 +335,19 @@ def _sums_pulled_back(
         everywhere[coupling.node] = values
         return everywhere
 
-    return _BySums(spread(by_area), spread(left), right, spread(by_relief / coupling.area[:, None]))
+    raised = spread(by_relief / coupling.area[:, None])
+    return _BySums(spread(by_area), spread(left), every, raised, spread(of_slave), own)
+
+
+def _of_shares(
+    left: np.ndarray, right: np.ndarray | None, weight: sp.csr_matrix | None, area: np.ndarray
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Differentiate integrals over their row sums: return the factors for the integrals."""
+    if right is None or weight is None:
+        return np.zeros((len(area), 0)), None
+    mean = np.einsum("nr,nr->n", left, weight @ right)
+    left = np.concatenate([left, -mean[:, None]], axis=1) / area[:, None]
+    return left, np.concatenate([right, np.ones((len(right), 1))], axis=1)
 
 
 def _add_integrals(
@@ -303,7 +361,7 @@ def _add_integrals(
     planes = planes_of(slave, chosen)
     pairs = candidate_pairs(planes, planes_of(master, np.arange(len(master.facets))))
     for pair_slave, pair_master in chunks(*pairs):
-        overlaps = overlaps_of(planes, pair_slave, pair_master, master)
+        overlaps = overlaps_of(planes, pair_slave, pair_master, master, degree_on(slave, master))
         if len(overlaps.pair) == 0:
             continue
         own, cells = planes.part(overlaps.facets), cells_of(overlaps)
@@ -341,12 +399,14 @@ def _cells_of_sums(
     plain = cells
     if slave.axisymmetric:
         cells = revolved(plain, slave, pairs[0])
-    basis, some = DualBasis.on(cells), cells.part(felt)
+    basis, some, traces = DualBasis.on(cells), cells.part(felt), Traces.of(cells, surfaces, pairs)
     if felt.any():
         field[felt] = relief_of_cells(some, slave, master, pairs, along)
-    by_weights = sums.left[of_pair] @ sums.right[master.facets[overlaps.master]].transpose(0, 2, 1)
-    by_integrals = np.concatenate([by_weights, by_raised[:, :, None]], axis=2)
-    by, by_field = integrals_pulled_back(basis, field, sums.area[nodes], by_integrals)
+    by_integrals = np.concatenate([sums.by_integrals(of_pair, traces), by_raised[:, :, None]], axis=2)
+    functions = np.concatenate([traces.functions, field[:, :, None]], axis=2)
+    by, by_functions = integrals_pulled_back(basis, functions, sums.area[nodes], by_integrals)
+    by = by.with_traces(traces.pulled_back(cells, surfaces, pairs, by_functions[:, :, :-1]))
+    by_field = by_functions[:, :, -1]
     if not felt.any():
         return _from_revolved(plain, slave, pairs[0], by, into[0].points), np.zeros(normal.shape)
     over_facets = SumsBy(overlaps.facet, len(facets))
@@ -392,7 +452,7 @@ class WeightDerivatives:
 
     Attributes:
         point: Point of the coupling of each weight, ascending, shape (m,).
-        node: Its node of the master, shape (m,).
+        node: Its node of the master, or, after these, of the slave in its mean, shape (m,).
         rows: Derivatives by the nodes of the slave and, after them, of the master, shape (m, dim · (n_slave +
             n_master)), [1 / length].
     """
@@ -426,12 +486,12 @@ def weight_derivatives(
         part = _integrals(slave, moved_aside(master), mine)
     parts = [each for each in comm.allgather(part) if each is not None]
     key, integral, rows = _joined(parts)
-    node, opposite = np.divmod(key, len(master.nodes))
+    node, other = np.divmod(key, len(master.nodes) + len(slave.nodes))
     kept = np.flatnonzero(marked[node])
-    point, opposite = np.searchsorted(coupling.node, node[kept]), opposite[kept]
-    return WeightDerivatives(
-        point, opposite, _normalised(point, integral[kept], rows[kept], len(coupling.node))
-    )
+    point, other, count = np.searchsorted(coupling.node, node[kept]), other[kept], len(coupling.node)
+    # Weights of the master and of the slave have sums of their own.
+    sums = point + count * (other >= len(master.nodes))
+    return WeightDerivatives(point, other, _normalised(sums, integral[kept], rows[kept], 2 * count))
 
 
 def _normalised(point: np.ndarray, integral: np.ndarray, rows: sp.csr_matrix, count: int) -> sp.csr_matrix:
@@ -463,14 +523,18 @@ def _summed(
 def _integrals(
     slave: FacetedSurface, master: FacetedSurface, chosen: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
-    """Return numbers (slave node · n_master + master node), integrals M and their derivatives, of facets."""
+    """Return numbers, integrals and their derivatives, of facets.
+
+    The number of an integral is that of its multiplier times that of all nodes, plus that of the function:
+    the nodes of the master, then those of the slave.
+    """
     width = slave.dim * (len(slave.nodes) + len(master.nodes))
     parts = []
     if len(chosen) and len(master.facets):
         planes = planes_of(slave, chosen)
         pairs = candidate_pairs(planes, planes_of(master, np.arange(len(master.facets))))
         for pair_slave, pair_master in chunks(*pairs):
-            overlaps = overlaps_of(planes, pair_slave, pair_master, master)
+            overlaps = overlaps_of(planes, pair_slave, pair_master, master, degree_on(slave, master))
             if len(overlaps.pair) == 0:
                 continue
             parts.append(_of_facets(overlaps, planes, slave, chosen, master))
@@ -485,10 +549,13 @@ def _of_facets(
     """Return the same of some overlaps that have all pairs of their slave facets.
 
     The dual functions of a facet depend on all that covers it. So reverse mode runs once for each corner and
-    each node of the master over a facet, in all facets at the same time; where these are few, several times
-    at once.
+    each function over a facet, in all facets at the same time; where these are few, several times at once.
     """
-    over, count = _over_facets(overlaps.facet, master.facets[overlaps.master]), len(overlaps.master)
+    functions = trace_nodes(master, overlaps.master)
+    if slave.whole is not None:
+        own = len(master.nodes) + trace_nodes(slave, chosen[overlaps.slave])
+        functions = np.concatenate([functions, own], axis=1)
+    over, count = _over_facets(overlaps.facet, functions), len(overlaps.master)
     corner, number = (part.ravel() for part in np.indices((slave.facets.shape[1], over.shape[1])))
     parts, width = [], max(1, AT_ONCE // count)
     for begin in range(0, len(corner), width):
@@ -508,38 +575,41 @@ def _of_nodes(
     corner: np.ndarray,
     node: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
-    """Return the same for one corner and one node of the master of each pair's slave facet, −1 for none."""
+    """Return the same for one corner and one function over each pair's slave facet, −1 for none."""
     dim, n_slave, n_master = slave.dim, len(slave.nodes), len(master.nodes)
     nodes, opposite = slave.facets[chosen[overlaps.slave]], master.facets[overlaps.master]
-    plain, each = cells_of(overlaps), np.arange(len(nodes))
-    cells = revolved(plain, slave, chosen[overlaps.slave]) if slave.axisymmetric else plain
-    basis, own = DualBasis.on(cells), planes.part(overlaps.slave)
-    integrals, meant = basis.integrals(cells.master), opposite == node[:, None]
-    seed = np.zeros((*integrals.shape[:2], integrals.shape[2] + 1))
-    seed[each, corner, :-1] = meant
-    by, _ = integrals_pulled_back(basis, np.zeros_like(cells.weight), np.zeros_like(basis.coverage), seed)
+    plain, each, both = cells_of(overlaps), np.arange(len(nodes)), (chosen[overlaps.slave], overlaps.master)
+    cells = revolved(plain, slave, both[0]) if slave.axisymmetric else plain
+    traces, basis = Traces.of(cells, (slave, master), both), DualBasis.on(cells)
+    integrals, own = basis.integrals(traces.functions), planes.part(overlaps.slave)
+    meant = np.concatenate([traces.master, n_master + traces.slave], axis=1) == node[:, None]
+    seed = np.zeros_like(integrals)
+    seed[each, corner] = meant
+    by, by_functions = integrals_pulled_back(basis, traces.functions, np.zeros_like(basis.coverage), seed)
+    by = by.with_traces(traces.pulled_back(cells, (slave, master), both, by_functions))
     by_radii = np.zeros(nodes.shape)
     if slave.axisymmetric:
-        by, by_radii = revolved_pulled_back(plain, slave, chosen[overlaps.slave], by)
+        by, by_radii = revolved_pulled_back(plain, slave, both[0], by)
     by_subject, by_window = cells_pulled_back(overlaps, plain, by)
     places = master.points[opposite], each, by_subject
-    both = planes_pulled_back(own, slave.points[nodes], by_window, np.zeros_like(own.normal), places)
-    both[0][:, :, 0] += by_radii
-    slopes = np.concatenate(both, axis=1).reshape(len(nodes), -1)
+    sides = planes_pulled_back(own, slave.points[nodes], by_window, np.zeros_like(own.normal), places)
+    sides[0][:, :, 0] += by_radii
+    slopes = np.concatenate(sides, axis=1).reshape(len(nodes), -1)
     felt = np.flatnonzero(slopes.any(axis=1))
     met = np.concatenate([nodes, n_slave + opposite], axis=1)[felt]
     column = (dim * met[:, :, None] + np.arange(dim)).reshape(len(felt), slopes.shape[1])
     entries = slopes[felt].ravel(), column.ravel(), slopes.shape[1] * np.arange(len(felt) + 1)
     rows = sp.csr_matrix(entries, shape=(len(felt), dim * (n_slave + n_master)))
     corner, node = corner[felt], node[felt]
-    return nodes[felt, corner] * n_master + node, (integrals[felt, corner] * meant[felt]).sum(axis=1), rows
+    key = nodes[felt, corner] * (n_master + n_slave) + node
+    return key, (integrals[felt, corner] * meant[felt]).sum(axis=1), rows
 
 
 def _over_facets(facet: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Return the nodes of the master over each slave facet, −1 beyond their number, (n_facets, most).
+    """Return the numbers of functions over each slave facet, −1 beyond their count, (n_facets, most).
 
-    `facet`: slave facet of each pair, shape (n_pairs,); `nodes`: nodes of the master's facet, shape (n_pairs,
-    master corners).
+    `facet`: slave facet of each pair, shape (n_pairs,); `nodes`: numbers of its functions, shape (n_pairs,
+    functions).
     """
     count = int(nodes.max()) + 1
     which, node = np.divmod(np.unique(facet[:, None] * count + nodes), count)

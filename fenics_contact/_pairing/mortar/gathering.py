@@ -75,14 +75,15 @@ class Gathering:
         node = whole.node[np.asarray(self.part.argmax(axis=1)).ravel()]
         weight, relief = (self.own @ whole.weight).tocsr(), self.own @ whole.relief
         weight.sort_indices()
-        normal = -slave.normals[node]
-        apart = self.own @ slave.points[whole.node] - weight @ master.points + relief
-        gap = np.einsum("nd,nd->n", normal, apart)
-        return MortarCoupling(node, self.part @ whole.area, weight, normal, relief, gap)
+        normal, own = -slave.normals[node], self._own_means(len(slave.nodes))
+        gap = np.einsum("nd,nd->n", normal, own @ slave.points - weight @ master.points + relief)
+        return MortarCoupling(node, self.part @ whole.area, weight, normal, relief, gap, own)
 
-    def weights(self, n_nodes: int) -> sp.csr_matrix:
+    def _own_means(self, n_nodes: int) -> sp.csr_matrix:
         """Return the weights of the slave's nodes in its means, shape (n, n_nodes)."""
-        own = self.own
+        own, of_whole = self.own, self.whole.own
+        if of_whole is not None:
+            return (own @ of_whole).tocsr()
         return sp.csr_matrix((own.data, self.whole.node[own.indices], own.indptr), (own.shape[0], n_nodes))
 
     def pulled_back(
@@ -97,18 +98,19 @@ class Gathering:
         left = np.concatenate([by.left, -along], axis=1)
         right = np.concatenate([by.right, places[1] - middle], axis=1)
         own = np.zeros((len(places[0]), by.right.shape[1])) if by.own is None else by.own
-        own = np.concatenate([own, places[0] - middle], axis=1)[whole.node]
+        own = np.concatenate([own, places[0] - middle], axis=1)
+        means = whole.of_slave(own)
         # Of the weights T_ji D_i / Σ_k T_jk D_k, and through them of the areas.
         here, there = self.part.nonzero()
         share, weight = (np.asarray(each[here, there]).ravel() for each in (self.part, self.own))
-        by_weight = np.einsum("nr,nr->n", left[here], (whole.weight @ right - own)[there])
+        by_weight = np.einsum("nr,nr->n", left[here], (whole.weight @ right - means)[there])
         by_weight += np.einsum("nd,nd->n", along[here], whole.relief[there])
         mean = np.bincount(here, weight * by_weight, len(coupling.node))
         by_areas = share * ((by_weight - mean[here]) / coupling.area[here] + by.area[here])
         count, dim = whole.normal.shape
         return CouplingDerivatives(
             np.bincount(there, by_areas, count), self.own.T @ left, right, np.zeros((count, dim)),
-            np.zeros(count), relief=self.own.T @ along,
+            np.zeros(count), own, self.own.T @ along,
         )  # fmt: skip
 
 

@@ -79,12 +79,12 @@ def _affine(away: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.stack([s, t], axis=2)
 
 
-def rule(dim: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return a quadrature rule of degree 5: three points of intervals (dim 2), seven of triangles (dim 3).
+def rule(dim: int, degree: int = 5) -> tuple[np.ndarray, np.ndarray]:
+    """Return a quadrature rule: of degree 5 three points of intervals (dim 2), seven of triangles (dim 3).
 
     Returns barycentric coordinates, shape (q, dim), and weights that add up to one, shape (q,).
     """
-    positions, weights = quadrature(FACET_TYPES[3, 2] if dim == 2 else CELL_TYPES["triangle6"])
+    positions, weights = quadrature(FACET_TYPES[3, 2] if dim == 2 else CELL_TYPES["triangle6"], degree)
     return np.column_stack([1 - positions.sum(axis=1), positions]), weights / weights.sum()
 
 

@@ -18,7 +18,7 @@ from fenics_contact._pairing.points import ContactPoints, NodeNumbers
 from fenics_contact._pairing.sliding.closest import moved_surface, summed_normals, summed_normals_by_points
 from fenics_contact._pairing.sliding.meeting import Meeting
 from fenics_contact._pairing.sliding.stiffness import LowRank, frame_changes, spread
-from fenics_contact._scene.parts import surface_of
+from fenics_contact._scene.parts import slave_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact.mesh.faces import coordinate_rounding
@@ -202,9 +202,15 @@ class MovingMeans:
 
     def weights(self, n_nodes: int) -> sp.csr_matrix:
         """Return the weights of the nodes of all bodies, shape (n, n_nodes)."""
-        weight = self.coupling.weight
+        weight, own = self.coupling.weight, self.coupling.own
         entries = weight.data, self.master_nodes[weight.indices], weight.indptr
-        return sp.csr_matrix(entries, shape=(weight.shape[0], n_nodes))
+        shape = (weight.shape[0], n_nodes)
+        weights = sp.csr_matrix(entries, shape=shape)
+        if own is None:
+            return weights
+        node, number = self.slave_nodes[self.coupling.node], np.arange(len(self.coupling.node) + 1)
+        alone = sp.csr_matrix((np.ones(len(node)), node, number), shape=shape)
+        return weights + alone - sp.csr_matrix((own.data, self.slave_nodes[own.indices], own.indptr), shape)
 
     def symmetric(self) -> np.ndarray:
         """Return the planes of symmetry that cut both surfaces at points, shape (n, n_planes)."""
@@ -273,7 +279,10 @@ class MovingMeans:
             among_all(scaled_rows(self._turned(points.tangents[:, a]), wanted.astype(float)))
             for a in range(dim - 1)
         )
-        return MeanMotion(turn, found.point, self.master_nodes[found.node], among_all(found.rows))
+        # The slave's own mean takes the place of its node: its weights are on the other side.
+        every = np.concatenate([self.master_nodes, self.slave_nodes])
+        rows = scaled_rows(found.rows, np.where(found.node < len(self.master_nodes), 1.0, -1.0))
+        return MeanMotion(turn, found.point, every[found.node], among_all(rows))
 
     def _turned(self, along: np.ndarray) -> sp.csr_matrix:
         """Return v·δn of the points by the slave's nodes for vectors v across the normals, (n, n_dofs)."""
@@ -323,7 +332,7 @@ class PointAreas:
         count, before = points.count, points.area
         areas = cls(np.zeros(count), before, np.ones(count), *np.zeros((2, count), dtype=bool))
         for index, (pair, met) in enumerate(zip(scene.contacts, means, strict=True)):
-            surface, body = surface_of(scene, pair.slave, "faceted"), pair.slave.body
+            surface, body = slave_of(scene, pair, "faceted"), pair.slave.body
             nodes = NodeNumbers.of(scene).global_nodes(body, surface.nodes)
             slave, point = points.of_surface(index, np.arange(count))
             own = surface.areas_at(coordinates[nodes])[np.searchsorted(nodes, slave)]

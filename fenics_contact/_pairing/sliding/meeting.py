@@ -16,7 +16,7 @@ from fenics_contact._pairing.sliding.patches import SmoothPatches
 from fenics_contact._scene.local_axes import LocalAxes
 from fenics_contact._scene.obstacles import RigidObstacle, RigidPlane
 from fenics_contact._scene.pairs import ContactPair, Surface
-from fenics_contact._scene.parts import surface_of
+from fenics_contact._scene.parts import slave_of, surface_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import Projection, join
@@ -199,7 +199,7 @@ def _joined_to(meeting: Meeting, lost: np.ndarray, kept: np.ndarray, number: tup
 
 def _meeting(scene: Scene, pair: ContactPair, fixed: np.ndarray, tied: np.ndarray) -> Meeting:
     numbers, dim = NodeNumbers.of(scene), scene.dim
-    slave = surface_of(scene, pair.slave, "faceted")
+    slave = slave_of(scene, pair, "faceted")
     slave_nodes = numbers.global_nodes(pair.slave.body, slave.nodes)
     bearing = ~fixed[slave_nodes].all(axis=1) & ~np.isin(slave_nodes, tied)
     candidates = np.flatnonzero(bearing & (slave.areas > 0.0))

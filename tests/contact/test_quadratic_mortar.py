@@ -1,0 +1,131 @@
+"""Mortar contact and ties of quadratic cells whose meshes do not match."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import BodyMesh, Coulomb, Scene, State, Support, Tie, Traction, solve_scene
+from fenics_contact.qp import FaceNewton
+from tests.pairing.pressed_boxes import PRESSURE, boxes, chosen, pressed, unevenly
+
+SOLVER = FaceNewton(tolerance=1e-11)
+#: Facets with 3 and 6, 4 and 9 nodes.
+FACES = [("tetrahedron", 1), ("tetrahedron", 2), ("hexahedron", 1), ("hexahedron", 2)]
+PAIRS = [pair for pair in product(FACES, FACES) if max(pair[0][1], pair[1][1]) == 2]
+
+
+def solved(scene: Scene) -> State:
+    return solve_scene(scene, MPI.COMM_SELF, solver=SOLVER)
+
+
+def mixed(
+    upper: tuple[str, int], lower: tuple[str, int], cells: tuple[int, int] = (2, 3)
+) -> dict[str, BodyMesh]:
+    """A cube, or square, on another one, each of cells of its own."""
+    return {
+        "a": boxes(upper[0], *cells, order=upper[1])["a"],
+        "b": boxes(lower[0], *cells, order=lower[1])["b"],
+    }
+
+
+@pytest.mark.parametrize(("slave", "master"), PAIRS)
+def test_a_uniform_pressure_passes_between_all_pairs_of_surfaces(
+    slave: tuple[str, int], master: tuple[str, int]
+) -> None:
+    state = solved(chosen(pressed(mixed(slave, master))))
+    assert state.scene.contacts[0].reason == "mortar, as the meshes do not match"
+    contact = state.contact
+    assert np.all(contact.area > 0.0)
+    np.testing.assert_allclose(contact.pressure, PRESSURE, rtol=1e-10)
+
+
+@pytest.mark.parametrize("slave", ["a", "b"])
+@pytest.mark.parametrize("orders", [(1, 2), (2, 1), (2, 2)])
+def test_a_uniform_pressure_passes_between_edges(orders: tuple[int, int], slave: str) -> None:
+    meshes = mixed(("triangle", orders[0]), ("quadrilateral", orders[1]), (4, 6))
+    pressure = solved(chosen(pressed(meshes, slave, stiff=7.0))).contact.pressure
+    np.testing.assert_allclose(pressure, PRESSURE, rtol=1e-10)
+
+
+@pytest.mark.parametrize("cell", ["quadrilateral", "tetrahedron"])
+def test_what_a_pressure_varies_by_nodes_it_does_not_by_mortar(cell: str) -> None:
+    scene = pressed(boxes(cell, 2, 3))
+    ranges = [np.ptp(solved(chosen(scene, how)).contact.pressure) for how in ("node", "best")]
+    assert ranges[0] > 0.1 * PRESSURE
+    assert ranges[1] < 1e-8 * PRESSURE
+
+
+def test_quadratic_cells_that_match_are_by_nodes_and_others_are_not() -> None:
+    for meshes, wanted in (
+        (boxes("quadrilateral", 3, 3), "node, as the meshes match"),
+        (boxes("quadrilateral", 3, 4), "mortar, as the meshes do not match"),
+        # Nodes lie over nodes, but displacements between them are not the same.
+        (mixed(("quadrilateral", 2), ("quadrilateral", 1), (3, 6)), "mortar, as the meshes do not match"),
+    ):
+        assert chosen(pressed(meshes)).contacts[0].reason == wanted
+
+
+@pytest.mark.parametrize("cell", ["triangle", "quadrilateral", "tetrahedron", "hexahedron"])
+def test_ties_transmit_any_constant_stress(cell: str) -> None:
+    """A linear displacement on the boundary of two bodies, tied by means."""
+    meshes = boxes(cell, 2, 3)
+    dim = meshes["a"].dim
+    gradient = 1e-2 * np.array([[1.0, 0.4, -0.3], [0.7, -0.5, 0.2], [-0.6, 0.8, 0.3]])[:dim, :dim]
+    scene = pressed(meshes)
+    (pair,) = scene.contacts
+    ends = {"a": scene.loads[0].surface, "b": scene.supports[-1].surface}
+    supports = [
+        Support(name, side, tuple((lambda x, k=k: x @ gradient[k]) for k in range(dim)))
+        for name, side in ends.items()
+    ]
+    tie = Tie(pair.slave, pair.master)
+    # Sides have the tractions of the stress, with Poisson's ratio 0 that is E ε.
+    strain = (gradient + gradient.T) / 2
+    loads = [
+        Traction(name, side, tuple((1 if side[1] == "1" else -1) * 1e3 * strain["xyz".index(side[0])]))
+        for name in "ab"
+        for side in [f"{axis}{end}" for axis in "xyz"[: dim - 1] for end in "01"]
+    ]
+    state = solved(replace(scene, supports=supports, loads=loads, contacts=[], ties=[tie]))
+    assert state.scene.ties[0].reason == "mortar, as the meshes do not match"
+    for name, mesh in meshes.items():
+        np.testing.assert_allclose(state.gather_displacement(name), mesh.points @ gradient.T, atol=1e-11)
+
+
+def test_blocks_that_are_pressed_and_pushed_evenly_stick_evenly() -> None:
+    """Pushed at the top and at the bottom; sides have the shear stress that balances the moment."""
+    scene = chosen(pressed(boxes("tetrahedron", 2, 3)))
+    (pair,), shear = scene.contacts, 10.0
+    pushed = [("a", "z1", (shear, 0.0, 0.0)), ("a", "x1", (0.0, 0.0, shear)), ("a", "x0", (0.0, 0.0, -shear))]
+    pushed += [("b", "x1", (0.0, 0.0, shear)), ("b", "x0", (0.0, 0.0, -shear))]
+    held = [Support("b", "z0"), *(Support(name, "y0", (None, 0.0, None)) for name in "ab")]
+    loads = [*scene.loads, *(Traction(*load) for load in pushed)]
+    pair = replace(pair, friction=Coulomb(0.5))
+    contact = solved(replace(scene, supports=held, loads=loads, contacts=[pair])).contact
+    rubbed = np.linalg.norm(contact.friction_force, axis=1) / contact.area
+    np.testing.assert_allclose(rubbed, shear, rtol=1e-9)
+    np.testing.assert_allclose(contact.pressure, PRESSURE, rtol=1e-9)
+
+
+def test_ranks_have_the_same_pressures(mpirun: Callable[..., str]) -> None:
+    code = """
+        from mpi4py import MPI
+        from fenics_contact import solve_scene
+        from fenics_contact.qp import FaceNewton
+        from tests.pairing.pressed_boxes import unevenly
+        contact = solve_scene(unevenly(), MPI.COMM_WORLD, solver=FaceNewton(tolerance=1e-11)).contact
+        if MPI.COMM_WORLD.rank == 0:
+            print(*(float(p).hex() for p in contact.pressure))
+    """
+    alone = solved(unevenly()).contact
+    assert alone.pressure.max() > PRESSURE
+    assert alone.normal_force.sum() == pytest.approx(PRESSURE)
+    for ranks in (2, 4):
+        found = [float.fromhex(p) for p in mpirun(code, ranks).split()]
+        np.testing.assert_allclose(found, alone.pressure, rtol=1e-8, atol=1e-6)
