@@ -25,6 +25,7 @@ from fenics_contact._scene.loads import (
     centrifugal,
     gravity,
 )
+from fenics_contact._scene.pairs import ContactPair, Tie
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.supports import AnySupport, Support
 from fenics_contact.decks.bodies import (
@@ -38,6 +39,13 @@ from fenics_contact.decks.bodies import (
     regions_of,
 )
 from fenics_contact.decks.cards import Card, Origin, read_cards
+from fenics_contact.decks.contact import (
+    Sides,
+    build_pairs,
+    clearances,
+    read_interactions,
+    read_sides,
+)
 from fenics_contact.decks.history import History, Moment, Pressed, Weight, read_history
 from fenics_contact.decks.materials import Conditions, build_material, read_materials
 from fenics_contact.decks.mesh import DeckMesh, Faces, Named, read_mesh_cards
@@ -260,6 +268,7 @@ class _Builder:
             if card.name in WITHOUT_EFFECT and card.name != "HEADING":
                 self.note(card, f"has no effect here ({WITHOUT_EFFECT[card.name]})")
         supported = self._supported()
+        sides = self._contact_surfaces()
         self._pressed_surfaces()
         self._named_surfaces()
         self._named_nodes()
@@ -270,7 +279,8 @@ class _Builder:
         )  # fmt: skip
         self.parts = parts
         bodies = self._bodies(parts)
-        scene = Scene(bodies, self._supports(supported, None), ())
+        contacts, ties = self._pairs(sides)
+        scene = self._scene(bodies, self._supports(supported, None), contacts, ties)
         steps, step_of = [], []
         for number, step in enumerate(self.history.steps):
             self.origins["step", step.name] = step.card.origin
@@ -286,6 +296,68 @@ class _Builder:
             self._element_numbers(), self._numbered(self.mesh.node_sets, self.mesh.numbers),
             self._numbered(self.mesh.element_sets, self.mesh.element_numbers), self.origins,
         )  # fmt: skip
+
+    def _contact_surfaces(self) -> list[Sides]:
+        """Name the surfaces of contact pairs and ties."""
+        self.interactions = read_interactions(self.cards)
+        sides = read_sides(self.cards, self.interactions)
+        self.sides_by_name: dict[str, str] = {}
+        for each in sides:
+            for name in (each.slave, each.master):
+                self._contact_surface(name, each)
+        return sides
+
+    def _contact_surface(self, name: str, of: Sides) -> None:
+        """Take the faces of a surface, of one of nodes, or of a node set, those that have all of them."""
+        if name not in self.mesh.surfaces and name in self.mesh.node_sets:
+            nodes: np.ndarray | None = self.mesh.node_sets[name]
+            faces, known = self.exterior.covering(self.mesh.node_sets[name]), False
+        else:
+            given = self.mesh.surface_named(name, of.card, of.row)
+            faces, nodes, known = self._faces_of(given), given.nodes, True
+        if faces is None:
+            raise of.card.error(
+                f"contact is between faces, but the {0 if nodes is None else len(nodes)} nodes of "
+                f"{name!r} are not all nodes of some faces: give the faces, as *SURFACE with TYPE=ELEMENT",
+                of.row,
+            )  # fmt: skip
+        outer = self.exterior.holds(faces)
+        if not outer.all():
+            number = self.mesh.element_numbers[faces.elements[~outer][0]]
+            raise of.card.error(
+                f"surface {name!r} must lie on the boundary of a body, a face of element {number} lies "
+                "between two elements: correct it", of.row,
+            )  # fmt: skip
+        label = name if known or name not in self.mesh.surfaces else f"{name} faces"
+        self.surfaces[label] = faces
+        self.sides_by_name[name] = label
+
+    def _pairs(self, sides: Sequence[Sides]) -> tuple[list[ContactPair], list[Tie]]:
+        found = build_pairs(
+            sides, self.sides_by_name, self.parts.meshes, self.interactions, clearances(self.cards), self.note
+        )
+        for each, pair in found:
+            kind = "tie" if isinstance(pair, Tie) else "contact"
+            self.origins[kind, pair.place] = each.card.origin
+        return [p for _, p in found if isinstance(p, ContactPair)], [
+            p for _, p in found if isinstance(p, Tie)
+        ]
+
+    def _scene(
+        self,
+        bodies: Mapping[str, Body],
+        supports: Sequence[AnySupport],
+        contacts: Sequence[ContactPair],
+        ties: Sequence[Tie],
+    ) -> Scene:
+        """Return the scene before the first step; what does not suit the bodies is told with its card."""
+        for kind, parts in (("contact", contacts), ("tie", ties)):
+            for part in parts:
+                try:
+                    Scene(bodies, **{f"{kind}s" if kind == "tie" else "contacts": (part,)})  # type: ignore[arg-type]
+                except InvalidInputError as error:
+                    raise self.origins[kind, part.place].error(str(error)) from error
+        return Scene(bodies, supports, (), contacts, ties)
 
     def _numbered(self, sets: Mapping[str, np.ndarray], numbers: np.ndarray) -> dict[str, np.ndarray]:
         return {name: np.sort(numbers[members]) for name, members in sets.items()}

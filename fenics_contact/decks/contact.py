@@ -1,0 +1,223 @@
+"""Contact pairs and ties of a deck."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tie
+from fenics_contact._scene.surface_laws import ClosureLaw, ClosureTable, ExponentialClosure, LinearClosure
+from fenics_contact.decks.cards import Card
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.body_mesh import BodyMesh
+
+#: Keeps what is worth knowing of a card.
+Note: TypeAlias = Callable[[Card, str], None]
+
+
+@dataclass(eq=False)
+class Interaction:
+    """A surface interaction with the cards behind it."""
+
+    card: Card
+    behavior: Card | None = None
+    friction: Card | None = None
+
+    @property
+    def tied(self) -> bool:
+        """Whether surfaces stay together."""
+        return self.behavior is not None and self.behavior.name_of("PRESSURE-OVERCLOSURE") == "TIED"
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Two surfaces by name, and the card that names them.
+
+    Attributes:
+        tied: Whether they stay together.
+    """
+
+    slave: str
+    master: str
+    card: Card
+    row: int
+    tied: bool
+
+
+def read_interactions(cards: Sequence[Card]) -> dict[str, Interaction]:
+    """Return the surface interactions of a deck: their cards follow them."""
+    found: dict[str, Interaction] = {}
+    now: Interaction | None = None
+    for card in cards:
+        if card.name == "SURFACEINTERACTION":
+            now = found[card.required("NAME")] = Interaction(card)
+        elif card.name in ("SURFACEBEHAVIOR", "FRICTION"):
+            if now is None:
+                raise card.error("must follow a *SURFACE INTERACTION, none is before it: add one with NAME=")
+            if card.name == "FRICTION":
+                now.friction = card
+            else:
+                now.behavior = card
+    return found
+
+
+def interaction_of(card: Card, known: Mapping[str, Interaction]) -> Interaction:
+    """Return the interaction that a contact pair names."""
+    name = card.required("INTERACTION")
+    if name not in known:
+        raise card.error(
+            f"surface interaction {name!r} is not there; the deck has {', '.join(known) or 'none'}"
+        )
+    return known[name]
+
+
+def read_sides(cards: Sequence[Card], known: Mapping[str, Interaction]) -> list[Sides]:
+    """Return the surfaces of all contact pairs and ties."""
+    found = []
+    for card in cards:
+        if card.name not in ("CONTACTPAIR", "TIE"):
+            continue
+        for name in ("CYCLICSYMMETRY", "MULTISTAGE"):
+            if name in card.parameters:
+                raise card.error(f"the parameter {name} is not read: give CyclicSymmetry in Python")
+        tied = card.name == "TIE" or interaction_of(card, known).tied
+        for row, entries in enumerate(card.rows):
+            if len(entries) != 2:
+                raise card.error("needs a slave and a master surface in each line: complete it", row)
+            found.append(Sides(entries[0].upper().strip('"'), entries[1].upper().strip('"'), card, row, tied))
+    return found
+
+
+def closure_of(interaction: Interaction, note: Note) -> ClosureLaw | None:
+    """Return how surfaces give way; None where contact is hard, which is exact here."""
+    card = interaction.behavior
+    kind = "HARD" if card is None else card.name_of("PRESSURE-OVERCLOSURE") or "HARD"
+    if card is None or kind == "HARD":
+        note(interaction.card if card is None else card, "hard contact is exact, without a penalty stiffness")
+        return None
+    numbers = card.all_floats()
+    if kind == "LINEAR" and numbers:
+        note(card, f"surfaces give way with {numbers[0]:g} [force / length³] under pressure alone")
+        return LinearClosure(numbers[0])
+    if kind == "EXPONENTIAL" and len(numbers) >= 2:
+        return ExponentialClosure(pressure=numbers[1], clearance=numbers[0])
+    if kind == "TABULAR":
+        pressures, closures = np.array([card.floats(k)[:2] for k in range(len(card.lines))]).T
+        start = max(int(np.count_nonzero(pressures <= 0.0)) - 1, 0)
+        return ClosureTable(tuple(closures[start:].tolist()), tuple(pressures[start:].tolist()))
+    raise card.error(
+        f"PRESSURE-OVERCLOSURE={kind} with {len(numbers)} numbers is not read: HARD, LINEAR (slope), "
+        "EXPONENTIAL (clearance, pressure), TABULAR (pressure, overclosure) and TIED are"
+    )
+
+
+def friction_of(interaction: Interaction) -> Coulomb | None:
+    """Return the friction of an interaction, with its stick slope if one is given."""
+    card = interaction.friction
+    if card is None:
+        return None
+    numbers = card.all_floats()
+    if not numbers:
+        raise card.error("needs a friction coefficient, it has no data line: add it")
+    stick = numbers[1] if len(numbers) > 1 and numbers[1] > 0 else None
+    return Coulomb(numbers[0], stick_stiffness=stick) if numbers[0] > 0 else None
+
+
+def clearances(cards: Sequence[Card]) -> dict[tuple[str, str], tuple[Card, float]]:
+    """Return the clearances by slave and master."""
+    return {
+        (card.required("SLAVE"), card.required("MASTER")): (card, card.number_of("VALUE"))
+        for card in cards
+        if card.name == "CLEARANCE"
+    }
+
+
+def near(one: BodyMesh, surface: str, other: BodyMesh, facing: str) -> bool:
+    """Return whether the boxes around two surfaces, half as large again, overlap."""
+    boxes = []
+    for mesh, name in ((one, surface), (other, facing)):
+        points = mesh.points[np.unique(mesh.surfaces[name])]
+        size = 0.25 * float(np.linalg.norm(np.ptp(points, axis=0)))
+        boxes.append((points.min(axis=0) - size, points.max(axis=0) + size))
+    (low, high), (below, above) = boxes
+    return bool((low <= above).all() and (below <= high).all())
+
+
+def build_pairs(
+    sides: Sequence[Sides],
+    names: Mapping[str, str],
+    meshes: Mapping[str, BodyMesh],
+    interactions: Mapping[str, Interaction],
+    given: Mapping[tuple[str, str], tuple[Card, float]],
+    note: Note,
+) -> list[tuple[Sides, ContactPair | Tie]]:
+    """Return contact pairs and ties between bodies.
+
+    `names`: name of a surface in the deck -> that in the meshes.
+    """
+    found: list[tuple[Sides, ContactPair | Tie]] = []
+    for each in sides:
+        slave, master = names[each.slave], names[each.master]
+        pairs = [
+            (Surface(a, slave), Surface(b, master))
+            for a, one in meshes.items() if slave in one.surfaces
+            for b, other in meshes.items() if master in other.surfaces
+        ]  # fmt: skip
+        if len(pairs) > 1:
+            pairs = [(s, m) for s, m in pairs if near(meshes[s.body], slave, meshes[m.body], master)]
+        for one, other in pairs:
+            twin = next((p for _, p in found if (p.slave, p.master) == (other, one)), None)
+            if twin is not None:
+                note(each.card, f"the pair {each.slave} on {each.master} is the one in the other sense, once")
+                continue
+            try:
+                made: ContactPair | Tie = (
+                    Tie(one, other) if each.tied else _pair(one, other, each, interactions, given, note)
+                )
+            except InvalidInputError as error:
+                if getattr(error, "card", ""):
+                    raise
+                raise each.card.error(str(error), each.row) from error
+            found.append((each, made))
+    return found
+
+
+def _pair(
+    slave: Surface,
+    master: Surface,
+    of: Sides,
+    interactions: Mapping[str, Interaction],
+    given: Mapping[tuple[str, str], tuple[Card, float]],
+    note: Note,
+) -> ContactPair:
+    interaction, card = interaction_of(of.card, interactions), of.card
+    kind = card.name_of("TYPE") or "NODE TO SURFACE"
+    if kind not in ("NODE TO SURFACE", "SURFACE TO SURFACE", "MORTAR", "LINMORTAR", "PGLINMORTAR"):
+        raise card.error(f"TYPE={kind} is not read: NODE TO SURFACE, SURFACE TO SURFACE and MORTAR are")
+    adjust = card.parameters.get("ADJUST")
+    if adjust is not None and not _is_number(adjust):
+        raise card.error(f"ADJUST={adjust} must be a distance: a set of nodes to adjust is not read")
+    _, clearance = given.get((of.slave, of.master), (None, None))
+    by_clearance = {} if clearance is None else {"gap" if clearance >= 0 else "interference": abs(clearance)}
+    if clearance is None and adjust is None:
+        by_clearance = {"interference": "measured"}  # type: ignore[dict-item]
+    return ContactPair(
+        slave,
+        master,
+        friction_of(interaction),
+        "node" if kind == "NODE TO SURFACE" else "best",
+        closure=closure_of(interaction, note),
+        adjust=None if adjust is None else float(adjust),
+        **by_clearance,  # type: ignore[arg-type]
+    )
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
