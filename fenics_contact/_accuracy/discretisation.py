@@ -33,6 +33,7 @@ from fenics_contact.feti.subdomain import Subdomain
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.elastic import Material
 from fenics_contact.mesh.cell_types import CELL_TYPES, CellType, quadrature, shape_gradients, shape_values
+from fenics_contact.mesh.collapsed import as_hexahedra, places_of
 from fenics_contact.mesh.quality import determinants
 
 
@@ -182,15 +183,15 @@ def energy_on_subdomain(
 ) -> np.ndarray:
     """Return ∫ C (g − ∇u) : (g − ∇u) over every cell of a subdomain, as if all were of one material.
 
-    `blocks`: block of each node of some cells, shape (n, nodes of a cell); elsewhere the result is undefined;
-    `displacement`: u at these nodes, shape (n, nodes of a cell, dim), [length]; `gradient`: g there, shape
-    (n, nodes of a cell, dim, dim), dimensionless.
+    `blocks`: dolfinx's block of each node of some cells, shape (n, nodes of a cell); elsewhere the result is
+    undefined; `displacement`: u at these nodes, shape (n, nodes of a cell, dim), [length]; `gradient`: g
+    there, shape (n, nodes of a cell, dim, dim), dimensionless.
 
     The result has shape (n_cells,), in the order of the subdomain's mesh, [force · length].
     """
     space = subdomain.mesh.space
     mesh, width = space.mesh, subdomain.mesh.components
-    _dolfinx.update_coordinates(mesh, subdomain.points[np.argsort(subdomain.mesh.nodes)])
+    _dolfinx.update_coordinates(mesh, subdomain.mesh.by_input_node(subdomain.points))
     fields = []
     for values in (displacement, *(gradient[:, :, k] for k in range(width))):
         fields.append(_dolfinx.fem.Function(space))
@@ -405,12 +406,12 @@ class CellEnergies:
         wanted = np.ones(len(nodes), dtype=bool) if among is None else among[mesh.cells]
         for number in np.unique(kind[wanted]):
             cells, way = np.flatnonzero(wanted & (kind == number)), self._ways[number]
-            u, g = displacement[cells], gradient[cells]
+            u, g = (as_hexahedra(each[cells], nodes[cells], whole.dim) for each in (displacement, gradient))
             if isinstance(way, np.ndarray):
-                result[cells] = energy_of_difference(way, whole.cell_type, whole.points[nodes[cells]], u, g)
+                places = places_of(whole.points, nodes[cells])
+                result[cells] = energy_of_difference(way, whole.cell_type, places, u, g)
             else:
-                order = np.argsort(mesh.nodes)
-                blocks = order[np.searchsorted(mesh.nodes[order], nodes[cells])]
+                blocks = _dolfinx.vtk_cell_dofs(mesh.space)[cells]
                 material = self._body.materials[number]
                 result[cells] = energy_on_subdomain(way, material, subdomain, blocks, u, g)[cells]
         # Moduli are insensitive to rotations, so some eigenvalues are zero up to rounding.

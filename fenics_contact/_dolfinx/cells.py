@@ -7,6 +7,8 @@ third component, around the axis.
 
 from __future__ import annotations
 
+import numpy as np
+
 _DIMENSION = {"triangle": 2, "quadrilateral": 2, "tetrahedron": 3, "hexahedron": 3}
 #: Quadratic cells and the linear ones of the same shape.
 _SHAPE = {
@@ -92,6 +94,11 @@ def cell_type_named(name: str, order: int) -> str:
 def facet_vertices(cell_type: str) -> list[list[int]]:
     """Return the vertices, in tensor-product order, of the facets of the reference cell."""
     return _FACET_VERTICES[shape(cell_type)]
+
+
+def facet_corners(cell_type: str) -> np.ndarray:
+    """Return the vertices, in the order of VTK, of the facets of a cell as dolfinx numbers these."""
+    return np.array(NODE_ORDER[shape(cell_type)])[facet_vertices(cell_type)]
 
 
 def dimension(cell_type: str) -> int:

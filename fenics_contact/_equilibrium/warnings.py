@@ -229,12 +229,12 @@ class _Gradients:
 def _moved_cells(state: State, name: str, mesh: BodyMesh) -> Iterator[tuple[_Gradients, np.ndarray]]:
     """Return for each of this rank's subdomains of a body its gradients and displacements of its nodes."""
     decomposition, linear = state.torn.decomposition, mesh.linear.cells
-    corners = linear.reshape(mesh.n_cells, -1, linear.shape[1])  # of each cell's linear ones
+    parents = mesh.cells_cut
     for own, part in zip(decomposition.meshes, decomposition.parts, strict=True):
         if own.body == name:
             order = np.argsort(own.nodes)
             nodes = own.nodes[order]
-            cells = np.searchsorted(nodes, corners[own.cells].reshape(-1, linear.shape[1]))
+            cells = np.searchsorted(nodes, linear[np.isin(parents, own.cells)])
             gradients = _Gradients.of(mesh.points[nodes], cells)
             yield gradients, state.torn_displacement[part].reshape(len(nodes), -1)[order]
 

@@ -215,23 +215,21 @@ class FollowingPressures:
         forms = decomposition.forms
         self._scene, self._tearing = scene, decomposition.tearing
         forms.prepare_mechanics(scene)
-        self._parts = decomposition.parts
+        self._parts, self._meshes = decomposition.parts, decomposition.meshes
         self._acting = []
         with together(decomposition.comm):
             for number, mesh in enumerate(decomposition.meshes):
-                body, order = scene.bodies[mesh.body], np.argsort(mesh.nodes)
+                body = scene.bodies[mesh.body]
                 for load in scene.following_pressures:
                     if load.body != mesh.body:
                         continue
                     facets = mesh.facets_of(body, load.surface)
                     if not len(facets[0]):
                         continue
-                    nodes = mesh.nodes[order]
-                    acted = np.isin(nodes, body.mesh.surfaces[load.surface])
-                    points, kind = body.mesh.points[nodes], body.cell_type
-                    self._acting.append(
-                        (number, forms.following(load, kind, mesh.space, points, facets, acted))
-                    )
+                    acted = mesh.acted(body.mesh.surfaces[load.surface])
+                    points, kind = mesh.by_input_node(body.mesh.points[mesh.nodes]), body.cell_type
+                    pressure = forms.following(load, kind, mesh.space, points, facets, acted)
+                    self._acting.append((number, pressure))
 
     @cached_property
     def rim(self) -> np.ndarray:
@@ -252,9 +250,10 @@ class FollowingPressures:
         force, size = np.zeros(displacement.size), displacement.size
         blocks = [sp.csr_matrix((part.stop - part.start,) * 2) for part in parts]
         for number, pressure in self._acting:
-            more, softening = pressure.at(displacement[parts[number]])
-            force[parts[number]] += more
-            blocks[number] = blocks[number] + softening
+            mesh = self._meshes[number]
+            more, softening = pressure.at(mesh.on_space(displacement[parts[number]]))
+            force[parts[number]] += mesh.force_of(more)
+            blocks[number] = blocks[number] + mesh.matrix_of(softening)
         matrix = sp.block_diag(blocks, format="csr") if blocks else sp.csr_matrix((size, size))
         return force, sp.csr_matrix(matrix)
 

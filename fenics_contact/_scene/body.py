@@ -18,6 +18,7 @@ from fenics_contact.materials.kernels import motions_of_revolution, rigid_body_m
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
+from fenics_contact.mesh.collapsed import places_of
 from fenics_contact.mesh.faces import computed_rounding
 from fenics_contact.mesh.quality import jacobians
 
@@ -120,7 +121,7 @@ class Body:
             return self.mesh.volume
         cell = CELL_TYPES[self.mesh.cell_type]
         positions, weights = quadrature(cell, 2 * cell.order)
-        radii = self.mesh.points[self.mesh.cells, 0] @ shape_values(cell, positions).T
+        radii = places_of(self.mesh.points, self.mesh.cells)[..., 0] @ shape_values(cell, positions).T
         around = 2 * np.pi * radii * jacobians(self.mesh.points, self.mesh.cells, positions)
         return float((around @ weights).sum())
 

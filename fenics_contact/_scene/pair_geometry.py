@@ -24,7 +24,7 @@ from fenics_contact._surfaces.projection import project
 from fenics_contact.materials.elastic import PlaneStress
 from fenics_contact.materials.kernels import rigid_body_modes
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.cell_types import cell_type_of
+from fenics_contact.mesh.collapsed import simplices_in
 from fenics_contact.mesh.faces import boundary_faces, corners_of, vector_areas
 from fenics_contact.shapes.combined import Joined, Placed
 from fenics_contact.shapes.simple import SurfaceShape, evaluate_shape, tangent_bases
@@ -455,7 +455,7 @@ def outline_of(mesh: BodyMesh) -> Outline:
     """Return the boundary and the inside of a body, which depend on its cells alone."""
     cells = mesh.linear.cells
     facets, behind = boundary_faces(cells, mesh.dim, mesh.hanging)
-    return facets, cells[behind], cells[:, cell_type_of(cells, mesh.dim).simplices].reshape(-1, mesh.dim + 1)
+    return facets, cells[behind], simplices_in(cells, mesh.dim)
 
 
 def unpaired_bodies(scene: SceneParts) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import FACET_TYPES, CellType, quadrature, shape_gradients, shape_values
-from fenics_contact.mesh.faces import computed_rounding
+from fenics_contact.mesh.faces import computed_rounding, is_triangle, of_one_shape
 
 
 def quadrature_areas(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> np.ndarray:
@@ -30,7 +30,10 @@ def quadrature_areas(points: np.ndarray, facets: np.ndarray, axisymmetric: bool 
 
     The result has shape (n_facets,), [length²] or [length].
     """
-    return np.asarray(nodal_areas(points, facets, axisymmetric).sum(axis=1), dtype=np.float64)
+    areas = np.empty(len(facets))
+    for numbers, some in of_one_shape(facets):
+        areas[numbers] = nodal_areas(points, some, axisymmetric).sum(axis=1)
+    return areas
 
 
 def nodal_areas(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> np.ndarray:
@@ -64,9 +67,11 @@ class SurfaceMoments:
 def surface_moments(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> SurfaceMoments:
     """Return area, centroid and second moments of a surface; arguments as of `quadrature_areas`."""
     origin = points[facets[0, 0]]  # moments are as exact far from the origin of coordinates as near it
-    corners = points[facets] - origin
-    every = gauss_points(points, facets, axisymmetric)
-    rule = [(at.areas, np.einsum("k,nkd->nd", at.values, corners)) for at in every]
+    rule = [
+        (at.areas, np.einsum("k,nkd->nd", at.values, points[some] - origin))
+        for _, some in of_one_shape(facets)
+        for at in gauss_points(points, some, axisymmetric)
+    ]
     areas, places = np.concatenate([area for area, _ in rule]), np.concatenate([place for _, place in rule])
     area = float(areas.sum())
     # A line on an axis of revolution has none: its middle is its centre.
@@ -110,7 +115,12 @@ class GaussPoint:
 
 
 def gauss_points(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> Iterator[GaussPoint]:
-    """Return the points of a quadrature rule on facets; arguments as of `quadrature_areas`."""
+    """Return the points of a quadrature rule on facets, of one shape; others as of `quadrature_areas`."""
+    if is_triangle(facets).any():
+        raise InvalidInputError(
+            "forces and springs on a surface need facets of one shape, this one has triangles and "
+            "quadrilaterals: name them as surfaces of their own"
+        )
     kind = FACET_TYPES[facets.shape[1], points.shape[1]]
     positions, weights = quadrature(kind, 2 * kind.order)  # as in load forms: resultants are exact
     values, gradients = shape_values(kind, positions), shape_gradients(kind, positions)
@@ -168,7 +178,7 @@ def share_areas(mesh: BodyMesh, name: str) -> np.ndarray:
         size = mesh.volume / mesh.n_nodes
         return np.where(np.isin(np.arange(mesh.n_nodes), mesh.node_sets[name]), size, 0.0)
     facets = mesh.surfaces[name]
-    if has_midside_pressure(facets):
+    if has_midside_pressure(facets) or is_triangle(facets).any():
         facets = mesh.linear.surfaces[name]
     return np.bincount(facets.ravel(), nodal_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
 

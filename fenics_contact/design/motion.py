@@ -305,6 +305,11 @@ class DesignGeometry:
             require_none(
                 body.mesh.followers, f"a design with body {name!r}", "refine it everywhere, or take simplices"
             )
+            if body.mesh.has_several_shapes:
+                raise InvalidInputError(
+                    f"designs need bodies with one shape of cells, body {name!r} has "
+                    f"{body.mesh.cells_in_words}: mesh it with one, for instance with tetrahedra alone"
+                )
         if scene.sectors:
             raise InvalidInputError(
                 f"designs have no derivatives of cyclic symmetry, the scene ties {scene.sectors[0].place}: "

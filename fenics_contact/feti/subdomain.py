@@ -27,7 +27,8 @@ from fenics_contact.feti.following import Following
 from fenics_contact.feti.foundations import foundation_stiffness, separated
 from fenics_contact.feti.nearby import Nearby
 from fenics_contact.materials.elastic import Material
-from fenics_contact.mesh.faces import coordinate_rounding, corners_of
+from fenics_contact.mesh.collapsed import expanded
+from fenics_contact.mesh.faces import coordinate_rounding, corners_of, match_faces
 
 
 class LocalOperator(Protocol):
@@ -88,6 +89,27 @@ def interface_dofs(
     return np.flatnonzero(touched)
 
 
+@dataclass(frozen=True, eq=False)
+class Expanded:
+    """How cells of several shapes are hexahedra: what values at nodes are at the nodes of these.
+
+    Attributes:
+        nodes: Values by input node of the dolfinx mesh by those by block, shape (n_input, n_blocks).
+        dofs: Values of dolfinx's dofs by those of the subdomain's, shape (n, components · n_blocks).
+    """
+
+    nodes: sp.csr_matrix
+    dofs: sp.csr_matrix
+
+    def values(self, by_block: np.ndarray) -> np.ndarray:
+        """Return values by input node."""
+        return np.asarray(self.nodes @ by_block)
+
+    def on(self, blocks: np.ndarray) -> np.ndarray:
+        """Return which input nodes depend on marked blocks alone."""
+        return np.asarray(abs(self.nodes) @ (~blocks).astype(float) == 0.0)
+
+
 @displayed
 @dataclass(frozen=True)
 class SubdomainMesh:
@@ -101,7 +123,8 @@ class SubdomainMesh:
         space: dolfinx function space of displacements on a mesh of its own, or one that subdomains with cells
             connected alike share: nodes are where who assembled last has moved them.
         facets: Surface of the body -> (cells, local facets) on this mesh; `facets_of` adds to it.
-        following: Its hanging nodes; None without any.
+        following: Its dependent nodes; None without any.
+        expanded: How cells of several shapes are hexahedra; None where they are of one shape.
     """
 
     number: int
@@ -111,6 +134,34 @@ class SubdomainMesh:
     space: _dolfinx.fem.FunctionSpace
     facets: dict[str, tuple[np.ndarray, np.ndarray]]
     following: Following | None = None
+    expanded: Expanded | None = None
+
+    def by_input_node(self, values: np.ndarray) -> np.ndarray:
+        """Return values by input node of the dolfinx mesh of those by block, (n_blocks, ...)."""
+        if self.expanded is not None:
+            return self.expanded.values(values)
+        return values[np.argsort(self.nodes)]
+
+    def acted(self, nodes: np.ndarray) -> np.ndarray:
+        """Return which input nodes of the dolfinx mesh lie on some nodes of the body, bool, (n,)."""
+        here = np.isin(self.nodes, nodes)
+        if self.expanded is not None:
+            return self.expanded.on(here)
+        return here[np.argsort(self.nodes)]
+
+    def on_space(self, values: np.ndarray) -> np.ndarray:
+        """Return values of dolfinx's dofs by those of the dofs, (size,)."""
+        return values if self.expanded is None else np.asarray(self.expanded.dofs @ values)
+
+    def force_of(self, assembled: np.ndarray) -> np.ndarray:
+        """Return a vector of the dofs by one that dolfinx has assembled."""
+        return assembled if self.expanded is None else np.asarray(self.expanded.dofs.T @ assembled)
+
+    def matrix_of(self, assembled: sp.csr_matrix) -> sp.csr_matrix:
+        """Return a matrix of the dofs by one that dolfinx has assembled."""
+        if self.expanded is None:
+            return assembled
+        return (self.expanded.dofs.T @ assembled @ self.expanded.dofs).tocsr()
 
     @property
     def components(self) -> int:
@@ -124,7 +175,13 @@ class SubdomainMesh:
 
     def facets_of(self, body: Body, surface: str) -> tuple[np.ndarray, np.ndarray]:
         """Return the part of a surface of the body that lies on this mesh: cells, local facets."""
-        if surface not in self.facets:
+        if surface not in self.facets and self.expanded is not None:
+            facets = corners_of(body.mesh.surfaces[surface], body.mesh.dim)
+            columns = _dolfinx.facet_corners(body.mesh.cell_type)
+            faces = body.mesh.cells[self.cells][:, columns].reshape(-1, columns.shape[1])
+            here = np.flatnonzero(match_faces(faces, facets) >= 0)
+            self.facets[surface] = here // len(columns), here % len(columns)
+        elif surface not in self.facets:
             used = np.sort(self.nodes)
             facets = corners_of(body.mesh.surfaces[surface], body.mesh.dim)
             inside = np.isin(facets, used).all(axis=1)
@@ -235,15 +292,29 @@ def cut_out(
     used, local = np.unique(mesh.cells[cells], return_inverse=True)
     local = local.reshape(len(cells), -1).astype(np.int32)
     key = blake2b(f"{body.cell_type} {body.components}".encode() + local.tobytes()).digest()
+    several = expanded(local.astype(np.int64), len(used), mesh.dim)
     if key not in spaces:
-        own = _dolfinx.local_mesh(mesh.points[used], local, mesh.cell_type)
+        points = mesh.points[used]
+        if several is not None:
+            local, points = several[0], several[1] @ points
+        own = _dolfinx.local_mesh(points, local, mesh.cell_type)
         spaces[key] = _dolfinx.coefficient(own, "u", body.components).function_space
     space = spaces[key]
     input_nodes, dofs = _dolfinx.node_dofs(space)
+    cells = cells[_dolfinx.input_cells(space.mesh)]
+    if several is not None:
+        by_dof = np.empty(len(dofs), dtype=np.int64)
+        by_dof[dofs] = input_nodes
+        on_dofs = sp.kron(several[1][by_dof], sp.identity(body.components), format="csr")
+        following = Following.of(mesh, used, body.components)
+        return SubdomainMesh(
+            number, body_name, cells, used, space, {}, following, Expanded(several[1], on_dofs)
+        )
     nodes = np.empty(len(used), dtype=np.int64)
     nodes[dofs] = used[input_nodes]
-    cells, following = cells[_dolfinx.input_cells(space.mesh)], Following.of(mesh, nodes, body.components)
-    return SubdomainMesh(number, body_name, cells, nodes, space, {}, following)
+    return SubdomainMesh(
+        number, body_name, cells, nodes, space, {}, Following.of(mesh, nodes, body.components)
+    )
 
 
 def assemble(
@@ -264,7 +335,6 @@ def assemble(
     beds = tuple(each for each in foundations if each.body == mesh.body)
     points = body.mesh.points[mesh.nodes]
     acting = tuple(load for load in loads if _acts(load, mesh, body))
-    order = np.argsort(mesh.nodes)
     springs = body.springs if isinstance(body, ToolBody) else ()
     known = earlier is not None and earlier.foundations == beds and earlier.springs == springs
     if earlier is None or not known or not _same_stiffness(earlier, parts, points):
@@ -281,12 +351,13 @@ def assemble(
         facets, acted = None, None
         if isinstance(load, SurfaceLoad):
             facets = mesh.facets_of(body, load.surface)
-            acted = np.isin(mesh.nodes[order], body.mesh.surfaces[load.surface])
-        form = forms.load(load, parts, body.cell_type, mesh.space, points[order], facets, acted)
+            acted = mesh.acted(body.mesh.surfaces[load.surface])
+        places = mesh.by_input_node(points)
+        form = forms.load(load, parts, body.cell_type, mesh.space, places, facets, acted)
         absolute = isinstance(load.value, Ufl) or _varies(parts, body, forms)
-        coordinates = points[order] if absolute else _from_own_origin(points[order])
+        coordinates = places if absolute else _from_own_origin(places)
         _dolfinx.update_coordinates(mesh.space.mesh, coordinates)
-        force += _dolfinx.assemble_vector(form)
+        force += mesh.force_of(_dolfinx.assemble_vector(form))
     _check_finite(force, mesh)
     if mesh.following is not None:
         force = mesh.following.force(force)
@@ -335,14 +406,14 @@ def _with_stiffness(
         kernel = kernel_of_body(body, points, parts.materials).reshape(mesh.size, -1)
         return replace(twin, mesh=mesh, loads=(), points=points, load=np.zeros(mesh.size), kernel=kernel)
     space, cell_type = mesh.space, body.cell_type
-    by_input_node = points[np.argsort(mesh.nodes)]
+    by_input_node = mesh.by_input_node(points)
     if not _varies(parts, body, forms):
         by_input_node = _from_own_origin(by_input_node)
 
     def stiffness() -> sp.csr_matrix:
         _dolfinx.update_coordinates(space.mesh, by_input_node)
         indptr, indices, data = _dolfinx.assemble_csr(forms.stiffness(parts, cell_type, space))
-        elastic = sp.csr_matrix((data, indices, indptr), shape=(mesh.size, mesh.size))
+        elastic = mesh.matrix_of(sp.csr_matrix((data, indices, indptr)))
         if isinstance(body, ToolBody) and body.springs:
             return (elastic + sp.csr_matrix(body.spring_matrix(points))).tocsr()
         whole = (elastic + bed).tocsr() if bed.nnz else elastic

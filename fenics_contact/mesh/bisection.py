@@ -259,7 +259,8 @@ def target_parts(mesh: BodyMesh, nodes: float | None = None) -> int:
             f"nodes must be at least {2**mesh.dim}, which one cell has, got {nodes}: a few hundred are usual"
         )
     inside = (nodes ** (1.0 / mesh.dim) - 1.0) ** mesh.dim
-    parts = round(mesh.n_cells * _NODES_PER_CELL[mesh.cell_type] / inside)
+    whole = mesh.n_nodes if mesh.has_several_shapes else mesh.n_cells * _NODES_PER_CELL[mesh.cell_type]
+    parts = round(whole / inside)
     return int(np.clip(parts, 1, mesh.n_cells))
 
 

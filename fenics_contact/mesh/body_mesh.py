@@ -9,22 +9,23 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
 from fenics_contact._base.checks import LARGEST, brief
 from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import quality
-from fenics_contact.mesh.cell_types import cell_type_of
+from fenics_contact.mesh.cell_types import FACET_TYPES, cell_type_of
 from fenics_contact.mesh.chart import Chart, check_chart
+from fenics_contact.mesh.checked_surfaces import check_range, checked_surfaces, integers
+from fenics_contact.mesh.collapsed import check_collapsed, cut_into_linear, expanded, in_words, shapes_in
 from fenics_contact.mesh.faces import (
     LAST_BITS,
-    boundary_faces,
     check_no_coincident_nodes,
     coordinate_rounding,
-    corners_of,
-    match_faces,
-    start_at_smallest,
+    is_triangle,
+    narrowed,
 )
 from fenics_contact.mesh.hanging import Centres, DependentNodes, HangingNodes, nodes_to_hold
 from fenics_contact.mesh.quadratic_nodes import check_node_order
@@ -62,32 +63,14 @@ def checked_points(points: ArrayLike, shape: tuple[int, ...] | None = None) -> n
     return array
 
 
-def _integers(values: ArrayLike, name: str) -> np.ndarray:
-    array = np.asarray(values)
-    if not np.issubdtype(array.dtype, np.integer):
-        raise InvalidInputError(
-            f"{name} must be integers, got {array.dtype}: convert with .astype(numpy.int64)"
-        )
-    copied = np.array(array, dtype=np.int64)
-    copied.setflags(write=False)
-    return copied
-
-
-def _check_range(nodes: np.ndarray, n_nodes: int, name: str) -> None:
-    if nodes.size and (nodes.min() < 0 or nodes.max() >= n_nodes):
-        raise InvalidInputError(
-            f"{name} must number nodes 0 to {n_nodes - 1}, got {nodes.min()} to {nodes.max()}: "
-            "node numbers count the rows of points from zero"
-        )
-
-
 def checked_cells(cells: ArrayLike, n_nodes: int, dim: int) -> np.ndarray:
     """Return cells, (n_cells, nodes of a cell) int64, that use every one of the ``n_nodes`` nodes."""
-    array = _integers(cells, "cells")
+    array = integers(cells, "cells")
     cell_type_of(array, dim)
     if array.shape[0] == 0:
         raise InvalidInputError("a mesh must have at least one cell, got none: give the cells of the body")
-    _check_range(array, n_nodes, "cells")
+    check_range(array, n_nodes, "cells")
+    check_collapsed(array, dim)
     orphans = np.flatnonzero(np.bincount(array.ravel(), minlength=n_nodes) == 0)
     if orphans.size:
         raise InvalidInputError(
@@ -128,85 +111,11 @@ def _check_resolved(points: np.ndarray, thick: np.ndarray) -> None:
         )
 
 
-def checked_surfaces(
-    surfaces: Mapping[str, ArrayLike],
-    cells: np.ndarray,
-    n_nodes: int,
-    dim: int,
-    *,
-    hanging: HangingNodes | None = None,
-) -> dict[str, np.ndarray]:
-    """Return named facets, (n_facets, nodes of a facet) int64, outward boundary faces of the cells."""
-    checked: dict[str, np.ndarray] = {}
-    if not surfaces:
-        return checked
-    boundary = boundary_faces(cells, dim, hanging)[0]
-    for name, facets in surfaces.items():
-        array = _integers(facets, f"surface '{name}'")
-        if array.ndim != 2 or array.shape[1] != boundary.shape[1] or array.shape[0] == 0:
-            raise InvalidInputError(
-                f"surface '{name}' must have shape (n_facets, {boundary.shape[1]}) with at least one facet, "
-                f"got {array.shape}: leave out a surface that is empty"
-            )
-        _check_range(array, n_nodes, f"surface '{name}'")
-        numbers = _face_numbers(name, array, boundary, dim)
-        # Midpoints follow from the corners; from here on they are in the order of `boundary_faces`.
-        checked[name] = (
-            array if boundary.shape[1] == corners_of(boundary, dim).shape[1] else boundary[numbers]
-        )
-        checked[name].setflags(write=False)
-    return checked
-
-
-def _face_numbers(name: str, facets: np.ndarray, boundary: np.ndarray, dim: int) -> np.ndarray:
-    """Return the numbers of the boundary faces that the facets are, (n_facets,)."""
-    numbers = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
-    lost = np.flatnonzero(numbers < 0)
-    if lost.size:
-        raise InvalidInputError(
-            f"surface '{name}' must consist of boundary faces of the cells, {lost.size} of {facets.shape[0]} "
-            f"are not, first facet {lost[0]} with nodes {facets[lost[0]].tolist()}: take them from "
-            f"`boundary_faces(cells, dim={dim})`"
-        )
-    _check_once(name, facets, numbers)
-    there = boundary[numbers]
-    wrong = np.flatnonzero((np.sort(facets, axis=1) != np.sort(there, axis=1)).any(axis=1))
-    if wrong.size:
-        raise InvalidInputError(
-            f"surface '{name}' must list the corners of each facet, then the midpoints of its edges, then "
-            f"its centre, {wrong.size} of {facets.shape[0]} facets have other nodes, first facet {wrong[0]} "
-            f"with nodes {facets[wrong[0]].tolist()} instead of {there[wrong[0]].tolist()}: take them from "
-            f"`boundary_faces(cells, dim={dim})`"
-        )
-    given, known = (start_at_smallest(corners_of(faces, dim)) for faces in (facets, there))
-    same = (given == known).all(axis=1)
-    if not same.all():
-        first = int(np.argmin(same))
-        raise InvalidInputError(
-            f"surface '{name}' must list nodes around each facet with the normal pointing out of the body, "
-            f"{np.count_nonzero(~same)} of {facets.shape[0]} facets do not, first facet {first} with nodes "
-            f"{facets[first].tolist()}: order them with `orient(cells, facets, dim={dim})`"
-        )
-    return numbers
-
-
-def _check_once(name: str, facets: np.ndarray, numbers: np.ndarray) -> None:
-    """Reject a facet that is listed twice, also in another order: its area would count twice."""
-    _, first, counts = np.unique(numbers, return_index=True, return_counts=True)
-    twice = np.flatnonzero(counts > 1)
-    if twice.size:
-        raise InvalidInputError(
-            f"surface '{name}' must list every facet once, {twice.size} of {first.size} are listed more "
-            f"often, among them the one with nodes {facets[first[twice[0]]].tolist()}: keep one of each "
-            "(numpy.unique(numpy.sort(facets, axis=1), axis=0, return_index=True))"
-        )
-
-
 def checked_grid(grid: ArrayLike | None, n_cells: int, dim: int) -> np.ndarray | None:
     """Return the structured index of every cell, (n_cells, dim) int64 from zero, or None."""
     if grid is None:
         return None
-    array = _integers(grid, "grid")
+    array = integers(grid, "grid")
     if array.shape != (n_cells, dim) or array.min() < 0:
         raise InvalidInputError(
             f"grid must have shape ({n_cells}, {dim}) and no negative entry, got shape {array.shape}: give "
@@ -220,7 +129,7 @@ def checked_regions(regions: Mapping[str, ArrayLike], n_cells: int) -> dict[str,
     checked: dict[str, np.ndarray] = {}
     owner = np.full(n_cells, -1, dtype=np.int64)
     for number, (name, cells) in enumerate(regions.items()):
-        array = np.sort(_integers(cells, f"region '{name}'"), axis=None)
+        array = np.sort(integers(cells, f"region '{name}'"), axis=None)
         if array.size == 0 or array[0] < 0 or array[-1] >= n_cells:
             raise InvalidInputError(
                 f"region '{name}' must hold cell numbers from 0 to {n_cells - 1}, got "
@@ -251,8 +160,8 @@ def checked_node_sets(
     """Return named ascending node numbers, int64 each."""
     checked: dict[str, np.ndarray] = {}
     for name, nodes in sets.items():
-        array = _integers(nodes, f"node set '{name}'")
-        _check_range(array, n_nodes, f"node set '{name}'")
+        array = integers(nodes, f"node set '{name}'")
+        check_range(array, n_nodes, f"node set '{name}'")
         checked[name] = np.unique(array)
         checked[name].setflags(write=False)
         if array.size == 0 or array.ndim != 1 or len(checked[name]) < len(array) or name in surfaces:
@@ -439,7 +348,28 @@ class BodyMesh:
     def cells_in_words(self) -> str:
         """Number and type of the cells: "24 hexahedra"."""
         plural = cell_type_of(self.cells, self.dim).plural
+        if self.has_several_shapes:
+            return in_words(self.cells, self.dim)
         return f"{self.n_cells} {plural if self.centres is None else plural.replace(*_FOLLOWING)}"
+
+    @property
+    def has_several_shapes(self) -> bool:
+        """Whether some cells are prisms, pyramids or simplices among others, see `joined_cells`."""
+        return shapes_in(self.cells, self.dim) is not None
+
+    @cached_property
+    def apart(self) -> tuple[np.ndarray, sp.csr_matrix | None]:
+        """The cells as they are integrated: hexahedra all of whose nodes differ, and values at their nodes.
+
+        Node numbers, (n_cells, nodes of a cell), and E, which makes values at their nodes of those at nodes,
+        shape (n, n_nodes). Of cells of one shape the cells themselves, and None.
+        """
+        return expanded(self.cells, self.n_nodes, self.dim) or (self.cells, None)
+
+    def at_nodes_apart(self, values: np.ndarray) -> np.ndarray:
+        """Return nodal values, (at least n_nodes, ...), at the nodes of cells as they are integrated."""
+        matrix = self.apart[1]
+        return values if matrix is None else np.asarray(matrix @ values[: self.n_nodes])
 
     @property
     def followers(self) -> DependentNodes | None:
@@ -632,26 +562,65 @@ class BodyMesh:
     def linear(self) -> BodyMesh:
         """The linear cells through the same nodes; the mesh itself unless its cells are quadratic.
 
-        Contact search and pictures use them. Each cell of order two is split into 2^dim consecutive ones;
-        facets likewise. There is no grid.
+        Contact search and pictures use them. Each cell of order two is split into 2^dim consecutive ones, a
+        pyramid into 10, see `cells_cut`; facets likewise. A surface of triangles and quadrilaterals has
+        triangles alone. There is no grid.
         """
-        kind = cell_type_of(self.cells, self.dim)
-        if kind.order == 1:
+        several = self.has_several_shapes
+        if self.order == 1 and not (several and any(map(_is_mixed, self.surfaces.values()))):
             return self
-        count, pieces = len(kind.pieces), kind.face_pieces
         result = copy(self)
+        result.__dict__.pop("apart", None)
+        kind = cell_type_of(self.cells, self.dim)
+        if several and self.order == 1:
+            cells = self.cells
+        elif several:
+            cells, _ = cut_into_linear(self.cells, self.dim)
+        else:
+            cells = self.cells[:, kind.pieces].reshape(-1, kind.pieces.shape[1])
+        parents = self.cells_cut
         result._set(
-            cells=self.cells[:, kind.pieces].reshape(-1, kind.pieces.shape[1]),
-            surfaces={
-                name: facets[:, pieces].reshape(-1, pieces.shape[1]) for name, facets in self.surfaces.items()
-            },
+            cells=cells,
+            surfaces={name: _linear_facets(facets, self.dim) for name, facets in self.surfaces.items()},
             grid=None,
             regions={
-                name: (count * cells[:, None] + np.arange(count)).ravel()
-                for name, cells in self.regions.items()
+                name: np.flatnonzero(np.isin(parents, numbers)) for name, numbers in self.regions.items()
             },
         )
         return result
+
+    @property
+    def cells_cut(self) -> np.ndarray:
+        """The cell that each cell of `linear` is a piece of, ascending."""
+        if self.order == 1:
+            return np.arange(self.n_cells)
+        if self.has_several_shapes:
+            return cut_into_linear(self.cells, self.dim)[1]
+        return np.repeat(np.arange(self.n_cells), len(cell_type_of(self.cells, self.dim).pieces))
+
+
+def _is_mixed(facets: np.ndarray) -> bool:
+    """Whether there are triangles among facets of four corners."""
+    return bool(is_triangle(facets).any())
+
+
+def _linear_facets(facets: np.ndarray, dim: int) -> np.ndarray:
+    """Return the linear facets through the nodes of facets; triangles where some of these are."""
+    if _is_mixed(facets):
+        mine = is_triangle(facets)
+        parts = narrowed(facets[mine]), facets[~mine]
+        numbers = np.concatenate([np.flatnonzero(mine), np.flatnonzero(~mine)])
+        cut = []
+        for part in parts:
+            linear = _linear_facets(part, dim)
+            linear = linear[:, [[0, 1, 2], [0, 2, 3]]] if linear.shape[1] == 4 else linear
+            cut.append(linear.reshape(len(part), -1, 3))
+        each = zip(np.split(numbers, [mine.sum()]), cut, strict=True)
+        owners = np.concatenate([np.repeat(own, part.shape[1]) for own, part in each])
+        rows = np.concatenate([part.reshape(-1, 3) for part in cut])
+        return rows[np.argsort(owners, kind="stable")]
+    pieces = FACET_TYPES[facets.shape[1], dim].pieces
+    return facets[:, pieces].reshape(-1, pieces.shape[1])
 
 
 def _sizes(parts: Mapping[str, np.ndarray]) -> str:

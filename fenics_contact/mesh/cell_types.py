@@ -51,6 +51,11 @@ class CellType:
         return FACET_TYPES[self.faces.shape[1], self.dim].pieces
 
     @property
+    def shape_name(self) -> str:
+        """Name of the linear cells of the same shape."""
+        return self.name.rstrip("0123456789")
+
+    @property
     def order(self) -> int:
         """Degree of the shape functions, 1 or 2."""
         return 1 if len(self.nodes) == len(self.edges) else 2

@@ -58,7 +58,8 @@ def cut_between(mesh: BodyMesh, name: Hashable, before: np.ndarray, behind: np.n
 def closed(mesh: BodyMesh) -> BodyMesh:
     """Return the cells as if no cut had been made; some of the points are unused then."""
     result = copy(mesh)
-    result.__dict__.pop("linear", None)
+    for known in ("linear", "apart"):
+        result.__dict__.pop(known, None)
     result._set(cells=_before_cuts(mesh)[mesh.cells], surfaces={}, _cuts={})
     return result
 

@@ -5,6 +5,9 @@ that points out of the cell. In two dimensions faces are edges, listed such that
 them. Faces of quadratic cells list their corners first, then the midpoints of the edges that follow the
 corners, then the centre. Two faces are the same when they have the same corners.
 
+In bodies of several shapes of cells a triangle is a face of four corners of which the last two are one node,
+see `collapsed`; the other columns repeat nodes as well.
+
 Cells of four nodes are tetrahedra unless ``dim=2``.
 """
 
@@ -19,6 +22,7 @@ from scipy.spatial import cKDTree
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cell_types import FACET_TYPES, cell_type_of
+from fenics_contact.mesh.collapsed import has_collapsed
 
 if TYPE_CHECKING:
     from fenics_contact.mesh.hanging import HangingNodes
@@ -28,6 +32,9 @@ LAST_BITS = 8.0
 
 OPERATIONS = 8.0
 """Number of roundings of coordinates that a few operations on them add up to."""
+
+LARGEST_NODE = 2**31 - 1
+"""No node has this number: two of them are one integer."""
 
 NOTHING = 1e-10
 """Lengths below this fraction of a body's size, plus the rounding of its coordinates, count as zero."""
@@ -123,7 +130,8 @@ def cell_faces(cells: np.ndarray, dim: int = 3) -> np.ndarray:
 
     Returns node numbers of the faces, (n_cells, faces of a cell, nodes of a face).
     """
-    return cells[:, cell_type_of(cells, dim).faces]
+    faces = cells[:, cell_type_of(cells, dim).faces]
+    return triangles_last(faces.reshape(-1, faces.shape[2])).reshape(faces.shape)
 
 
 def corners_of(faces: np.ndarray, dim: int) -> np.ndarray:
@@ -141,6 +149,11 @@ def face_keys(faces: np.ndarray) -> np.ndarray:
     nodes = np.zeros((faces.shape[0], 4), dtype=np.int64)
     corners = faces[:, : 3 if faces.shape[1] == 6 else 4]
     nodes[:, : corners.shape[1]] = np.sort(corners, axis=1)
+    if corners.shape[1] == 4 and (twice := nodes[:, :-1] == nodes[:, 1:]).any():
+        # A triangle has one key however it is written: its corners, ascending, and a zero.
+        nodes[:, :-1][twice] = LARGEST_NODE
+        nodes = np.sort(nodes, axis=1)
+        nodes[nodes == LARGEST_NODE] = 0
     return (nodes[:, [0, 2]] << 31) + nodes[:, [1, 3]]
 
 
@@ -149,13 +162,13 @@ def number_faces(faces: np.ndarray) -> np.ndarray:
 
     Returns (n,) int64 consecutive numbers from 0.
     """
-    if faces.shape[0] == 0:
-        return np.zeros(0, dtype=np.int64)
     return _numbered(face_keys(faces))
 
 
 def _numbered(keys: np.ndarray) -> np.ndarray:
     """Return consecutive numbers of keys, (n, 2), in their order, the same for equal ones, (n,)."""
+    if len(keys) == 0:
+        return np.zeros(0, dtype=np.int64)
     order = _in_order(keys)
     changes = np.zeros(len(keys), dtype=bool)
     for column in keys.T:  # one after the other: keys are the largest arrays of a mesh
@@ -183,13 +196,77 @@ def _numbers_of_faces(cells: np.ndarray, dim: int) -> np.ndarray:
     keys = np.empty((len(cells), len(faces), 2), dtype=np.int64)
     for place, nodes in enumerate(faces):
         keys[:, place] = face_keys(cells[:, nodes])
-    return _numbered(keys.reshape(-1, 2))
+    keys = keys.reshape(-1, 2)
+    flat = flat_faces(cells, dim)
+    keys[flat] = -1 - flat[:, None]  # each is alone
+    return _numbered(keys)
+
+
+def flat_faces(cells: np.ndarray, dim: int) -> np.ndarray:
+    """Return the places of faces that are no more than an edge or a vertex, of collapsed cells, (n,)."""
+    if not has_collapsed(cells, dim):
+        return np.zeros(0, dtype=np.int64)
+    faces = cell_type_of(cells, dim).faces
+    corners = np.sort(cells[:, faces[:, : 2 * (dim - 1)]], axis=2)
+    different = 1 + np.count_nonzero(np.diff(corners, axis=2), axis=2)
+    return np.flatnonzero(different.ravel() < dim)
 
 
 def _faces_at(cells: np.ndarray, dim: int, places: np.ndarray) -> np.ndarray:
     """Return some faces of cells, by their places in the list of all, (n, nodes of a face)."""
     faces = cell_type_of(cells, dim).faces
-    return cells[places[:, None] // len(faces), faces[places % len(faces)]]
+    return triangles_last(cells[places[:, None] // len(faces), faces[places % len(faces)]])
+
+
+#: Columns of faces of 4 and 9 nodes that begin with another corner, by that corner.
+_TURNED = {
+    4: np.array([[0, 1, 2, 3], [1, 2, 3, 0], [2, 3, 0, 1], [3, 0, 1, 2]]),
+    9: np.array([[*(np.arange(4) + k) % 4, *4 + (np.arange(4) + k) % 4, 8] for k in range(4)]),
+}
+
+
+def triangles_last(faces: np.ndarray) -> np.ndarray:
+    """Return faces of four corners so that of triangles the last two are one node; others as they are."""
+    if faces.shape[1] not in _TURNED:
+        return faces
+    twice = faces[:, :4] == np.roll(faces[:, :4], -1, axis=1)
+    if not (turned := twice[:, :3].any(axis=1)).any():
+        return faces
+    result = faces.copy()
+    start = (twice[turned].argmax(axis=1) + 2) % 4
+    result[turned] = np.take_along_axis(faces[turned], _TURNED[faces.shape[1]][start], axis=1)
+    return result
+
+
+def is_triangle(faces: np.ndarray) -> np.ndarray:
+    """Return which faces of four corners are triangles, whose last two corners are one node, (n,)."""
+    if faces.shape[1] not in _TURNED:
+        return np.zeros(len(faces), dtype=bool)
+    return np.asarray(faces[:, 2] == faces[:, 3])
+
+
+_NARROW = {4: [0, 1, 2], 9: [0, 1, 2, 4, 5, 7]}
+_WIDE = {(3, 4): [0, 1, 2, 2], (6, 9): [0, 1, 2, 2, 3, 4, 2, 5, 2]}
+
+
+def widened(faces: np.ndarray, width: int) -> np.ndarray:
+    """Return triangles as faces of four corners with so many nodes; others as they are."""
+    columns = _WIDE.get((faces.shape[1], width))
+    return triangles_last(faces) if columns is None else faces[:, columns]
+
+
+def of_one_shape(faces: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return triangles and others among faces: numbers and nodes of each; all where they are alike."""
+    mine = is_triangle(faces)
+    if not mine.any():
+        return [(np.arange(len(faces)), faces)]
+    parts = (np.flatnonzero(mine), np.flatnonzero(~mine))
+    return [(numbers, narrowed(faces[numbers])) for numbers in parts if len(numbers)]
+
+
+def narrowed(faces: np.ndarray) -> np.ndarray:
+    """Return faces that are all triangles with 3 or 6 nodes each; others as they are."""
+    return faces[:, _NARROW[faces.shape[1]]] if len(faces) and is_triangle(faces).all() else faces
 
 
 def boundary_faces(
@@ -206,7 +283,7 @@ def boundary_faces(
         The faces, outward, (n, nodes of a face), and the cell that each belongs to, (n,), ascending.
     """
     numbers = _numbers_of_faces(cells, dim)
-    single = np.flatnonzero(np.bincount(numbers)[numbers] == 1)
+    single = np.setdiff1d(np.flatnonzero(np.bincount(numbers)[numbers] == 1), flat_faces(cells, dim))
     if hanging is not None:
         small, large = _on_larger(_faces_at(cells, dim, single), hanging)
         single = np.delete(single, np.concatenate([small, large]))
@@ -269,11 +346,11 @@ def neighbours(cells: np.ndarray, dim: int = 3, hanging: HangingNodes | None = N
 def match_faces(faces: np.ndarray, candidates: np.ndarray) -> np.ndarray:
     """Find each face among the candidates, whatever its orientation.
 
-    `faces`: node numbers, (n, k); `candidates`: node numbers, (m, k), all different faces.
+    `faces`: node numbers, (n, k); `candidates`: node numbers, (m, k'), all different faces.
 
     Returns (n,) positions in ``candidates``, -1 where there is none.
     """
-    numbers = number_faces(np.concatenate([candidates, faces]))
+    numbers = _numbered(np.concatenate([face_keys(candidates), face_keys(faces)]))
     position = np.full(numbers.max(initial=-1) + 1, -1, dtype=np.int64)
     position[numbers[: candidates.shape[0]]] = np.arange(candidates.shape[0])
     return position[numbers[candidates.shape[0] :]]

@@ -16,6 +16,7 @@ from fenics_contact.mesh.cell_types import (
     shape_values,
 )
 from fenics_contact.mesh.chart import kept_valid
+from fenics_contact.mesh.collapsed import SHAPES, by_shape, joined_cells, shapes_in
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
 from fenics_contact.mesh.hanging import require_none
 from fenics_contact.mesh.on_shapes import put_on_shapes, with_parts
@@ -81,6 +82,8 @@ def with_more_nodes(
 
     Returns the vertices around them, groups of shape (n, k) in the order of the numbers, and the cells.
     """
+    if shapes_in(cells, linear.dim) is not None:
+        return _with_nodes_of_shapes(count, cells, linear.dim)
     # The vertices whose linear shape functions are not zero there.
     weights = shape_values(linear, kind.nodes[len(linear.nodes) :])
     parents = [np.flatnonzero(values > 0.1) for values in weights]
@@ -94,6 +97,36 @@ def with_more_nodes(
         result[:, where] = number.reshape(len(cells), -1) + count
         groups.append(unique)
         count += len(unique)
+    return groups, result
+
+
+def _with_nodes_of_shapes(count: int, cells: np.ndarray, dim: int) -> tuple[list[np.ndarray], np.ndarray]:
+    """Number the nodes in the middle of edges, faces and cells of several shapes, as `with_more_nodes`."""
+    found = by_shape(cells, dim)
+    whole = {name: SHAPES[name].sets(SHAPES[name].counts[2]) for name in found}
+    rows = {name: np.empty((len(own), len(whole[name])), dtype=np.int64) for name, (_, own) in found.items()}
+    groups: list[np.ndarray] = []
+    for size in sorted({len(each) for sets in whole.values() for each in sets}):
+        where = {
+            name: [i for i, each in enumerate(sets) if len(each) == size] for name, sets in whole.items()
+        }
+        around = [
+            np.sort(own[:, [sorted(whole[name][i]) for i in where[name]]].reshape(-1, size), axis=1)
+            for name, (_, own) in found.items()
+        ]
+        if size == 1:
+            numbers = np.concatenate(around).ravel()
+        else:
+            unique, numbers = np.unique(np.concatenate(around), axis=0, return_inverse=True)
+            groups.append(unique)
+            numbers = numbers.ravel() + count
+            count += len(unique)
+        ends = np.cumsum([len(each) for each in around])[:-1]
+        for name, mine in zip(found, np.split(numbers, ends), strict=True):
+            rows[name][:, where[name]] = mine.reshape(len(rows[name]), -1)
+    order = np.concatenate([mine for mine, _ in found.values()])
+    result = np.empty((len(cells), 9 if dim == 2 else 27), dtype=np.int64)
+    result[order] = joined_cells(rows, dim)
     return groups, result
 
 

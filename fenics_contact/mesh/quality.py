@@ -13,6 +13,7 @@ import numpy as np
 from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cell_types import CellType, cell_type_of, quadrature, shape_gradients
+from fenics_contact.mesh.collapsed import SHAPES, collapse, places_of, shapes_in
 from fenics_contact.mesh.faces import computed_rounding, corners_of
 from fenics_contact.shapes.combined import Joined
 from fenics_contact.shapes.parametric import tensor_grid
@@ -63,16 +64,39 @@ def jacobians(points: np.ndarray, cells: np.ndarray, positions: np.ndarray | Non
     The result has shape (n_cells, m), or (n_cells, 1) for linear simplices, in units of volume (area).
     """
     cell = cell_type_of(cells, points.shape[1])
-    corners = points[cells]
     if cell.is_affine:
+        corners = points[cells]
         return determinants(corners[:, 1:] - corners[:, :1])[:, None]
     if positions is None:
         positions = _critical_positions(cell)
+        if (groups := shapes_in(cells, cell.dim)) is not None:
+            return _of_shapes(points, cells, positions, groups)
+    corners = places_of(points, cells)
     columns = np.ascontiguousarray(corners.transpose(0, 2, 1)).reshape(-1, cells.shape[1])
     values = np.empty((cells.shape[0], positions.shape[0]))
     # A few positions, all cells at once, which keeps the arrays small.
     for m, gradients in enumerate(shape_gradients(cell, positions)):
         values[:, m] = determinants((columns @ gradients).reshape(-1, cell.dim, cell.dim))
+    return values
+
+
+def _of_shapes(
+    points: np.ndarray,
+    cells: np.ndarray,
+    positions: np.ndarray,
+    groups: Mapping[str, np.ndarray],
+    inward: float = 1e-3,
+) -> np.ndarray:
+    """Return Jacobians of prisms, pyramids and simplices over those of the collapsed map of straight ones.
+
+    `inward`: the positions are moved towards the middle by this fraction, as both vanish at collapsed edges.
+    """
+    values = np.empty((len(cells), len(positions)))
+    for name, mine in groups.items():
+        shape, at = SHAPES[name], positions
+        if not shape.is_whole:
+            at = positions + inward * (0.5 - positions)
+        values[mine] = jacobians(points, cells[mine], at) / shape.shrinkage(at)
     return values
 
 
@@ -96,11 +120,31 @@ def scaled_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
         (n_cells,) values in [-1, 1]: 1 for a box or a regular simplex, 0 or less where inverted.
     """
     cell = cell_type_of(cells, points.shape[1])
+    if (groups := shapes_in(cells, cell.dim)) is not None:
+        values = np.empty(len(cells))
+        for name, mine in groups.items():
+            own = cells[mine][:, collapse(name, cell.order).places]
+            values[mine] = _best_shape(name) * _corner_determinants(points, own, SHAPES[name].corner_edges)
+        return values
     corners = points[cells[:, : len(cell.edges)]]
     edges = corners[:, cell.edges] - corners[:, :, None, :]
     length = np.linalg.norm(edges, axis=-1, keepdims=True)
     values = determinants(edges / np.maximum(length, np.finfo(float).tiny)).min(axis=1)
     return np.asarray((_BEST_CORNER[cell.dim] if cell.is_simplex else 1.0) * values)
+
+
+def _corner_determinants(points: np.ndarray, cells: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Return the smallest determinant of the unit edge vectors at corners, (n_cells,)."""
+    edges = points[cells[:, corners[:, 1:]]] - points[cells[:, corners[:, :1]]]
+    length = np.linalg.norm(edges, axis=-1, keepdims=True)
+    return np.asarray(determinants(edges / np.maximum(length, np.finfo(float).tiny)).min(axis=1))
+
+
+def _best_shape(name: str) -> float:
+    """Return one over the corner determinant of a shape whose edges are all equal."""
+    return {"prism": _BEST_CORNER[2], "pyramid": _BEST_CORNER[3]}.get(
+        name, _BEST_CORNER[SHAPES[name].dim] if name in ("triangle", "tetrahedron") else 1.0
+    )
 
 
 def cell_volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:

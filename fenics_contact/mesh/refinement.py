@@ -185,7 +185,7 @@ def _carried_nodes(mesh: BodyMesh, points: np.ndarray) -> dict[str, np.ndarray]:
 def _checked_marks(mesh: BodyMesh, marked: ArrayLike) -> np.ndarray:
     """Return the numbers of the marked cells."""
     kind = CELL_TYPES[mesh.cell_type]
-    if kind.order == 2 and not kind.is_simplex:
+    if (kind.order == 2 and not kind.is_simplex) or mesh.has_several_shapes:
         raise InvalidInputError(
             "refined needs simplices, or linear quadrilaterals or hexahedra, got "
             f"{mesh.cells_in_words}: take linear cells, or a finer mesh of these"

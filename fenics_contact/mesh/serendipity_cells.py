@@ -1,4 +1,4 @@
-"""Serendipity cells: quadrilaterals of 8 and hexahedra of 20 nodes, as complete ones whose centres follow."""
+"""Serendipity cells, such as hexahedra of 20 nodes, as complete ones whose centres follow."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh, check_jacobians
-from fenics_contact.mesh.cell_types import HEXAHEDRON27, QUADRILATERAL9, cell_type_of
+from fenics_contact.mesh.cell_types import cell_type_of
+from fenics_contact.mesh.collapsed import SHAPES, by_shape
 from fenics_contact.mesh.hanging import Centres
 
 _OF_A_FACE = np.array([-0.25, -0.25, -0.25, -0.25, 0.5, 0.5, 0.5, 0.5])
@@ -22,31 +23,29 @@ def centres_of(cells: np.ndarray, dim: int) -> Centres | None:
 
     `cells`: node numbers of complete quadratic cells, (n_cells, nodes of a cell).
     """
-    kind = cell_type_of(cells, dim)
-    if kind is QUADRILATERAL9:
-        return _once(cells[:, 8], cells[:, :8], _OF_A_FACE)
-    if kind is not HEXAHEDRON27:
+    if cell_type_of(cells, dim).order == 1:
         return None
-    faces = cells[:, kind.faces].reshape(-1, 9)
-    masters = np.column_stack([faces[:, :8], np.repeat(faces[:, :1], 12, axis=1)])
-    weights = np.concatenate([_OF_A_FACE, np.zeros(12)])
-    on_faces, inside = _once(faces[:, 8], masters, weights), _once(cells[:, 26], cells[:, :20], _OF_A_CELL)
-    nodes = np.concatenate([on_faces.nodes, inside.nodes])
-    order = np.argsort(nodes)
-    return Centres(
-        nodes[order],
-        np.concatenate([on_faces.masters, inside.masters])[order],
-        np.concatenate([on_faces.given, inside.given])[order],
-    )
-
-
-def _once(nodes: np.ndarray, masters: np.ndarray, weights: np.ndarray) -> Centres:
-    nodes, first = np.unique(nodes, return_index=True)
-    return Centres(nodes, masters[first], np.tile(weights, (len(nodes), 1)))
+    width = 8 if dim == 2 else 20
+    nodes, masters, weights = [np.zeros(0, dtype=np.int64)], [np.zeros((0, width), dtype=np.int64)], []
+    for name, (_, own) in by_shape(cells, dim).items():
+        faces = own[:, SHAPES[name].square_columns].reshape(-1, 9)
+        nodes.append(faces[:, 8])
+        masters.append(np.column_stack([faces[:, :8], np.repeat(faces[:, :1], width - 8, axis=1)]))
+        weights.append(np.tile(np.append(_OF_A_FACE, np.zeros(width - 8)), (len(faces), 1)))
+        if dim == 3 and SHAPES[name].centre:
+            nodes.append(own[:, 26])
+            masters.append(own[:, :20])
+            weights.append(np.tile(_OF_A_CELL, (len(own), 1)))
+    node, first = np.unique(np.concatenate(nodes), return_index=True)
+    if not len(node):
+        return None
+    return Centres(node, np.concatenate(masters)[first], np.concatenate(weights)[first])
 
 
 def serendipity(mesh: BodyMesh) -> BodyMesh:
-    """Return the mesh with cells of 8 nodes in the plane, of 20 in space: their centres follow the others.
+    """Return the mesh with serendipity cells: the centres of faces and cells follow their other nodes.
+
+    Quadrilaterals have 8 nodes then, hexahedra 20, prisms 15 and pyramids 13.
 
     The nodes in the centres of faces and cells stay, so that surfaces, results and files are those of
     complete cells, but they are no unknowns: u_c = ½ Σ midpoints − ¼ Σ corners on faces, ¼ Σ midpoints − ¼ Σ
@@ -55,7 +54,7 @@ def serendipity(mesh: BodyMesh) -> BodyMesh:
     uniform pressure pulls at the corners of facets without them; a `Scene` sees to that.
 
     Args:
-        mesh: Quadrilaterals of 9 nodes or hexahedra of 27.
+        mesh: Quadrilaterals of 9 nodes, hexahedra of 27, prisms of 18, pyramids of 14, or several of these.
 
     Raises:
         InvalidInputError: If the cells are others, or a cell is inverted.
@@ -73,7 +72,7 @@ def serendipity(mesh: BodyMesh) -> BodyMesh:
     centres = centres_of(mesh.cells, mesh.dim)
     if centres is None:
         raise InvalidInputError(
-            "serendipity needs quadrilaterals of 9 nodes or hexahedra of 27, got "
+            "serendipity needs quadratic cells with faces of four corners, got "
             f"{cell_type_of(mesh.cells, mesh.dim).plural}: make them quadratic first (mesh.quadratic); "
             "simplices have no centres"
         )

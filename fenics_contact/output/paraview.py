@@ -20,8 +20,10 @@ from fenics_contact._base.files import remove_abandoned
 from fenics_contact._base.libraries import MPI
 from fenics_contact._base.requirements import require_extra
 from fenics_contact.errors import InvalidInputError, collectively, together
+from fenics_contact.mesh.collapsed import by_shape
 from fenics_contact.output.files import replacing, replacing_together, write_text
 from fenics_contact.results.fields import in_space
+from fenics_contact.results.multi_block import vtk_nodes
 from fenics_contact.results.state import State
 
 if TYPE_CHECKING:
@@ -179,16 +181,17 @@ def checked_name(folder: str | Path, name: str, suffix: str) -> Path:
     return Path(folder) / f"{name}{suffix}"
 
 
-_MESHIO_NAMES = {
-    "hexahedron": "hexahedron",
-    "tetrahedron": "tetra",
-    "quadrilateral": "quad",
-    "triangle": "triangle",
-    "hexahedron27": "hexahedron27",
-    "quadrilateral9": "quad9",
-    "triangle6": "triangle6",
-    "tetrahedron10": "tetra10",
-}
+#: meshio's names of shapes of cells by order, and the number of nodes that they have there.
+_MESHIO_SHAPES = {
+    1: {
+        "triangle": ("triangle", 3), "quadrilateral": ("quad", 4), "tetrahedron": ("tetra", 4),
+        "pyramid": ("pyramid", 5), "prism": ("wedge", 6), "hexahedron": ("hexahedron", 8),
+    },
+    2: {
+        "triangle": ("triangle6", 6), "quadrilateral": ("quad9", 9), "tetrahedron": ("tetra10", 10),
+        "pyramid": ("pyramid", 5), "prism": ("wedge15", 15), "hexahedron": ("hexahedron27", 27),
+    },
+}  # fmt: skip
 
 
 @collectively("write_vtu", lambda state, *_, **__: state.torn.decomposition.comm)
@@ -255,11 +258,19 @@ def _gathered(state: State, body: str, more: Mapping[str, np.ndarray]) -> meshio
     fields = state.gather_fields(body)
     import meshio
 
+    names = _MESHIO_SHAPES[mesh.order]
+    blocks = [
+        (names[shape][0], mine, own[:, vtk_nodes(shape, names[shape][1])])
+        for shape, (mine, own) in by_shape(mesh.cells, mesh.dim).items()
+    ]
     return meshio.Mesh(
         in_space(mesh.points),
-        [(_MESHIO_NAMES[mesh.cell_type], mesh.cells)],
+        [(name, cells) for name, _, cells in blocks],
         point_data={key: in_space(values) for key, values in fields.points.items()},
-        cell_data={key: [in_space(values)] for key, values in {**fields.cells, **more}.items()},
+        cell_data={
+            key: [in_space(values[mine]) for _, mine, _ in blocks]
+            for key, values in {**fields.cells, **more}.items()
+        },
     )
 
 

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cell_types import cell_type_of
+from fenics_contact.mesh.collapsed import SHAPES
 from fenics_contact.mesh.faces import boundary_faces
 from fenics_contact.pictures.canvas import (
     INK,
@@ -30,7 +31,7 @@ from fenics_contact.pictures.canvas import (
 )
 from fenics_contact.results.contact import ContactResult
 from fenics_contact.results.fields import STRESS_COMPONENTS
-from fenics_contact.results.multi_block import hanging_of
+from fenics_contact.results.multi_block import hanging_of, vtk_nodes
 from fenics_contact.results.state import State
 
 #: Drawn bodies by name.
@@ -73,6 +74,7 @@ def is_plane(body: pv.UnstructuredGrid) -> bool:
 
 def linear_cells(name: str, body: pv.UnstructuredGrid) -> tuple[np.ndarray, int, int]:
     """Return the nodes of linear cells, how many of them one of the body makes, and their dimension."""
+    body = of_one_type(body)
     if body.n_cells == 0 or len(np.unique(body.celltypes)) != 1:
         raise InvalidInputError(
             f"fields are drawn on cells of one type, {name!r} has {len(np.unique(body.celltypes))} types: "
@@ -85,8 +87,41 @@ def linear_cells(name: str, body: pv.UnstructuredGrid) -> tuple[np.ndarray, int,
     return cells[:, kind.pieces].reshape(-1, kind.pieces.shape[1]), len(kind.pieces), dim
 
 
+#: Shape of the linear cell at the corners of VTK's types of cells.
+_SHAPE_OF = {
+    5: "triangle", 22: "triangle", 9: "quadrilateral", 23: "quadrilateral", 28: "quadrilateral",
+    10: "tetrahedron", 24: "tetrahedron", 12: "hexahedron", 25: "hexahedron", 29: "hexahedron",
+    13: "prism", 26: "prism", 32: "prism", 14: "pyramid", 27: "pyramid",
+}  # fmt: skip
+
+
+def of_one_type(body: pv.UnstructuredGrid) -> pv.UnstructuredGrid:
+    """Return a body of several shapes of cells with hexahedra (quadrilaterals) at their corners.
+
+    All fields are kept. Others are returned as they are.
+    """
+    types = np.asarray(body.celltypes)
+    several = len(np.unique(types)) > 1 or np.isin(types, (13, 14, 26, 27, 32)).any()
+    if not several or not np.isin(types, list(_SHAPE_OF)).all():
+        return body
+    dim = 2 if is_plane(body) else 3
+    nodes, starts = np.asarray(body.cell_connectivity), np.asarray(body.offset)[:-1]
+    cells = np.empty((len(types), 2**dim), dtype=np.int64)
+    for number in np.unique(types):
+        mine = np.flatnonzero(types == number)
+        shape = SHAPES[_SHAPE_OF[int(number)]]
+        onto = vtk_nodes(shape.name, shape.corners)[np.array(shape.onto)]
+        cells[mine] = nodes[starts[mine][:, None] + onto]
+    kind = pv.CellType.QUAD if dim == 2 else pv.CellType.HEXAHEDRON
+    found = pv.UnstructuredGrid({kind: cells}, body.points)
+    found.point_data.update(body.point_data)
+    found.cell_data.update(body.cell_data)
+    return found
+
+
 def linear(name: str, body: pv.UnstructuredGrid) -> pv.UnstructuredGrid:
     """Return a body with linear cells and all fields."""
+    body = of_one_type(body)
     cells, pieces, dim = linear_cells(name, body)
     if pieces == 1:
         return body

@@ -123,7 +123,7 @@ def plot_decomposition(
     for name, body in scene.deforming.items():
         mesh, numbers = body.mesh.linear, np.unique(partitions[name], return_inverse=True)[1]
         grid = body_grid(mesh, in_space(mesh.points))
-        grid.cell_data["subdomain"] = count + np.repeat(numbers, mesh.n_cells // body.mesh.n_cells)
+        grid.cell_data["subdomain"] = count + numbers[body.mesh.cells_cut]
         bodies[name] = _shrunk(grid, 1.0 - explode) if explode else grid
         count += int(numbers.max()) + 1
     total = written(sum(body.mesh.n_cells for body in scene.deforming.values()))

@@ -36,6 +36,7 @@ from fenics_contact.feti.torn import TornSystem
 from fenics_contact.materials.elastic import Material
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
+from fenics_contact.mesh.collapsed import places_of
 from fenics_contact.mesh.quality import jacobians
 from fenics_contact.results.contact import ContactResult
 
@@ -49,13 +50,15 @@ def body_mesh(decomposition: Decomposition, name: str, body: Body) -> _dolfinx.m
     tearing, mesh = decomposition.tearing, body.mesh
     first = tearing.subdomain_offset[tearing.body_names.index(name)]
     rank = tearing.subdomain_rank[first + decomposition.partitions[name]]
-    return _dolfinx.rank_mesh(decomposition.comm, mesh.points, mesh.cells, rank, mesh.cell_type)
+    points, cells = mesh.at_nodes_apart(mesh.points), mesh.apart[0]
+    return _dolfinx.rank_mesh(decomposition.comm, points, cells, rank, mesh.cell_type)
 
 
 def displacement_function(mesh: _dolfinx.mesh.Mesh, values: np.ndarray) -> _dolfinx.fem.Function:
     """Return the displacement as a Function on a body's mesh. Collective.
 
-    `values`: displacement of the body's nodes, valid at least on those of this rank, shape (n_nodes, dim).
+    `values`: displacement of the nodes of its cells, see `BodyMesh.at_nodes_apart`, valid at least on those
+    of this rank, shape (n_nodes, dim).
     """
     function = _dolfinx.coefficient(mesh, "displacement", values.shape[1])
     nodes, dofs = _dolfinx.node_dofs(function.function_space)
@@ -67,7 +70,8 @@ def displacement_function(mesh: _dolfinx.mesh.Mesh, values: np.ndarray) -> _dolf
 def nodal_function(mesh: _dolfinx.mesh.Mesh, name: str, values: np.ndarray) -> _dolfinx.fem.Function:
     """Return a scalar field on a body's mesh from its nodal values. Collective.
 
-    `values`: nodal values of the body, on every rank, shape (at least n_nodes,).
+    `values`: values at the nodes of its cells, see `BodyMesh.at_nodes_apart`, on every rank, shape (at least
+    n_nodes,).
     """
     function = _dolfinx.fem.Function(_dolfinx.scalar_space(mesh, 1), name=name)
     nodes, dofs = _dolfinx.node_dofs(function.function_space)
@@ -79,7 +83,7 @@ def nodal_function(mesh: _dolfinx.mesh.Mesh, name: str, values: np.ndarray) -> _
 def cells_of_body(mesh: _dolfinx.mesh.Mesh, cells: np.ndarray) -> np.ndarray:
     """Return the number in the body of each cell owned by this rank, shape (n_owned,).
 
-    `cells`: node numbers of all cells of the body, shape (n_cells, nodes of a cell).
+    `cells`: node numbers of all cells of the body, see `BodyMesh.apart`, shape (n_cells, nodes of a cell).
     """
     owned = mesh.topology.index_map(mesh.topology.dim).size_local
     mine = _dolfinx.cell_nodes(mesh).reshape(-1, cells.shape[1])[:owned]
@@ -136,7 +140,7 @@ class CellMeans:
             form, constants, coefficients = _weighted(
                 self._parts.materials, cell_type, q, temperature, quantity
             )
-            self._fields = temperature.fields(mesh, body.mesh.points)
+            self._fields = temperature.fields(mesh, body.mesh.at_nodes_apart(body.mesh.points))
         self._form = Template(mesh.comm, form, constants, coefficients)
         self._numbers = temperature.numbers
         self._space = _dolfinx.scalar_space(mesh, 0)
@@ -258,7 +262,7 @@ def _composition(mesh: _dolfinx.mesh.Mesh, body: Body) -> Composition:
     count = len(body.materials)
     if count == 1:
         return Composition(body.materials)
-    number = body.material_of_cells[cells_of_body(mesh, body.mesh.cells)]
+    number = body.material_of_cells[cells_of_body(mesh, body.mesh.apart[0])]
     return Composition(body.materials, {k + 1: np.flatnonzero(number == k) for k in range(count)})
 
 
@@ -378,7 +382,7 @@ def put_history_stress(
     for mesh, response in zip(torn.decomposition.meshes, responses, strict=True):
         if mesh.body == name and response.stress is not None:
             known[mesh.cells] = _means(body, mesh.cells, quantity(response.stress))
-    number = cells_of_body(field.function_space.mesh, body.mesh.cells)
+    number = cells_of_body(field.function_space.mesh, body.mesh.apart[0])
     mine = known[number].reshape(len(number), math.prod(shape))  # a rank may have no cells
     here = ~np.isnan(mine[:, 0])
     own = _dolfinx.cell_dofs(field.function_space).ravel()[: len(number)]
@@ -398,7 +402,7 @@ def _gauss_weights(body: Body, cells: np.ndarray) -> tuple[np.ndarray, np.ndarra
     """Return weights of the Gauss points in the plane or in space, and their first coordinates."""
     mesh, cell = body.mesh, CELL_TYPES[body.mesh.cell_type]
     positions, weights = quadrature(cell, quadrature_degree(body.cell_type))
-    first = mesh.points[mesh.cells[cells], 0] @ shape_values(cell, positions).T
+    first = places_of(mesh.points, mesh.cells[cells])[..., 0] @ shape_values(cell, positions).T
     return weights * jacobians(mesh.points, mesh.cells[cells], positions), first
 
 
@@ -406,7 +410,7 @@ def _gauss_heights(body: Body, cells: np.ndarray) -> np.ndarray:
     """Return the second coordinates of the Gauss points of cells, shape (n_cells, n_gauss)."""
     mesh, cell = body.mesh, CELL_TYPES[body.mesh.cell_type]
     positions, _ = quadrature(cell, quadrature_degree(body.cell_type))
-    return np.asarray(mesh.points[mesh.cells[cells], 1] @ shape_values(cell, positions).T)
+    return np.asarray(places_of(mesh.points, mesh.cells[cells])[..., 1] @ shape_values(cell, positions).T)
 
 
 def nodal_stress(
@@ -443,7 +447,7 @@ def nodal_stress(
 def _from_cells(torn: TornSystem, name: str, sites: Sites, stress: _dolfinx.fem.Function) -> np.ndarray:
     """Return the components of the mean stress around the sites of a body, shape (n_sites, 6). Collective."""
     space = stress.function_space
-    number = cells_of_body(space.mesh, torn.scene.bodies[name].mesh.cells)
+    number = cells_of_body(space.mesh, torn.scene.bodies[name].mesh.apart[0])
     own = _dolfinx.cell_dofs(space).ravel()[: len(number)]
     return _around_sites(torn, name, sites, components_of(stress.x.array.reshape(-1, 3, 3)[own]), number)
 
@@ -466,7 +470,7 @@ def _at_sites(
     displacement, gradients = moved
     temperature = temperature_of(torn.scene.loads, name)
     means = CellStress(mesh, body, torn.decomposition.comm, temperature)
-    number = cells_of_body(mesh, body.mesh.cells)
+    number = cells_of_body(mesh, body.mesh.apart[0])
     places = body.mesh.points - (0.0 if body.axisymmetric else body.mesh.points.mean(axis=0))
     # A rotation has no stress: the gradients (i, j) and (j, i) have the same. Of bodies of revolution u_z = r
     # is shear alone, u_r = z has a hoop strain.
@@ -484,7 +488,9 @@ def _at_sites(
         fields += [np.eye(width)[2] * np.ones((len(places), 1)), np.eye(width)[2] * places[:, 1:]]
         turn = _by_radius(torn, sites, displacement, gradients[:, 2, 0], 2)
         sizes += [gradients[:, 2, 0] - turn, gradients[:, 2, 1]]
-    on_cells = [means.components(displacement_function(mesh, field)) for field in fields]
+    on_cells = [
+        means.components(displacement_function(mesh, body.mesh.at_nodes_apart(field))) for field in fields
+    ]
     if body.axisymmetric:
         weights, radii = _gauss_weights(body, number)
         mean = ((weights * radii).sum(axis=1) / weights.sum(axis=1))[:, None]

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, together
+from fenics_contact.mesh.cell_types import CELL_TYPES
+from fenics_contact.mesh.collapsed import SHAPES, by_shape
 from fenics_contact.mesh.hanging import HangingNodes
 from fenics_contact.results.fields import GatheredFields, in_space
 
@@ -19,17 +21,11 @@ if TYPE_CHECKING:
     from fenics_contact.mesh.body_mesh import BodyMesh
 
 
-#: VTK's names of the cell types; their nodes are in VTK's order.
-_VTK_NAMES = {
-    "hexahedron": "HEXAHEDRON",
-    "tetrahedron": "TETRA",
-    "quadrilateral": "QUAD",
-    "triangle": "TRIANGLE",
-    "hexahedron27": "TRIQUADRATIC_HEXAHEDRON",
-    "quadrilateral9": "BIQUADRATIC_QUAD",
-    "triangle6": "QUADRATIC_TRIANGLE",
-    "tetrahedron10": "QUADRATIC_TETRA",
-}
+#: Of shapes of cells, VTK's number and the number of nodes that it has, by order.
+_VTK_SHAPES = {
+    "triangle": ((5, 3), (22, 6)), "quadrilateral": ((9, 4), (28, 9)), "tetrahedron": ((10, 4), (24, 10)),
+    "pyramid": ((14, 5), (27, 13)), "prism": ((13, 6), (26, 15)), "hexahedron": ((12, 8), (29, 27)),
+}  # fmt: skip
 
 
 def multi_block(
@@ -52,27 +48,52 @@ def multi_block(
         fields = gather(name)
         points = in_space(whole.points) + deformed * in_space(fields.points["displacement"])
         mesh = whole.linear if linear else whole
-        grid = body_grid(mesh, points)
+        grid = body_grid(mesh, points, by_shapes=not linear)
         for key, values in fields.points.items():
             grid.point_data[key] = in_space(values)
         for key, values in fields.cells.items():
-            grid.cell_data[key] = np.repeat(values, mesh.n_cells // whole.n_cells, axis=0)
+            grid.cell_data[key] = values[whole.cells_cut] if linear else values
         blocks[name] = grid
     return blocks
 
 
-def body_grid(mesh: BodyMesh, points: np.ndarray) -> pyvista.UnstructuredGrid:
+def body_grid(mesh: BodyMesh, points: np.ndarray, *, by_shapes: bool = False) -> pyvista.UnstructuredGrid:
     """Return the cells of a body on points in space, (n_nodes, 3), as pyvista's UnstructuredGrid.
+
+    Cells of several shapes are hexahedra (quadrilaterals) some of whose nodes coincide, unless `by_shapes`.
 
     If nodes hang, it has their numbers and their masters as fields of its own, ``hanging_nodes``, (n,), and
     ``hanging_masters``, (n, 2 | 4).
     """
     pv = _pyvista()
-    grid = pv.UnstructuredGrid({pv.CellType[_VTK_NAMES[mesh.cell_type]]: mesh.cells}, points)
+    if by_shapes and mesh.has_several_shapes:
+        return _grid_of_shapes(mesh, points)
+    kind = _VTK_SHAPES[CELL_TYPES[mesh.cell_type].shape_name][mesh.order - 1][0]
+    grid = pv.UnstructuredGrid({pv.CellType(kind): mesh.cells}, points)
     if mesh.hanging is not None:
         grid.field_data["hanging_nodes"] = mesh.hanging.nodes
         grid.field_data["hanging_masters"] = mesh.hanging.masters
     return grid
+
+
+def vtk_nodes(shape: str, count: int) -> np.ndarray:
+    """Return the nodes of a cell in the order of VTK, whose prisms begin with an outward triangle."""
+    return SHAPES[shape].mirror(count) if shape == "prism" else np.arange(count)
+
+
+def _grid_of_shapes(mesh: BodyMesh, points: np.ndarray) -> pyvista.UnstructuredGrid:
+    found = by_shape(mesh.cells, mesh.dim)
+    kinds = {name: _VTK_SHAPES[name][mesh.order - 1] for name in found}
+    types, counts = np.empty((2, mesh.n_cells), dtype=np.int64)
+    for name, (mine, _) in found.items():
+        types[mine], counts[mine] = kinds[name]
+    starts = np.concatenate([[0], np.cumsum(counts + 1)])
+    flat = np.empty(starts[-1], dtype=np.int64)
+    flat[starts[:-1]] = counts
+    for name, (mine, own) in found.items():
+        width = kinds[name][1]
+        flat[starts[mine][:, None] + 1 + np.arange(width)] = own[:, vtk_nodes(name, width)]
+    return _pyvista().UnstructuredGrid(flat, types, points)
 
 
 def hanging_of(grid: pyvista.DataSet) -> HangingNodes | None:

@@ -310,7 +310,9 @@ class State(ABC):
         """Displacement of each body as a Function on its own mesh, [length]. Collective on first use."""
         decomposition = self.torn.decomposition
         return {
-            name: displacement_function(body_mesh(decomposition, name, body), self._at_nodes(name))
+            name: displacement_function(
+                body_mesh(decomposition, name, body), body.mesh.at_nodes_apart(self._at_nodes(name))
+            )
             for name, body in self.scene.bodies.items()
         }
 
@@ -345,7 +347,7 @@ class State(ABC):
         Collective on first use.
         """
         return {
-            name: principal_stress(self.stress[name], body.mesh.cells)
+            name: principal_stress(self.stress[name], body.mesh.apart[0])
             for name, body in self.scene.bodies.items()
         }
 
@@ -361,7 +363,11 @@ class State(ABC):
 
     def _contact_functions(self, key: str) -> dict[str, dolfinx.fem.Function]:
         return {
-            name: nodal_function(u.function_space.mesh, key, self._contact_fields(name)[key])
+            name: nodal_function(
+                u.function_space.mesh,
+                key,
+                self.scene.bodies[name].mesh.at_nodes_apart(self._contact_fields(name)[key]),
+            )
             for name, u in self.displacement.items()
         }
 
@@ -387,12 +393,12 @@ class State(ABC):
     @collectively("State.gather_von_mises", comm_of)
     def gather_von_mises(self, body: str) -> np.ndarray:
         """Return the von Mises stress of a body's cells on every rank, shape (n_cells,). Collective."""
-        return cell_values(self.von_mises[body], self.scene.bodies[body].mesh.cells)
+        return cell_values(self.von_mises[body], self.scene.bodies[body].mesh.apart[0])
 
     @collectively("State.gather_stress", comm_of)
     def gather_stress(self, body: str) -> np.ndarray:
         """Return the mean stress of a body's cells on every rank, shape (n_cells, 3, 3). Collective."""
-        return cell_values(self.stress[body], self.scene.bodies[body].mesh.cells)
+        return cell_values(self.stress[body], self.scene.bodies[body].mesh.apart[0])
 
     @collectively("State.gather_nodal_stress", comm_of)
     def gather_nodal_stress(self, body: str) -> np.ndarray:

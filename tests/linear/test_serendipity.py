@@ -118,7 +118,7 @@ def test_large_strains_are_even_as_well() -> None:
 def test_cells_without_centres_are_refused_and_complete_ones_stay() -> None:
     ten = quadratic(block((0, 0, 0), (1, 1, 1), (1, 1, 1), "tetrahedron"))
     with pytest.raises(
-        InvalidInputError, match=r"needs quadrilaterals of 9 nodes or hexahedra of 27, got quad"
+        InvalidInputError, match=r"needs quadratic cells with faces of four corners, got quad"
     ):
         serendipity(ten)
     assert completed(ten) is ten

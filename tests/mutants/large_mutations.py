@@ -13,8 +13,8 @@ LARGE_MUTATIONS = (
     Mutation(
         "pressures that follow are three percent softer than their forces say",
         "_large_deformations/loading.py",
-        "blocks[number] = blocks[number] + softening",
-        "blocks[number] = blocks[number] + 0.97 * softening",
+        "blocks[number] = blocks[number] + mesh.matrix_of(softening)",
+        "blocks[number] = blocks[number] + 0.97 * mesh.matrix_of(softening)",
         (
             "tests/nonlinear/test_prescribed_motion.py::test_newton_is_quadratic_where_rims_slide_in_planes_of"
             "_symmetry_and_neighbours_pass_forces_on",
