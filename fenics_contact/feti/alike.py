@@ -90,7 +90,7 @@ class Kind:
 
     def forget(self) -> None:
         """Free what is made again where it is needed."""
-        for name in ("arms", "tree", "marks", "sorted_marks", "blocks"):
+        for name in ("arms", "tree", "marks", "sorted_marks", "blocks", "diagonal"):
             self.__dict__.pop(name, None)
 
     @cached_property

@@ -250,7 +250,10 @@ class DualSystem:
         """Build coarse space and preconditioner. Collective."""
         torn, comm = self.torn, self.torn.numbering.comm
         # B has no other nonzero columns: products with F then need no vectors of the torn size.
-        self._B_interface = torn.B[:, self.inverse.interface].tocsr()
+        place = np.zeros(torn.B.shape[1], dtype=torn.B.indices.dtype)
+        place[self.inverse.interface] = np.arange(len(self.inverse.interface))
+        entries = torn.B.data, place[torn.B.indices], torn.B.indptr  # values share their memory
+        self._B_interface = sp.csr_matrix(entries, shape=(torn.B.shape[0], len(self.inverse.interface)))
         self._Bt_interface = self._B_interface.T
         with timer.phase("coarse space"):
             self.kernel = self._kernel(comm)
@@ -478,7 +481,7 @@ class DualSystem:
             columns = (columns - self.points.T @ self.torn.free.columns.T).tocsr()
         columns.data[np.abs(columns.data) <= ROUNDING * np.abs(columns.data).max(initial=0.0)] = 0.0
         columns.eliminate_zeros()
-        return columns
+        return columns.copy()  # otherwise with room for the zeros
 
     def _compliance(self) -> np.ndarray:
         """Return 1 / the typical stiffness at each interface dof."""

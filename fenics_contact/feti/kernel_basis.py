@@ -74,9 +74,11 @@ class TornModes:
         first = np.repeat(np.cumsum(widths) - widths, sizes)
         counts = np.repeat(widths, sizes)
         start = np.concatenate([[0], np.cumsum(counts)])
-        column = np.arange(start[-1]) - np.repeat(start[:-1] - first, counts)
+        column = np.arange(start[-1], dtype=np.int32)
+        column -= np.repeat((start[:-1] - first).astype(np.int32), counts)
         values = np.concatenate([part.ravel() for part in parts])
-        modes = sp.csr_matrix((values, column.astype(np.int32), start), shape=(len(counts), widths.sum()))
+        modes = sp.csr_matrix((values, column, start), shape=(len(counts), widths.sum()))
+        modes.eliminate_zeros()  # half of the entries of rigid motions
         return (rows @ modes) @ self.coefficients
 
     def combined(self, coefficients: sp.csr_matrix) -> TornModes:

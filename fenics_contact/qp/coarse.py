@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -154,6 +155,34 @@ DENSE_LIMIT = 600
 Gram: TypeAlias = Vector | sp.csr_matrix
 
 
+@dataclass(frozen=True, eq=False)
+class Composed:
+    """A product of sparse matrices that is applied factor by factor: G Z of a face is as large as G."""
+
+    factors: tuple[sp.spmatrix, ...]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Numbers of rows and columns."""
+        return self.factors[0].shape[0], self.factors[-1].shape[1]
+
+    def __matmul__(self, vector: Vector) -> Vector:
+        """Apply it."""
+        for factor in reversed(self.factors):
+            vector = factor @ vector
+        return vector
+
+    @property
+    def T(self) -> Composed:
+        """The transposed one, which shares the memory."""
+        return Composed(tuple(factor.T for factor in reversed(self.factors)))
+
+    def from_column(self, first: int) -> sp.csr_matrix:
+        """Return the columns from one on as a matrix."""
+        left, right = self.factors
+        return sp.csr_matrix(left @ right[:, first:])
+
+
 class CoarseSpace:
     """Equilibrium of all rigid motions, G lambda = e, with P = I - G^T (G G^T)^-1 G.
 
@@ -171,7 +200,7 @@ class CoarseSpace:
     def __init__(
         self,
         comm: MPI.Comm,
-        G: sp.spmatrix | sp.sparray,
+        G: sp.spmatrix | sp.sparray | Composed,
         e: Vector,
         *,
         gram: Gram | Callable[[], CoarseInverse] | None = None,
@@ -184,7 +213,7 @@ class CoarseSpace:
         matrices of faces beyond `DENSE_LIMIT`.
         """
         self.comm = comm
-        self.matrix = sp.csr_matrix(G, dtype=np.float64)
+        self.matrix: Any = G if isinstance(G, Composed) else sp.csr_matrix(G, dtype=np.float64)
         self.load = np.asarray(e, dtype=np.float64)
         if self.load.shape != (self.matrix.shape[0],):
             raise InvalidInputError(
@@ -290,11 +319,17 @@ class CoarseSpace:
         fixed, shape (m,), replicated; e itself by default; `whole`: whether the face has all equality rows
         and begins with them, Z = [I_E, Z_C].
         """
-        columns, load = sp.csr_matrix(self.matrix @ Z), self.load if load is None else load
-        if not whole or self.eliminate is None or (faces := self.faces) is None:
+        columns, load = self.columns(Z, whole=whole), self.load if load is None else load
+        if not isinstance(columns, Composed) or self.eliminate is None or (faces := self.faces) is None:
             return CoarseSpace(self.comm, columns, load, gram=gram)
-        contact = columns[:, len(self.eliminate.equality) :]
+        contact = columns.from_column(len(self.eliminate.equality))
         return CoarseSpace(self.comm, columns, load, gram=lambda: faces.inverse(contact))
+
+    def columns(self, Z: sp.spmatrix | sp.sparray, *, whole: bool = False) -> sp.csr_matrix | Composed:
+        """Return G Z of a face, as a matrix where it is not reduced; see `restricted`. Collective."""
+        if not whole or self.eliminate is None or self.faces is None:
+            return sp.csr_matrix(self.matrix @ Z)
+        return Composed((self.matrix, sp.csr_matrix(Z)))
 
 
 def gram_matrix(comm: MPI.Comm, columns: sp.csr_matrix) -> Gram:

@@ -12,6 +12,7 @@ from fenics_contact._base.costs import count_flops
 from fenics_contact._base.libraries import MPI
 from fenics_contact.qp.coarse import (
     CoarseSpace,
+    Composed,
     FaceGrams,
     SquareInverse,
     gram_matrix,
@@ -33,6 +34,7 @@ class FaceSystem:
         preconditioner: Approximation of F⁻¹, owned to owned, or None.
         patience: Iterations without progress after which an inner solver gives up.
         spring: 1/ρ of the discs is the diagonal of F divided by this, as for springs of proximal points.
+        single: Whether Krylov methods store directions in single precision, as F is no more accurate.
     """
 
     comm: MPI.Comm
@@ -42,6 +44,7 @@ class FaceSystem:
     preconditioner: Operator | None = None
     patience: int = 60
     spring: float = 1.0
+    single: bool = False
 
     def image(self, y: Vector, full: Vector) -> Vector:
         """Return A y, shape (n_face,), for y on the face and full = F Z y, owned."""
@@ -119,7 +122,10 @@ class FaceSystems:
         if isinstance(preconditioner, FacePreconditioner):
             preconditioner = preconditioner.on_face(face.restriction)
         spring = self._operator.stiffness if isinstance(self._operator, ShiftedOperator) else 1.0
-        return FaceSystem(problem.comm, face, self._operator, restricted, preconditioner, spring=spring)
+        return FaceSystem(
+            problem.comm, face, self._operator, restricted, preconditioner,
+            spring=spring, single=problem.exact is not None,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,20 +137,25 @@ class ObliqueProjector:
         moving: Coarse space of G_u on the moving basis.
     """
 
-    tested: sp.csr_matrix
+    tested: sp.csr_matrix | Composed
     moving: CoarseSpace
     inverse: SquareInverse
 
     @classmethod
     def build(
-        cls, tested: sp.csr_matrix, moving: CoarseSpace, faces: FaceGrams | None = None, shared: int = 0
+        cls,
+        tested: sp.csr_matrix | Composed,
+        moving: CoarseSpace,
+        faces: FaceGrams | None = None,
+        shared: int = 0,
     ) -> ObliqueProjector | None:
         """Factor G_u G_sᵀ; None if it is singular, when the face does not hold every body. Collective.
 
         `faces`: reduced matrices of faces, whose first ``shared`` columns are equality rows.
         """
         if faces is not None:
-            reduced = faces.square(moving.matrix[:, shared:], tested[:, shared:])
+            assert isinstance(tested, Composed)
+            reduced = faces.square(moving.matrix.from_column(shared), tested.from_column(shared))
             return None if reduced is None else cls(tested, moving, reduced)
         diagonal = global_sum(moving.comm, moving.matrix.power(2).sum(axis=1))
         scale = 1.0 / np.sqrt(np.maximum(diagonal, np.finfo(float).tiny))
@@ -161,7 +172,7 @@ class ObliqueProjector:
         return self.solve(self.moving.apply(v))
 
     @cached_property
-    def transposed(self) -> sp.csc_matrix:
+    def transposed(self) -> sp.csc_matrix | Composed:
         """G_sᵀ, which shares the memory of G_s, shape (n_face, m)."""
         return self.tested.T
 
@@ -237,8 +248,8 @@ class CoupledSystem:
         `least_damping`: lower bound on D, so that motions that only offsets resist stay
         distinct from unresisted ones.
         """
-        on_face = tested is system.face.restriction
-        columns = system.coarse.matrix if on_face else sp.csr_matrix(coarse.matrix @ tested)
+        known = whole and tested is system.face.restriction
+        columns = system.coarse.matrix if known else coarse.columns(tested, whole=whole)
         faces, shared = coarse.faces if whole else None, len(system.face.layout.equality)
         own = coarse.restricted(moving, whole=whole)
         oblique = ObliqueProjector.build(columns, own, faces, shared)

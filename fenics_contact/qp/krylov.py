@@ -50,35 +50,55 @@ Enough: TypeAlias = Callable[[Vector, Vector, float], bool]
 
 
 class _Rows:
-    """Growing sets of vectors, one for each kind, in blocks that are never copied: they fill the memory."""
+    """Growing sets of vectors, one for each kind, in blocks that are never copied: they fill the memory.
 
-    def __init__(self, *lengths: int, rows: int = 16) -> None:
-        """Start empty; lengths are those of this rank's vectors of each kind, `rows` those of a block."""
+    In single precision each is stored over its largest entry, as the range does not suffice for all units.
+    """
+
+    def __init__(self, rows: int = 16, *, single: bool = False) -> None:
+        """Start empty; `rows` are those of a block, `single` stores them in single precision."""
         self.count = 0
-        self._rows, self._blocks = rows, [(length, list[Vector]()) for length in lengths]
+        self._rows, self._type = rows, np.float32 if single else np.float64
+        self._blocks: list[list[np.ndarray]] = []
+        self._scales: list[Vector] = []
 
     def append(self, *rows: Vector) -> None:
-        """Append one vector of each kind."""
+        """Append one vector of each kind, each of the length that those of its kind have on this rank."""
         number, place = divmod(self.count, self._rows)
-        for (length, blocks), row in zip(self._blocks, rows, strict=True):
-            if number == len(blocks):
-                blocks.append(np.zeros((self._rows, length)))
-            blocks[number][place] = row
+        if place == 0:
+            self._blocks.append([np.zeros((self._rows, len(row)), dtype=self._type) for row in rows])
+        scales = np.ones(len(rows))
+        if self._type is np.float32:
+            sizes = np.array([np.abs(row).max(initial=0.0) for row in rows])
+            scales[sizes > 0.0] = sizes[sizes > 0.0]
+        for block, row, scale in zip(self._blocks[number], rows, scales, strict=True):
+            np.divide(row, scale, out=block[place], casting="same_kind")
+        self._scales.append(scales)
         self.count += 1
 
     def dot(self, kind: int, vector: Vector) -> Vector:
         """Return this rank's products of all vectors of a kind with one, shape (count,)."""
-        parts = [np.zeros(0), *(block @ vector for block in self._blocks[kind][1])]
-        return np.concatenate(parts)[: self.count]
+        given, scale = self._rounded(vector)
+        parts = [np.zeros(0), *(block[kind] @ given for block in self._blocks)]
+        products = np.concatenate(parts)[: self.count]
+        return products * (scale * np.array([scales[kind] for scales in self._scales]))
 
     def combined(self, kind: int, factors: Vector) -> Vector:
-        """Return the sum of factor times vector over all vectors of a kind; factors of shape (count,)."""
-        length, blocks = self._blocks[kind]
-        total = np.zeros(length)
-        for number, block in enumerate(blocks):
-            part = factors[number * self._rows : (number + 1) * self._rows]
-            total += part @ block[: len(part)]
-        return total
+        """Return the sum of factor times vector over the first vectors of a kind, one for each factor."""
+        scales = np.array([scales[kind] for scales in self._scales[: len(factors)]])
+        given, scale = self._rounded(factors * scales)
+        total = np.zeros(self._blocks[0][kind].shape[1] if self._blocks else 0)
+        for number, block in enumerate(self._blocks):
+            part = given[number * self._rows : (number + 1) * self._rows]
+            total += part @ block[kind][: len(part)]
+        return total if scale == 1.0 else scale * total
+
+    def _rounded(self, vector: Vector) -> tuple[np.ndarray, float]:
+        """Return a vector in the precision of the rows, over a scale, and the scale."""
+        if self._type is np.float64:
+            return vector, 1.0
+        scale = float(np.abs(vector).max(initial=0.0)) or 1.0
+        return (vector / scale).astype(np.float32), scale
 
 
 def projected_cg(
@@ -110,7 +130,7 @@ def projected_cg(
     residual = system.coarse.project(gradient)
     step, product = np.zeros_like(gradient), np.zeros(system.face.layout.size)
     # Directions p and images P A p, and their curvatures pᵀA p.
-    rows, curvatures = _Rows(len(gradient), len(gradient)), list[float]()
+    rows, curvatures = _Rows(single=system.single), list[float]()
     size = system.weighted_norm(residual, weights)
     best, since_best, iterations, stop = size, 0, 0, Stop.CONVERGED
     while not size <= tolerance:
@@ -153,8 +173,9 @@ def _next_direction(
     m = system.coarse.m
     sums = global_sum(system.comm, system.coarse.local(z), rows.dot(1, z), residual @ z)
     projected = z - system.coarse.transpose(system.coarse.solve(sums[:m]))
-    conjugate = projected - rows.combined(0, sums[m:-1] / np.array(curvatures))
-    return -conjugate, float(sums[-1])
+    if rows.count:
+        projected = projected - rows.combined(0, sums[m:-1] / np.array(curvatures))
+    return -projected, float(sums[-1])
 
 
 def _image(
@@ -184,21 +205,64 @@ def projected_gmres(
     tolerance: float,
     max_iterations: int,
     enough: Enough | None = None,
+    *,
+    restart_at: float = 1e-5,
+    longest: int = 40,
 ) -> FaceStep:
     """Solve (Wᵀ F Z + κ) δ = −g + (G W)ᵀ α with G Z δ = 0. Collective.
 
-    Right preconditioned, without restart, in the norm ‖weights · r‖ of the projected residual, which is
-    minimised and compared with the tolerance.
+    Right preconditioned, in the norm ‖weights · r‖ of the projected residual, which is minimised and compared
+    with the tolerance. Without restart, but where memory is short and directions are stored in single
+    precision: there after some of them, and at each residual that their rounding would reach.
 
     `gradient`: g = Wᵀ(F λ − d) + κ y at the starting point, shape (n_face,), owned; `weights`: positive
-    weights, shape (n_face,), owned; `enough`: ends the iteration before the tolerance is reached.
+    weights, shape (n_face,), owned; `enough`: ends the iteration before the tolerance is reached;
+    `restart_at`: residual at which a restart begins, relative to the one before; `longest`: directions.
 
     Returns the step in face coordinates (the multiplier moves by Z δ) and why the iteration ended.
 
     References:
         Y. Saad, Iterative Methods for Sparse Linear Systems, 2nd ed. (2003), algorithms 6.9 and 9.5.
     """
-    comm, operator = coupled.system.comm, coupled.system.operator
+    step, product = np.zeros(len(gradient)), np.zeros(coupled.moving.shape[0])
+    residual, iterations, size = coupled.oblique(gradient), 0, 0.0
+    while True:
+        first, goal, most = -weights * residual, tolerance, max_iterations - iterations
+        if coupled.system.single:
+            size = float(np.sqrt(global_sum(coupled.system.comm, first @ first)[0]))
+            goal, most = max(tolerance, restart_at * size), min(most, longest)
+        found, step, product = _krylov_step(coupled, first, weights, goal, most, (step, product), enough)
+        iterations += found.iterations
+        residual = coupled.oblique(gradient + coupled.operate(step, product))
+        weighted = weights * residual
+        left = float(np.sqrt(global_sum(coupled.system.comm, weighted @ weighted)[0]))
+        restarts = found.stop is Stop.CONVERGED and goal > tolerance
+        restarts = restarts or (found.stop is Stop.ITERATION_LIMIT and iterations < max_iterations)
+        if not (coupled.system.single and restarts and left <= 0.9 * size):
+            break
+    stop = found.stop
+    if stop is Stop.ITERATION_LIMIT and restarts:
+        stop = Stop.STAGNATION
+    if stop is Stop.CONVERGED and left > 10.0 * tolerance:
+        # The recursion has lost accuracy: rounding was taken for the image of a direction that has none.
+        stop = Stop.NO_CURVATURE
+    return FaceStep(step, product, residual, iterations, max(left, found.residual), stop)
+
+
+def _krylov_step(
+    coupled: CoupledSystem,
+    first: Vector,
+    weights: Vector,
+    tolerance: float,
+    max_iterations: int,
+    before: tuple[Vector, Vector],
+    enough: Enough | None,
+) -> tuple[Krylov, Vector, Vector]:
+    """Return the Krylov space of a weighted residual, and a step and its product with what is added to them.
+
+    Collective.
+    """
+    system, operator = coupled.system, coupled.system.operator
 
     def expand(vector: Vector) -> tuple[Vector, Kept]:
         direction = coupled.precondition(vector / weights)
@@ -206,19 +270,15 @@ def projected_gmres(
         return weights * coupled.image(direction, full), (direction, full)
 
     def both(found: Krylov) -> tuple[Vector, Vector]:
-        return found.combined(0, len(gradient)), found.combined(1, coupled.moving.shape[0])
+        step, product = (found.combined(kind, len(vector)) for kind, vector in enumerate(before))
+        if system.single:  # directions are in equilibrium up to their rounding
+            step = coupled.balanced(step, np.zeros(coupled.oblique.moving.m))
+        return before[0] + step, before[1] + product
 
     ends = None if enough is None else lambda found: enough(*both(found), found.residual)
-    first = -weights * coupled.oblique(gradient)
-    found = gmres(comm, first, expand, tolerance, max_iterations, coupled.system.patience, ends)
-    step, product = both(found)
-    residual = coupled.oblique(gradient + coupled.operate(step, product))
-    left = float(np.sqrt(global_sum(comm, (weights * residual) @ (weights * residual))[0]))
-    stop = found.stop
-    if stop is Stop.CONVERGED and left > 10.0 * tolerance:
-        # The recursion has lost accuracy: rounding was taken for the image of a direction that has none.
-        stop = Stop.NO_CURVATURE
-    return FaceStep(step, product, residual, found.iterations, max(left, found.residual), stop)
+    single, patience = system.single, system.patience
+    found = gmres(system.comm, first, expand, tolerance, max_iterations, patience, ends, single=single)
+    return found, *both(found)
 
 
 #: What is kept of each direction of GMRES: vectors whose combination is the solution.
@@ -230,21 +290,18 @@ class Krylov:
     """The outcome of GMRES: factors of the directions, and what was kept of each."""
 
     factors: Vector
-    kept: tuple[Kept, ...]
+    kept: _Rows
     residual: float
     stop: Stop
 
     @property
     def iterations(self) -> int:
         """Number of directions."""
-        return len(self.kept)
+        return len(self.factors)
 
     def combined(self, kind: int, length: int) -> Vector:
         """Return the sum of factor times vector, of one kind of vectors of a given length."""
-        total = np.zeros(length)
-        for factor, vectors in zip(self.factors, self.kept, strict=True):  # without a copy of them all
-            total += factor * vectors[kind]
-        return total
+        return self.kept.combined(kind, self.factors) if len(self.factors) else np.zeros(length)
 
 
 def gmres(
@@ -256,13 +313,17 @@ def gmres(
     patience: int,
     enough: Callable[[Krylov], bool] | None = None,
     asked_every: int = 4,
+    *,
+    single: bool = False,
 ) -> Krylov:
     """Combine directions whose images sum up to ``first``, by GMRES without restart. Collective.
 
-    `enough`: ends the iteration before the tolerance is reached, asked every few iterations.
+    `enough`: ends the iteration before the tolerance is reached, asked every few iterations; `single`: stores
+    directions in single precision, where images have no more.
     """
     size = float(np.sqrt(global_sum(comm, first @ first)[0]))
-    basis, kept, small, stop = _Rows(len(first)), list[Kept](), _LeastSquares(size), Stop.CONVERGED
+    basis, kept = _Rows(single=single), _Rows(single=single)
+    small, stop = _LeastSquares(size), Stop.CONVERGED
     vector: Vector = np.asarray(first / (size or 1.0), dtype=np.float64)
     while not small.residual <= tolerance:
         if basis.count == max_iterations:
@@ -270,7 +331,7 @@ def gmres(
             break
         image, vectors = expand(vector)
         basis.append(vector)
-        kept.append(vectors)
+        kept.append(*vectors)
         image, column = _orthogonalised(comm, basis, image)
         small.append(column)
         if basis.count - small.last_progress > patience:
@@ -281,11 +342,11 @@ def gmres(
             stop = Stop.CONVERGED if small.residual <= tolerance else Stop.NO_CURVATURE
             break
         if enough is not None and basis.count % asked_every == 0 and small.residual > tolerance:
-            if enough(Krylov(small.solution(), tuple(kept), small.residual, stop)):
+            if enough(Krylov(small.solution(), kept, small.residual, stop)):
                 stop = Stop.ENOUGH
                 break
         vector = image / column[-1]
-    return Krylov(small.solution(), tuple(kept), small.residual, stop)
+    return Krylov(small.solution(), kept, small.residual, stop)
 
 
 def _orthogonalised(comm: MPI.Comm, basis: _Rows, image: Vector) -> tuple[Vector, Vector]:

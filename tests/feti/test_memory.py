@@ -73,6 +73,13 @@ def test_transposed_matrices_share_the_memory_of_what_they_transpose(system: Dua
         assert np.shares_memory(matrix.indices, transposed.indices)
 
 
+def test_rows_on_the_interface_share_the_values_of_all(system: DualSystem) -> None:
+    assert np.shares_memory(system._B_interface.data, system.torn.B.data)
+    assert abs(system._B_interface - system.torn.B[:, system.inverse.interface]).max() == 0.0
+    data = system.problem.coarse.matrix.data  # has no room for zeros
+    assert data.base is None or data.base.nbytes == data.nbytes
+
+
 def test_the_coarse_space_needs_few_bytes_a_torn_unknown_while_it_is_built(system: DualSystem) -> None:
     size = system.torn.decomposition.torn_size
     assert traced(system._kernel, MPI.COMM_SELF) < 100 * size
