@@ -25,6 +25,7 @@ from fenics_contact._equilibrium.starts import (
 from fenics_contact._equilibrium.static_admissibility import check_held
 from fenics_contact._equilibrium.stored import Stored, restored_solution, with_stored_slip
 from fenics_contact._equilibrium.warnings import ContactWarnings
+from fenics_contact._scene.memory import Fit
 from fenics_contact._scene.obstacles import MovingObstacle
 from fenics_contact._scene.plan import SolverKind, choose_solver
 from fenics_contact._scene.scene import LoadStep, Scene
@@ -326,7 +327,12 @@ class ContactProblem:
         """Body name -> subdomain of every cell, numbered from 0 within the body. Collective on first use."""
         if self._partitions is None:
             with together(self.comm):
-                self._partitions = self.scene.partition(self.comm.size)
+                usual = self.scene.partition(self.comm.size)
+            linear = not self.scene.is_nonlinear
+            if linear and Fit.of(self.scene, usual, self.comm, limit=self._memory).is_tighter:
+                with together(self.comm):
+                    usual = self.scene.partition(self.comm.size, lean=True)
+            self._partitions = usual
         return self._partitions
 
     @property

@@ -150,45 +150,93 @@ def expected_memory(
     return steady + max(assembled, factors + max(workspaces, solving))
 
 
+@dataclass(frozen=True)
+class Fit:
+    """Memory that a state of a linear scene takes on a machine, and what the machine has left, [bytes].
+
+    Attributes:
+        left: What may be taken; None where it is not known, or the scene is too small to matter.
+        fast: What a state takes where subdomains are stored for speed.
+        compact: That where each is stored as one triangle in single precision, `LocalKind.COMPACT`.
+        roomy: Share of the memory that may be taken.
+    """
+
+    left: float | None = None
+    fast: float = 0.0
+    compact: float = 0.0
+    roomy: float = 0.9
+
+    @property
+    def is_tight(self) -> bool:
+        """Whether subdomains are to be stored compactly."""
+        return self.left is not None and self.fast > self.roomy * self.left
+
+    @property
+    def is_tighter(self) -> bool:
+        """Whether bodies are to be cut for subdomains that are stored compactly."""
+        return self.left is not None and min(self.fast, self.compact) > self.roomy * self.left
+
+    @classmethod
+    def of(
+        cls,
+        scene: SceneParts,
+        partitions: Mapping[str, np.ndarray],
+        comm: MPI.Comm,
+        *,
+        limit: float | None = None,
+        small: int = 50_000,
+    ) -> Fit:
+        """Compute it from a partition. Collective; of the machines the one with the least memory counts.
+
+        `limit`: memory that a state may take on a machine, [bytes]; None: what it has left; `small`: unknowns
+        up to which nothing is computed without a limit.
+        """
+        with together(comm):
+            _check_limit(limit)
+        if limit is None and _unknowns(scene) <= small:
+            return cls()
+        machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
+        share = machine.size / comm.size
+        machine.Free()
+        with together(comm):
+            parts = Subdomains.of(scene, partitions)
+            fast = expected_memory(scene, parts, comm.size)
+            compact = expected_memory(scene, parts, comm.size, compact=True)
+            left = limit or available_memory()
+        each = comm.allgather((np.inf if left is None else left / share, left, share))
+        _, left, share = min(each, key=lambda one: one[0])
+        return cls(left, share * fast, share * compact)
+
+
 def require_memory(
     scene: SceneParts,
     partitions: Mapping[str, np.ndarray],
     comm: MPI.Comm,
     *,
     limit: float | None = None,
-    small: int = 50_000,
     certain: float = 1.3,
-    roomy: float = 0.9,
 ) -> bool:
     """Refuse a scene of which a state needs more memory than its machines have left. Collective.
 
     Returns whether it fits only where subdomains are stored compactly.
 
-    `limit`: memory that a state may take on a machine, [bytes]; None: what it has left; `small`: unknowns up
-    to which nothing is computed without a limit; `certain`: how far the expected memory must exceed what
-    is left, as it is an estimate; `roomy`: share of it up to which subdomains are stored for speed.
+    `limit`: memory that a state may take on a machine, [bytes]; None: what it has left; `certain`: how far
+    the expected memory must exceed what is left, as it is an estimate.
     """
-    unknowns = scene.components * sum(body.mesh.n_nodes for body in scene.bodies.values())
-    with together(comm):
-        _check_limit(limit)
-    if limit is None and unknowns <= small:
-        return False
-    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    here = machine.size
-    machine.Free()
-    with together(comm):
-        left, share = limit or available_memory(), here / comm.size
-        parts = Subdomains.of(scene, partitions)
-        compact = left is not None and share * expected_memory(scene, parts, comm.size) > roomy * left
-        needed = share * expected_memory(scene, parts, comm.size, compact=True) if compact else 0.0
-        if left is not None and needed > certain * left:
-            raise InvalidInputError(
-                f"a state must fit into memory, but {unknowns} unknowns need about {needed / 1e9:.3g} GB on "
-                f"this machine, and {left / 1e9:.3g} GB {'are left' if limit is None else 'are allowed'}: "
-                f"about {int(unknowns * left / needed):,} "
-                "unknowns would fit; take coarser meshes, refine where it matters, or use more machines"
-            )
-    return bool(comm.allreduce(int(compact), op=MPI.MAX))
+    fit, unknowns = Fit.of(scene, partitions, comm, limit=limit), _unknowns(scene)
+    needed = min(fit.fast, fit.compact)
+    if fit.left is not None and needed > certain * fit.left:
+        raise InvalidInputError(
+            f"a state must fit into memory, but {unknowns} unknowns need about {needed / 1e9:.3g} GB on "
+            f"this machine, and {fit.left / 1e9:.3g} GB {'are left' if limit is None else 'are allowed'}: "
+            f"about {int(unknowns * fit.left / needed):,} "
+            "unknowns would fit; take coarser meshes, refine where it matters, or use more machines"
+        )
+    return fit.is_tight
+
+
+def _unknowns(scene: SceneParts) -> int:
+    return scene.components * sum(body.mesh.n_nodes for body in scene.bodies.values())
 
 
 def _check_limit(limit: float | None) -> None:

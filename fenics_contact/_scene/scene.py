@@ -81,18 +81,22 @@ class Scene(SceneParts):
         object.__setattr__(self, "contacts", with_discretisation(self, self.contacts))
         object.__setattr__(self, "ties", with_discretisation(self, self.ties))
 
-    def partition(self, ranks: int = 1) -> dict[str, np.ndarray]:
+    def partition(self, ranks: int = 1, *, lean: bool = False) -> dict[str, np.ndarray]:
         """Cut every body into subdomains of a suitable size.
 
         Args:
             ranks: Number of ranks that need a subdomain each.
+            lean: Whether memory matters more than products, as where a state hardly fits: subdomains are
+                smaller, and have fewer unknowns on their interfaces.
 
         Returns:
             Body name -> subdomain of every cell, numbered from 0 within the body.
         """
         bodies = self.deforming
         each = -(-ranks // len(bodies))
-        return {name: default_partition(body.mesh, each, body=name) for name, body in bodies.items()}
+        return {
+            name: default_partition(body.mesh, each, body=name, lean=lean) for name, body in bodies.items()
+        }
 
     @property
     def is_nonlinear(self) -> bool:

@@ -226,10 +226,10 @@ def face_areas(mesh: BodyMesh) -> tuple[np.ndarray, np.ndarray]:
     return pairs, np.linalg.norm(vector_areas(mesh.points, faces), axis=1)
 
 
-def cell_weights(mesh: BodyMesh) -> np.ndarray:
-    """Return the weight of every cell, (n_cells,), with sum 1: the root of its volume.
+def cell_weights(mesh: BodyMesh, power: float = 0.5) -> np.ndarray:
+    """Return the weight of every cell, (n_cells,), with sum 1: the root of its volume, or another power.
 
     A compromise between equal numbers of cells, hence equal cost, and equal volume, hence compactness.
     """
-    root = np.sqrt(cell_volumes(mesh.points, mesh.cells))
+    root = cell_volumes(mesh.points, mesh.cells) ** power
     return np.asarray(root / root.sum())

@@ -12,7 +12,15 @@ from hypothesis import strategies as st
 from benchmarks.graph_partition import graph_partition, smoothed
 from fenics_contact import BodyMesh, box_partition
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block, chain_link, half_disc, hemisphere, rectangle
+from fenics_contact.gallery import (
+    LinkShape,
+    block,
+    chain_link,
+    half_disc,
+    hemisphere,
+    rectangle,
+    two_links,
+)
 from fenics_contact.mesh import bisection_partition
 from fenics_contact.mesh.bisection import default_partition, target_parts
 from fenics_contact.mesh.partition import (
@@ -212,6 +220,21 @@ def test_every_rank_gets_a_subdomain_while_there_are_cells() -> None:
     assert not default_partition(mesh).any()
     with pytest.raises(InvalidInputError, match="ranks must be an integer of at least 1, got 0"):
         default_partition(mesh, 0)
+
+
+def test_a_lean_cut_has_small_interfaces_also_where_cells_are_graded() -> None:
+    """Dense matrices of subdomains have as many entries as the squares of their unknowns on interfaces."""
+    mesh = two_links(LinkShape(n_around=54, n_a=9, n_b=24, grading=4.0)).first.mesh
+    squares = []
+    for lean in (False, True):
+        partition = default_partition(mesh, lean=lean)
+        check_face_connected(mesh, partition)
+        key = np.unique(partition[:, None] * mesh.n_nodes + mesh.cells)
+        torn = np.bincount(key % mesh.n_nodes) > 1
+        squares.append(float((np.bincount(key // mesh.n_nodes, torn[key % mesh.n_nodes]) ** 2).sum()))
+    assert squares[1] < 0.6 * squares[0]
+    plane = rectangle((0, 0), (1, 1), (60, 60))
+    assert np.array_equal(default_partition(plane, lean=True), default_partition(plane))
 
 
 def test_a_bent_bar_is_cut_across_its_length() -> None:
