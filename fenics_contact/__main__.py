@@ -16,6 +16,7 @@ for _name in ("stdout", "stderr"):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command given by the arguments on all ranks; return the exit status."""
+    from fenics_contact._base.launching import started_alone
     from fenics_contact._base.libraries import MPI
     from fenics_contact._base.requirements import check, require_extra
     from fenics_contact.errors import MissingRequirementError
@@ -23,7 +24,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         check()
         require_extra("commands", "cli", "pydantic", "rich", "tomlkit", "typer")
-        world = MPI.COMM_WORLD
+        with started_alone():
+            world = MPI.COMM_WORLD
     except MissingRequirementError as error:
         sys.stderr.write(f"error: {error}\n")
         return MISSING

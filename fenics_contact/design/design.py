@@ -8,7 +8,6 @@ from math import prod
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline, make_interp_spline
 from scipy.spatial import cKDTree
 from scipy.special import comb
 
@@ -353,6 +352,8 @@ class MovedSurface:
 
     def _interpolated(self, values: np.ndarray, parameters: np.ndarray) -> np.ndarray:
         """Return values of the nodes, shape (n_nodes, m), between them."""
+        from scipy.interpolate import RectBivariateSpline, make_interp_spline  # scene files load designs
+
         degrees = [min(3, len(ticks) - 1) for ticks in self.ticks]
         if len(self.ticks) == 1:
             return np.asarray(make_interp_spline(self.ticks[0], values, k=degrees[0])(parameters[:, 0]))

@@ -28,7 +28,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from fenics_contact._base.checks import check_count, check_grading, check_numbers
 from fenics_contact.errors import InvalidInputError
@@ -65,6 +64,8 @@ def strength_for(smallest: float) -> float:
     """Find κ with κ / sinh κ = ``smallest``, the smallest cell over the mean; 0 if that is not below 1."""
     if smallest >= 1.0:
         return 0.0
+    from scipy.optimize import brentq  # graded rings alone need it
+
     # x / sinh x falls from 1 and is about 2 x exp(-x), which lies below at the end of the interval.
     most = 10.0 - 2.0 * float(np.log(smallest))
     return float(brentq(lambda x: x / np.sinh(x) - smallest, 1e-9, most))

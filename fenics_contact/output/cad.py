@@ -14,7 +14,6 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -92,6 +91,8 @@ def _places(count: int, axes: int) -> np.ndarray:
 
 def _interpolated(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return knots and control points of the spline through values at equal steps."""
+    from scipy.interpolate import make_interp_spline  # scene files load this module
+
     points, knots = values, np.zeros(0)
     for axis in range(values.ndim - 1):
         spline = make_interp_spline(np.linspace(0.0, 1.0, len(values)), np.moveaxis(points, axis, 0), DEGREE)
@@ -100,6 +101,8 @@ def _interpolated(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _values(knots: np.ndarray, points: np.ndarray, count: int) -> np.ndarray:
+    from scipy.interpolate import BSpline
+
     for axis in range(points.ndim - 1):
         along = BSpline(knots, np.moveaxis(points, axis, 0), DEGREE)(np.linspace(0.0, 1.0, count))
         points = np.moveaxis(along, 0, axis)

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from fenics_contact._base.checks import GivenVector, checked
 from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.shapes.parametric import Patch
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 #: Samples between two points.
 SAMPLES = 8
@@ -73,6 +76,8 @@ class Profile(Patch):
 
     @cached_property
     def _spline(self) -> CubicSpline:
+        from scipy.interpolate import CubicSpline  # few bodies need it
+
         along = np.concatenate([[0.0], np.cumsum(self._lengths)])
         kind = "periodic" if self.closed else "not-a-knot"
         return CubicSpline(along, self._corners, bc_type=kind)

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.output.files import write_json
@@ -230,6 +229,8 @@ def extrapolate(spacing: Sequence[float], values: Sequence[float]) -> Extrapolat
         return Extrapolation(finest, None, "the meshes give the same")
     if before * after <= 0.0:
         return Extrapolation(finest, None, "it does not converge monotonically on the three finest meshes")
+
+    from scipy.optimize import brentq  # commands load this module
 
     def excess(p: float) -> float:
         return float((h1**p - h2**p) / (h2**p - h3**p) - before / after)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import pkgutil
 import sys
 from collections.abc import Callable
@@ -12,6 +13,7 @@ import pytest
 
 import fenics_contact
 from fenics_contact._base.form_language import without_setuptools
+from tests.conftest import ROOT, launch
 from tests.house.public import rooms
 
 SOLVING = """
@@ -58,6 +60,21 @@ def test_a_linear_scene_loads_what_it_needs(mpirun: Callable[..., str]) -> None:
     assert loaded & {f"fenics_contact.{name}" for name in NOT_OURS} == set()
     # 687 with Python 3.11 and dolfinx 0.5; 925 before names were loaded late.
     assert len(loaded) < 800
+
+
+def test_a_scene_file_loads_what_it_needs() -> None:
+    scene = ROOT / "demos" / "scenes" / "two_blocks.toml"
+    code = f"""
+        import sys
+        from fenics_contact.__main__ import main
+        assert main(["run", {str(scene)!r}, "--dry-run"]) == 0
+        sys.stdout.write(" ".join(["loaded", *sys.modules]))
+    """
+    answer = launch(1, "-c", inspect.cleandoc(code))
+    loaded = set(answer.stdout.rpartition("loaded ")[2].split())
+    assert "fenics_contact._scene_file" in loaded, answer.stderr
+    late = {"gmsh", "IPython", "matplotlib", "pyvista", "scipy.interpolate", "scipy.optimize"}
+    assert loaded & late == set()
 
 
 @pytest.mark.parametrize("room", rooms(), ids=lambda room: room.__name__.partition(".")[2])

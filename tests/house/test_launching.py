@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from fenics_contact import clean_environment
 from fenics_contact._base import launching
 from fenics_contact._base.launching import last_words, launcher, traces
 from fenics_contact.errors import MissingRequirementError
-from tests.conftest import LAUNCH
+from tests.conftest import LAUNCH, launch
 
 #: A process without a shell between: its environment is that which MPI_Init wrote into, not `os.environ`.
 STARTING = f"""
@@ -117,3 +118,31 @@ def test_a_process_without_a_word_gets_some(monkeypatch: pytest.MonkeyPatch) -> 
     words = last_words(["mpirun", "-n", "2", "my script"], "\n")
     assert "nothing and probably could not start: run `mpirun -n 2 'my script'` in a shell" in words
     assert "OMPI_MCA_plm" in words
+
+
+ALONE = """
+    import os, sys
+    from pathlib import Path
+    from fenics_contact._base.launching import started_alone
+    from fenics_contact._base.libraries import MPI
+
+    os.environ["OMPI_MCA_pml"] = "^cm"  # of the user
+    before = dict(os.environ)
+    with started_alone():
+        inside = os.environ.get("OMPI_MCA_ess_singleton_isolated", "none"), os.environ["OMPI_MCA_pml"]
+        world = MPI.COMM_WORLD
+    added = {name for name in os.environ if name.startswith("OMPI_MCA_ess_singleton")} - before.keys()
+    children = Path("/proc/self/task", str(os.getpid()), "children")
+    started = len(children.read_text().split()) if children.exists() else 0
+    sys.stdout.write(f"{world.size} {inside[0]} {inside[1]} {len(added)} {started} ")
+"""
+
+
+def test_a_program_that_is_alone_starts_mpi_without_a_daemon() -> None:
+    answer = launch(1, "-c", inspect.cleandoc(ALONE))
+    assert answer.stdout.split() == ["1", "1", "^cm", "0", "0"], answer.stderr
+
+
+def test_a_program_among_several_starts_mpi_as_mpirun_says() -> None:
+    answer = launch(2, "-c", inspect.cleandoc(ALONE))
+    assert answer.stdout.split() == ["2", "none", "^cm", "0", "0"] * 2, answer.stderr

@@ -157,6 +157,6 @@ def test_every_process_uses_one_blas_thread(mpirun: Callable[..., str]) -> None:
 
 def test_the_environment_file_is_read_without_its_comments() -> None:
     environment = read_environment(ROOT / "scripts" / "environment")
-    assert environment["OMPI_MCA_btl"] == "^tcp,openib"
+    assert environment["OMPI_MCA_btl"] == "^tcp,openib,uct,ofi"
     assert len(environment) > 5
     assert all(name.isidentifier() for name in environment)
