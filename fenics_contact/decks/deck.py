@@ -292,7 +292,7 @@ class _Builder:
                 step_of.append(number)
         return Deck(
             self.name, scene, tuple(steps), tuple(step_of), self._prints(), tuple(self.notes), self.thickness,
-            {name: self.mesh.numbers[nodes] for name, nodes in parts.nodes.items()},
+            {name: np.where(at < 0, 0, self.mesh.numbers[at]) for name, at in parts.nodes.items()},
             self._element_numbers(), self._numbered(self.mesh.node_sets, self.mesh.numbers),
             self._numbered(self.mesh.element_sets, self.mesh.element_numbers), self.origins,
         )  # fmt: skip
@@ -563,6 +563,7 @@ class _Builder:
     def _in_body(self, name: str, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return which nodes of the deck a body has, and their numbers in it."""
         mine = self.parts.nodes[name]
+        mine = mine[mine >= 0]  # ascending; centres of cells are behind
         place = np.minimum(np.searchsorted(mine, nodes), len(mine) - 1)
         there = mine[place] == nodes
         return nodes[there], place[there]
@@ -657,7 +658,9 @@ class _Builder:
         found: list[Load] = []
         for name, mesh in self.parts.meshes.items():
             nodes = self.parts.nodes[name]
-            change = temperatures[nodes] - self.history.initial[nodes]
+            change = (temperatures - self.history.initial)[nodes]
+            if mesh.centres is not None:
+                change[mesh.centres.nodes] = (mesh.centres.given * change[mesh.centres.masters]).sum(axis=1)
             materials = bodies[name].materials
             if not change.any() or not all(getattr(m, "expands", False) for m in materials):
                 continue

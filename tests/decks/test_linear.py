@@ -65,6 +65,31 @@ def test_tetrahedra_with_nodes_on_edges_are_read_in_their_order(tmp_path: Path) 
     assert found.source("surface", "TIP").card == "*SURFACE"
 
 
+@pytest.mark.parametrize("element", ["C3D20R", "C3D20", "CPS8R", "CPE8"])
+def test_elements_without_centres_stretch_as_in_theory(element: str, tmp_path: Path) -> None:
+    linear = (
+        block((0, 0, 0), (3, 1, 1), (2, 1, 1)) if element[:3] == "C3D" else rectangle((0, 0), (3, 1), (2, 1))
+    )
+    text = (
+        mesh_cards({"BAR": quadratic(linear)}, element)
+        + STEEL
+        + SECTION
+        + "*BOUNDARY\nBAR_X0, 1\nBAR_Y0, 2\n"
+    )
+    text += "BAR_Z0, 3\n" if linear.dim == 3 else ""
+    face = "P4" if linear.dim == 3 else "P2"
+    found = read_deck(deck(tmp_path, text + step(f"*DLOAD\n2, {face}, -100.\n")))
+    mesh = found.scene.bodies["BAR"].mesh
+    assert mesh.cells_in_words.startswith("2 serendipity")
+    assert (found.node_numbers["BAR"] == 0).sum() == mesh.n_nodes - text.partition("*ELEMENT")[0].count(
+        "\n"
+    ) + 1
+    exact = stretched(mesh.points, 100.0)
+    if element == "CPE8":
+        exact = mesh.points * np.array([1 - 0.3**2, -0.3 * 1.3]) * 100.0 / 210000.0
+    np.testing.assert_allclose(displacement(found), exact, atol=1e-12)
+
+
 def test_a_plate_of_a_thickness_is_loaded_by_whole_forces(tmp_path: Path) -> None:
     """CPS4 of 2 mm: three nodes with the forces of 10 N/mm² on 1 mm by 2 mm."""
     mesh = rectangle((0, 0), (3, 1), (3, 2))

@@ -12,24 +12,37 @@ from fenics_contact import BodyMesh
 #: Name of the elements of each type of cells.
 ELEMENTS = {
     "hexahedron": "C3D8", "tetrahedron": "C3D4", "tetrahedron10": "C3D10",
+    "hexahedron27": "C3D20R", "quadrilateral9": "CPS8R",
     "quadrilateral": "CPS4", "triangle": "CPS3", "triangle6": "CPS6",
 }  # fmt: skip
 
 
 def mesh_cards(meshes: Mapping[str, BodyMesh], element: str = "", sets: bool = True) -> str:
-    """Return nodes, elements and sets of bodies: each side z1 of body A is the node set A_Z1."""
+    """Return nodes, elements and sets of bodies: each side z1 of body A is the node set A_Z1.
+
+    Of cells of 9 and 27 nodes those without centres are written.
+    """
     nodes, rest, first, count = [], [], 1, 1
     for name, mesh in meshes.items():
-        points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.dim)))
+        used = {"hexahedron27": 20, "quadrilateral9": 8}.get(mesh.cell_type, mesh.cells.shape[1])
+        kept = np.unique(mesh.cells[:, :used])
+        points = np.pad(mesh.points[kept], ((0, 0), (0, 3 - mesh.dim)))
+        number = np.full(mesh.n_nodes, -1)
+        number[kept] = first + np.arange(len(kept))
         nodes += [f"{first + k}, {x:.17g}, {y:.17g}, {z:.17g}" for k, (x, y, z) in enumerate(points)]
         rest.append(f"*ELEMENT, TYPE={element or ELEMENTS[mesh.cell_type]}, ELSET={name}")
-        for cell in mesh.cells:
-            rest.append(f"{count}, " + ", ".join(str(first + node) for node in cell))
+        for cell in number[mesh.cells[:, :used]]:
+            line = ", ".join(map(str, [count, *cell]))
+            rest += (
+                [f"{', '.join(line.split(', ')[:16])},", ", ".join(line.split(", ")[16:])]
+                if used > 15
+                else [line]
+            )
             count += 1
         for side, facets in mesh.surfaces.items() if sets else ():
             rest.append(f"*NSET, NSET={name}_{side.upper()}")
-            rest += [f"{first + node}," for node in np.unique(facets)]
-        first += mesh.n_nodes
+            rest += [f"{node}," for node in np.unique(number[facets]) if node > 0]
+        first += len(kept)
     return "\n".join(["*NODE", *nodes, *rest, ""])
 
 
