@@ -27,7 +27,7 @@ from fenics_contact._scene.obstacles import RigidObstacle
 from fenics_contact._scene.pairs import ContactPair, Discretisation, Surface, pressures_of
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.revolution import hold_axis, require_all_or_none, require_simple_torsion, twisting
-from fenics_contact._scene.rollers import direction_of, flat_normal, held_directions, widest_angle
+from fenics_contact._scene.rollers import direction_of, flat_normal, held_directions, require_direction
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._scene.springs import Spring
 from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support, ToolMotion
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from fenics_contact._surfaces.continued import Neighbour
 
 
-_ON_NODES = ("Support", "PointForce", "Spring.first", "Spring.second")
+_ON_NODES = ("Support", "Roller", "PointForce", "Spring.first", "Spring.second")
 """What may act on the nodes of a node set."""
 
 
@@ -179,7 +179,7 @@ class SceneParts:
         if isinstance(support, Support):
             return support.held_in(self.components)
         if isinstance(support, Roller):
-            self._require_direction(support)
+            require_direction(self.bodies[support.body], support)
             return support
         assert isinstance(support, RigidSurface)
         if self.axisymmetric:
@@ -190,22 +190,6 @@ class SceneParts:
                 f"coordinates, got {support.at!r}: give {dim} of them, and as many displacements"
             )
         return support
-
-    def _require_direction(self, roller: Roller) -> None:
-        """Reject a direction in another space, and normals that change where bodies deform much."""
-        mesh, given = self.bodies[roller.body].mesh, roller.direction
-        where = f"surface {roller.surface!r} of body {roller.body!r}"
-        if given is not None and len(given) != mesh.dim:
-            raise InvalidInputError(
-                f"Roller.direction of {where} must have {mesh.dim} components, got {given!r}: give "
-                f"{mesh.dim} of them, or none for the normal"
-            )
-        if self.bodies[roller.body].deforms_much and direction_of(mesh, roller) is None:
-            raise InvalidInputError(
-                f"a roller on a body that deforms much needs one direction, but {where} is curved, its "
-                f"normals turn by up to {widest_angle(mesh, roller.surface):.3g} degrees: give the roller a "
-                "direction, or hold the surface by a RigidObstacle and contact"
-            )
 
     def _require_components(self, part: Load | Support) -> None:
         """Reject a vector whose dimension is not that of its body."""

@@ -100,14 +100,16 @@ class Roller:
 
     Attributes:
         body: Name of the body.
-        surface: Name of its surface.
+        surface: Name of its surface; with a direction also of a node set of its mesh.
         displacement: Displacement along the direction, along the normal positive outwards, [length]: a
             number, zero by default, or a function that receives points, shape (n, dim), and returns it there,
             shape (n,).
-        direction: The direction, of any length; the outward normal at every node by default.
+        direction: The direction, of any length, or a function that receives points, shape (n, dim), and
+            returns the directions there, shape (n, dim), as the radial one of a cylinder; the outward normal
+            at every node by default.
 
     Raises:
-        InvalidInputError: If the direction is zero, or the displacement is no finite number or function.
+        InvalidInputError: If a direction is zero, or the displacement is no finite number or function.
 
     Example:
         >>> tilted = Roller("sector", "cut")  # a plane of symmetry at any angle
@@ -118,7 +120,7 @@ class Roller:
     body: str
     surface: str
     displacement: float | OfPosition = 0.0
-    direction: GivenVector | None = None
+    direction: GivenVector | OfPosition | None = None
 
     def __post_init__(self) -> None:
         """Reject a direction without length and a displacement that is no number."""
@@ -128,7 +130,7 @@ class Roller:
                 f"Roller.displacement of surface {self.surface!r} of body {self.body!r} must be a finite "
                 f"number or a function of the points, got {given!r}: 0.0 holds the surface where it is"
             )
-        if self.direction is not None:
+        if self.direction is not None and not callable(self.direction):
             name = f"Roller.direction of surface {self.surface!r} of body {self.body!r}"
             dim = 2 if len(self.direction) == 2 else 3
             object.__setattr__(self, "direction", unit_vector(name, self.direction, dim))
@@ -137,8 +139,10 @@ class Roller:
     def in_words(self) -> str:
         """Where it is and what it prescribes."""
         amount = "function" if callable(self.displacement) else f"{self.displacement:g}"
-        along = self.direction and f"({', '.join(f'{part:.4g}' for part in self.direction)})"
-        return f"{self.body} {self.surface} slides, {amount} along {along or 'the normal'}"
+        along = "the normal" if self.direction is None else "a function"
+        if self.direction is not None and not callable(self.direction):
+            along = f"({', '.join(f'{part:.4g}' for part in self.direction)})"
+        return f"{self.body} {self.surface} slides, {amount} along {along}"
 
     def amounts(self, points: np.ndarray) -> np.ndarray:
         """Return the prescribed displacement at points, shape (n, dim), along the direction there, (n,).

@@ -419,6 +419,9 @@ class RollerPart(_Named):
 
     changed: ClassVar[str] = "displacement"
     kind: Literal["roller"]
+    direction: Vector | None = Field(
+        None, description="the direction, of any length; the outward normal at every node by default"
+    )
     displacement: ScalarField = Field(
         0.0,
         alias="value",

@@ -4,40 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from fenics_contact._base.checks import require_file
 from fenics_contact._base.display import displayed
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._equilibrium.steps import LoadSequence
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.loads import (
-    BodyForce,
-    Load,
-    PointForce,
-    Pressure,
-    ThermalStrain,
-    centrifugal,
-    gravity,
-)
 from fenics_contact._scene.pairs import ContactPair, Tie
+from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.scene import LoadStep, Scene
-from fenics_contact._scene.supports import AnySupport, Support
-from fenics_contact.decks.bodies import (
-    Component,
-    Exterior,
-    Parts,
-    Section,
-    build_bodies,
-    components,
-    read_sections,
-    regions_of,
-)
+from fenics_contact._scene.supports import AnySupport
+from fenics_contact.decks.acting import Acting
 from fenics_contact.decks.cards import Card, Origin, read_cards
 from fenics_contact.decks.contact import (
     Sides,
@@ -46,9 +27,12 @@ from fenics_contact.decks.contact import (
     read_interactions,
     read_sides,
 )
-from fenics_contact.decks.history import History, Moment, Pressed, Weight, read_history
-from fenics_contact.decks.materials import Conditions, build_material, read_materials
-from fenics_contact.decks.mesh import DeckMesh, Faces, Named, read_mesh_cards
+from fenics_contact.decks.couplings import (
+    drawn,
+)
+from fenics_contact.decks.history import Moment
+from fenics_contact.decks.holding import Holding
+from fenics_contact.decks.model import Model
 from fenics_contact.decks.vocabulary import KNOWN, NOT_YET, PROCEDURES, WITHOUT_EFFECT
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import made_once
@@ -57,32 +41,6 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from fenics_contact.results.state import State
-
-
-@displayed
-@dataclass(frozen=True, eq=False)
-class NodeValues:
-    """Values at nodes of a body, as a function of position: that of the nearest node.
-
-    Attributes:
-        points: Coordinates of the nodes, shape (n, dim), [length].
-        values: Shape (n,), or (n, k).
-    """
-
-    points: np.ndarray
-    values: np.ndarray
-
-    @cached_property
-    def _tree(self) -> cKDTree:
-        return cKDTree(self.points)
-
-    def __call__(self, points: np.ndarray) -> np.ndarray:
-        """Return the values at points, shape (n, dim)."""
-        return np.asarray(self.values[self._tree.query(points)[1]])
-
-    def __getstate__(self) -> dict[str, np.ndarray]:
-        """Pickle the values alone."""
-        return {"points": self.points, "values": self.values}
 
 
 @displayed
@@ -227,80 +185,80 @@ def _read(path: Path) -> Deck:
 
 
 class _Builder:
-    """Builds the parts of a scene from the cards of a deck."""
+    """Builds the scene and the load steps of a deck."""
 
     def __init__(self, name: str, cards: Sequence[Card]) -> None:
-        self.name, self.cards = name, cards
-        self.notes: list[str] = []
-        self.origins: dict[tuple[str, str], Origin] = {}
-        self.mesh: DeckMesh = read_mesh_cards(cards)
-        self.kind = self.mesh.blocks[0].element.kind
-        self.dim = self.mesh.blocks[0].element.dim
-        self.sections, self.of_element = read_sections(cards, self.mesh)
-        self.materials, self.axes = read_materials(cards)
-        self.parts_of_mesh = components(self.mesh, self.sections, self.of_element)
-        self.exterior = Exterior.of(self.mesh)
-        self.thickness = self._thickness()
-        self.history: History = read_history(cards, self.mesh, self.dim, self.note)
-        self.surfaces: dict[str, Faces] = {}
-        self.node_sets: dict[str, np.ndarray] = {}
-
-    def note(self, card: Card, words: str) -> None:
-        """Keep what is worth knowing of a card."""
-        text = f"{card.origin}: {words}"
-        if text not in self.notes:
-            self.notes.append(text)
-
-    def _thickness(self) -> float:
-        if self.kind not in ("plane stress", "plane strain"):
-            return 1.0
-        found = sorted({section.thickness for section in self.sections})
-        if len(found) > 1:
-            card = next(s.card for s in self.sections if s.thickness != self.sections[0].thickness)
-            raise card.error(
-                f"plane bodies must have one thickness, got {found[0]:g} and {found[-1]:g}: give one"
-            )
-        return found[0]
+        self.model = Model(name, cards)
+        self.holding = Holding(self.model)
+        self.acting = Acting(self.model, self.holding)
 
     def deck(self) -> Deck:
         """Return the deck."""
-        for card in self.cards:
+        model = self.model
+        for card in model.cards:
             if card.name in WITHOUT_EFFECT and card.name != "HEADING":
-                self.note(card, f"has no effect here ({WITHOUT_EFFECT[card.name]})")
-        supported = self._supported()
+                model.note(card, f"has no effect here ({WITHOUT_EFFECT[card.name]})")
+        supported = self.holding.supported()
         sides = self._contact_surfaces()
-        self._pressed_surfaces()
+        self.holding.name_surfaces()
+        self.holding.name_nodes()
+        self.acting.name_surfaces()
         self._named_surfaces()
         self._named_nodes()
-        loaded = self._loaded()
-        parts = build_bodies(
-            self.mesh, self.parts_of_mesh, self.of_element, self.sections, self.surfaces, self.node_sets,
-            f"deck '{self.name}'",
-        )  # fmt: skip
-        self.parts = parts
-        bodies = self._bodies(parts)
-        contacts, ties = self._pairs(sides)
-        scene = self._scene(bodies, self._supports(supported, None), contacts, ties)
-        steps, step_of = [], []
-        for number, step in enumerate(self.history.steps):
-            self.origins["step", step.name] = step.card.origin
+        loaded = self.acting.loaded()
+        model.build_meshes()
+        bodies = model.bodies()
+        preloads = self.holding.preloads()
+        supports = self.holding.supports(supported, None)
+        scene = self._scene(bodies, supports, *self._pairs(sides), preloads)
+        steps, step_of = self._steps(bodies, supported, loaded, preloads)
+        mesh = model.mesh
+        return Deck(
+            model.name,
+            scene,
+            steps,
+            step_of,
+            self._prints(),
+            tuple(model.notes),
+            model.thickness,
+            {name: np.where(at < 0, 0, mesh.numbers[at]) for name, at in model.parts.nodes.items()},
+            {part.name: mesh.element_numbers[part.elements] for part in model.parts_of_mesh},
+            {name: np.sort(mesh.numbers[members]) for name, members in mesh.node_sets.items()},
+            {name: np.sort(mesh.element_numbers[members]) for name, members in mesh.element_sets.items()},
+            model.origins,
+        )
+
+    def _steps(
+        self,
+        bodies: Mapping[str, Body],
+        supported: Mapping[str, tuple[np.ndarray, tuple[int, ...]]],
+        loaded: Mapping[int, Sequence[tuple[str, np.ndarray | None]]],
+        preloads: Sequence[Preload],
+    ) -> tuple[tuple[LoadStep, ...], tuple[int, ...]]:
+        """Return the load steps, and the step of the deck of each."""
+        steps: list[LoadStep] = []
+        step_of = []
+        before: Moment | None = None
+        for number, step in enumerate(self.model.history.steps):
+            self.model.origins["step", step.name] = step.card.origin
             for moment in step.moments:
                 part = "" if moment is step.moments[-1] else f", time {moment.time:g}"
-                loads = self._loads(moment, loaded[id(moment)], bodies)
-                supports = self._supports(supported, moment)
-                steps.append(LoadStep(f"{step.name}{part}", loads, supports, moment.time))
+                loads = self.acting.loads(moment, loaded[id(moment)], bodies)
+                supports = (*self.holding.supports(supported, moment), *self.holding.equations()[0])
+                acting = None
+                if self.model.bolts:
+                    pairs = zip(self.model.bolts, preloads, strict=True)
+                    aims = [drawn(bolt, held, moment, before) for bolt, held in pairs]
+                    acting = [aim for aim in aims if aim is not None]
+                steps.append(LoadStep(f"{step.name}{part}", loads, supports, moment.time, acting))
+                before = moment
                 step_of.append(number)
-        return Deck(
-            self.name, scene, tuple(steps), tuple(step_of), self._prints(), tuple(self.notes), self.thickness,
-            {name: np.where(at < 0, 0, self.mesh.numbers[at]) for name, at in parts.nodes.items()},
-            self._element_numbers(), self._numbered(self.mesh.node_sets, self.mesh.numbers),
-            self._numbered(self.mesh.element_sets, self.mesh.element_numbers), self.origins,
-        )  # fmt: skip
+        return tuple(steps), tuple(step_of)
 
     def _contact_surfaces(self) -> list[Sides]:
         """Name the surfaces of contact pairs and ties."""
-        self.interactions = read_interactions(self.cards)
-        sides = read_sides(self.cards, self.interactions)
+        self.interactions = read_interactions(self.model.cards)
+        sides = read_sides(self.model.cards, self.interactions)
         self.sides_by_name: dict[str, str] = {}
         for each in sides:
             for name in (each.slave, each.master):
@@ -309,36 +267,41 @@ class _Builder:
 
     def _contact_surface(self, name: str, of: Sides) -> None:
         """Take the faces of a surface, of one of nodes, or of a node set, those that have all of them."""
-        if name not in self.mesh.surfaces and name in self.mesh.node_sets:
-            nodes: np.ndarray | None = self.mesh.node_sets[name]
-            faces, known = self.exterior.covering(self.mesh.node_sets[name]), False
+        if name not in self.model.mesh.surfaces and name in self.model.mesh.node_sets:
+            nodes: np.ndarray | None = self.model.mesh.node_sets[name]
+            faces, known = self.model.exterior.covering(self.model.mesh.node_sets[name]), False
         else:
-            given = self.mesh.surface_named(name, of.card, of.row)
-            faces, nodes, known = self._faces_of(given), given.nodes, True
+            given = self.model.mesh.surface_named(name, of.card, of.row)
+            faces, nodes, known = self.model.faces_of(given), given.nodes, True
         if faces is None:
             raise of.card.error(
                 f"contact is between faces, but the {0 if nodes is None else len(nodes)} nodes of "
                 f"{name!r} are not all nodes of some faces: give the faces, as *SURFACE with TYPE=ELEMENT",
                 of.row,
             )  # fmt: skip
-        outer = self.exterior.holds(faces)
+        outer = self.model.exterior.holds(faces)
         if not outer.all():
-            number = self.mesh.element_numbers[faces.elements[~outer][0]]
+            number = self.model.mesh.element_numbers[faces.elements[~outer][0]]
             raise of.card.error(
                 f"surface {name!r} must lie on the boundary of a body, a face of element {number} lies "
                 "between two elements: correct it", of.row,
             )  # fmt: skip
-        label = name if known or name not in self.mesh.surfaces else f"{name} faces"
-        self.surfaces[label] = faces
+        label = name if known or name not in self.model.mesh.surfaces else f"{name} faces"
+        self.model.surfaces[label] = faces
         self.sides_by_name[name] = label
 
     def _pairs(self, sides: Sequence[Sides]) -> tuple[list[ContactPair], list[Tie]]:
         found = build_pairs(
-            sides, self.sides_by_name, self.parts.meshes, self.interactions, clearances(self.cards), self.note
+            sides,
+            self.sides_by_name,
+            self.model.parts.meshes,
+            self.interactions,
+            clearances(self.model.cards),
+            self.model.note,
         )
         for each, pair in found:
             kind = "tie" if isinstance(pair, Tie) else "contact"
-            self.origins[kind, pair.place] = each.card.origin
+            self.model.origins[kind, pair.place] = each.card.origin
         return [p for _, p in found if isinstance(p, ContactPair)], [
             p for _, p in found if isinstance(p, Tie)
         ]
@@ -349,6 +312,7 @@ class _Builder:
         supports: Sequence[AnySupport],
         contacts: Sequence[ContactPair],
         ties: Sequence[Tie],
+        preloads: Sequence[Preload],
     ) -> Scene:
         """Return the scene before the first step; what does not suit the bodies is told with its card."""
         for kind, parts in (("contact", contacts), ("tie", ties)):
@@ -356,321 +320,29 @@ class _Builder:
                 try:
                     Scene(bodies, **{f"{kind}s" if kind == "tie" else "contacts": (part,)})  # type: ignore[arg-type]
                 except InvalidInputError as error:
-                    raise self.origins[kind, part.place].error(str(error)) from error
-        return Scene(bodies, supports, (), contacts, ties)
-
-    def _numbered(self, sets: Mapping[str, np.ndarray], numbers: np.ndarray) -> dict[str, np.ndarray]:
-        return {name: np.sort(numbers[members]) for name, members in sets.items()}
-
-    def _element_numbers(self) -> dict[str, np.ndarray]:
-        """Return the numbers of the elements of each body in the order of its cells: by their cards."""
-        return {part.name: self.mesh.element_numbers[part.elements] for part in self.parts_of_mesh}
-
-    def _bodies(self, parts: Parts) -> dict[str, Body]:
-        large = any(step.large for step in self.history.steps)
-        if large and not all(step.large for step in self.history.steps):
-            step = next(step for step in self.history.steps if not step.large)
-            raise step.card.error("all steps must have NLGEOM, or none, got both: give it to this one, too")
-        bodies = {}
-        for part in self.parts_of_mesh:
-            mesh = parts.meshes[part.name]
-            of = Conditions(
-                self.kind, large, self._temperature(), mesh.cell_type in ("hexahedron", "quadrilateral")
-            )
-            given = {}
-            for region, section in regions_of(self.sections, part).items():
-                given[region] = self._material(section, of)
-            material = given if len(given) > 1 else next(iter(given.values()))
-            bodies[part.name] = Body(mesh, material, axisymmetric=self.kind == "axisymmetric")
-            self.origins["body", part.name] = self.sections[part.sections[0]].card.origin
-        return bodies
-
-    def _material(self, section: Section, of: Conditions) -> Any:
-        if section.material not in self.materials:
-            there = ", ".join(self.materials) or "none"
-            raise section.card.error(f"material {section.material!r} is not there; the deck has {there}")
-        if section.orientation and section.orientation not in self.axes:
-            there = ", ".join(self.axes) or "none"
-            raise section.card.error(
-                f"orientation {section.orientation!r} is not there; the deck has {there}"
-            )
-        cards = self.materials[section.material]
-        self.origins["material", section.material] = cards.card.origin
-        return build_material(cards, self.axes.get(section.orientation), of)
-
-    def _temperature(self) -> float | None:
-        """Return the temperature if it is the same everywhere and always."""
-        found = {float(t) for t in np.unique(self.history.initial)}
-        for step in self.history.steps:
-            for moment in step.moments:
-                if moment.temperatures is not None:
-                    found |= {float(t) for t in np.unique(moment.temperatures)}
-        return found.pop() if len(found) == 1 else None
-
-    def _nodes_of_bodies(self) -> np.ndarray:
-        """Return which nodes belong to elements, (n_nodes,)."""
-        mark = np.zeros(len(self.mesh.points), dtype=bool)
-        for block in self.mesh.blocks:
-            mark[block.nodes] = True
-        return mark
-
-    def _supported(self) -> dict[str, tuple[np.ndarray, tuple[int, ...]]]:
-        """Return what is held by name: nodes and components. Single nodes are put together."""
-        inside = self._nodes_of_bodies()
-        found: dict[str, tuple[np.ndarray, set[int]]] = {}
-        single: dict[int, set[int]] = {}
-        for target in self.history.targets:
-            nodes = target.nodes[inside[target.nodes]]
-            if not len(nodes):
-                self.note(target.card, f"nodes {target.label} belong to no element")
-            elif target.label.isdecimal():
-                single.setdefault(int(nodes[0]), set()).update(target.components)
-            else:
-                found.setdefault(target.label, (nodes, set()))[1].update(target.components)
-                self.origins.setdefault(("support", target.label), target.card.origin)
-        together: dict[tuple[int, ...], list[int]] = {}
-        for node, held in single.items():
-            together.setdefault(tuple(sorted(held)), []).append(node)
-        for alike, several in together.items():
-            name = "BOUNDARY " + " ".join(str(k + 1) for k in alike)
-            found[name] = np.array(several), set(alike)
-        result = {}
-        for name, (nodes, held) in found.items():
-            result[self._place(name, nodes)] = np.unique(nodes), tuple(sorted(held))
-        self._require_same(inside)
-        return result
-
-    def _require_same(self, inside: np.ndarray) -> None:
-        """Reject steps that hold other components than the first."""
-        moments = [(step, moment) for step in self.history.steps for moment in step.moments]
-        for step, moment in moments[1:]:
-            held, first = (~np.isnan(each.held[inside, : self.dim]) for each in (moment, moments[0][1]))
-            if (held != first).any():
-                node = self.mesh.numbers[inside][(held != first).any(axis=1)][0]
-                raise step.card.error(
-                    f"the same components must be held in all steps, here others than in the first, at "
-                    f"node {node}: hold them in all steps with OP=MOD, or make two decks"
-                )
-
-    def _place(self, name: str, nodes: np.ndarray) -> str:
-        """Name nodes as a surface if they are all nodes of some faces, else as a set of nodes."""
-        faces = self.exterior.covering(nodes)
-        if faces is not None:
-            name = f"{name} faces" if name in self.mesh.surfaces else name
-            self.surfaces[name] = faces
-        else:
-            name = f"{name} nodes" if name in self.mesh.surfaces else name
-            self.node_sets[name] = np.unique(nodes)
-        return name
+                    raise self.model.origins[kind, part.place].error(str(error)) from error
+        rollers, springs = self.holding.equations()
+        return Scene(bodies, (*supports, *rollers), (), contacts, ties, preloads, springs=springs)
 
     def _named_surfaces(self) -> None:
         """Take all surfaces of the deck that lie on the boundary of bodies."""
-        for name, given in self.mesh.surfaces.items():
-            faces = self._faces_of(given)
-            if faces is not None and len(faces) and self.exterior.holds(faces).all():
-                self.surfaces.setdefault(name, faces)
-                self.origins["surface", name] = given.card.origin
-
-    def _faces_of(self, surface: Named) -> Faces | None:
-        """Return the faces of a surface, of one of nodes those that have all of them, or None."""
-        return surface.faces if surface.nodes is None else self.exterior.covering(surface.nodes)
+        for name, given in self.model.mesh.surfaces.items():
+            faces = self.model.faces_of(given)
+            if faces is not None and len(faces) and self.model.exterior.holds(faces).all():
+                self.model.surfaces.setdefault(name, faces)
+                self.model.origins["surface", name] = given.card.origin
 
     def _named_nodes(self) -> None:
-        inside = self._nodes_of_bodies()
-        for name, nodes in self.mesh.node_sets.items():
+        inside = self.model.nodes_of_bodies()
+        for name, nodes in self.model.mesh.node_sets.items():
             mine = nodes[inside[nodes]]
-            if name not in self.surfaces and name not in self.node_sets and len(mine):
-                self._place(name, mine)
-            self.origins["nodes", name] = self.mesh.origins[name].origin
-
-    def _pressed_surfaces(self) -> None:
-        """Name the faces that pressures act on."""
-        acting = [
-            pressed for step in self.history.steps for moment in step.moments for pressed in moment.pressures
-        ]
-        sides: dict[str, Pressed] = {}
-        taken: dict[tuple[int, int], str] = {}
-        for pressed in acting:
-            name = " ".join(pressed.where)
-            if name in sides:
-                continue
-            sides[name] = pressed
-            faces = self._faces(pressed)
-            outer = self.exterior.holds(faces)
-            if not outer.all():
-                number = self.mesh.element_numbers[faces.elements[~outer][0]]
-                raise pressed.card.error(
-                    f"a pressure must act on the boundary of a body, a face of element {number} lies "
-                    "between two elements: correct the set or the label", pressed.row,
-                )  # fmt: skip
-            for key in zip(faces.elements.tolist(), faces.sides.tolist(), strict=True):
-                other = taken.setdefault(key, name)
-                if other != name:
-                    number = self.mesh.element_numbers[key[0]]
-                    raise pressed.card.error(
-                        f"the same face of element {number} is loaded by {other!r} and {name!r}: load it "
-                        "once",
-                        pressed.row,
-                    )
-            self.surfaces[name] = faces
-            self.origins["load", name] = pressed.card.origin
-
-    def _faces(self, pressed: Pressed) -> Faces:
-        card, row = pressed.card, pressed.row
-        if len(pressed.where) == 1:
-            given = self.mesh.surface_named(pressed.where[0], card, row)
-            if given.faces is None:
-                raise card.error(
-                    "a pressure needs a surface of faces, this one has nodes: give TYPE=ELEMENT", row
-                )
-            return given.faces
-        elements = self.mesh.elements_named(pressed.where[0], card, row)
-        return self.mesh.faces_of(elements, pressed.where[1], card, row)
-
-    def _loaded(self) -> dict[int, list[tuple[str, np.ndarray | None]]]:
-        """Name the nodes that forces act on; return for each moment its names, with None for many forces."""
-        result: dict[int, list[tuple[str, np.ndarray | None]]] = {}
-        inside = self._nodes_of_bodies()
-        for step in self.history.steps:
-            for moment in step.moments:
-                force = np.where(inside[:, None], moment.forces, 0.0)[:, : self.dim]
-                nodes = np.flatnonzero(force.any(axis=1))
-                result[id(moment)] = self._groups(nodes, force) if len(nodes) else []
-        return result
-
-    def _groups(
-        self, nodes: np.ndarray, force: np.ndarray, most: int = 6
-    ) -> list[tuple[str, np.ndarray | None]]:
-        """Return sets of nodes with the same force each, one set for all where there are many forces."""
-        values, number = np.unique(force[nodes], axis=0, return_inverse=True)
-        if len(values) > most:
-            return [(self._set_of(nodes), None)]
-        return [(self._set_of(nodes[number.ravel() == k]), value) for k, value in enumerate(values)]
-
-    def _set_of(self, nodes: np.ndarray) -> str:
-        """Return the name of exactly these nodes, a new one if there is none."""
-        for known in (self.node_sets, self.mesh.node_sets):
-            for name, inside in known.items():
-                if np.array_equal(inside, nodes) and (known is self.node_sets or name not in self.surfaces):
-                    self.node_sets.setdefault(name, nodes)
-                    return name
-        name = next(
-            f"CLOAD {k}" for k in range(1, len(self.node_sets) + 2) if f"CLOAD {k}" not in self.node_sets
-        )
-        self.node_sets[name] = nodes
-        return name
-
-    def _in_body(self, name: str, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return which nodes of the deck a body has, and their numbers in it."""
-        mine = self.parts.nodes[name]
-        mine = mine[mine >= 0]  # ascending; centres of cells are behind
-        place = np.minimum(np.searchsorted(mine, nodes), len(mine) - 1)
-        there = mine[place] == nodes
-        return nodes[there], place[there]
-
-    def _supports(
-        self, supported: Mapping[str, tuple[np.ndarray, tuple[int, ...]]], moment: Moment | None
-    ) -> tuple[AnySupport, ...]:
-        """Return the supports at a time, at zero before all."""
-        found = []
-        for name, (nodes, held) in supported.items():
-            for body, mesh in self.parts.meshes.items():
-                mine, inner = self._in_body(body, nodes)
-                if not len(mine):
-                    continue
-                value: list[Any] = [None] * self.dim
-                for k in held:
-                    given = np.zeros(len(mine)) if moment is None else moment.held[mine, k]
-                    same = np.ptp(given) == 0.0
-                    value[k] = float(given[0]) if same else NodeValues(mesh.points[inner], given)
-                found.append(Support(body, name, tuple(value)))
-        return tuple(found)
-
-    def _loads(
-        self, moment: Moment, loaded: Sequence[tuple[str, np.ndarray | None]], bodies: Mapping[str, Body]
-    ) -> tuple[Load, ...]:
-        """Return the loads at a time."""
-        found: list[Load] = []
-        for name, force in loaded:
-            for body, mesh in self.parts.meshes.items():
-                mine, inner = self._in_body(body, self.node_sets[name])
-                if len(mine):
-                    each = moment.forces[mine, : self.dim] / self.thickness
-                    value: Any = (
-                        tuple((force / self.thickness).tolist())
-                        if force is not None
-                        else NodeValues(mesh.points[inner], each)
-                    )
-                    found.append(PointForce(body, name, value))
-        for pressed in moment.pressures:
-            name = " ".join(pressed.where)
-            if pressed.value:
-                found += [
-                    Pressure(b, name, pressed.value)
-                    for b, m in self.parts.meshes.items()
-                    if name in m.surfaces
-                ]
-        for weight in moment.weights:
-            found += self._weights(weight)
-        if moment.temperatures is not None:
-            found += self._heat(moment.temperatures, bodies)
-        return tuple(found)
-
-    def _weights(self, weight: Weight) -> list[Load]:
-        """Return gravity or centrifugal force on whole bodies."""
-        elements = self.mesh.elements_named(weight.where, weight.card, weight.row)
-        found: list[Load] = []
-        for part in self.parts_of_mesh:
-            mine = np.isin(part.elements, elements)
-            if not mine.any() or not weight.value:
-                continue
-            densities = {
-                self.materials[self.sections[k].material].density
-                for k in np.unique(self.of_element[part.elements])
-            }
-            if not mine.all() or len(densities) > 1:
-                raise weight.card.error(
-                    f"{weight.kind} must act on whole bodies of one density, on body {part.name} it does "
-                    "not: give all of its elements, and one density", weight.row,
-                )  # fmt: skip
-            density = densities.pop()
-            if not density:
-                name = self.sections[part.sections[0]].material
-                raise weight.card.error(
-                    f"{weight.kind} needs a *DENSITY of material {name}: add it", weight.row
-                )
-            found.append(self._weight(weight, part, density))
-        return found
-
-    def _weight(self, weight: Weight, part: Component, density: float) -> BodyForce:
-        numbers = np.array(weight.numbers)
-        if weight.kind == "GRAV":
-            return gravity(part.name, density, (weight.value * numbers)[: self.dim].tolist())
-        speed = float(np.sqrt(weight.value))
-        if self.dim == 3:
-            return centrifugal(part.name, density, speed, tuple(numbers[:3]), tuple(numbers[3:]))
-        if self.kind == "axisymmetric":
-            return centrifugal(part.name, density, speed, (0.0, 0.0), (0.0, 1.0))
-        return centrifugal(part.name, density, speed, tuple(numbers[:2]))
-
-    def _heat(self, temperatures: np.ndarray, bodies: Mapping[str, Body]) -> list[Load]:
-        """Return the changes of temperature of bodies that expand."""
-        found: list[Load] = []
-        for name, mesh in self.parts.meshes.items():
-            nodes = self.parts.nodes[name]
-            change = (temperatures - self.history.initial)[nodes]
-            if mesh.centres is not None:
-                change[mesh.centres.nodes] = (mesh.centres.given * change[mesh.centres.masters]).sum(axis=1)
-            materials = bodies[name].materials
-            if not change.any() or not all(getattr(m, "expands", False) for m in materials):
-                continue
-            value: Any = float(change[0]) if np.ptp(change) == 0.0 else NodeValues(mesh.points, change)
-            found.append(ThermalStrain(name, value))
-        return found
+            if name not in self.model.surfaces and name not in self.model.node_sets and len(mine):
+                self.model.place(name, mine)
+            self.model.origins["nodes", name] = self.model.mesh.origins[name].origin
 
     def _prints(self) -> tuple[Print, ...]:
         found = []
-        for step, card in self.history.prints:
+        for step, card in self.model.history.prints:
             where = card.name_of("NSET") or card.name_of("ELSET") or card.name_of("SURFACE")
             variables = tuple(entry.upper() for row in card.rows for entry in row if entry)
             found.append(Print(step, card.written, where, variables, card.name_of("TOTALS"), card.origin))

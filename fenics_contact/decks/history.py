@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -82,9 +82,11 @@ class Moment:
 
     Attributes:
         time: Time from the first step on.
-        held: What nodes are held at, NaN where they are free, (n_nodes, 3), along their local axes.
-        forces: Forces on nodes, (n_nodes, 3), along their local axes.
+        held: What nodes are held at, NaN where they are free, displacements and rotations, (n_nodes, 6),
+            along their local axes.
+        forces: Forces and moments on nodes, (n_nodes, 6), along their local axes.
         temperatures: (n_nodes,), or None where none are given.
+        fixed: What is held as it was before the step, (n_nodes, 6).
     """
 
     time: float
@@ -93,7 +95,7 @@ class Moment:
     pressures: Sequence[Pressed]
     weights: Sequence[Weight]
     temperatures: np.ndarray | None
-    more_forces: Mapping[tuple[int, int], float] = field(default_factory=dict)
+    fixed: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,10 +132,11 @@ class Held:
 class _Course:
     """What acts now, changed by one card after the other."""
 
-    def __init__(self, mesh: DeckMesh, amplitudes: Mapping[str, Amplitude], dim: int) -> None:
-        shape = (len(mesh.points), 3)
-        self.mesh, self.amplitudes, self.dim = mesh, amplitudes, dim
+    def __init__(self, mesh: DeckMesh, amplitudes: Mapping[str, Amplitude]) -> None:
+        shape = (len(mesh.points), 6)
+        self.mesh, self.amplitudes = mesh, amplitudes
         self.held, self.held_before = np.full(shape, np.nan), np.zeros(shape)
+        self.fixed = np.zeros(shape, dtype=bool)
         self.force, self.force_before = np.zeros(shape), np.zeros(shape)
         self.held_by, self.force_by = np.zeros(shape, dtype=int), np.zeros(shape, dtype=int)
         self.factors: list[Amplitude | None] = [None]
@@ -144,7 +147,6 @@ class _Course:
         self.temperature_before: np.ndarray | None = None
         self.temperature_by = 0
         self.targets: list[Held] = []
-        self.rotations: dict[tuple[int, int], tuple[float, Card, int]] = {}
 
     def _by(self, card: Card) -> int:
         name = card.name_of("AMPLITUDE")
@@ -170,34 +172,22 @@ class _Course:
         for row, entries in enumerate(card.rows):
             nodes = self.mesh.nodes_named(entries[0], card, row)
             components, value = _components(card, row, entries)
-            if max(components, default=0) > 2:
-                self._beyond(card, row, nodes, components, value)
-            inside = tuple(k for k in components if k < self.dim)
-            if not inside:
-                continue
+            if max(components) > 5:
+                raise card.error(
+                    f"component {max(components) + 1} is no displacement: 1 to 3, of nodes that drive rigid "
+                    "surfaces 4 to 6", row,
+                )  # fmt: skip
+            inside = tuple(components)
             self.targets.append(Held(plain(entries[0]), nodes, inside, card, row))
             for k in inside:
                 self.held[nodes, k] = self.held_before[nodes, k] if fixed else value
                 self.held_by[nodes, k] = by
-
-    def _beyond(
-        self, card: Card, row: int, nodes: np.ndarray, components: Sequence[int], value: float
-    ) -> None:
-        """Take rotations of nodes that drive rigid surfaces; others have none, if they are held at zero."""
-        if max(components) > 5:
-            raise card.error(
-                f"component {max(components) + 1} is no displacement: 1 to 3, of nodes that drive rigid "
-                "surfaces 4 to 6", row,
-            )  # fmt: skip
-        for k in components:
-            if k > 2:
-                for node in nodes.tolist():
-                    self.rotations[node, k] = (value, card, row)
+                self.fixed[nodes, k] = fixed
 
     def forces(self, card: Card, fresh: bool, touched: np.ndarray) -> None:
         """Load nodes. Forces of one step add up, those of earlier steps are replaced.
 
-        `touched`: what the step has loaded, (n_nodes, 3), changed in place.
+        `touched`: what the step has loaded, (n_nodes, 6), changed in place.
         """
         if card.name_of("OP") == "NEW" and fresh:
             self.force[:] = 0.0
@@ -208,10 +198,6 @@ class _Course:
             if len(numbers) < 2 or not 1 <= numbers[0] <= 6:
                 raise card.error("needs node or set, component and force: complete the line", row)
             component = int(numbers[0]) - 1
-            if component > 2:
-                for node in nodes.tolist():
-                    self.rotations[node, component + 10] = (numbers[1], card, row)
-                continue
             kept = np.where(touched[nodes, component], self.force[nodes, component], 0.0)
             self.force[nodes, component] = kept + numbers[1]
             self.force_by[nodes, component] = by
@@ -292,7 +278,7 @@ class _Course:
             before = self.temperature if self.temperature_before is None else self.temperature_before
             heat = now(self.temperature, before, np.full(len(self.temperature), self.temperature_by))
         forces = now(self.force, self.force_before, self.force_by)
-        return Moment(start + step_time, held, forces, pressures, weights, heat)
+        return Moment(start + step_time, held, forces, pressures, weights, heat, self.fixed.copy())
 
     def times(self, period: float, start: float) -> list[float]:
         """Return the times of a step at which something changes its slope, and its end."""
@@ -347,15 +333,12 @@ class History:
     steps: Sequence[Step]
     targets: Sequence[Held]
     prints: Sequence[tuple[int, Card]]
-    rotations: Mapping[tuple[int, int], tuple[float, Card, int]]
     initial: np.ndarray
 
 
-def read_history(
-    cards: Sequence[Card], mesh: DeckMesh, dim: int, note: Callable[[Card, str], None]
-) -> History:
+def read_history(cards: Sequence[Card], mesh: DeckMesh) -> History:
     """Return the load steps of a deck."""
-    course = _Course(mesh, read_amplitudes(cards), dim)
+    course = _Course(mesh, read_amplitudes(cards))
     initial = _initial(cards, mesh)
     steps: list[Step] = []
     prints: list[tuple[int, Card]] = []
@@ -369,7 +352,7 @@ def read_history(
         elif card.name == "ENDSTEP":
             if inside is None:
                 raise card.error("there is no *STEP before it: add one, or leave it out")
-            step, start = _step(inside, course, initial, start, len(steps), note)
+            step, start = _step(inside, course, initial, start, len(steps))
             steps.append(step)
             prints += [(len(steps) - 1, each) for each in inside if each.name in PRINT_CARDS]
             inside = None
@@ -381,7 +364,7 @@ def read_history(
             raise card.error("must be between *STEP and *END STEP: move it there")
     if inside is not None:
         raise inside[0].error("has no *END STEP: add it")
-    return History(steps, course.targets, prints, course.rotations, initial)
+    return History(steps, course.targets, prints, initial)
 
 
 def _initial(cards: Sequence[Card], mesh: DeckMesh) -> np.ndarray:
@@ -402,7 +385,6 @@ def _step(
     initial: np.ndarray,
     start: float,
     number: int,
-    note: Callable[[Card, str], None],
 ) -> tuple[Step, float]:
     """Return a step and the time at its end."""
     head, seen, period = cards[0], set[str](), 1.0

@@ -143,7 +143,6 @@ WRONG = [
         "*AMPLITUDE",
         r"needs pairs of a time and a value, got 3 numbers",
     ),
-    ("*STEP\n", "*EQUATION\n2\n1, 1, 1., 2, 1, -1.\n*STEP\n", "*EQUATION", r"known, but not read yet"),
 ]
 
 

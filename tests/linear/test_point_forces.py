@@ -12,6 +12,7 @@ from fenics_contact import (
     Body,
     BodyMesh,
     PointForce,
+    Roller,
     Scene,
     Support,
     Traction,
@@ -22,7 +23,7 @@ from fenics_contact import (
 from fenics_contact._surfaces.facets import share_areas
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.materials import IsotropicElasticity, NeoHooke
 from fenics_contact.mesh import quadratic, refined
 
 STEEL = IsotropicElasticity(1000.0, 0.3)
@@ -135,3 +136,41 @@ def test_derivatives_by_the_shape_keep_forces_at_nodes_as_they_are() -> None:
         InvalidInputError, match=r"need forces at nodes as numbers, got a function of the points"
     ):
         moving_loads(state.torn, None)
+
+
+def test_nodes_slide_along_directions_that_a_function_gives() -> None:
+    """Nodes of an end are held across a slope, others along z: only what is held has a reaction."""
+    mesh = replace(BAR, node_sets={**BAR.node_sets, "root": np.unique(BAR.surfaces["x0"])})
+    rollers = [Roller("bar", "root", 0.01, lambda x: np.tile([1.0, 1.0, 0.0], (len(x), 1)))]
+    supports = [Support("bar", "end", (0.0, 0.0, 0.0)), *rollers]
+    state = solve_scene(Scene({"bar": Body(mesh, STEEL)}, supports), MPI.COMM_SELF, tolerance=1e-12)
+    moved = state.gather_displacement("bar")[mesh.node_sets["root"]]
+    np.testing.assert_allclose(moved[:, :2].sum(axis=1), 0.01 * np.sqrt(2), atol=1e-12)
+    force = state.reactions()["bar root"].force
+    assert force[0] == pytest.approx(force[1], rel=1e-6)
+    assert force[0] > 0.1
+    assert abs(force[2]) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("roller", "message"),
+    [
+        (
+            Roller("bar", "end"),
+            r"a roller on nodes needs a direction, node set 'end' of body 'bar' has no norm",
+        ),
+        (
+            Roller("bar", "end", 0.0, lambda x: 0.0 * x),
+            r"must not be zero, got zeros at \(3, 0, 0\): leave out",
+        ),
+    ],
+)
+def test_a_roller_on_nodes_without_direction_is_refused(roller: Roller, message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        solve_scene(Scene({"bar": Body(BAR, STEEL)}, [roller]), MPI.COMM_SELF)
+
+
+def test_bodies_that_deform_much_slide_along_vectors_alone() -> None:
+    roller = Roller("bar", "end", 0.0, lambda x: x)
+    with pytest.raises(InvalidInputError, match=r"that of 'end' of body 'bar' is a function: give a vector"):
+        Scene({"bar": Body(BAR, NeoHooke(1.0, 0.3))}, [roller])

@@ -1,0 +1,221 @@
+"""What loads the bodies of a deck."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from fenics_contact._scene.body import Body
+from fenics_contact._scene.loads import (
+    BodyForce,
+    Load,
+    PointForce,
+    Pressure,
+    ThermalStrain,
+    TotalForce,
+    centrifugal,
+    gravity,
+)
+from fenics_contact.decks.bodies import (
+    Component,
+)
+from fenics_contact.decks.couplings import (
+    Driven,
+)
+from fenics_contact.decks.history import Moment, Pressed, Weight
+from fenics_contact.decks.holding import Holding
+from fenics_contact.decks.mesh import Faces
+from fenics_contact.decks.model import Model, NodeValues
+
+
+class Acting:
+    """Makes loads of what acts at a time of a deck."""
+
+    def __init__(self, model: Model, holding: Holding) -> None:
+        self.model, self.holding = model, holding
+
+    def name_surfaces(self) -> None:
+        """Name the faces that pressures act on."""
+        acting = [
+            pressed
+            for step in self.model.history.steps
+            for moment in step.moments
+            for pressed in moment.pressures
+        ]
+        sides: dict[str, Pressed] = {}
+        taken: dict[tuple[int, int], str] = {}
+        for pressed in acting:
+            name = " ".join(pressed.where)
+            if name in sides:
+                continue
+            sides[name] = pressed
+            faces = self._faces(pressed)
+            outer = self.model.exterior.holds(faces)
+            if not outer.all():
+                number = self.model.mesh.element_numbers[faces.elements[~outer][0]]
+                raise pressed.card.error(
+                    f"a pressure must act on the boundary of a body, a face of element {number} lies "
+                    "between two elements: correct the set or the label", pressed.row,
+                )  # fmt: skip
+            for key in zip(faces.elements.tolist(), faces.sides.tolist(), strict=True):
+                other = taken.setdefault(key, name)
+                if other != name:
+                    number = self.model.mesh.element_numbers[key[0]]
+                    raise pressed.card.error(
+                        f"the same face of element {number} is loaded by {other!r} and {name!r}: load it "
+                        "once",
+                        pressed.row,
+                    )
+            self.model.surfaces[name] = faces
+            self.model.origins["load", name] = pressed.card.origin
+
+    def _faces(self, pressed: Pressed) -> Faces:
+        card, row = pressed.card, pressed.row
+        if len(pressed.where) == 1:
+            given = self.model.mesh.surface_named(pressed.where[0], card, row)
+            if given.faces is None:
+                raise card.error(
+                    "a pressure needs a surface of faces, this one has nodes: give TYPE=ELEMENT", row
+                )
+            return given.faces
+        elements = self.model.mesh.elements_named(pressed.where[0], card, row)
+        return self.model.mesh.faces_of(elements, pressed.where[1], card, row)
+
+    def loaded(self) -> dict[int, list[tuple[str, np.ndarray | None]]]:
+        """Name the nodes that forces act on; return for each moment its names, with None for many forces."""
+        result: dict[int, list[tuple[str, np.ndarray | None]]] = {}
+        inside = self.model.nodes_of_bodies()
+        for step in self.model.history.steps:
+            for moment in step.moments:
+                turned = np.flatnonzero(
+                    moment.forces[:, 3:].any(axis=1) & ~np.isin(np.arange(len(inside)), self.model.references)
+                )
+                if len(turned):
+                    raise step.card.error(
+                        f"nodes of solid elements take no moments, node "
+                        f"{self.model.mesh.numbers[turned[0]]} has one: load a surface by a node, with "
+                        "*COUPLING"
+                    )
+                loose = inside & ~np.isin(np.arange(len(inside)), self.model.references)
+                force = np.where(loose[:, None], moment.forces, 0.0)[:, : self.model.dim]
+                nodes = np.flatnonzero(force.any(axis=1))
+                result[id(moment)] = self._groups(nodes, force) if len(nodes) else []
+        return result
+
+    def _groups(
+        self, nodes: np.ndarray, force: np.ndarray, most: int = 6
+    ) -> list[tuple[str, np.ndarray | None]]:
+        """Return sets of nodes with the same force each, one set for all where there are many forces."""
+        values, number = np.unique(force[nodes], axis=0, return_inverse=True)
+        if len(values) > most:
+            return [(self.model.set_of(nodes), None)]
+        return [(self.model.set_of(nodes[number.ravel() == k]), value) for k, value in enumerate(values)]
+
+    def loads(
+        self, moment: Moment, loaded: Sequence[tuple[str, np.ndarray | None]], bodies: Mapping[str, Body]
+    ) -> tuple[Load, ...]:
+        """Return the loads at a time."""
+        found: list[Load] = []
+        for name, force in loaded:
+            for body, mesh in self.model.parts.meshes.items():
+                mine, inner = self.model.in_body(body, self.model.node_sets[name])
+                if len(mine):
+                    each = moment.forces[mine, : self.model.dim] / self.model.thickness
+                    value: Any = (
+                        tuple((force / self.model.thickness).tolist())
+                        if force is not None
+                        else NodeValues(mesh.points[inner], each)
+                    )
+                    found.append(PointForce(body, name, value))
+        for pressed in moment.pressures:
+            name = " ".join(pressed.where)
+            if pressed.value:
+                found += [
+                    Pressure(b, name, pressed.value)
+                    for b, m in self.model.parts.meshes.items()
+                    if name in m.surfaces
+                ]
+        for weight in moment.weights:
+            found += self._weights(weight)
+        for driven in self.model.driven:
+            if driven.spread:
+                found += self._spread(driven, moment)
+        if moment.temperatures is not None:
+            found += self._heat(moment.temperatures, bodies)
+        return tuple(found)
+
+    def _spread(self, driven: Driven, moment: Moment) -> list[Load]:
+        """Return the force and moment of a node, spread over its surface."""
+        body, name = self.holding.body_of(driven)
+        held, load = driven.row(moment.held), driven.row(moment.forces) / self.model.thickness
+        if not np.isnan(held).all():
+            raise driven.card.error(
+                "a distributing coupling takes forces, but its node is held: use *KINEMATIC for displacements"
+            )
+        if not load.any():
+            return []
+        dim, at = self.model.dim, self.model.mesh.points[driven.node]
+        moments: Any = tuple(load[3:].tolist()) if dim == 3 else float(load[5])
+        return [
+            TotalForce(
+                body,
+                name,
+                tuple(load[:dim].tolist()),
+                moments if np.any(moments) else None,
+                tuple(at[:dim].tolist()),
+            )
+        ]
+
+    def _weights(self, weight: Weight) -> list[Load]:
+        """Return gravity or centrifugal force on whole bodies."""
+        elements = self.model.mesh.elements_named(weight.where, weight.card, weight.row)
+        found: list[Load] = []
+        for part in self.model.parts_of_mesh:
+            mine = np.isin(part.elements, elements)
+            if not mine.any() or not weight.value:
+                continue
+            densities = {
+                self.model.materials[self.model.sections[k].material].density
+                for k in np.unique(self.model.of_element[part.elements])
+            }
+            if not mine.all() or len(densities) > 1:
+                raise weight.card.error(
+                    f"{weight.kind} must act on whole bodies of one density, on body {part.name} it does "
+                    "not: give all of its elements, and one density", weight.row,
+                )  # fmt: skip
+            density = densities.pop()
+            if not density:
+                name = self.model.sections[part.sections[0]].material
+                raise weight.card.error(
+                    f"{weight.kind} needs a *DENSITY of material {name}: add it", weight.row
+                )
+            found.append(self._weight(weight, part, density))
+        return found
+
+    def _weight(self, weight: Weight, part: Component, density: float) -> BodyForce:
+        numbers = np.array(weight.numbers)
+        if weight.kind == "GRAV":
+            return gravity(part.name, density, (weight.value * numbers)[: self.model.dim].tolist())
+        speed = float(np.sqrt(weight.value))
+        if self.model.dim == 3:
+            return centrifugal(part.name, density, speed, tuple(numbers[:3]), tuple(numbers[3:]))
+        if self.model.kind == "axisymmetric":
+            return centrifugal(part.name, density, speed, (0.0, 0.0), (0.0, 1.0))
+        return centrifugal(part.name, density, speed, tuple(numbers[:2]))
+
+    def _heat(self, temperatures: np.ndarray, bodies: Mapping[str, Body]) -> list[Load]:
+        """Return the changes of temperature of bodies that expand."""
+        found: list[Load] = []
+        for name, mesh in self.model.parts.meshes.items():
+            nodes = self.model.parts.nodes[name]
+            change = (temperatures - self.model.history.initial)[nodes]
+            if mesh.centres is not None:
+                change[mesh.centres.nodes] = (mesh.centres.given * change[mesh.centres.masters]).sum(axis=1)
+            materials = bodies[name].materials
+            if not change.any() or not all(getattr(m, "expands", False) for m in materials):
+                continue
+            value: Any = float(change[0]) if np.ptp(change) == 0.0 else NodeValues(mesh.points, change)
+            found.append(ThermalStrain(name, value))
+        return found

@@ -1,0 +1,276 @@
+"""What holds the bodies of a deck: supports, surfaces that nodes drive, equations, bolts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fenics_contact._scene.pairs import Surface
+from fenics_contact._scene.preloads import Preload
+from fenics_contact._scene.preloads import Section as CutAt
+from fenics_contact._scene.springs import Spring
+from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support
+from fenics_contact.decks.bodies import (
+    Component,
+)
+from fenics_contact.decks.couplings import (
+    Bolt,
+    Driven,
+    rigid_surface,
+)
+from fenics_contact.decks.history import Held, Moment
+from fenics_contact.decks.mesh import Faces
+from fenics_contact.decks.model import Model, NodeValues
+
+
+class Holding:
+    """Makes supports, springs and bolts of what a deck holds."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.driven_at: dict[int, str] = {}
+
+    def supported(self) -> dict[str, tuple[np.ndarray, tuple[int, ...]]]:
+        """Return what is held by name: nodes and components. Single nodes are put together."""
+        inside = self.model.nodes_of_bodies()
+        found: dict[str, tuple[np.ndarray, set[int]]] = {}
+        single: dict[int, set[int]] = {}
+        for target in self.model.history.targets:
+            nodes = target.nodes[inside[target.nodes]]
+            held = {k for k in target.components if k < self.model.dim}
+            self._check_turns(target, nodes)
+            if not len(nodes):
+                if not np.isin(target.nodes, self.model.references).any():
+                    self.model.note(target.card, f"nodes {target.label} belong to no element")
+            elif target.label.isdecimal() and held:
+                single.setdefault(int(nodes[0]), set()).update(held)
+            elif held:
+                found.setdefault(target.label, (nodes, set()))[1].update(held)
+                self.model.origins.setdefault(("support", target.label), target.card.origin)
+        together: dict[tuple[int, ...], list[int]] = {}
+        for node, held in single.items():
+            together.setdefault(tuple(sorted(held)), []).append(node)
+        for alike, several in together.items():
+            name = "BOUNDARY " + " ".join(str(k + 1) for k in alike)
+            found[name] = np.array(several), set(alike)
+        result = {}
+        for name, (nodes, held) in found.items():
+            result[self.model.place(name, nodes)] = np.unique(nodes), tuple(sorted(held))
+        self._require_same(inside)
+        return result
+
+    def _check_turns(self, target: Held, nodes: np.ndarray) -> None:
+        """Reject rotations of nodes of elements, which have none, unless they are held at zero."""
+        turned = [k for k in target.components if k > 2]
+        free = nodes[~np.isin(nodes, self.model.references)]
+        moments = [moment for step in self.model.history.steps for moment in step.moments]
+        if turned and any(np.nan_to_num(moment.held[free][:, turned]).any() for moment in moments):
+            raise target.card.error(
+                f"nodes of solid elements have no rotation, but {target.label} is turned: drive the "
+                "surface by a node, with *RIGID BODY or *COUPLING", target.row,
+            )  # fmt: skip
+
+    def _require_same(self, inside: np.ndarray) -> None:
+        """Reject steps that hold other components than the first."""
+        moments = [(step, moment) for step in self.model.history.steps for moment in step.moments]
+        for step, moment in moments[1:]:
+            held, first = (~np.isnan(each.held[inside, : self.model.dim]) for each in (moment, moments[0][1]))
+            if (held != first).any():
+                node = self.model.mesh.numbers[inside][(held != first).any(axis=1)][0]
+                raise step.card.error(
+                    f"the same components must be held in all steps, here others than in the first, at "
+                    f"node {node}: hold them in all steps with OP=MOD, or make two decks"
+                )
+
+    def supports(
+        self, supported: Mapping[str, tuple[np.ndarray, tuple[int, ...]]], moment: Moment | None
+    ) -> tuple[AnySupport, ...]:
+        """Return the supports at a time, at zero before all."""
+        found = []
+        for name, (nodes, held) in supported.items():
+            for body, mesh in self.model.parts.meshes.items():
+                mine, inner = self.model.in_body(body, nodes)
+                if not len(mine):
+                    continue
+                found += self._supports_of(body, name, mine, mesh.points[inner], held, moment)
+        for driven in self.model.driven:
+            if not driven.spread:
+                found.append(self._rigid(driven, moment))
+        return tuple(found)
+
+    def _supports_of(
+        self,
+        body: str,
+        name: str,
+        nodes: np.ndarray,
+        points: np.ndarray,
+        held: Sequence[int],
+        moment: Moment | None,
+    ) -> list[AnySupport]:
+        """Return the supports of some nodes of a body: along x, y and z, or along their local axes."""
+        given = [np.zeros(len(nodes)) if moment is None else moment.held[nodes, k] for k in held]
+        amounts: list[Any] = [
+            float(each[0]) if np.ptp(each) == 0.0 else NodeValues(points, each) for each in given
+        ]
+        turned = [self.model.local_axes[node] for node in nodes.tolist() if node in self.model.local_axes]
+        whole = len(held) == self.model.dim and not any(each.any() for each in given)
+        if not turned or (whole and self._always_zero(nodes, held)):
+            value: list[Any] = [None] * self.model.dim
+            for k, amount in zip(held, amounts, strict=True):
+                value[k] = amount
+            return [Support(body, name, tuple(value))]
+        axes = np.stack([self.model.local_axes.get(node, np.eye(3)) for node in nodes.tolist()])[
+            :, :, : self.model.dim
+        ]
+        found: list[AnySupport] = []
+        for k, amount in zip(held, amounts, strict=True):
+            alike = np.allclose(axes[:, k], axes[0, k], atol=1e-12)
+            direction: Any = tuple(axes[0, k].tolist()) if alike else NodeValues(points, axes[:, k])
+            found.append(Roller(body, name, amount, direction))
+        return found
+
+    def _always_zero(self, nodes: np.ndarray, held: Sequence[int]) -> bool:
+        """Return whether components of nodes are held at zero in all steps."""
+        moments = [moment for step in self.model.history.steps for moment in step.moments]
+        return not any(np.nan_to_num(moment.held[nodes][:, list(held)]).any() for moment in moments)
+
+    def name_surfaces(self) -> None:
+        """Name the surfaces that nodes drive or load."""
+        for driven in self.model.driven:
+            name = driven.surface
+            if name:
+                faces = self.model.faces_of(self.model.mesh.surface_named(name, driven.card))
+            elif driven.nodes is not None:
+                name, faces = f"{driven.name} rigid", self.model.exterior.covering(driven.nodes)
+            else:
+                name, faces = f"{driven.name} rigid", self._whole(driven)
+            if faces is None or not self.model.exterior.holds(faces).all():
+                raise driven.card.error(
+                    f"{driven.name!r} must be faces on the boundary of a body, or all nodes of some "
+                    "faces, so that they move as one piece: give such a set"
+                )
+            self.model.surfaces[name] = faces
+            self.driven_at[id(driven)] = name
+
+    def _whole(self, driven: Driven) -> Faces | None:
+        """Return the boundary of the bodies whose elements are those of a set."""
+        elements = self.model.mesh.elements_named(driven.name, driven.card)
+        for part in self.model.parts_of_mesh:
+            if np.array_equal(part.elements, elements):
+                mine = np.isin(self.model.exterior.faces.elements, elements)
+                return Faces(self.model.exterior.faces.elements[mine], self.model.exterior.faces.sides[mine])
+        return None
+
+    def body_of(self, driven: Driven) -> tuple[str, str]:
+        """Return the one body of a driven surface, and the name of the surface."""
+        name = self.driven_at[id(driven)]
+        bodies = [body for body, mesh in self.model.parts.meshes.items() if name in mesh.surfaces]
+        if len(bodies) != 1:
+            raise driven.card.error(
+                f"a node drives a surface of one body, {driven.name!r} is on {', '.join(bodies)}: give "
+                "one for each"
+            )
+        return bodies[0], name
+
+    def _rigid(self, driven: Driven, moment: Moment | None) -> RigidSurface:
+        body, name = self.body_of(driven)
+        self.model.origins["support", name] = driven.card.origin
+        if moment is None:
+            first = self.model.history.steps[0].moments[0] if self.model.history.steps else None
+            start = (
+                None if first is None else replace(first, held=0.0 * first.held, forces=0.0 * first.forces)
+            )
+            moment = start
+        return rigid_surface(
+            driven, body, name, self.model.mesh.points[driven.node, : self.model.dim], moment
+        )
+
+    def name_nodes(self) -> None:
+        """Name the nodes of equations, and reject those that have no counterpart."""
+        inside = self.model.nodes_of_bodies()
+        for each in self.model.equations:
+            same, sums = len(set(each.nodes)) == 1, sum(each.factors)
+            alike = len(each.nodes) == 2 and len(set(each.components)) == 1 and sums == 0.0
+            if (
+                max(each.components) >= self.model.dim
+                or not inside[list(each.nodes)].all()
+                or not (same or alike)
+            ):
+                raise each.card.error(
+                    "an equation is read where components of one node have a relation, as in an inclined "
+                    "plane of symmetry, or the same component of two nodes of elements is equal; this one "
+                    "is neither: use a tie, a rigid surface or a plane of symmetry", each.row,
+                )  # fmt: skip
+            for node in each.nodes:
+                self.model.node_sets[f"node {self.model.mesh.numbers[node]}"] = np.array([node])
+
+    def equations(self) -> tuple[list[Roller], list[Spring]]:
+        """Return the equations: nodes that slide along planes, and pairs that move alike."""
+        rollers, springs = [], []
+        for each in self.model.equations:
+            names = [f"node {self.model.mesh.numbers[node]}" for node in each.nodes]
+            ends = [
+                Surface(body, name)
+                for node, name in zip(each.nodes, names, strict=True)
+                for body in self.model.parts.meshes
+                if len(self.model.in_body(body, np.array([node]))[0])
+            ]
+            if len(set(each.nodes)) == 1:
+                normal = np.zeros(self.model.dim)
+                np.add.at(normal, list(each.components), each.factors)
+                rollers.append(Roller(ends[0].body, names[0], 0.0, tuple(normal.tolist())))
+            else:
+                stiffness = np.where(np.arange(self.model.dim) == each.components[0], np.inf, 0.0)
+                springs.append(Spring(ends[0], ends[1], tuple(stiffness.tolist())))
+        return rollers, springs
+
+    def preloads(self) -> list[Preload]:
+        """Return the bolts of pre-tension sections, held at their length."""
+        found = []
+        for bolt in self.model.bolts:
+            parts = [p for p in self.model.parts_of_mesh if np.isin(bolt.faces.elements, p.elements).all()]
+            if len(parts) != 1:
+                raise bolt.card.error(f"surface {bolt.name!r} must go through one body: give one for each")
+            found.append(Preload(parts[0].name, self._section(bolt, parts[0]), name=bolt.name))
+            self.model.origins["preload", bolt.name] = bolt.card.origin
+        return found
+
+    def _section(self, bolt: Bolt, part: Component, flat: float = 1e-6) -> CutAt:
+        """Return the plane of a section with the cells that it may separate, those of its elements' body."""
+        corners = np.concatenate(
+            [self.model.mesh.points[n].reshape(-1, 3) for n in self.model.mesh.corners(bolt.faces)]
+        )
+        centre = corners.mean(axis=0)
+        _, size, axes = np.linalg.svd(corners - centre)
+        dim = self.model.dim
+        if size[dim - 1] > flat * size[0]:
+            raise bolt.card.error(f"surface {bolt.name!r} must be flat: give faces in a plane")
+        normal = axes[dim - 1][:dim]
+        middle = self.model.middles(bolt.faces.elements)
+        normal = normal if (middle - centre)[:, :dim].mean(axis=0) @ normal < 0 else -normal
+        radius = 1.5 * float(np.linalg.norm(corners - centre, axis=1).max())
+        whole = CutAt(tuple(centre[:dim].tolist()), tuple(normal.tolist()))
+        return whole if self._cuts(whole, bolt, part) else replace(whole, radius=radius)
+
+    def _cuts(self, section: CutAt, bolt: Bolt, part: Component) -> bool:
+        """Return whether a plane through a whole body separates it at the faces of a bolt alone."""
+        point, normal = np.array(section.point), np.array(section.normal)
+        away = (self.model.middles(part.elements)[:, : self.model.dim] - point) @ normal
+        before = np.isin(part.elements, bolt.faces.elements)
+        return (
+            bool((away[before] < 0).all())
+            and len(bolt.faces) > 0
+            and not self._others_at(section, bolt, part)
+        )
+
+    def _others_at(self, section: CutAt, bolt: Bolt, part: Component, near: float = 1e-6) -> bool:
+        """Return whether nodes of a body lie in the plane of a section besides those of its faces."""
+        nodes = self.model.parts.nodes[part.name]
+        nodes = nodes[nodes >= 0]
+        points = self.model.mesh.points[nodes][:, : self.model.dim]
+        away = (points - np.array(section.point)) @ np.array(section.normal)
+        own = np.unique(np.concatenate([n.ravel() for _, _, _, n in self.model.mesh.parts_of(bolt.faces)]))
+        return bool((np.abs(away[~np.isin(nodes, own)]) <= near * np.abs(away).max()).any())

@@ -1,0 +1,227 @@
+"""What a deck says, before a scene is made of it: mesh, materials, steps, and names of surfaces and nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fenics_contact._base.display import displayed
+from fenics_contact._scene.body import Body
+from fenics_contact.decks.bodies import (
+    Exterior,
+    Parts,
+    Section,
+    build_bodies,
+    components,
+    read_sections,
+    regions_of,
+)
+from fenics_contact.decks.cards import Card, Origin
+from fenics_contact.decks.couplings import (
+    in_global_axes,
+    read_axes,
+    read_bolts,
+    read_driven,
+    read_equations,
+)
+from fenics_contact.decks.history import History, read_history
+from fenics_contact.decks.materials import Conditions, build_material, read_materials
+from fenics_contact.decks.mesh import DeckMesh, Faces, Named, read_mesh_cards
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class NodeValues:
+    """Values at nodes of a body, as a function of position: that of the nearest node.
+
+    Attributes:
+        points: Coordinates of the nodes, shape (n, dim), [length].
+        values: Shape (n,), or (n, k).
+    """
+
+    points: np.ndarray
+    values: np.ndarray
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.points)
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Return the values at points, shape (n, dim)."""
+        return np.asarray(self.values[self._tree.query(points)[1]])
+
+    def __getstate__(self) -> dict[str, np.ndarray]:
+        """Pickle the values alone."""
+        return {"points": self.points, "values": self.values}
+
+
+class Model:
+    """The cards of a deck, sorted, and what is named for the scene."""
+
+    def __init__(self, name: str, cards: Sequence[Card]) -> None:
+        """Sort the cards."""
+        self.name, self.cards = name, cards
+        self.notes: list[str] = []
+        self.origins: dict[tuple[str, str], Origin] = {}
+        self.mesh: DeckMesh = read_mesh_cards(cards)
+        self.kind = self.mesh.blocks[0].element.kind
+        self.dim = self.mesh.blocks[0].element.dim
+        self.sections, self.of_element = read_sections(cards, self.mesh)
+        self.materials, self.axes = read_materials(cards)
+        self.parts_of_mesh = components(self.mesh, self.sections, self.of_element)
+        self.exterior = Exterior.of(self.mesh)
+        self.thickness = self._thickness()
+        self.history: History = read_history(cards, self.mesh)
+        self.parts: Parts
+        self.surfaces: dict[str, Faces] = {}
+        self.node_sets: dict[str, np.ndarray] = {}
+        self.driven = read_driven(cards, self.mesh)
+        self.bolts = read_bolts(cards, self.mesh)
+        self.equations = read_equations(cards, self.mesh)
+        self.local_axes = read_axes(cards, self.mesh)
+        nodes = [[each.node, each.turning] for each in self.driven] + [[bolt.node] for bolt in self.bolts]
+        self.references = np.array(
+            [node for several in nodes for node in several if node >= 0], dtype=np.int64
+        )
+        self._turn_forces()
+
+    def note(self, card: Card, words: str) -> None:
+        """Keep what is worth knowing of a card."""
+        text = f"{card.origin}: {words}"
+        if text not in self.notes:
+            self.notes.append(text)
+
+    def _turn_forces(self) -> None:
+        """Give forces on nodes with local axes along x, y and z."""
+        if self.local_axes:
+            steps = [
+                replace(
+                    step,
+                    moments=[
+                        replace(m, forces=in_global_axes(m.forces, self.local_axes)) for m in step.moments
+                    ],
+                )
+                for step in self.history.steps
+            ]
+            self.history = replace(self.history, steps=steps)
+
+    def _thickness(self) -> float:
+        if self.kind not in ("plane stress", "plane strain"):
+            return 1.0
+        found = sorted({section.thickness for section in self.sections})
+        if len(found) > 1:
+            card = next(s.card for s in self.sections if s.thickness != self.sections[0].thickness)
+            raise card.error(
+                f"plane bodies must have one thickness, got {found[0]:g} and {found[-1]:g}: give one"
+            )
+        return found[0]
+
+    def build_meshes(self) -> None:
+        """Make the meshes of the bodies, with everything that is named by now."""
+        self.parts = build_bodies(
+            self.mesh,
+            self.parts_of_mesh,
+            self.of_element,
+            self.sections,
+            self.surfaces,
+            self.node_sets,
+            f"deck '{self.name}'",
+        )
+
+    def bodies(self) -> dict[str, Body]:
+        """Return the bodies with their materials."""
+        large = any(step.large for step in self.history.steps)
+        if large and not all(step.large for step in self.history.steps):
+            step = next(step for step in self.history.steps if not step.large)
+            raise step.card.error("all steps must have NLGEOM, or none, got both: give it to this one, too")
+        bodies = {}
+        for part in self.parts_of_mesh:
+            mesh = self.parts.meshes[part.name]
+            of = Conditions(
+                self.kind, large, self._temperature(), mesh.cell_type in ("hexahedron", "quadrilateral")
+            )
+            given = {}
+            for region, section in regions_of(self.sections, part).items():
+                given[region] = self._material(section, of)
+            material = given if len(given) > 1 else next(iter(given.values()))
+            bodies[part.name] = Body(mesh, material, axisymmetric=self.kind == "axisymmetric")
+            self.origins["body", part.name] = self.sections[part.sections[0]].card.origin
+        return bodies
+
+    def _material(self, section: Section, of: Conditions) -> Any:
+        if section.material not in self.materials:
+            there = ", ".join(self.materials) or "none"
+            raise section.card.error(f"material {section.material!r} is not there; the deck has {there}")
+        if section.orientation and section.orientation not in self.axes:
+            there = ", ".join(self.axes) or "none"
+            raise section.card.error(
+                f"orientation {section.orientation!r} is not there; the deck has {there}"
+            )
+        cards = self.materials[section.material]
+        self.origins["material", section.material] = cards.card.origin
+        return build_material(cards, self.axes.get(section.orientation), of)
+
+    def _temperature(self) -> float | None:
+        """Return the temperature if it is the same everywhere and always."""
+        found = {float(t) for t in np.unique(self.history.initial)}
+        for step in self.history.steps:
+            for moment in step.moments:
+                if moment.temperatures is not None:
+                    found |= {float(t) for t in np.unique(moment.temperatures)}
+        return found.pop() if len(found) == 1 else None
+
+    def nodes_of_bodies(self) -> np.ndarray:
+        """Return which nodes belong to elements, (n_nodes,)."""
+        mark = np.zeros(len(self.mesh.points), dtype=bool)
+        for block in self.mesh.blocks:
+            mark[block.nodes] = True
+        return mark
+
+    def place(self, name: str, nodes: np.ndarray) -> str:
+        """Name nodes as a surface if they are all nodes of some faces, else as a set of nodes."""
+        faces = self.exterior.covering(nodes)
+        if faces is not None:
+            name = f"{name} faces" if name in self.mesh.surfaces else name
+            self.surfaces[name] = faces
+        else:
+            name = f"{name} nodes" if name in self.mesh.surfaces else name
+            self.node_sets[name] = np.unique(nodes)
+        return name
+
+    def faces_of(self, surface: Named) -> Faces | None:
+        """Return the faces of a surface, of one of nodes those that have all of them, or None."""
+        return surface.faces if surface.nodes is None else self.exterior.covering(surface.nodes)
+
+    def set_of(self, nodes: np.ndarray) -> str:
+        """Return the name of exactly these nodes, a new one if there is none."""
+        for known in (self.node_sets, self.mesh.node_sets):
+            for name, inside in known.items():
+                if np.array_equal(inside, nodes) and (known is self.node_sets or name not in self.surfaces):
+                    self.node_sets.setdefault(name, nodes)
+                    return name
+        name = next(
+            f"CLOAD {k}" for k in range(1, len(self.node_sets) + 2) if f"CLOAD {k}" not in self.node_sets
+        )
+        self.node_sets[name] = nodes
+        return name
+
+    def in_body(self, name: str, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return which nodes of the deck a body has, and their numbers in it."""
+        mine = self.parts.nodes[name]
+        mine = mine[mine >= 0]  # ascending; centres of cells are behind
+        place = np.minimum(np.searchsorted(mine, nodes), len(mine) - 1)
+        there = mine[place] == nodes
+        return nodes[there], place[there]
+
+    def middles(self, elements: np.ndarray) -> np.ndarray:
+        """Return the mean of the nodes of elements, (n, 3)."""
+        block_of, found = self.mesh.block_of, np.zeros((len(elements), 3))
+        for number in np.unique(block_of[elements]):
+            block, mine = self.mesh.blocks[number], block_of[elements] == number
+            found[mine] = self.mesh.points[block.nodes[elements[mine] - block.first]].mean(axis=1)
+        return found

@@ -1,0 +1,157 @@
+"""Rigid bodies, couplings, bolts, local axes and equations of decks, as in theory."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import RigidSurface, Roller, Spring, Support, TotalForce
+from fenics_contact.decks import DeckError, read_deck
+from fenics_contact.gallery import block, rectangle
+from tests.decks.texts import STEEL, deck, mesh_cards
+
+SECTION = "*SOLID SECTION, ELSET=BAR, MATERIAL=STEEL\n"
+BAR = mesh_cards({"BAR": block((0, 0, 0), (4, 1, 1), (4, 1, 1))}) + STEEL.replace("0.3", "0.") + SECTION
+FIXED = "*BOUNDARY\nBAR_X0, 1, 3\n"
+#: Two nodes beside the bar: they drive its end by displacements and rotations.
+REFERENCE = (
+    "*NODE, NSET=REF\n501, 4., 0.5, 0.5\n*NODE, NSET=ROT\n502, 4., 0.5, 0.5\n*SURFACE, NAME=TIP\n4, S4\n"
+)
+RIGID = "*RIGID BODY, NSET=BAR_X1, REF NODE=501, ROT NODE=502\n"
+KINEMATIC = "*COUPLING, REF NODE=501, SURFACE=TIP, CONSTRAINT NAME=C\n*KINEMATIC\n1, 6\n"
+SPREAD = "*COUPLING, REF NODE=501, SURFACE=TIP, CONSTRAINT NAME=C\n*DISTRIBUTING\n1, 6\n"
+
+
+def step(cards: str) -> str:
+    return f"*STEP\n*STATIC\n{cards}*END STEP\n"
+
+
+@pytest.mark.parametrize("coupling", [RIGID, KINEMATIC])
+def test_a_node_pulls_a_surface_that_stays_rigid(coupling: str, tmp_path: Path) -> None:
+    text = BAR + REFERENCE + coupling + FIXED + step("*BOUNDARY\n501, 1, 1, 0.004\n501, 2, 3\n")
+    found = read_deck(deck(tmp_path, text))
+    (rigid,) = (each for each in found.steps[0].supports if isinstance(each, RigidSurface))
+    assert rigid.displacement == (0.004, 0.0, 0.0)
+    assert rigid.rotation == (None, None, None)
+    (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-10)
+    exact = found.scene.bodies["BAR"].mesh.points * [1e-3, 0.0, 0.0]
+    np.testing.assert_allclose(state.gather_displacement("BAR"), exact, atol=1e-9)
+    assert state.reactions()["BAR BAR_X0"].force[0] == pytest.approx(-210.0, rel=1e-6)
+
+
+def test_a_node_turns_and_loads_a_rigid_surface(tmp_path: Path) -> None:
+    """Forces and moments of the reference node balance the reactions, also by a node of rotations."""
+    by_rotation_node = RIGID + FIXED + step("*CLOAD\n501, 2, 3.\n502, 1, 7.\n")
+    by_reference = KINEMATIC + FIXED + step("*CLOAD\n501, 2, 3.\n501, 4, 7.\n")
+    spread = SPREAD + FIXED + step("*CLOAD\n501, 2, 3.\n501, 4, 7.\n")
+    for cards in (by_rotation_node, by_reference, spread):
+        found = read_deck(deck(tmp_path, BAR + REFERENCE + cards))
+        (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-10)
+        root = state.reactions(about=(4.0, 0.5, 0.5))["BAR BAR_X0"]
+        np.testing.assert_allclose(root.force, [0.0, -3.0, 0.0], atol=1e-5)
+        assert root.moment[0] == pytest.approx(-7.0, rel=1e-5)
+    assert isinstance(found.steps[0].loads[0], TotalForce)
+
+
+def test_a_bolt_is_drawn_by_a_force_and_held_then(tmp_path: Path) -> None:
+    """A bar between two walls: the section gets its force; held, it adds the strain of a wall that moves."""
+    bolt = "*NODE\n900, 0., 0., 0.\n*SURFACE, NAME=CUT\n2, S4\n"
+    bolt += "*PRE-TENSION SECTION, SURFACE=CUT, NODE=900\n1., 0., 0.\n"
+    steps = step("*CLOAD\n900, 1, 420.\n") + step(
+        "*BOUNDARY, FIXED\n900, 1, 1\n*BOUNDARY\nBAR_X1, 1, 1, 0.004\n"
+    )
+    text = BAR + bolt + FIXED + "BAR_X1, 1, 3\n" + steps
+    found = read_deck(deck(tmp_path, text))
+    first, second = found.solve(MPI.COMM_SELF, tolerance=1e-10)
+    assert first.reactions()["BAR BAR_X0"].force[0] == pytest.approx(-420.0, rel=1e-6)
+    assert first.preloads()["CUT"].force == pytest.approx(420.0, rel=1e-6)
+    assert first.preloads()["CUT"].shortening == pytest.approx(420.0 * 4 / 210000.0, rel=1e-6)
+    assert second.preloads()["CUT"].force == pytest.approx(420.0 + 210.0, rel=1e-6)
+    assert found.source("preload", "CUT").card == "*PRE-TENSION SECTION"
+
+
+def test_axes_of_a_set_turn_what_is_held_and_loaded(tmp_path: Path) -> None:
+    """A bar that lies at 30 degrees, held and pulled along its own axes."""
+    turn = np.array([[np.sqrt(3) / 2, -0.5, 0.0], [0.5, np.sqrt(3) / 2, 0.0], [0.0, 0.0, 1.0]])
+    mesh = block((0, 0, 0), (4, 1, 1), (4, 1, 1)).placed(turn, np.zeros(3))
+    text = mesh_cards({"BAR": mesh}) + STEEL + SECTION + "*NSET, NSET=ALL, GENERATE\n1, 20\n"
+    axes = ", ".join(f"{value:.16g}" for value in turn.T[:2].ravel())
+    held = f"*TRANSFORM, NSET=ALL, TYPE=R\n{axes}\n*BOUNDARY\nBAR_X0, 1\nBAR_Y0, 2\n1, 3\n17, 3\n3, 3\n"
+    found = read_deck(deck(tmp_path, text + held + step("*CLOAD\nBAR_X1, 1, 52.5\n")))
+    assert all(isinstance(each, Roller) for each in found.scene.supports)
+    (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-10)
+    moved = state.gather_displacement("BAR") @ turn
+    points = mesh.points @ turn
+    np.testing.assert_allclose(moved, points * [1e-3, -3e-4, -3e-4], atol=1e-9)
+
+
+def test_nodes_of_a_ring_are_pushed_along_their_radii(tmp_path: Path) -> None:
+    """A quarter of a ring, in plane strain, whose inner side moves outwards by 0.01: Lamé's solution."""
+    flat = rectangle((1.0, 0.0), (2.0, 1.0), (24, 12))
+    angle = flat.points[:, 1] * np.pi / 2
+    mesh = flat.moved(flat.points[:, :1] * np.column_stack([np.cos(angle), np.sin(angle)]))
+    text = mesh_cards({"BAR": mesh}, "CPE4") + STEEL + SECTION
+    text += "*TRANSFORM, NSET=BAR_X0, TYPE=C\n0., 0., 0., 0., 0., 1.\n*BOUNDARY\nBAR_Y0, 2\nBAR_Y1, 1\n"
+    text = text.replace("*NSET, NSET=BAR_Y0\n1,\n", "*NSET, NSET=BAR_Y0\n").replace(
+        "*NSET, NSET=BAR_Y1\n13,\n", "*NSET, NSET=BAR_Y1\n"
+    )
+    found = read_deck(deck(tmp_path, text + step("*BOUNDARY\nBAR_X0, 1, 1, 0.01\nBAR_X0, 2, 2\n")))
+    (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-10)
+    outer = np.linalg.norm(state.gather_displacement("BAR")[mesh.surfaces["x1"][:, 0]], axis=1)
+    a, b, nu = 1.0, 2.0, 0.3
+    exact = 0.01 * (b * (1 - 2 * nu) + b) / (a * (1 - 2 * nu) + b**2 / a)
+    np.testing.assert_allclose(outer, exact, rtol=5e-3)
+
+
+def test_equations_let_nodes_slide_and_move_alike(tmp_path: Path) -> None:
+    slide = "*EQUATION\n2\n17, 1, 1., 17, 2, 1.\n2\n18, 3, 1., 20, 3, -1.\n"
+    found = read_deck(deck(tmp_path, BAR + FIXED + slide + step("*CLOAD\n17, 2, 5.\n20, 3, -4.\n")))
+    assert [type(each) for each in found.scene.supports] == [Support, Roller]
+    assert [type(each) for each in found.scene.springs] == [Spring]
+    (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-10)
+    moved = dict(zip(found.node_numbers["BAR"].tolist(), state.gather_displacement("BAR"), strict=True))
+    assert abs(moved[17][0]) > 1e-6
+    assert moved[17][0] == pytest.approx(-moved[17][1], abs=1e-10)
+    assert moved[18][2] == pytest.approx(moved[20][2], abs=1e-10)
+
+
+WRONG = [
+    (
+        RIGID.replace("NSET=BAR_X1", "NSET=FEW").replace("*RIGID", "*NSET, NSET=FEW\n17, 18\n*RIGID"),
+        r"'FEW' must be faces on the boundary",
+    ),
+    (RIGID.replace("REF NODE=501, ", ""), r"\*RIGID BODY: needs the parameter REFNODE="),
+    (KINEMATIC.replace("*KINEMATIC\n1, 6\n", ""), r"must be followed by \*KINEMATIC or \*DISTRIBUTING"),
+    (KINEMATIC.replace("1, 6", "1, 2"), r"moves as one piece where components 1 to 3 are coupled"),
+    (KINEMATIC.replace("COUPLING,", "COUPLING, ORIENTATION=A,"), r"ORIENTATION is not read here"),
+    (SPREAD + "*BOUNDARY\n501, 1\n", r"a distributing coupling takes forces, but its node is held"),
+    ("*BOUNDARY\n17, 4, 4, 0.1\n", r"nodes of solid elements have no rotation, but 17 is turned"),
+    ("*EQUATION\n2\n17, 1, 1., 18, 1, 2.\n", r"an equation is read where components of one node"),
+    ("*EQUATION\n2\n17, 1, 1.\n", r"needs 2 terms of node, component and factor"),
+    ("*EQUATION\n2\nBAR_X1, 1, 1., 18, 1, -1.\n", r"needs single nodes, got a set of several"),
+    ("*EQUATION, REMOVE\n1\n", r"REMOVE is not read"),
+    ("*TRANSFORM, NSET=BAR_X1, TYPE=S\n", r"needs TYPE=R or C and a line with two points"),
+    (
+        "*TRANSFORM, NSET=BAR_X0, TYPE=C\n0., 0., 0., 1., 0., 0.\n",
+        r"nodes on the axis of a cylinder have no radial",
+    ),
+    (
+        "*SURFACE, NAME=N, TYPE=NODE\n17,\n*PRE-TENSION SECTION, SURFACE=N, NODE=501\n",
+        r"needs a surface of faces, 'N' has nodes",
+    ),
+    (
+        "*SURFACE, NAME=B\n2, S4\n3, S1\n*PRE-TENSION SECTION, SURFACE=B, NODE=501\n",
+        r"surface 'B' must be flat",
+    ),
+]
+
+
+@pytest.mark.parametrize(("cards", "message"), WRONG, ids=[w[1][:30] for w in WRONG])
+def test_what_couples_nothing_is_refused(cards: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(DeckError, match=message):
+        read_deck(deck(tmp_path, BAR + REFERENCE + FIXED + cards + step("*CLOAD\n501, 1, 1.\n")))
+    with pytest.raises(DeckError, match=r"nodes of solid elements take no moments, node 17 has one"):
+        read_deck(deck(tmp_path, BAR + FIXED + step("*CLOAD\n17, 5, 1.\n")))
