@@ -212,18 +212,20 @@ class MortarPoints:
         bearing: np.ndarray,
         share: float,
         comm: MPI.Comm | None = None,
+        movable: np.ndarray | None = None,
     ) -> MortarPoints:
         """Couple two surfaces. Collective on ``comm``.
 
         `bearing`: which slave nodes may carry one, shape (n_nodes,); `comm`: communicator of the ranks that
-        share the work; this one by default.
+        share the work; this one by default; `movable`: which of them supports leave free, by default those.
         """
         from fenics_contact._pairing.mortar.coupling import mortar_coupling
         from fenics_contact._pairing.mortar.gathering import Gathering
 
         comm = comm or MPI.COMM_SELF
         coupling = mortar_coupling(slave, master, comm)
-        gathering = Gathering.of(coupling, slave)
+        held = None if slave.whole is None else bearing if movable is None else movable
+        gathering = Gathering.of(coupling, slave, held)
         if gathering is not None:
             coupling = gathering.coupling(slave, master)
         chosen = np.flatnonzero(bearing[coupling.node])

@@ -194,7 +194,8 @@ def mortar_by_shape(
         for side, surface in ((pair.slave, slave), (pair.master, master))
     )
     bearing, comm = np.isin(nodes, points), torn.decomposition.comm
-    met = MortarPoints.of(slave, master, bearing, master_share(scene, pair), comm)
+    movable = ~scene.fixed(pair.slave.body)[slave.nodes].all(axis=1)
+    met = MortarPoints.of(slave, master, bearing, master_share(scene, pair), comm, movable)
     left, right = (np.hstack(list(each)) for each in (by.pulled, motions.at(opposite)))
     own, known = np.zeros((len(nodes), left.shape[1])), np.isin(nodes, motions.nodes)
     own[known] = np.hstack(list(motions.at(nodes[known])))

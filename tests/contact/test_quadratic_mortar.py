@@ -5,12 +5,29 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import BodyMesh, Coulomb, Scene, State, Support, Tie, Traction, solve_scene
+from fenics_contact import (
+    Body,
+    BodyForce,
+    BodyMesh,
+    Coulomb,
+    Scene,
+    State,
+    Support,
+    Surface,
+    Tie,
+    Traction,
+    solve_scene,
+)
+from fenics_contact.gallery import rectangle
+from fenics_contact.materials import PlaneStrain
+from fenics_contact.mesh import quadratic
+from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
 from fenics_contact.qp import FaceNewton
 from tests.pairing.pressed_boxes import PRESSURE, boxes, chosen, pressed, unevenly
 
@@ -98,6 +115,64 @@ def test_ties_transmit_any_constant_stress(cell: str) -> None:
         np.testing.assert_allclose(state.gather_displacement(name), mesh.points @ gradient.T, atol=1e-11)
 
 
+def held_strip(cells: int, slave: str, exact: Callable[[np.ndarray], np.ndarray], **more: Any) -> Scene:
+    """Tied squares of triangles on quadrilaterals, three cells on two, whose other sides are prescribed."""
+    meshes = {
+        "a": quadratic(rectangle((0, 0), (1, 1), (3 * cells,) * 2, "triangle")),
+        "b": quadratic(rectangle((0, -1), (1, 0), (2 * cells,) * 2)),
+    }
+    values = tuple((lambda x, k=k: exact(x)[:, k]) for k in range(2))
+    supports = [Support(n, side, values) for n, y in (("a", "y1"), ("b", "y0")) for side in ("x0", "x1", y)]
+    sides = [Surface("a", "y0"), Surface("b", "y1")]
+    tie = Tie(*(sides if slave == "a" else sides[::-1]))
+    return Scene({n: Body(m, PlaneStrain(1.0, 0.3)) for n, m in meshes.items()}, supports, ties=[tie], **more)
+
+
+@pytest.mark.parametrize("slave", ["a", "b"])
+def test_ends_of_the_slave_that_supports_hold_do_not_disturb_the_patch(slave: str) -> None:
+    gradient = np.array([[0.01, 0.004], [0.007, -0.005]])
+    scene = held_strip(2, slave, lambda x: x @ gradient)
+    state = solved(scene)
+    for name, body in scene.bodies.items():
+        found = state.gather_displacement(name)
+        np.testing.assert_allclose(found, body.mesh.points @ gradient, atol=1e-13)
+
+
+@pytest.mark.parametrize(("slave", "order"), [("a", 2.9), ("b", 2.7)])
+def test_displacements_converge_with_third_order(slave: str, order: float) -> None:
+    """In L2 to u = (sin 2x cos y, cos x sin y) / 10 with its body force; the coarse slave costs a little."""
+    shear, lame = 1.0 / 2.6, 0.3 / 1.3 / 0.4
+
+    def exact(x: np.ndarray) -> np.ndarray:
+        return 0.1 * np.column_stack(
+            [np.sin(2 * x[:, 0]) * np.cos(x[:, 1]), np.cos(x[:, 0]) * np.sin(x[:, 1])]
+        )
+
+    def force(x: np.ndarray) -> np.ndarray:
+        """−μ Δu − (λ + μ) ∇ div u, with div u = (2 cos 2x + cos x) cos y / 10."""
+        one, two = x.T
+        by_one, by_two = (
+            (-4 * np.sin(2 * one) - np.sin(one)) * np.cos(two),
+            -(2 * np.cos(2 * one) + np.cos(one)) * np.sin(two),
+        )
+        laplacian = exact(x) * [-5.0, -2.0]
+        return np.asarray(-shear * laplacian - 0.1 * (lame + shear) * np.column_stack([by_one, by_two]))
+
+    errors = []
+    for cells in (2, 4, 8):
+        scene = held_strip(cells, slave, exact, loads=[BodyForce(name, force) for name in "ab"])
+        state, square = solved(scene), 0.0
+        for name, body in scene.bodies.items():
+            mesh, found = body.mesh, state.gather_displacement(name)
+            places, weights = quadrature(CELL_TYPES[mesh.cell_type], 8)
+            values = shape_values(CELL_TYPES[mesh.cell_type], places)
+            at, moved = (np.einsum("qk,nkd->nqd", values, each[mesh.cells]) for each in (mesh.points, found))
+            miss = moved - exact(at.reshape(-1, 2)).reshape(at.shape)
+            square += (weights @ (miss**2).sum(axis=2).T).sum() / weights.sum() / len(mesh.cells)
+        errors.append(np.sqrt(square))
+    assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > order), errors
+
+
 def test_blocks_that_are_pressed_and_pushed_evenly_stick_evenly() -> None:
     """Pushed at the top and at the bottom; sides have the shear stress that balances the moment."""
     scene = chosen(pressed(boxes("tetrahedron", 2, 3)))
@@ -117,7 +192,9 @@ def test_ranks_have_the_same_pressures(mpirun: Callable[..., str]) -> None:
     code = """
         from mpi4py import MPI
         from fenics_contact import solve_scene
-        from fenics_contact.qp import FaceNewton
+        from fenics_contact.mesh import quadratic
+from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
+from fenics_contact.qp import FaceNewton
         from tests.pairing.pressed_boxes import unevenly
         contact = solve_scene(unevenly(), MPI.COMM_WORLD, solver=FaceNewton(tolerance=1e-11)).contact
         if MPI.COMM_WORLD.rank == 0:

@@ -1,4 +1,4 @@
-"""Slave nodes that hardly face the master give their dual functions to their neighbours.
+"""Slave nodes that hardly face the master, or cannot move, give their dual functions to their neighbours.
 
 Where the rim of the master lies over a slave facet, the dual functions of the corners beyond it are
 extrapolated from the covered part. However small this is, a multiplier there keeps a node beyond the rim
@@ -6,6 +6,9 @@ from moving, with a force that does not vanish with its area: its pressure has n
 none, and the dual function of a neighbour becomes ψ_j + Σ_i T_ji ψ_i. All functions still add up to one:
 constant pressures and linear displacements stay exact, forces and moments in balance. The constraint of a
 neighbour is the mean, weighted by areas, of those that it gathers: it contains several nodes of the slave.
+
+Nodes that supports hold carry no multiplier either. Where the surfaces end there, quadratic displacements
+would be as inaccurate as linear ones without their functions.
 """
 
 from __future__ import annotations
@@ -27,24 +30,35 @@ class Gathering:
 
     Attributes:
         whole: The coupling of all nodes that face the master.
+        point: Which of these nodes each point is, shape (n,).
         part: T, what each point has of the dual function of each of these nodes, shape (n, n_whole).
         own: Weights of these nodes in the slave's mean at each point, shape (n, n_whole); rows add up to one.
     """
 
     whole: MortarCoupling
+    point: np.ndarray
     part: sp.csr_matrix
     own: sp.csr_matrix
 
     @classmethod
-    def of(cls, whole: MortarCoupling, slave: FacetedSurface, least_share: float = 0.05) -> Gathering | None:
-        """Return which points gather what; None if all nodes face the master well.
+    def of(
+        cls,
+        whole: MortarCoupling,
+        slave: FacetedSurface,
+        bearing: np.ndarray | None = None,
+        least_share: float = 0.05,
+    ) -> Gathering | None:
+        """Return which points gather what; None if all nodes face the master well and can move.
 
         A node without a neighbour that does keeps its multiplier, and so do all where the rest could not
         bear a body that tips.
 
+        `bearing`: which nodes may carry a multiplier, shape (len(slave.nodes),), by default all;
         `least_share`: fraction of a node's area below which it hardly faces the master.
         """
         well = whole.area > least_share * slave.areas[whole.node]
+        if bearing is not None:
+            well &= bearing[whole.node]
         hardly = np.flatnonzero(~well)
         shared = _shared_facets(whole.node, slave)[np.flatnonzero(well)][:, hardly]
         facets = np.asarray(shared.sum(axis=0)).ravel()
@@ -58,11 +72,11 @@ class Gathering:
         entries = np.append(np.ones(count), shares.data), (row, column)
         part = sp.csr_matrix(entries, shape=(count, len(well)))
         own = part @ sp.diags(whole.area)
-        return cls(whole, part, scaled_rows(own, 1.0 / np.asarray(own.sum(axis=1)).ravel()))
+        return cls(whole, points, part, scaled_rows(own, 1.0 / np.asarray(own.sum(axis=1)).ravel()))
 
     def chosen(self, points: np.ndarray) -> Gathering:
         """Return some of the points, by indices or a mask."""
-        return replace(self, part=self.part[points], own=self.own[points])
+        return replace(self, point=self.point[points], part=self.part[points], own=self.own[points])
 
     @property
     def gathers(self) -> np.ndarray:
@@ -72,7 +86,7 @@ class Gathering:
     def coupling(self, slave: FacetedSurface, master: FacetedSurface) -> MortarCoupling:
         """Return the coupling at the points."""
         whole = self.whole
-        node = whole.node[np.asarray(self.part.argmax(axis=1)).ravel()]
+        node = whole.node[self.point]
         weight, relief = (self.own @ whole.weight).tocsr(), self.own @ whole.relief
         weight.sort_indices()
         normal, own = -slave.normals[node], self._own_means(len(slave.nodes))
