@@ -4,6 +4,10 @@ Where the gap g closes, the slave moves by (1 − s) g and the master by s g, s 
 to rigid motions. The constraint contains linear interpolants of that, I g on the slave and J g on the master:
 it can close (1 − s) g(x_i) + s ∫ ψ_i J g. The mean of g itself includes its curvature between nodes. Nodes
 that are partly beside the other surface keep that mean, and so do points with several nodes of the slave.
+
+Dual functions are negative in places. Where a surface turns away from the other one in a crease, so that the
+gap is no smooth function, such a mean may be below all gaps of the nodes in it, and bodies that only touch
+would be pressed apart: there a point has the gap of its node.
 """
 
 from __future__ import annotations
@@ -46,7 +50,7 @@ from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import Projection, node_weights
-from fenics_contact._surfaces.true_surface import Geometry
+from fenics_contact._surfaces.true_surface import Geometry, wedges_of
 from fenics_contact.errors import InvalidDesignError, InvalidInputError, together
 from fenics_contact.errors.kinds import safe_log
 from fenics_contact.mesh.faces import computed_rounding, coordinate_rounding
@@ -70,6 +74,7 @@ class ClosableGaps:
         there: Projections of master nodes onto the slave, numbered as ``master.nodes``.
         own: Gaps of the slave nodes, zero where there is none, shape (len(slave.nodes),), [length].
         opposite: Their gaps, zero where there is none, shape (len(master.nodes),), [length].
+        nodal: Whether it is the gap of the node alone, at creases, shape (n,).
     """
 
     value: np.ndarray
@@ -79,6 +84,16 @@ class ClosableGaps:
     there: Projection
     own: np.ndarray
     opposite: np.ndarray
+    nodal: np.ndarray
+
+    def by_nodes(self, coupling: MortarCoupling, by_own: np.ndarray) -> np.ndarray:
+        """Vector-Jacobian product of the slave's part of the gaps with respect to `own`, in its shape.
+
+        `by_own`: derivative by that part, shape (n,).
+        """
+        result = coupling.of_slave_pulled_back(np.where(self.nodal, 0.0, by_own), len(self.own))
+        result[coupling.node[self.nodal]] += by_own[self.nodal]
+        return result
 
 
 def closable_gaps(
@@ -88,11 +103,12 @@ def closable_gaps(
     share: float,
     comm: MPI.Comm,
     alone: np.ndarray,
+    creased: np.ndarray | None = None,
 ) -> ClosableGaps:
     """Return the gaps that linear displacements can close. Collective.
 
     `comm`: communicator of the ranks that share the work; `alone`: whether a point has no dual function but
-    its own, shape (n,); others keep their mean.
+    its own, shape (n,); others keep their mean; `creased`: which are at creases, shape (n,), by default none.
     """
     weight, mine = coupling.weight, coupling.node
     if coupling.own is not None:
@@ -114,13 +130,36 @@ def closable_gaps(
     if master.followed is not None:
         opposite = master.followed @ opposite
     lost = abs(weight) @ np.isnan(opposite).astype(np.float64) > 0
+    met = ~np.isnan(opposite)
     opposite = np.nan_to_num(opposite)
     across = np.where(lost, own, weight @ opposite)
     closable = (1.0 - share) * own + share * across
     kept = np.isnan(closable) | ~alone
     value = np.where(kept, coupling.gap, closable)
-    shares = np.where(lost | kept, 0.0, share)
-    return ClosableGaps(value, kept, shares, here, there, np.nan_to_num(gaps), opposite)
+    nodal = np.zeros(len(value), dtype=bool)
+    if creased is not None:
+        at_node, lowest = gaps[coupling.node], _lowest(weight, np.where(met, opposite, np.inf))
+        means = lowest if coupling.own is None else _lowest(coupling.own, np.nan_to_num(gaps, nan=np.inf))
+        nodal = creased & (value < np.minimum(np.minimum(at_node, lowest), means))
+        value, kept = np.where(nodal, at_node, value), kept & ~nodal
+    shares = np.where(lost | kept | nodal, 0.0, share)
+    return ClosableGaps(value, kept, shares, here, there, np.nan_to_num(gaps), opposite, nodal)
+
+
+def _lowest(weight: sp.csr_matrix, values: np.ndarray) -> np.ndarray:
+    """Return the lowest value with a weight in each row, shape (n,)."""
+    return np.minimum.reduceat(np.append(values[weight.indices], np.inf), weight.indptr[:-1])
+
+
+def _at_creases(slave: FacetedSurface, master: FacetedSurface, coupling: MortarCoupling) -> np.ndarray:
+    """Return which points have nodes at creases of either surface in their means, shape (n,)."""
+    sharp = [
+        (np.bincount(wedges_of(side).node, minlength=len(side.nodes)) > 1).astype(float)
+        for side in (slave, master)
+    ]
+    found = abs(coupling.weight) @ sharp[1]
+    own = sharp[0][coupling.node] if coupling.own is None else abs(coupling.own) @ sharp[0]
+    return np.asarray(found + own > 0.0)
 
 
 _LOG = logging.getLogger(__name__)
@@ -232,9 +271,14 @@ class MortarPoints:
         coupling = coupling.part(chosen)
         gathering = None if gathering is None else gathering.chosen(chosen)
         flat, closable = slave.relief is None and master.relief is None, None
+        alone = np.full(len(chosen), not flat) if gathering is None or flat else ~gathering.gathers
         if not flat:
-            alone = np.ones(len(chosen), dtype=bool) if gathering is None else ~gathering.gathers
             closable = closable_gaps(slave, master, coupling, share, comm, alone)
+        found = coupling.gap if closable is None else closable.value
+        if np.any(found < -computed_rounding(slave.points)):
+            creased = _at_creases(slave, master, coupling)
+            if creased.any():
+                closable = closable_gaps(slave, master, coupling, share, comm, alone, creased)
         return cls(slave, master, coupling, gathering, closable)
 
     @property

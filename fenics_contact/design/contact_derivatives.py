@@ -223,7 +223,8 @@ def mortar_points_pulled_back(
         across = gaps.share * by.gap
         by_own = np.where(gaps.kept, 0.0, by.gap) - across
         here, there = gaps.here, gaps.there
-        by_nodes = coupling.of_slave_pulled_back(by_own, len(slave.nodes))
+        by_nodes = gaps.by_nodes(coupling, by_own)
+        by_own = np.where(gaps.nodal, 0.0, by_own)
         at_slave, at_master = _gaps_pulled_back(master, here, by_nodes[here.point])
         by_slave[here.point] += at_slave
         by_master += at_master

@@ -42,7 +42,7 @@ from fenics_contact.gallery import block, half_disc, rectangle, side_of
 from fenics_contact.materials import IsotropicElasticity, OrthotropicElasticity
 from fenics_contact.mesh import quadratic
 from fenics_contact.shapes import Torus
-from tests.pairing.mortar_surfaces import SOLID, shell
+from tests.pairing.mortar_surfaces import SOLID, halved, lattice, shell
 from tests.shape.aims import aims
 from tests.shape.blocks import problem
 from tests.shape.objectives import objectives
@@ -465,16 +465,17 @@ def in_touch(kind: str, cells: int, radius: float, *, convex: bool) -> FacetedSu
     warp = 0.004 * np.random.default_rng(cells).standard_normal(plain.points.shape)
     mirrored = np.zeros(warp.shape, dtype=bool)
     mirrored[plain.points[:, 2] == 0.0, 2] = True
-    return reconstructed(
-        faceted_surface(plain.points + np.where(mirrored, 0.0, warp), plain.facets, mirrored)
-    )
+    return reconstructed(placed(plain, plain.points + np.where(mirrored, 0.0, warp), mirrored))
+
+
+def placed(surface: FacetedSurface, points: np.ndarray, mirrored: np.ndarray) -> FacetedSurface:
+    plain = replace(faceted_surface(points, surface.facets, mirrored), whole=surface.whole)
+    return plain.with_areas_of_pieces()
 
 
 def moved(surface: FacetedSurface, by: np.ndarray) -> FacetedSurface:
     """The surface with other nodes, those on the plane of symmetry within it."""
-    plain = faceted_surface(
-        surface.points + np.where(surface.mirrored, 0.0, by), surface.facets, surface.mirrored
-    )
+    plain = placed(surface, surface.points + np.where(surface.mirrored, 0.0, by), surface.mirrored)
     return replace(plain, relief=surface.relief)
 
 
@@ -521,7 +522,7 @@ def test_gaps_are_closable_from_both_sides_and_at_the_rim_means(kinds: tuple[str
     alone = (gaps.share == 0.0) & ~gaps.kept
     assert alone.any(), "what faces them has nodes that face nothing"
     own = dict(zip(gaps.here.point, gaps.here.gap, strict=True))
-    assert gaps.value[alone] == pytest.approx([own[node] for node in np.flatnonzero(alone)], abs=1e-15)
+    assert gaps.value[alone] == pytest.approx([own[node] for node in here.chosen[alone]], abs=1e-15)
     met = couple(here.slave, here.master)
     assert met.gathering is not None
     assert gaps.kept[met.gathering.gathers].all()
@@ -530,7 +531,7 @@ def test_gaps_are_closable_from_both_sides_and_at_the_rim_means(kinds: tuple[str
 
 
 @pytest.mark.parametrize("which", ["slave", "master"])
-@pytest.mark.parametrize("kinds", SOLID, ids="-".join)
+@pytest.mark.parametrize("kinds", [*SOLID, ("triangles6", "quads9"), ("quads", "triangles6")], ids="-".join)
 def test_the_derivative_by_nodes_agrees_with_central_differences(kinds: tuple[str, str], which: str) -> None:
     here, rng = mortar_setting(kinds), np.random.default_rng(11)
     ways = [rng.standard_normal(each.points.shape) for each in (here.slave, here.master)]
@@ -547,3 +548,47 @@ def test_the_derivative_by_nodes_agrees_with_central_differences(kinds: tuple[st
     found, size = sum(map(np.sum, terms)), sum(np.abs(term).sum() for term in terms)
     assert size > 1.0
     assert abs(found - (ahead - behind) / (2 * MORTAR_STEP)) < 1e-6 * size
+
+
+# Gaps where a surface turns away from the other one in a crease.
+def turning_away(kind: str, master: bool) -> tuple[FacetedSurface, FacetedSurface]:
+    """A line that turns away by 45 degrees within a facet of the other, which it touches."""
+    x = halved(np.linspace(0.0, 1.0, 8)[:, None])[:, 0] if kind == "edges3" else np.linspace(0.0, 1.0, 8)
+    ends = np.array([[-0.1, 0.0], [0.23, 0.0], [0.47, 0.0], [0.76, 0.29], [1.1, 0.63]])
+    ends[:, 1] *= 1.0 if master else -1.0
+    bent = lattice(halved(ends) if kind == "edges3" else ends, kind, master)
+    flat = lattice(np.column_stack([x, 0.0 * x]), kind, not master)
+    return (flat, bent) if master else (bent, flat)
+
+
+@pytest.mark.parametrize("master", [True, False])
+@pytest.mark.parametrize("kind", ["edges", "edges3"])
+def test_bodies_that_only_touch_do_not_overlap_at_creases(kind: str, master: bool) -> None:
+    slave, other = turning_away(kind, master)
+    met = couple(slave, other)
+    assert met.gap.min() > -1e-9
+    assert met.gap.max() > 0.1
+    means = met.coupling.gap.min()
+    assert means < -1e-3 if master else means > -1e-9, "not even the means"
+
+
+@pytest.mark.parametrize("kind", ["edges", "edges3"])
+def test_gaps_at_creases_have_the_derivative_of_those_of_nodes(kind: str) -> None:
+    rng = np.random.default_rng(5)
+    slave, master = (  # not only touching, where many points are as low as their lowest node
+        moved(side, 1e-3 * rng.standard_normal(side.points.shape)) for side in turning_away(kind, True)
+    )
+    met = couple(slave, master)
+    assert met.closable is not None
+    assert met.closable.nodal.any()
+    count = len(met.coupling.node)
+    none = np.zeros((count, 0)), np.zeros((len(master.nodes), 0)), np.zeros((count, 2))
+    by = CouplingDerivatives(np.zeros(count), *none, rng.standard_normal(count))
+    ways = [rng.standard_normal(each.points.shape) for each in (slave, master)]
+    pulled = mortar_points_pulled_back(met, by, MPI.COMM_SELF)
+    ends = [
+        by.gap @ couple(moved(slave, s * ways[0]), moved(master, s * ways[1])).gap
+        for s in (MORTAR_STEP, -MORTAR_STEP)
+    ]
+    found = sum(np.sum(part * way) for part, way in zip(pulled, ways, strict=True))
+    assert found == pytest.approx((ends[0] - ends[1]) / (2 * MORTAR_STEP), rel=1e-5)
