@@ -38,8 +38,9 @@ class AutomaticContact(Sequence[ContactPair]):
 
     The scene looks for facets that face another body within a distance, names them "near B" on A and "near
     A" on B, and makes a pair of them; look at ``scene.contacts`` and at pictures before trusting it. The
-    slave is the side with the smaller facets; between facets alike to a tenth, that of the softer body. A
-    side whose nodes are all held is the master. Bodies named in ``self_contact`` may meet themselves wherever
+    slave is the side with linear cells if the other one has quadratic ones, else that with the smaller
+    facets; between facets alike to a tenth, that of the softer body. A side whose nodes are all held is the
+    master. Bodies named in ``self_contact`` may meet themselves wherever
     they fold.
 
     Attributes:
@@ -149,6 +150,9 @@ class AutomaticContact(Sequence[ContactPair]):
         held = [bool(scene.fixed(side.body)[np.unique(scene.facets(side))].all()) for side in sides]
         alike = max(sizes) <= 1.1 * min(sizes)
         other_is_better = master_share(scene, pair) > 0.5 if alike else sizes[1] < sizes[0]
+        orders = [scene.bodies[side.body].mesh.order for side in sides]
+        if orders[0] != orders[1]:  # what a linear master cannot follow, a quadratic slave presses on
+            other_is_better = orders[1] < orders[0]
         if held[0] != held[1]:  # nodes that cannot move carry no multipliers
             other_is_better = held[0]
         return replace(pair, slave=sides[1], master=sides[0]) if other_is_better else pair

@@ -100,6 +100,14 @@ def test_the_finer_side_is_the_slave_where_cells_are_quadratic() -> None:
         assert found.contacts[0].slave.body == slave
 
 
+@pytest.mark.parametrize("curved", ["plate", "punch"])
+def test_linear_cells_are_the_slave_of_quadratic_ones(curved: str) -> None:
+    meshes = {"plate": LOW, "punch": block((0.5, 0.5, 1.0), (2.5, 2.5, 2.0), (3, 3, 2))}
+    bodies = {n: Body(quadratic(mesh) if n == curved else mesh, STEEL) for n, mesh in meshes.items()}
+    found = Scene(bodies, [Support("plate", "z0")], contacts=AutomaticContact()).contacts[0]
+    assert found.slave.body == ("punch" if curved == "plate" else "plate")
+
+
 def test_a_side_whose_nodes_are_all_held_is_the_master() -> None:
     fine = block((0.5, 0.5, 1.0), (2.5, 2.5, 2.0), (8, 8, 2))
     bodies = {"plate": Body(LOW, STEEL), "punch": Body(fine, STEEL)}

@@ -33,6 +33,7 @@ from fenics_contact.feti import DualSystem
 from fenics_contact.feti.direct import DirectSystem
 from fenics_contact.gallery import block, half_cylinder, half_disc, hemisphere, rectangle
 from fenics_contact.materials import IsotropicElasticity, Material, PlaneStrain
+from fenics_contact.mesh import quadratic
 from fenics_contact.results.deformed_state import AnyState
 from fenics_contact.theory import contact_modulus, hertz_line, hertz_point
 
@@ -304,6 +305,18 @@ def test_facets_of_very_different_widths_are_named(counts: int, words: str) -> N
     assert found.wider == pytest.approx(4.0 / counts)
     assert str(found) == f"flat on flat; node; {words}facets miss nothing" or (words and words in str(found))
     assert replace(found, by_nodes=False).match() == (found.match() if counts < 4 else "")
+
+
+@pytest.mark.parametrize("orders", [(1, 2), (2, 1), (2, 2)])
+def test_a_quadratic_slave_on_a_linear_master_is_named(orders: tuple[int, int]) -> None:
+    wanted, bodies = dict(zip(("lower", "upper"), orders, strict=True)), dict(stack().bodies)
+    for name in wanted:
+        if wanted[name] == 2:
+            bodies[name] = Body(quadratic(bodies[name].mesh), STEEL)
+    scene = replace(stack(), bodies=bodies, contacts=[replace(pair()[0], discretisation="mortar")])
+    (found,) = scene.plan(ranks=1).contacts
+    named = scene.bodies[pair()[0].slave.body].mesh.order > scene.bodies[pair()[0].master.body].mesh.order
+    assert ("swapped by less than 1 %: let the linear surface be the slave" in str(found)) == named
 
 
 def test_a_scene_is_made_without_what_its_plan_computes(mpirun: Callable[..., str]) -> None:
