@@ -12,11 +12,9 @@ from scipy.sparse.csgraph import connected_components
 from fenics_contact.decks.cards import Card
 from fenics_contact.decks.mesh import Block, DeckMesh, Faces
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.cell_types import CELL_TYPES
-from fenics_contact.mesh.quadratic_nodes import in_vtk_order
+from fenics_contact.mesh.quadratic_nodes import with_centres
 from fenics_contact.mesh.quality import thickness
-from fenics_contact.mesh.serendipity_cells import serendipity
-from fenics_contact.readers.bodies import Label, TaggedMesh, bodies_of
+from fenics_contact.readers.bodies import Label, TaggedMesh, bodies_of, one_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,8 +182,8 @@ def build_bodies(
         )
     dim = mesh.blocks[0].element.dim
     points = np.ascontiguousarray(mesh.points[:, :dim])
-    points, cells, place = _cells(mesh, points)
-    kinds = np.array([block.element.complete for block in mesh.blocks])[mesh.block_of]
+    cells, place = _cells(mesh, points)
+    kinds = np.array([block.element.cell for block in mesh.blocks])[mesh.block_of]
     groups: dict[Label, dict[str, np.ndarray]] = {}
     chosen: dict[str, dict[str, str]] = {}
     for part in parts:
@@ -210,44 +208,25 @@ def build_bodies(
     }
     meshes = bodies_of(tagged, wanted, list(surfaces))
     nodes = {}
-    follows = np.array([block.element.has_following_centres for block in mesh.blocks])[mesh.block_of]
     for part in parts:
-        if follows[part.elements].any():
-            meshes[part.name] = serendipity(meshes[part.name])
         rows = [cells[kind][at] for label in chosen[part.name].values() for kind, at in groups[label].items()]
         mine = np.unique(np.concatenate([row.ravel() for row in rows]))
-        nodes[part.name] = np.where(mine < len(mesh.points), mine, -1)
+        centres = meshes[part.name].n_nodes - len(mine)  # after all others
+        nodes[part.name] = np.append(mine, np.full(centres, -1))
     return Parts(parts, meshes, nodes)
 
 
-def _cells(mesh: DeckMesh, points: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
-    """Return coordinates with centres of cells that the deck has not, cells by type, and places of elements.
-
-    Elements of 8 and 20 nodes are cells of 9 and 27 nodes, whose centres follow the other nodes.
-    """
-    joined: dict[str, list[Block]] = {}
-    place = np.zeros(len(mesh.element_numbers), dtype=np.int64)  # of each element among those of its cells
+def _cells(mesh: DeckMesh, points: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Return cells by type, as the deck has them, and the place of each element among those of its type."""
+    joined: dict[str, list[np.ndarray]] = {}
+    place = np.zeros(len(mesh.element_numbers), dtype=np.int64)
     for block in mesh.blocks:
-        if block.element.complete not in CELL_TYPES:
-            raise block.card.error(
-                f"elements of type {block.element.name} are not read yet: there are no cells with their "
-                "nodes; mesh the body with others"
-            )
-        known = joined.setdefault(block.element.complete, [])
-        place[block.first : block.first + len(block.nodes)] = sum(len(b.nodes) for b in known) + np.arange(
-            len(block.nodes)
-        )
-        known.append(block)
-    cells = {}
-    for kind, blocks in joined.items():
-        cells[kind] = np.concatenate([block.nodes for block in blocks])
-        if blocks[0].element.has_following_centres:
-            points, cells[kind] = in_vtk_order(points, cells[kind])
-        start = 0
-        for block in blocks:
-            _check_block(block, points, cells[kind][start : start + len(block.nodes)])
-            start += len(block.nodes)
-    return points, cells, place
+        _check_block(block, points)
+        known = joined.setdefault(block.element.cell, [])
+        start = sum(map(len, known))
+        place[block.first : block.first + len(block.nodes)] = start + np.arange(len(block.nodes))
+        known.append(block.nodes)
+    return {kind: np.concatenate(rows) for kind, rows in joined.items()}, place
 
 
 def _region(sections: Sequence[Section], part: Component, section: int) -> str:
@@ -261,9 +240,11 @@ def regions_of(sections: Sequence[Section], part: Component) -> dict[str, Sectio
     return {_region(sections, part, number): sections[number] for number in part.sections}
 
 
-def _check_block(block: Block, points: np.ndarray, cells: np.ndarray) -> None:
+def _check_block(block: Block, points: np.ndarray) -> None:
     """Reject elements without a positive Jacobian, by their numbers."""
-    bad = np.flatnonzero(thickness(points, cells) <= 0.0)
+    places, whole = with_centres(points, {block.element.name: block.nodes}, block.element.dim)
+    cells = one_array(whole, block.element.dim)
+    bad = np.flatnonzero(thickness(places, cells) <= 0.0)
     if len(bad):
         numbers = ", ".join(map(str, block.numbers[bad[:5]])) + (", ..." if len(bad) > 5 else "")
         ends = np.cumsum([line.strip().rstrip(",").count(",") + 1 for line in block.card.lines])

@@ -38,16 +38,6 @@ class Element:
         return 3 if self.kind == "solid" else 2
 
     @property
-    def complete(self) -> str:
-        """Name of the type of cells with all nodes: those of 8 and 20 nodes have centres besides."""
-        return _COMPLETE.get(self.cell, self.cell)
-
-    @property
-    def has_following_centres(self) -> bool:
-        """Whether centres of its cells follow the other nodes."""
-        return self.cell in _COMPLETE
-
-    @property
     def shape(self) -> str:
         """Name of the linear cell of its shape."""
         return re.sub(r"\d+$", "", self.cell)
@@ -67,7 +57,6 @@ class Element:
         ]
 
 
-_COMPLETE = {"hexahedron20": "hexahedron27", "quadrilateral8": "quadrilateral9"}
 _KINDS = {"C3D": "solid", "CPS": "plane stress", "CPE": "plane strain", "CAX": "axisymmetric"}
 _CELLS = {
     3: {

@@ -349,7 +349,7 @@ class BodyMesh:
         """Number and type of the cells: "24 hexahedra"."""
         plural = cell_type_of(self.cells, self.dim).plural
         if self.has_several_shapes:
-            return in_words(self.cells, self.dim)
+            return in_words(self.cells, self.dim, self.centres is not None)
         return f"{self.n_cells} {plural if self.centres is None else plural.replace(*_FOLLOWING)}"
 
     @property

@@ -260,8 +260,8 @@ def cell_type_of(cells: np.ndarray, dim: int) -> CellType:
             return cell
     if dim == 3 and cells.ndim == 2 and cells.shape[1] == 20:
         raise InvalidInputError(
-            "hexahedra of 20 nodes are not supported, as a uniform pressure pulls at the corners of their "
-            "facets: complete them by centres, points, cells = in_vtk_order(points, cells)"
+            "hexahedra of 20 nodes are those of 27 whose centres follow: add these, points, cells = "
+            "in_vtk_order(points, cells), and take serendipity(BodyMesh(points, cells))"
         )
     known = " or ".join(
         f"(n_cells, {cell.nodes.shape[0]}) for {cell.plural}"

@@ -126,6 +126,11 @@ class Shape:
         }.get(self.name, np.ones(len(at)))  # fmt: skip
 
     @property
+    def is_simplex(self) -> bool:
+        """Whether it is a triangle or a tetrahedron."""
+        return self.corners == self.dim + 1
+
+    @property
     def is_whole(self) -> bool:
         """Whether it is the hexahedron (quadrilateral)."""
         return len(set(self.onto)) == len(self.onto)
@@ -401,13 +406,16 @@ def expanded(cells: np.ndarray, n_nodes: int, dim: int) -> tuple[np.ndarray, sp.
     return result, sp.csr_matrix(found, shape=(count, n_nodes))
 
 
-def in_words(cells: np.ndarray, dim: int) -> str:
-    """Return numbers of cells by shape: "8 hexahedra, 4 pyramids and 12 prisms"."""
-    order = cell_type_of(cells, dim).order
-    parts = [
-        counted(len(mine), *("quadratic " * (order - 1) + word for word in (name, SHAPES[name].plural)))
-        for name, mine in (shapes_in(cells, dim) or {}).items()
-    ]
+def in_words(cells: np.ndarray, dim: int, lacking: bool = False) -> str:
+    """Return numbers of cells by shape: "8 hexahedra, 4 pyramids and 12 prisms".
+
+    `lacking`: whether centres follow, as in serendipity cells.
+    """
+    order, parts = cell_type_of(cells, dim).order, []
+    for name, mine in (shapes_in(cells, dim) or {}).items():
+        kind = "serendipity " if lacking and len(SHAPES[name].square_columns) else "quadratic "
+        words = (kind * (order - 1) + word for word in (name, SHAPES[name].plural))
+        parts.append(counted(len(mine), *words))
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
 
 

@@ -5,32 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh.cell_types import cell_type_of
+from fenics_contact.mesh.collapsed import joined_cells, shape_of
 from fenics_contact.mesh.faces import (
     NOTHING,
     cell_faces,
     coordinate_rounding,
-    corners_of,
+    flat_faces,
     number_faces,
     start_at_smallest,
 )
 from fenics_contact.mesh.quality import jacobians
-
-_MIRRORED = {
-    "triangle": [0, 2, 1],
-    "quadrilateral": [0, 3, 2, 1],
-    "tetrahedron": [0, 2, 1, 3],
-    "hexahedron": [4, 5, 6, 7, 0, 1, 2, 3],
-    "triangle6": [0, 2, 1, 5, 4, 3],
-    "quadrilateral9": [0, 3, 2, 1, 7, 6, 5, 4, 8],
-    "tetrahedron10": [0, 2, 1, 3, 6, 5, 4, 7, 9, 8],
-    "hexahedron27": [
-        *(4, 5, 6, 7, 0, 1, 2, 3),
-        *(12, 13, 14, 15, 8, 9, 10, 11, 16, 17, 18, 19),
-        *(20, 21, 22, 23, 25, 24, 26),
-    ],
-}
-"""The cell with the opposite sign of its Jacobian."""
 
 
 def flattened(points: np.ndarray, used: np.ndarray, source: str) -> np.ndarray:
@@ -58,21 +42,30 @@ def turned_counter_clockwise(points: np.ndarray, cells: np.ndarray) -> np.ndarra
 
     Returns the cells; unchanged if only some run clockwise, which is a mistake in the mesh.
     """
-    if np.all(jacobians(points, cells).max(axis=1) < 0.0):
-        return cells[:, _MIRRORED[cell_type_of(cells, 2).name]]
+    shape = shape_of(cells.shape[1], 2)
+    if np.all(jacobians(points, cells[:, : shape.corners]).max(axis=1) < 0.0):
+        return cells[:, shape.mirror(cells.shape[1])]
     return cells
 
 
 def turned_right_handed(points: np.ndarray, cells: np.ndarray, source: str) -> np.ndarray:
     """Reverse every cell with negative Jacobian, in meshes without a prescribed order of vertices.
 
-    `points`: coordinates, (n_nodes, 3 | 2); `cells`: node numbers, (n_cells, nodes of a cell).
+    `points`: coordinates, (n_nodes, 3 | 2); `cells`: node numbers in VTK order, (n_cells, nodes of a cell).
     """
     dim = points.shape[1]
-    negative = jacobians(points, cells).max(axis=1) < 0.0
-    turned = np.where(negative[:, None], cells[:, _MIRRORED[cell_type_of(cells, dim).name]], cells)
-    faces = cell_faces(turned, dim)
-    flat = corners_of(faces.reshape(-1, faces.shape[2]), dim)
+    shape = shape_of(cells.shape[1], dim)
+
+    def linear(rows: np.ndarray) -> np.ndarray:
+        corners = rows[:, : shape.corners]
+        known = shape.is_whole or shape.is_simplex
+        return corners if known else joined_cells({shape.name: corners}, dim)
+
+    negative = jacobians(points, linear(cells)).max(axis=1) < 0.0
+    turned = np.where(negative[:, None], cells[:, shape.mirror(cells.shape[1])], cells)
+    faces = cell_faces(linear(turned), dim)
+    flat = faces.reshape(-1, faces.shape[2])
+    flat = np.delete(flat, flat_faces(linear(turned), dim), axis=0)
     numbers = number_faces(flat)
     order = np.argsort(numbers, kind="stable")
     one, other = order[:-1], order[1:]

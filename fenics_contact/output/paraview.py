@@ -189,7 +189,7 @@ _MESHIO_SHAPES = {
     },
     2: {
         "triangle": ("triangle6", 6), "quadrilateral": ("quad9", 9), "tetrahedron": ("tetra10", 10),
-        "pyramid": ("pyramid", 5), "prism": ("wedge15", 15), "hexahedron": ("hexahedron27", 27),
+        "pyramid": ("pyramid", 5), "prism": ("wedge18", 18), "hexahedron": ("hexahedron27", 27),
     },
 }  # fmt: skip
 

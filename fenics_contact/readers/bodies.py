@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.faces import boundary_faces, cell_faces, corners_of, match_faces
+from fenics_contact.mesh.collapsed import has_collapsed, joined_cells, shape_of
+from fenics_contact.mesh.faces import boundary_faces, cell_faces, corners_of, match_faces, widened
+from fenics_contact.mesh.quadratic_nodes import with_centres
+from fenics_contact.mesh.serendipity_cells import serendipity
 
 Label = str | int
 """A physical name of gmsh, or a numeric tag."""
@@ -23,7 +26,8 @@ class TaggedMesh:
     Attributes:
         source: Where it comes from, for messages: ``"file 'beam.msh'"``.
         points: Coordinates, (n_nodes, 3 | 2).
-        cells: Cell type to node numbers in VTK order, (n_cells, nodes of a cell).
+        cells: Cell type, by any name, to node numbers in VTK order, (n_cells, nodes of a cell), also of
+            prisms, pyramids and serendipity cells.
         groups: Label to cell type to the numbers of its cells.
         facets: Label to the corners of facets, arrays of (n, 4 | 3 | 2) node numbers; in any order.
         words: Names of its labels, for messages: ``"physical volume"``, ``"physical surface"``.
@@ -150,22 +154,32 @@ def bodies_of(mesh: TaggedMesh, bodies: Any = None, surfaces: Any = None) -> dic
 
     Returns the name to body. A surface belongs to every body on whose boundary some of its facets lie.
     """
+    points, cells = with_centres(mesh.points, mesh.cells, mesh.dim)
+    follow = {kind for kind, rows in cells.items() if rows.shape != mesh.cells[kind].shape}
+    mesh = replace(mesh, points=points, cells=cells)
     chosen, facets = chosen_bodies(mesh, bodies), chosen_surfaces(mesh, surfaces)
     _check_facets_belong(mesh, facets)
     owner = {kind: np.full(len(cells), -1) for kind, cells in mesh.cells.items()}
     result = {}
     for number, (name, parts) in enumerate(chosen.items()):
-        kind, cells, region = _cells_of(mesh, name, parts)
-        taken = owner[kind][cells]
-        if np.any(taken >= 0):
-            other = list(chosen)[int(taken.max())]
-            raise InvalidInputError(
-                f"a cell must belong to one body, {np.count_nonzero(taken >= 0)} cells of {mesh.source} "
-                f"belong to '{other}' and '{name}': say which {mesh.words[0]}s are bodies with "
-                "bodies={name: label}"
-            )
-        owner[kind][cells] = number
-        result[name] = _body(mesh, name, mesh.cells[kind][cells], parts.regions, region, facets)
+        found = _cells_of(mesh, name, parts)
+        for kind, numbers, _ in found:
+            taken = owner[kind][numbers]
+            if np.any(taken >= 0):
+                other = list(chosen)[int(taken.max())]
+                raise InvalidInputError(
+                    f"a cell must belong to one body, {np.count_nonzero(taken >= 0)} cells of {mesh.source} "
+                    f"belong to '{other}' and '{name}': say which {mesh.words[0]}s are bodies with "
+                    "bodies={name: label}"
+                )
+            owner[kind][numbers] = number
+        cells = {kind: mesh.cells[kind][numbers] for kind, numbers, _ in found}
+        _checked_order(mesh, name, cells)
+        rows = one_array(cells, mesh.dim)
+        region = np.concatenate([region for _, _, region in found])
+        body = _body(mesh, name, rows, parts.regions, region, facets)
+        lacking = {kind in follow for kind, _, _ in found if len(square_columns(mesh, kind))}
+        result[name] = serendipity(body) if lacking == {True} else body
     if surfaces is not None:
         _check_nodes_make_facets(mesh, facets, result)
     return result
@@ -173,29 +187,57 @@ def bodies_of(mesh: TaggedMesh, bodies: Any = None, surfaces: Any = None) -> dic
 
 def cells_of_bodies(mesh: TaggedMesh, bodies: Any = None) -> dict[str, np.ndarray]:
     """Return the ascending numbers of each body's cells; arguments as in `bodies_of`."""
-    return {name: _cells_of(mesh, name, parts)[1] for name, parts in chosen_bodies(mesh, bodies).items()}
+    return {name: _cells_of(mesh, name, parts)[0][1] for name, parts in chosen_bodies(mesh, bodies).items()}
 
 
-def _cells_of(mesh: TaggedMesh, name: str, parts: BodyParts) -> tuple[str, np.ndarray, np.ndarray]:
-    """Return the cell type of a body, its ascending cells, and the group of each."""
+def square_columns(mesh: TaggedMesh, kind: str) -> np.ndarray:
+    """Return the nodes of cells of a type on faces that have centres where they are quadratic, (n, 9)."""
+    shape = shape_of(mesh.cells[kind].shape[1], mesh.dim)
+    return shape.square_columns if mesh.cells[kind].shape[1] > shape.corners else np.zeros((0, 9), dtype=int)
+
+
+def _checked_order(mesh: TaggedMesh, name: str, cells: Mapping[str, np.ndarray]) -> None:
+    """Reject cells of both orders in one body."""
+    orders = {rows.shape[1] > shape_of(rows.shape[1], mesh.dim).corners for rows in cells.values()}
+    if len(orders) > 1:
+        raise InvalidInputError(
+            f"a body must have linear or quadratic cells, body '{name}' of {mesh.source} has both, of types "
+            f"{sorted(cells)}: mesh it with one order, or make bodies of its parts"
+        )
+
+
+def one_array(cells: Mapping[str, np.ndarray], dim: int) -> np.ndarray:
+    """Return the nodes of complete cells, those of one shape as they are, of several as hexahedra.
+
+    `cells`: any name to node numbers, (n_cells, nodes of a cell), all of one order.
+    """
+    shapes = {kind: shape_of(rows.shape[1], dim) for kind, rows in cells.items()}
+    first = next(iter(shapes.values()))
+    if len(cells) == 1 and (first.is_whole or first.is_simplex):
+        return next(iter(cells.values()))
+    return np.concatenate([joined_cells({shapes[kind].name: rows}, dim) for kind, rows in cells.items()])
+
+
+def _cells_of(mesh: TaggedMesh, name: str, parts: BodyParts) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Return the cell types of a body, of each its ascending cells, and the group of each."""
     chosen = [
         (kind, cells, n) for n, label in enumerate(parts.labels) for kind, cells in mesh.groups[label].items()
     ]
     chosen = [(kind, cells, n) for kind, cells, n in chosen if cells.size]
-    kinds = sorted({kind for kind, _, _ in chosen})
-    if len(kinds) > 1:
-        counts = [sum(cells.size for kind, cells, _ in chosen if kind == one) for one in kinds]
-        there = " and ".join(f"{count} of type {kind}" for count, kind in zip(counts, kinds, strict=True))
-        raise InvalidInputError(
-            f"a body must have cells of one type, body '{name}' of {mesh.source} has {there}: mesh it with "
-            "one type, or make bodies of its parts"
-        )
-    if not kinds:
+    if not chosen:
         raise InvalidInputError(
             f"a body must have cells, body '{name}' of {mesh.source} has none: mesh it, or leave it out"
         )
-    cells = np.concatenate([cells for _, cells, _ in chosen])
-    region = np.concatenate([np.full(cells.size, n) for _, cells, n in chosen])
+    kinds = sorted({kind for kind, _, _ in chosen})
+    return [_cells_of_kind(mesh, name, parts, kind, chosen) for kind in kinds]
+
+
+def _cells_of_kind(
+    mesh: TaggedMesh, name: str, parts: BodyParts, kind: str, chosen: list[tuple[str, np.ndarray, int]]
+) -> tuple[str, np.ndarray, np.ndarray]:
+    mine = [(cells, n) for each, cells, n in chosen if each == kind]
+    cells = np.concatenate([cells for cells, _ in mine])
+    region = np.concatenate([np.full(cells.size, n) for cells, n in mine])
     order = np.argsort(cells, kind="stable")
     cells, region = cells[order], region[order]
     double = np.flatnonzero(np.diff(cells) == 0)
@@ -205,7 +247,7 @@ def _cells_of(mesh: TaggedMesh, name: str, parts: BodyParts) -> tuple[str, np.nd
             f"a cell must belong to one region, {double.size} cells of body '{name}' of {mesh.source} belong "
             f"to {pair[0]!r} and {pair[1]!r}: leave one of them out"
         )
-    return kinds[0], cells, region
+    return kind, cells, region
 
 
 def _body(
@@ -226,7 +268,9 @@ def _body(
     surfaces = {}
     for surface, parts in facets.items():
         members: list[np.ndarray] = [np.zeros(0, dtype=np.int64)]
-        mine = [number[block] for block in parts.facets if block.shape[1] == corners.shape[1]]
+        widths = {corners.shape[1], 3} if has_collapsed(local, mesh.dim) else {corners.shape[1]}
+        mine = [number[block] for block in parts.facets if block.shape[1] in widths]
+        mine = [widened(block, corners.shape[1]) for block in mine]
         mine = [block[(block >= 0).all(axis=1)] for block in mine]
         if mine and (candidates := np.concatenate(mine)).size:
             matches = match_faces(candidates, corners)
@@ -277,15 +321,13 @@ def _check_nodes_make_facets(mesh: TaggedMesh, facets: Facets, bodies: Mapping[s
 
 def _check_facets_belong(mesh: TaggedMesh, surfaces: Facets) -> None:
     """Reject facets that are not faces of cells."""
-    known: dict[int, list[np.ndarray]] = {}
-    for cells in mesh.cells.values():
-        faces = cell_faces(cells, mesh.dim)
-        corners = corners_of(faces.reshape(-1, faces.shape[2]), mesh.dim)
-        known.setdefault(corners.shape[1], []).append(corners)
-    joined = {columns: np.concatenate(blocks) for columns, blocks in known.items()}
+    known = []
+    for kind, rows in mesh.cells.items():
+        faces = cell_faces(one_array({kind: rows}, mesh.dim), mesh.dim)
+        known.append(widened(corners_of(faces.reshape(-1, faces.shape[2]), mesh.dim), 2 * (mesh.dim - 1)))
+    faces = np.concatenate(known)
     for name, parts in surfaces.items():
         for block in parts.facets:
-            faces = joined.get(block.shape[1], np.zeros((0, block.shape[1]), dtype=np.int64))
             lost = np.flatnonzero(match_faces(block, faces) < 0)
             if lost.size:
                 place = ", ".join(f"{x:.6g}" for x in mesh.points[block[lost[0]]].mean(axis=0))

@@ -65,8 +65,8 @@ def read_msh(
 
     Raises:
         InvalidInputError: If the file is missing or cannot be read, a group does not exist, a volume has no
-            group, cells are prisms or pyramids, of higher order, of several types in one body, flipped,
-            or disconnected, a cell is in two bodies, or a surface lies inside a body.
+            group, cells are of order three, of both orders in one body, flipped, or disconnected, a cell is
+            in two bodies, or a surface lies inside a body.
         MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
 
     Note:

@@ -19,18 +19,18 @@ import numpy as np
 from fenics_contact._base.progress import Task
 from fenics_contact._base.requirements import check_gmsh
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh.cell_types import CELL_TYPES, OF_THE_FILE
+from fenics_contact.mesh.cell_types import OF_THE_FILE
+from fenics_contact.mesh.collapsed import SHAPES
 from fenics_contact.mesh.plane import flattened, turned_counter_clockwise
-from fenics_contact.mesh.quadratic_nodes import in_vtk_order
+from fenics_contact.mesh.quadratic_nodes import ordered
 from fenics_contact.readers.bodies import Label, TaggedMesh
 
 _TYPES = {
-    2: "triangle", 3: "quadrilateral", 4: "tetrahedron", 5: "hexahedron",
-    9: "triangle6", 10: "quadrilateral9", 11: "tetrahedron10", 12: "hexahedron27",
+    2: "triangle", 3: "quadrilateral", 4: "tetrahedron", 5: "hexahedron", 6: "prism", 7: "pyramid",
+    9: "triangle6", 10: "quadrilateral9", 11: "tetrahedron10", 12: "hexahedron27", 13: "prism18",
+    14: "pyramid14", 16: "quadrilateral8", 17: "hexahedron20", 18: "prism15", 19: "pyramid13",
 }  # fmt: skip
 """gmsh's numbers of the supported cell types."""
-_INCOMPLETE = (16, 17)
-"""gmsh's numbers of quadratic cells without nodes on their faces or in their centre."""
 
 
 def tagged_mesh_of(gmsh: ModuleType, source: str) -> TaggedMesh:
@@ -85,12 +85,11 @@ def _elements(gmsh: ModuleType, dim: int, source: str) -> dict[int, dict[str, np
         for number, tags in zip(types, nodes, strict=True):
             name, _, order, nodes_each, *_ = gmsh.model.mesh.getElementProperties(number)
             if order > 1 and number not in _TYPES:
-                remedy = "set Mesh.SecondOrderIncomplete = 0" if number in _INCOMPLETE else OF_THE_FILE
-                raise InvalidInputError(f"{source} has cells of type '{name}': {remedy}")
+                raise InvalidInputError(f"{source} has cells of type '{name}': {OF_THE_FILE}")
             if number not in _TYPES:
                 raise InvalidInputError(
-                    f"cells must be tetrahedra or hexahedra (in two dimensions triangles or quadrilaterals), "
-                    f"{source} has cells of type '{name}': mesh it without prisms and pyramids"
+                    "cells must be tetrahedra, pyramids, prisms or hexahedra (in two dimensions triangles or "
+                    f"quadrilaterals), {source} has cells of type '{name}': mesh it without these"
                 )
             blocks = elements.setdefault(int(entity), {})
             blocks[_TYPES[number]] = tags.astype(np.int64).reshape(-1, nodes_each)
@@ -98,7 +97,7 @@ def _elements(gmsh: ModuleType, dim: int, source: str) -> dict[int, dict[str, np
 
 
 def _in_vtk_order(points: np.ndarray, kind: str, cells: np.ndarray) -> np.ndarray:
-    return cells if CELL_TYPES[kind].order == 1 else in_vtk_order(points, cells)[1]
+    return ordered(points, cells, SHAPES[kind.rstrip("0123456789")])
 
 
 def _groups(gmsh: ModuleType, dim: int, meshed: set[int], source: str) -> dict[Label, list[int]]:
@@ -156,7 +155,7 @@ def _facets(
         for entity in entities:
             if dim == 2:
                 there = elements[2].get(entity, {}).items()
-                blocks += [nodes[:, : len(CELL_TYPES[kind].edges)] for kind, nodes in there]
+                blocks += [nodes[:, : SHAPES[kind.rstrip("0123456789")].corners] for kind, nodes in there]
             else:
                 types, _, nodes = gmsh.model.mesh.getElements(dim, entity)
                 each = [gmsh.model.mesh.getElementProperties(number)[3] for number in types]

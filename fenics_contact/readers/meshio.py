@@ -25,9 +25,9 @@ from fenics_contact._base.checks import require_file
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import made_once
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.cell_types import cell_type_of
+from fenics_contact.mesh.collapsed import shape_of
 from fenics_contact.mesh.plane import flattened, turned_right_handed
-from fenics_contact.mesh.quadratic_nodes import in_vtk_order
+from fenics_contact.mesh.quadratic_nodes import ordered
 from fenics_contact.readers.bodies import Label, TaggedMesh, bodies_of
 from fenics_contact.readers.dolfinx import Bodies, Surfaces, read_xdmf
 from fenics_contact.readers.gmsh import read_msh
@@ -74,11 +74,12 @@ def _check_nodes(lines: Sequence[str], path: Path) -> None:
         )
 
 
-_CORNERS = {"triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8}
+_CORNERS = {"triangle": 3, "quad": 4, "tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8}
 """Number of corners by meshio's name of a linear cell."""
 _SERENDIPITY_OR_LAGRANGE = {
     "triangle6": "triangle", "quad8": "quad", "quad9": "quad",
     "hexahedron20": "hexahedron", "hexahedron27": "hexahedron", "tetra10": "tetra",
+    "pyramid13": "pyramid", "pyramid14": "pyramid", "wedge15": "wedge", "wedge18": "wedge",
 }  # fmt: skip
 """meshio's name of a quadratic cell to that of the linear cell."""
 
@@ -125,15 +126,16 @@ def cells_of(
     cells: dict[str, np.ndarray] = {}
     kinds: dict[int, str] = {}
     for columns, nodes in joined.items():
-        if columns > (8 if dim == 3 else 4):
-            points, nodes = in_vtk_order(points, nodes)
-        kind = kinds[columns] = cell_type_of(nodes, dim).name
-        if kind in cells:
-            raise InvalidInputError(
-                f"quadratic cells must have one number of nodes, {source} has {_counted(mesh)}: save it with "
-                "one of them, or read it with corners_only=True"
-            )
-        cells[kind] = turned_right_handed(points, nodes, source)
+        shape = shape_of(columns, dim)
+        kinds[columns] = f"{shape.name}{columns if columns > shape.corners else ''}"
+        nodes = ordered(points, nodes, shape)
+        if any(shape is shape_of(other, dim) and other > shape.corners for other in set(joined) - {columns}):
+            if columns > shape.corners:
+                raise InvalidInputError(
+                    f"quadratic cells must have one number of nodes, {source} has {_counted(mesh)}: save it "
+                    "with one of them, or read it with corners_only=True"
+                )
+        cells[kinds[columns]] = turned_right_handed(points, nodes, source)
     return points, _blocks(mesh, dim, kinds, corners_only), cells
 
 
@@ -142,8 +144,8 @@ def _nodes(block: meshio.CellBlock, mesh: meshio.Mesh, source: str, corners_only
     linear = _SERENDIPITY_OR_LAGRANGE.get(name, name)
     if linear not in _CORNERS:
         raise InvalidInputError(
-            "cells must be tetrahedra or hexahedra (in two dimensions triangles or quadrilaterals), "
-            f"{source} has {_counted(mesh)}: mesh it without cells of type '{name}'"
+            "cells must be tetrahedra, pyramids, prisms or hexahedra (in two dimensions triangles or "
+            f"quadrilaterals), {source} has {_counted(mesh)}: mesh it without cells of type '{name}'"
         )
     nodes = np.array(block.data, dtype=np.int64)
     return nodes[:, : _CORNERS[linear]] if corners_only else nodes
@@ -402,8 +404,9 @@ def read_mesh(
     of length; ``mesh.moved(1e3 * mesh.points)`` converts metres to millimetres.
 
     Quadratic cells stay quadratic: tetrahedra of 10 nodes, hexahedra of 20 or 27, in the plane
-    quadrilaterals of 8 or 9 and triangles of 6; whatever order a format lists midpoints in. Missing nodes of
-    27 or 9 are added without changing the geometry.
+    quadrilaterals of 8 or 9 and triangles of 6; whatever order a format lists midpoints in. A body may have
+    prisms, pyramids and several shapes of cells. Cells of 20, 15, 13 and 8 nodes stay as they are, see
+    `mesh.serendipity`; `mesh.completed` makes them cells of 27, 18, 14 and 9.
 
     Example:
         ``read_mesh("press.inp")`` makes a body of every element set. ``read_mesh("press.vtu",
@@ -428,8 +431,8 @@ def read_mesh(
 
     Raises:
         InvalidInputError: If the file is missing or cannot be read, a label does not exist, a cell has none
-            or several, cells are prisms, pyramids, or of several types in one body, are
-            degenerate or disconnected, or a surface lies inside a body.
+            or several, cells of one body are of different orders, are degenerate or disconnected, or a
+            surface lies inside a body.
 
     Note:
         Collective on ``comm`` if given.

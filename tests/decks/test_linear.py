@@ -12,8 +12,9 @@ from fenics_contact import PointForce, Pressure, Support, ThermalStrain
 from fenics_contact.decks import Deck, read_deck
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStress
-from fenics_contact.mesh import quadratic
+from fenics_contact.mesh import joined_cells, quadratic
 from tests.decks.texts import STEEL, deck, mesh_cards
+from tests.linear.mixed_cells import named_sides
 
 SECTION = "*SOLID SECTION, ELSET=BAR, MATERIAL=STEEL\n"
 #: A corner, a line and a side hold a bar so that it may contract.
@@ -88,6 +89,21 @@ def test_elements_without_centres_stretch_as_in_theory(element: str, tmp_path: P
     if element == "CPE8":
         exact = mesh.points * np.array([1 - 0.3**2, -0.3 * 1.3]) * 100.0 / 210000.0
     np.testing.assert_allclose(displacement(found), exact, atol=1e-12)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_prisms_beside_hexahedra_stretch_as_one_body(order: int, tmp_path: Path) -> None:
+    box = block((0, 0, 0), (3, 1, 1), (2, 1, 1))
+    prisms = box.cells[1, [[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]]]
+    mesh = named_sides(box.points, joined_cells({"hexahedron": box.cells[:1], "prism": prisms}))
+    mesh = mesh if order == 1 else quadratic(mesh)
+    text = mesh_cards({"BAR": mesh}) + STEEL + SECTION + "*BOUNDARY\nBAR_X0, 1\nBAR_Y0, 2\nBAR_Z0, 3\n"
+    assert ("TYPE=C3D15" if order == 2 else "TYPE=C3D6") in text
+    found = read_deck(deck(tmp_path, text + step("*BOUNDARY\nBAR_X1, 1, 1, 0.01\n")))
+    read = found.scene.bodies["BAR"].mesh
+    assert read.has_several_shapes
+    rate = np.array([1.0, -0.3, -0.3]) * 0.01 / 3
+    np.testing.assert_allclose(displacement(found), read.points * rate, atol=1e-12)
 
 
 def test_a_plate_of_a_thickness_is_loaded_by_whole_forces(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fenics_contact import BodyMesh
+from fenics_contact.mesh.collapsed import SHAPES, by_shape
 
 #: Name of the elements of each type of cells.
 ELEMENTS = {
@@ -20,25 +21,30 @@ ELEMENTS = {
 def mesh_cards(meshes: Mapping[str, BodyMesh], element: str = "", sets: bool = True) -> str:
     """Return nodes, elements and sets of bodies: each side z1 of body A is the node set A_Z1.
 
-    Of cells of 9 and 27 nodes those without centres are written.
+    Of complete quadratic cells those without centres are written.
     """
     nodes, rest, first, count = [], [], 1, 1
     for name, mesh in meshes.items():
-        used = {"hexahedron27": 20, "quadrilateral9": 8}.get(mesh.cell_type, mesh.cells.shape[1])
-        kept = np.unique(mesh.cells[:, :used])
+        blocks = []
+        for shape, (_, own) in by_shape(mesh.cells, mesh.dim).items():
+            lean = own[:, : SHAPES[shape].counts[mesh.order - 1]]
+            name_of = "C3D{}" if mesh.has_several_shapes else ELEMENTS[mesh.cell_type]
+            blocks.append((element or name_of, lean))
+        kept = np.unique(np.concatenate([lean.ravel() for _, lean in blocks]))
         points = np.pad(mesh.points[kept], ((0, 0), (0, 3 - mesh.dim)))
         number = np.full(mesh.n_nodes, -1)
         number[kept] = first + np.arange(len(kept))
         nodes += [f"{first + k}, {x:.17g}, {y:.17g}, {z:.17g}" for k, (x, y, z) in enumerate(points)]
-        rest.append(f"*ELEMENT, TYPE={element or ELEMENTS[mesh.cell_type]}, ELSET={name}")
-        for cell in number[mesh.cells[:, :used]]:
-            line = ", ".join(map(str, [count, *cell]))
-            rest += (
-                [f"{', '.join(line.split(', ')[:16])},", ", ".join(line.split(", ")[16:])]
-                if used > 15
-                else [line]
-            )
-            count += 1
+        for letters, lean in blocks:
+            rest.append(f"*ELEMENT, TYPE={letters.format(lean.shape[1])}, ELSET={name}")
+            for cell in number[lean]:
+                line = ", ".join(map(str, [count, *cell]))
+                rest += (
+                    [f"{', '.join(line.split(', ')[:16])},", ", ".join(line.split(", ")[16:])]
+                    if len(cell) > 15
+                    else [line]
+                )
+                count += 1
         for side, facets in mesh.surfaces.items() if sets else ():
             rest.append(f"*NSET, NSET={name}_{side.upper()}")
             rest += [f"{node}," for node in np.unique(number[facets]) if node > 0]

@@ -1,0 +1,171 @@
+"""Prisms, pyramids, serendipity cells and several shapes in one body, from gmsh and by meshio."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import ModuleType
+
+import meshio
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import Body, Scene, Support, Traction, solve_scene
+from fenics_contact.gallery import block
+from fenics_contact.materials import IsotropicElasticity
+from fenics_contact.mesh import bisection_partition, completed, quadratic, serendipity
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.collapsed import SHAPES, by_shape
+from fenics_contact.mesh.quadratic_nodes import ordered
+from fenics_contact.output.paraview import write_vtu
+from fenics_contact.readers.bodies import TaggedMesh, bodies_of
+from fenics_contact.readers.gmsh import from_gmsh_model
+from fenics_contact.readers.meshio import from_meshio, read_mesh
+from tests.linear.graded import pulled
+from tests.linear.mixed_cells import mixed_bar
+from tests.mesh_io.msh_files import name, own_gmsh
+
+
+@pytest.fixture
+def gmsh() -> Iterator[ModuleType]:
+    with own_gmsh() as module:
+        yield module
+
+
+def four_boxes(gmsh: ModuleType) -> None:
+    """Mesh a "bar" of 2 x 1 x 2: hexahedra, prisms beside them, tetrahedra and pyramids on top of both."""
+    geo, mesh = gmsh.model.geo, gmsh.model.mesh
+    at = {(x, y, z): geo.addPoint(x, y, z) for x in range(3) for y in range(2) for z in range(3)}
+    lines: dict[tuple, int] = {}
+    faces: dict[frozenset, int] = {}
+
+    def line(a: tuple, b: tuple) -> int:
+        if (b, a) in lines:
+            return -lines[b, a]
+        if (a, b) not in lines:
+            lines[a, b] = geo.addLine(at[a], at[b])
+        return lines[a, b]
+
+    def face(*corners: tuple) -> int:
+        key = frozenset(corners)
+        if key not in faces:
+            around = [line(a, b) for a, b in zip(corners, (*corners[1:], corners[0]), strict=True)]
+            faces[key] = geo.addPlaneSurface([geo.addCurveLoop(around)])
+        return faces[key]
+
+    boxes = {}
+    for x, z in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        low, high = [[(x + a, b, z + c) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))] for c in (0, 1)]
+        around = [(low[i], low[j], high[j], high[i]) for i, j in ((0, 1), (1, 2), (2, 3), (3, 0))]
+        sides = [face(*low), face(*high), *(face(*each) for each in around)]
+        boxes[x, z] = geo.addVolume([geo.addSurfaceLoop(sides)]), sides, [at[c] for c in (*low, *high)]
+    geo.synchronize()
+    for tag in lines.values():
+        mesh.setTransfiniteCurve(tag, 3)
+    for tag in faces.values():
+        mesh.setTransfiniteSurface(tag)
+    for place, recombined in (((0, 0), range(6)), ((1, 0), range(2, 6))):
+        volume, sides, corners = boxes[place]
+        for side in recombined:
+            mesh.setRecombine(2, sides[side])
+        mesh.setTransfiniteVolume(volume, corners)
+    name(gmsh, 3, [volume for volume, _, _ in boxes.values()], "bar")
+    for axis, end in ((0, 2), (1, 1), (2, 2)):
+        for k, value in enumerate((0, end)):
+            there = [tag for corners, tag in faces.items() if all(c[axis] == value for c in corners)]
+            name(gmsh, 2, there, f"{'xyz'[axis]}{k}")
+    mesh.generate(3)
+
+
+def check_even_stress(mesh: BodyMesh, subdomains: int) -> None:
+    scene = pulled(mesh, IsotropicElasticity(100.0, 0.3))
+    partition = {"bar": bisection_partition(mesh, subdomains)}
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=partition, tolerance=1e-12)
+    exact = mesh.points * [0.01, -0.003, -0.003]
+    np.testing.assert_allclose(state.gather_displacement("bar"), exact, atol=1e-10 * np.abs(exact).max())
+
+
+def test_a_model_of_all_shapes_is_one_body(gmsh: ModuleType) -> None:
+    """Linear, quadratic and serendipity; one model, as this gmsh ends the process at a second one."""
+    four_boxes(gmsh)
+    linear = from_gmsh_model()["bar"]
+    assert list(by_shape(linear.cells, 3)) == ["tetrahedron", "pyramid", "prism", "hexahedron"]
+    assert linear.volume == pytest.approx(4.0, rel=1e-12)
+    assert sorted(linear.surfaces) == ["x0", "x1", "y0", "y1", "z0", "z1"]
+    check_even_stress(linear, 3)
+    gmsh.model.mesh.setOrder(2)
+    whole = from_gmsh_model(shapes=False)["bar"]
+    assert whole.order == 2
+    assert whole.centres is None
+    check_even_stress(whole, 2)
+    gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 1)
+    gmsh.model.mesh.setOrder(1)
+    gmsh.model.mesh.setOrder(2)
+    gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 0)
+    lean = from_gmsh_model(shapes=False)["bar"]
+    assert lean.centres is not None
+    assert lean.n_nodes == whole.n_nodes
+    check_even_stress(lean, 2)
+
+
+def as_meshio(mesh: BodyMesh, lacking: bool) -> meshio.Mesh:
+    """Return a body in the order of VTK, whose prisms begin with the other triangle, without centres."""
+    names = {"tetrahedron": "tetra", "pyramid": "pyramid", "prism": "wedge", "hexahedron": "hexahedron"}
+    blocks = []
+    for shape, (_, own) in by_shape(mesh.cells, 3).items():
+        count = SHAPES[shape].counts[1] if lacking else own.shape[1]
+        own = own[:, SHAPES[shape].mirror(count)] if shape == "prism" else own[:, :count]
+        blocks.append((f"{names[shape]}{count if mesh.order > 1 else ''}", own))
+    return meshio.Mesh(mesh.points, blocks)
+
+
+def test_prisms_of_either_order_are_read_by_meshio() -> None:
+    bar = mixed_bar()
+    found = from_meshio(as_meshio(bar, False))["mesh"]
+    assert found.cells_in_words == bar.cells_in_words
+    assert found.volume == pytest.approx(2.0, rel=1e-12)
+
+
+def test_cells_of_20_nodes_stay_as_they_are_and_may_be_completed() -> None:
+    bar = serendipity(quadratic(block((0, 0, 0), (2, 1, 1), (2, 1, 1))))
+    lean = meshio.Mesh(bar.points[:], [("hexahedron20", bar.cells[:, :20])])
+    found = from_meshio(lean)["mesh"]
+    assert found.cells_in_words == "2 serendipity hexahedra"
+    assert found.n_nodes == bar.n_nodes
+    assert completed(found).cells_in_words == "2 quadratic hexahedra"
+
+
+def test_prisms_of_15_nodes_follow_in_three_centres() -> None:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]], dtype=float)
+    middles = [corners[sorted(each)].mean(axis=0) for each in SHAPES["prism"].sets(15)[6:]]
+    order = [*range(6), *np.random.default_rng(0).permutation(9) + 6]  # any order is put right
+    points = np.vstack([corners, middles])
+    tagged = TaggedMesh(
+        "a test", points, {"wedge": ordered(points, np.array([order]), SHAPES["prism"])},
+        {"lug": {"wedge": np.array([0])}}, {}, ("set", "surface"),
+    )  # fmt: skip
+    lug = bodies_of(tagged)["lug"]
+    assert lug.cells_in_words == "1 serendipity prism"
+    assert len(lug.centres.nodes) == 3
+    assert lug.volume == pytest.approx(0.5)
+
+
+def test_files_have_all_shapes_and_are_read_again(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    mesh = mixed_bar()
+    scene = Scene(
+        {"bar": Body(mesh, IsotropicElasticity(100.0, 0.3))},
+        [Support("bar", "x0")],
+        [Traction("bar", "x1", (0.0, 0.0, 0.1))],
+    )
+    state = solve_scene(scene, MPI.COMM_SELF)
+    write_vtu(state, tmp_path)
+    read = read_mesh(tmp_path / "state_bar.vtu", labels="pieces")
+    (again,) = read.values()
+    assert again.volume == pytest.approx(2.0, rel=1e-12)
+    assert {name: len(mine) for name, (mine, _) in by_shape(again.cells, 3).items()} == {
+        name: len(mine) for name, (mine, _) in by_shape(mesh.cells, 3).items()
+    }
+    grid = state.to_pyvista()["bar"]
+    assert sorted(np.unique(grid.celltypes)) == [10, 12, 13, 14]
+    assert grid.compute_cell_sizes()["Volume"].sum() == pytest.approx(2.0)
+    np.testing.assert_allclose(grid.cell_data["von_mises"], state.gather_von_mises("bar"))
