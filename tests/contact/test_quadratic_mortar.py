@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from fenics_contact import (
     Body,
     BodyForce,
     BodyMesh,
+    ContactPair,
     Coulomb,
     Scene,
     State,
@@ -22,13 +24,17 @@ from fenics_contact import (
     Surface,
     Tie,
     Traction,
+    read_cad,
     solve_scene,
 )
 from fenics_contact.gallery import rectangle
-from fenics_contact.materials import PlaneStrain
+from fenics_contact.materials import IsotropicElasticity, PlaneStrain
 from fenics_contact.mesh import quadratic
 from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
 from fenics_contact.qp import FaceNewton
+from fenics_contact.readers import gmsh_model
+from fenics_contact.results import ContactResult
+from tests.contact.press_fits import BORE, INTERFERENCE, NU, RIM, SEAT, YOUNG, lame, press_fit
 from tests.pairing.pressed_boxes import PRESSURE, boxes, chosen, pressed, unevenly
 
 SOLVER = FaceNewton(tolerance=1e-11)
@@ -188,6 +194,63 @@ def test_blocks_that_are_pressed_and_pushed_evenly_stick_evenly() -> None:
     np.testing.assert_allclose(contact.pressure, PRESSURE, rtol=1e-9)
 
 
+def fitted(cells: int, slave: str, order: int = 2) -> ContactResult:
+    """A ring on a hollow shaft with three facets on two, of so many cells around a quarter."""
+    scene = press_fit(8 * cells, cells, outside=12 * cells, part=0.25, interference=INTERFERENCE)
+    (pair,) = scene.contacts
+    assert isinstance(pair.master, Surface)
+    if slave == "shaft":
+        pair = replace(pair, slave=pair.master, master=pair.slave)
+    bodies = scene.bodies
+    if order == 2:
+        bodies = {n: replace(body, mesh=quadratic(body.mesh)) for n, body in bodies.items()}
+    return solved(replace(scene, bodies=bodies, contacts=[replace(pair, discretisation="mortar")])).contact
+
+
+def miss(contact: ContactResult) -> float:
+    """Error of Lamé's pressure, in L2."""
+    error = contact.pressure / lame() - 1.0
+    return float(np.sqrt(contact.area @ error**2 / contact.area.sum()))
+
+
+@pytest.mark.parametrize("slave", ["hub", "shaft"])
+def test_pressures_of_a_press_fit_converge_with_second_order(slave: str) -> None:
+    errors = [miss(fitted(cells, slave)) for cells in (2, 4)]
+    assert np.log2(errors[0] / errors[1]) > 1.7
+    assert errors[1] < 0.002
+    assert errors[0] < miss(fitted(2, slave, order=1)) / 3.0
+
+
+def test_a_press_fit_of_a_step_file_has_its_pressure_at_every_node(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Quarters of 10-node tetrahedra, 8 cells across the seat of the shaft, 10 of the hub's; 6 mm long."""
+    with gmsh_model("fit") as gmsh:
+        occ = gmsh.model.occ
+        for inner, outer in ((BORE, SEAT), (SEAT, RIM)):
+            parts = [occ.addCylinder(0, 0, 0, 0, 0, 6.0, r, angle=np.pi / 2) for r in (outer, inner)]
+            occ.cut(*([(3, part)] for part in parts))
+        occ.synchronize()
+        gmsh.write(str(tmp_path / "fit.step"))
+    capfd.readouterr()
+    sizes = {"1": 6.0, "2": 4.5}
+    round_, supports = {}, []
+    meshes = read_cad(tmp_path / "fit.step", order=2, sizes=sizes)
+    for name, mesh in meshes.items():
+        for side, facets in mesh.surfaces.items():
+            places = mesh.points[facets.ravel()]
+            flat = np.ptp(places, axis=0) < 1e-9
+            if flat.any():
+                supports.append(Support(name, side, tuple(0.0 if across else None for across in flat)))
+            elif np.allclose(np.linalg.norm(places[:, :2], axis=1), SEAT):
+                round_[name] = Surface(name, side)
+    steel = IsotropicElasticity(YOUNG, NU)
+    pair = ContactPair(round_["1"], round_["2"], interference=INTERFERENCE)
+    state = solved(Scene({n: Body(m, steel) for n, m in meshes.items()}, supports, contacts=[pair]))
+    assert state.scene.contacts[0].reason == "mortar, as the meshes do not match"
+    np.testing.assert_allclose(state.contact.pressure, lame(), rtol=0.03)
+
+
 def test_ranks_have_the_same_pressures(mpirun: Callable[..., str]) -> None:
     code = """
         from mpi4py import MPI
@@ -195,6 +258,9 @@ def test_ranks_have_the_same_pressures(mpirun: Callable[..., str]) -> None:
         from fenics_contact.mesh import quadratic
 from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
 from fenics_contact.qp import FaceNewton
+from fenics_contact.readers import gmsh_model
+from fenics_contact.results import ContactResult
+from tests.contact.press_fits import BORE, INTERFERENCE, NU, RIM, SEAT, YOUNG, lame, press_fit
         from tests.pairing.pressed_boxes import unevenly
         contact = solve_scene(unevenly(), MPI.COMM_WORLD, solver=FaceNewton(tolerance=1e-11)).contact
         if MPI.COMM_WORLD.rank == 0:
