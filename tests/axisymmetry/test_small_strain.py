@@ -92,7 +92,7 @@ def test_pressure_is_transmitted_exactly_by_nodes(kind: Kind, inner: float) -> N
 
 
 @pytest.mark.parametrize("tied", [False, True])
-@pytest.mark.parametrize("kind", ["triangle", "quadrilateral"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_pressure_is_transmitted_exactly_by_mortar(kind: Kind, tied: bool) -> None:
     state = solved(stacked(kind, "mortar", (4, 7), tied=tied))
     assert worst_patch_error(state) < 1e-9

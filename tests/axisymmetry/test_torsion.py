@@ -191,7 +191,13 @@ def test_stiffness_annihilates_translation_and_turn(kind: Kind, inner: float) ->
 
 
 @pytest.mark.parametrize(
-    ("kind", "by"), [("quadrilateral", "node"), ("quadrilateral", "mortar"), ("quadrilateral9", "node")]
+    ("kind", "by"),
+    [
+        ("quadrilateral", "node"),
+        ("quadrilateral", "mortar"),
+        ("quadrilateral9", "node"),
+        ("triangle6", "mortar"),
+    ],
 )
 def test_press_fit_slips_at_the_torque_of_its_friction(kind: Kind, by: str) -> None:
     """Uniform pressure p: T = μ p 2 π b² L; before it the tube's T = 4 π G L φ / (1/a² − 1/c²)."""

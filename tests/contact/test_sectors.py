@@ -36,7 +36,7 @@ from fenics_contact.design import TotalPotential
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import NeoHooke
-from fenics_contact.mesh import bisection_partition
+from fenics_contact.mesh import bisection_partition, quadratic
 from fenics_contact.pictures.unrolled import contact_patches
 from fenics_contact.results.deformed_state import AnyState
 from tests.contact.press_fits import BORE, NU, RIM, ring
@@ -131,11 +131,13 @@ def test_sides_may_belong_to_two_bodies() -> None:
         assert np.abs(two.gather_displacement(name) - u[place]).max() < 1e-8 * np.abs(u).max()
 
 
-@pytest.mark.parametrize("discretisation", ["node", "mortar"])
-def test_sides_whose_meshes_differ_pass_the_patch_test(discretisation: Discretisation) -> None:
+@pytest.mark.parametrize(("discretisation", "order"), [("node", 1), ("mortar", 1), ("mortar", 2)])
+def test_sides_whose_meshes_differ_pass_the_patch_test(discretisation: Discretisation, order: int) -> None:
     scene = rotor(skew=0.3)
     assert all(tie.reason == "mortar, as the meshes do not match" for tie in scene.ties)
     hub = {"hub": scene.bodies["hub"]}
+    if order == 2:
+        hub = {"hub": replace(hub["hub"], mesh=quadratic(hub["hub"].mesh))}
     ties = [replace(scene.ties[1], discretisation=discretisation)]
     state = solved(Scene(hub, loads=[ThermalStrain("hub", 1.0)], ties=ties))
     exact = 1e-3 * (1.0 + NU) * hub["hub"].mesh.points
