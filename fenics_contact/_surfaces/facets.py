@@ -532,6 +532,21 @@ def shape_weight_gradients(
     return np.asarray(by_place @ np.einsum("mka,mkd->mda", gradients, corners))
 
 
+def shape_weights_pulled_back(
+    facets: np.ndarray, facet: np.ndarray, weights: np.ndarray, by: np.ndarray
+) -> np.ndarray:
+    """Vector-Jacobian product of the functions that `shape_weights` returns with respect to ``weights``.
+
+    `by`: derivative by the functions, (m, nodes of a facet).
+
+    The result has shape (m, corners).
+    """
+    kind, corners = _pieces(facets, facet)
+    gradients = shape_gradients(kind, np.einsum("mk,mkd->md", weights, corners))
+    by_place = np.einsum("mk,mkd->md", by, gradients)
+    return np.asarray(np.einsum("md,mkd->mk", by_place, corners))
+
+
 def _pieces(facets: np.ndarray, facet: np.ndarray) -> tuple[CellType, np.ndarray]:
     """Return the type of quadratic facets and the reference corners of pieces, (m, corners, dim − 1)."""
     kind = FACET_TYPES[facets.shape[1], 2 if facets.shape[1] == 3 else 3]

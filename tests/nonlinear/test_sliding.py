@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -41,6 +41,7 @@ from fenics_contact.errors import InvalidInputError, LoadStepError
 from fenics_contact.errors.kinds import FoldedFacetsError
 from fenics_contact.gallery import block, half_disc, rectangle
 from fenics_contact.materials import HistoryMaterial, MaterialResponse, NeoHooke
+from fenics_contact.mesh import quadratic
 from tests.conftest import run_on_ranks
 from tests.nonlinear.ironing import WAY, die, ironing
 from tests.nonlinear.mortar_scenes import by_mortar, followed, pressed_and_pushed, stacked
@@ -284,6 +285,21 @@ def test_patch_of_half_the_height(cells: str, held: bool, friction: float) -> No
     np.testing.assert_allclose(contact.pressure, -stress[0, across, across], rtol=1e-7)
     np.testing.assert_allclose(contact.nominal_pressure, contact.pressure * grown, rtol=1e-7)
     assert contact.area.sum() == pytest.approx(grown, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("cells", "held", "friction"), [("triangle", False, 0.3), ("quadrilateral", True, 0.0)]
+)
+def test_patch_of_quadratic_cells_of_half_the_height(cells: str, held: bool, friction: float) -> None:
+    scene = stacked(cells, 1.0, held=held, friction=friction)
+    bodies = {name: replace(body, mesh=quadratic(body.mesh)) for name, body in scene.bodies.items()}
+    (state,) = followed([replace(scene, bodies=bodies)], MPI.COMM_SELF)
+    worst = [line.residuals.worst for line in state.solution.history]
+    assert worst[-1] < max(10 * worst[-2] ** 1.8, 1e-10), "quadratic down to rounding"
+    stress = np.concatenate([state.gather_stress(body) for body in scene.bodies])
+    assert np.abs(stress[0]).max() > 0.5
+    assert np.abs(stress - stress[0]).max() < 1e-8 * np.abs(stress).max()
+    np.testing.assert_allclose(state.contact.pressure, -stress[0, 1, 1], rtol=1e-7)
 
 
 def test_ironing_converges_quadratically() -> None:

@@ -382,7 +382,7 @@ QUADRATIC = ["quadratic tetrahedron", "quadratic quadrilateral"]
 @cache
 def by_mortar(kind: str) -> tuple[SlidingContact, np.ndarray]:
     cell, order = (kind.removeprefix("quadratic "), 2) if kind in QUADRATIC else (kind, 1)
-    few = {} if order == 1 else {"order": 2, "master_cells": 3, "slave_cells": 2}
+    few = {} if order == 1 else {"order": 2, "master_cells": 3, "slave_cells": 2 if "tet" in kind else 5}
     scene = on_arch(cell, **few)
     scene = replace(scene, contacts=[replace(scene.contacts[0], discretisation="mortar")])
     return sliding(scene), shaken(scene)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact._pairing.mortar.cells import Cells
-from fenics_contact._surfaces.facets import FacetedSurface, shape_weight_gradients, shape_weights
+from fenics_contact._surfaces.facets import FacetedSurface, shape_weights, shape_weights_pulled_back
 
 
 def trace_nodes(surface: FacetedSurface, facet: np.ndarray) -> np.ndarray:
@@ -50,10 +50,8 @@ def trace_functions_pulled_back(
         return by
     count, points, corners = values.shape
     at_points = np.repeat(facet, points), values.reshape(count * points, corners)
-    every = np.broadcast_to(np.eye(corners), (count * points, corners, corners))
-    slopes = shape_weight_gradients(surface.whole, *at_points, every)
-    by = by.reshape(count * points, slopes.shape[1])
-    return np.asarray(np.einsum("nk,nkc->nc", by, slopes)).reshape(values.shape)
+    by = by.reshape(count * points, by.shape[2])
+    return shape_weights_pulled_back(surface.whole, *at_points, by).reshape(values.shape)
 
 
 @dataclass(frozen=True)

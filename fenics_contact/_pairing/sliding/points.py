@@ -276,6 +276,8 @@ class SlidingPoints:
         for mine, _ in self._by_means:
             chosen[mine] = False
         points, width = self.points, self.points.normal.shape[1] - 1
+        if not chosen.any():
+            return sp.csr_matrix((points.count * width, self.coordinates.size))
         rows = interleaved([spread(points.tangents[:, c], points.jump) for c in range(width)])
         return scaled_rows((self.slip_rows(start) - rows).tocsr(), np.repeat(chosen, width).astype(float))
 
