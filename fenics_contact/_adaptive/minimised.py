@@ -260,7 +260,7 @@ class _Descent(Way):
     def _at_spots(self) -> SceneRefinement:
         """Return the reference shape on the next meshes where spots are smaller than their cells."""
         scene = self.problems[-1].scene
-        simplices = all(CELL_TYPES[body.cell_type].is_simplex for body in scene.bodies.values())
+        simplices = all(CELL_TYPES[body.mesh.cell_type].is_simplex for body in scene.bodies.values())
         others = {} if simplices else {"most": 1}  # all cells of a body are halved
         return refined_at_spots(self._state, self._doubted, scene=scene, refine=refined_for_designs, **others)
 

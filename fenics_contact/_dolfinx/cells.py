@@ -2,7 +2,7 @@
 
 Forms of bodies of revolution are written on cells whose type has the word axisymmetric in front: they have
 weights and strains of their own. Where such bodies may twist, the word torsion follows: displacements have a
-third component, around the axis.
+third component, around the axis. The word reduced behind the type stands for integrals by fewer points.
 """
 
 from __future__ import annotations
@@ -47,11 +47,23 @@ _FACET_VERTICES = {
 _REVOLVED = "axisymmetric "
 #: What follows where such bodies may twist.
 _TWISTING = "torsion "
+#: What the types of quadratic cells end with that are integrated by the points of linear ones.
+_REDUCED = " reduced"
 
 
 def revolved(cell_type: str, torsion: bool = False) -> str:
     """Return the type of plane cells as that of a body of revolution, which may twist."""
     return _REVOLVED + (_TWISTING if torsion else "") + cell_type
+
+
+def reduced(cell_type: str) -> str:
+    """Return the type of quadratic cells as that of cells integrated by the points of linear ones."""
+    return cell_type + _REDUCED
+
+
+def is_reduced(cell_type: str) -> bool:
+    """Return whether quadratic cells are integrated by the points of linear ones."""
+    return cell_type.endswith(_REDUCED)
 
 
 def is_revolved(cell_type: str) -> bool:
@@ -70,8 +82,8 @@ def components(cell_type: str) -> int:
 
 
 def of_mesh(cell_type: str) -> str:
-    """Return the type that the cells have in a mesh, which does not know whether a body is revolved."""
-    return cell_type.removeprefix(_REVOLVED).removeprefix(_TWISTING)
+    """Return the type that the cells have in a mesh, which does not know what a body makes of them."""
+    return cell_type.removeprefix(_REVOLVED).removeprefix(_TWISTING).removesuffix(_REDUCED)
 
 
 def shape(cell_type: str) -> str:

@@ -173,7 +173,7 @@ def scalar_constants(cell_type: str, count: int) -> Constants:
 def volume_measure(cell_type: str, degree: int | None = None) -> ufl.Measure:
     """Return dx on the template with the package's quadrature degree, or the given one.
 
-    The given one is for linear cells; it is doubled on quadratic ones.
+    The given one is for linear cells; it is doubled on quadratic ones that are not reduced.
     """
     metadata = {"quadrature_degree": quadrature_degree(cell_type, degree)}
     return ufl.dx(domain=_dolfinx.template(cell_type), metadata=metadata)
@@ -185,7 +185,7 @@ def quadrature_degree(cell_type: str, degree: int | None = None) -> int:
         degree = QUADRATURE_DEGREE[_dolfinx.shape(cell_type)]
         if _dolfinx.is_revolved(cell_type):
             degree = max(degree, 2)  # the hoop strain varies in linear triangles, too
-    return int(degree * _dolfinx.degree(cell_type))
+    return int(degree if _dolfinx.is_reduced(cell_type) else degree * _dolfinx.degree(cell_type))
 
 
 def surface_measure(cell_type: str) -> ufl.Measure:

@@ -392,6 +392,9 @@ class BodyPart(Part):
     torsion: bool = Field(
         False, description="whether a body of revolution may twist: a third component, around the axis"
     )
+    integration: Literal["full", "reduced"] = Field(
+        "full", description="reduced: cells of 20 or 8 nodes by 2 points in each direction"
+    )
 
 
 class OutputPart(Part):

@@ -105,7 +105,8 @@ class Builder:
                 given: Any = materials[made_of] if isinstance(made_of, str) else None
                 if given is None:
                     given = {region: materials[part] for region, part in made_of.items()}
-                made[name] = Body(chosen[name].mesh, given, body.axisymmetric, body.torsion)
+                ways = body.axisymmetric, body.torsion, body.integration
+                made[name] = Body(chosen[name].mesh, given, *ways)
         self._check()
         return made, chosen
 
