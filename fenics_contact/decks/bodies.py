@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -254,3 +255,23 @@ def _check_block(block: Block, points: np.ndarray) -> None:
             f"{block.element.name} are inverted or flat: {numbers}; see the order of their nodes, and their "
             "coordinates", row,
         )  # fmt: skip
+
+
+def integration_of(
+    mesh: DeckMesh, part: Component, note: Callable[[Card, str], None]
+) -> Literal["full", "reduced"]:
+    """Return how the elements of a body are integrated, which must be alike."""
+    blocks = [mesh.blocks[k] for k in np.unique(mesh.block_of[part.elements])]
+    for block in blocks:
+        element = block.element
+        if element.variant and (element.variant != "R" or not element.has_following_centres):
+            plain = element.name.removesuffix(element.variant)
+            note(block.card, f"elements {element.name} are solved as {plain}, by full integration")
+    found = {each.element.variant == "R" and each.element.has_following_centres for each in blocks}
+    if len(found) > 1:
+        block = next(each for each in blocks if each.element.variant == "R")
+        raise block.card.error(
+            f"elements of a body must all have reduced integration or none, body {part.name} has both: "
+            "take one type of elements"
+        )
+    return "reduced" if found.pop() else "full"

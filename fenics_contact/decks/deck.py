@@ -179,6 +179,8 @@ def _read(path: Path) -> Deck:
             raise card.error(
                 "this card is not known: the guide lists those that are; leave it out if it has no effect"
             )
+        if card.name == "RESTART" and "READ" in card.parameters:
+            raise card.error("states of the other program are not read: give the steps from the start")
         if card.name in NOT_YET:
             raise card.error("this card is known, but not read yet: leave it out, or describe it in Python")
     return _Builder(path.name, cards).deck()

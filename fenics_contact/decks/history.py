@@ -156,9 +156,12 @@ class _Course:
             raise card.error(
                 f"amplitude {name!r} is not there; the deck has {', '.join(self.amplitudes) or 'none'}"
             )
+        delay, factor = card.number_of("TIMEDELAY"), self.amplitudes[name]
+        if delay:
+            name, factor = f"{name} after {delay:g}", replace(factor, times=factor.times + delay)
         if name not in self.names:
             self.names.append(name)
-            self.factors.append(self.amplitudes[name])
+            self.factors.append(factor)
         return self.names.index(name)
 
     def boundary(self, card: Card, fresh: bool) -> None:

@@ -18,6 +18,7 @@ from fenics_contact.decks.bodies import (
     Section,
     build_bodies,
     components,
+    integration_of,
     read_sections,
     regions_of,
 )
@@ -149,7 +150,9 @@ class Model:
             for region, section in regions_of(self.sections, part).items():
                 given[region] = self._material(section, of)
             material = given if len(given) > 1 else next(iter(given.values()))
-            bodies[part.name] = Body(mesh, material, axisymmetric=self.kind == "axisymmetric")
+            integration = integration_of(self.mesh, part, self.note)
+            revolved = self.kind == "axisymmetric"
+            bodies[part.name] = Body(mesh, material, axisymmetric=revolved, integration=integration)
             self.origins["body", part.name] = self.sections[part.sections[0]].card.origin
         return bodies
 

@@ -33,6 +33,7 @@ WITHOUT_EFFECT = {
     "SECTIONPRINT": "output",
     "MONITOR": "output",
     "TIMEPOINTS": "times of output",
+    "RESTART": "output",
     "NODALTHICKNESS": "thickness of shells, of which there are none",
     "CONTROLS": "how the other program iterates",
     "SOLUTIONTECHNIQUE": "how the other program iterates",

@@ -1,0 +1,75 @@
+"""Elements with R behind their number have reduced integration; other letters, delays and restarts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.decks import DeckError, read_deck
+from fenics_contact.gallery import block
+from tests.decks.texts import STEEL, deck, mesh_cards
+from tests.linear.test_reduced_integration import COLUMN
+
+SECTION = "*SOLID SECTION, ELSET=BAR, MATERIAL=STEEL\n"
+SOFT = STEEL.replace("210000.", "1000.")
+CUBE = block((0, 0, 0), (1, 1, 1), (1, 1, 1))
+NOTHING = "*STEP\n*STATIC\n*END STEP\n"
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(
+    ("element", "calculix"),
+    [("C3D20", (0.1599523, 0.1913494, -0.1057309)), ("C3D20R", (0.6174659, -0.1591363, -0.3378822))],
+)
+def test_a_column_bends_as_calculix_has_it(element: str, calculix, tmp_path: Path) -> None:
+    text = mesh_cards({"BAR": COLUMN}, element) + SOFT + SECTION + "*BOUNDARY\nBAR_Z0, 1, 3\n"
+    tip = "*STEP\n*STATIC\n*CLOAD\nTIP, 1, 1.\nTIP, 2, 2.\nTIP, 3, -3.\n*END STEP\n"
+    points = [line.split(", ") for line in text.splitlines() if line.count(", ") == 3 and "=" not in line]
+    place = COLUMN.points[COLUMN.node_sets["tip"][0]]
+    number = next(row[0] for row in points if np.allclose([float(x) for x in row[1:]], place))
+    found = read_deck(deck(tmp_path, text + f"*NSET, NSET=TIP\n{number}\n" + tip))
+    body = found.scene.bodies["BAR"]
+    assert body.integration == ("reduced" if element.endswith("R") else "full")
+    u = found.solve(MPI.COMM_SELF, tolerance=1e-10)[-1].gather_displacement("BAR")
+    at_tip = u[np.argmin(np.linalg.norm(body.mesh.points - place, axis=1))]
+    np.testing.assert_allclose(at_tip, calculix, rtol=2e-6)
+
+
+def test_a_body_has_one_integration(tmp_path: Path) -> None:
+    lines = mesh_cards({"BAR": COLUMN}, "C3D20").splitlines()
+    place = next(k for k, line in enumerate(lines) if line.startswith("*ELEMENT")) + 3
+    lines.insert(place, "*ELEMENT, TYPE=C3D20R, ELSET=BAR")
+    with pytest.raises(DeckError, match="reduced integration or none"):
+        read_deck(deck(tmp_path, "\n".join(lines) + "\n" + STEEL + SECTION + NOTHING))
+
+
+def test_linear_elements_with_a_letter_are_noted(tmp_path: Path) -> None:
+    text = mesh_cards({"BAR": CUBE}, "C3D8R") + STEEL + SECTION + "*BOUNDARY\nBAR_X0, 1, 3\n"
+    found = read_deck(deck(tmp_path, text + NOTHING))
+    assert any("C3D8R are solved as C3D8, by full integration" in note for note in found.notes)
+
+
+def test_an_expansion_of_plastic_material_is_refused(tmp_path: Path) -> None:
+    plastic = STEEL + "*PLASTIC\n300., 0.\n*EXPANSION\n1.E-5\n"
+    with pytest.raises(DeckError, match="an expansion beside"):
+        read_deck(deck(tmp_path, mesh_cards({"BAR": CUBE}) + plastic + SECTION + NOTHING))
+
+
+def test_a_delay_shifts_an_amplitude(tmp_path: Path) -> None:
+    text = mesh_cards({"BAR": CUBE}) + STEEL + SECTION + "*BOUNDARY\nBAR_X0, 1, 3\n"
+    rising = "*AMPLITUDE, NAME=A\n0., 0., 4., 8.\n*STEP\n*STATIC\n1., 3.\n"
+    loads = "*CLOAD, AMPLITUDE=A, TIME DELAY=1.\nBAR_X1, 1, 1.\n*END STEP\n"
+    found = read_deck(deck(tmp_path, text + rising + loads))
+    (load,) = found.steps[-1].loads or ()
+    assert load.value == pytest.approx((4.0, 0.0, 0.0))  # twice the time behind the delay
+
+
+def test_states_of_the_other_program_are_not_read(tmp_path: Path) -> None:
+    text = mesh_cards({"BAR": CUBE}) + STEEL + SECTION + "*BOUNDARY\nBAR_X0, 1, 3\n"
+    with pytest.raises(DeckError, match="give the steps from the start"):
+        read_deck(deck(tmp_path, text + "*RESTART, READ, STEP=1\n" + NOTHING))
+    found = read_deck(deck(tmp_path, text + "*RESTART, WRITE, FREQUENCY=1\n" + NOTHING))
+    assert any("RESTART" in note for note in found.notes)
