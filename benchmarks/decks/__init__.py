@@ -1,0 +1,1 @@
+"""CalculiX's own test decks, solved here and by CalculiX."""
