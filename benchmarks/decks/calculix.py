@@ -18,6 +18,8 @@ from time import perf_counter
 
 import numpy as np
 
+from fenics_contact._base.launching import clean_environment
+
 #: What a line of a .dat file begins with -> quantity, and how many numbers of a row are labels.
 PRINTED = {
     "displacements": ("U", 1),
@@ -169,7 +171,7 @@ def run_calculix(text: str, limit: float = 120.0) -> tuple[list[Block], float]:
         folder = Path(place)
         (folder / "model.inp").write_text(text)
         start = perf_counter()
-        environment = {"OMP_NUM_THREADS": "1", "CCX_NPROC_EQUATION_SOLVER": "1", "PATH": "/usr/bin:/bin"}
+        environment = clean_environment() | {"OMP_NUM_THREADS": "1", "CCX_NPROC_EQUATION_SOLVER": "1"}
         try:
             done = subprocess.run(
                 [str(program()), "model"],

@@ -257,6 +257,10 @@ def _check_block(block: Block, points: np.ndarray) -> None:
         )  # fmt: skip
 
 
+#: Cells that may be integrated by fewer points.
+_REDUCED = ("hexahedron20", "quadrilateral8")
+
+
 def integration_of(
     mesh: DeckMesh, part: Component, note: Callable[[Card, str], None]
 ) -> Literal["full", "reduced"]:
@@ -264,10 +268,10 @@ def integration_of(
     blocks = [mesh.blocks[k] for k in np.unique(mesh.block_of[part.elements])]
     for block in blocks:
         element = block.element
-        if element.variant and (element.variant != "R" or not element.has_following_centres):
+        if element.variant and (element.variant != "R" or element.cell not in _REDUCED):
             plain = element.name.removesuffix(element.variant)
             note(block.card, f"elements {element.name} are solved as {plain}, by full integration")
-    found = {each.element.variant == "R" and each.element.has_following_centres for each in blocks}
+    found = {each.element.variant == "R" and each.element.cell in _REDUCED for each in blocks}
     if len(found) > 1:
         block = next(each for each in blocks if each.element.variant == "R")
         raise block.card.error(

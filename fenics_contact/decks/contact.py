@@ -208,7 +208,6 @@ def _pair(
         slave,
         master,
         friction_of(interaction),
-        "node" if kind == "NODE TO SURFACE" else "best",
         closure=closure_of(interaction, note),
         adjust=None if adjust is None else float(adjust),
         **by_clearance,  # type: ignore[arg-type]

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from fenics_contact.decks import DeckError, read_deck
 from fenics_contact.gallery import block
 from tests.decks.texts import STEEL, deck, mesh_cards
-from tests.linear.test_reduced_integration import COLUMN
+from tests.linear.columns import COLUMN
 
 SECTION = "*SOLID SECTION, ELSET=BAR, MATERIAL=STEEL\n"
 SOFT = STEEL.replace("210000.", "1000.")
