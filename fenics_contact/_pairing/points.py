@@ -20,6 +20,7 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.errors import together
 from fenics_contact.errors.kinds import safe_log
+from fenics_contact.mesh.faces import corners_of, match_faces
 from fenics_contact.qp.cones import Strengths
 
 if TYPE_CHECKING:
@@ -553,11 +554,11 @@ def areas_taken(
 def are_beside(scene: Scene, pair: ContactPair, other: ContactPair) -> bool:
     """Return whether the slave surface of another pair has no facet of the surfaces of a pair."""
     mesh = scene.bodies[other.slave.body].mesh
-    theirs = np.sort(mesh.surfaces[other.slave.name], axis=1)
+    theirs = corners_of(mesh.surfaces[other.slave.name], mesh.dim)
     for side in (pair.slave, pair.master):
         if isinstance(side, Surface) and side.body == other.slave.body:
-            every = np.vstack([theirs, np.sort(mesh.surfaces[side.name], axis=1)])
-            if len(np.unique(every, axis=0)) < len(every):
+            mine = corners_of(mesh.surfaces[side.name], mesh.dim)
+            if (match_faces(theirs, mine) >= 0).any():
                 return False
     return True
 

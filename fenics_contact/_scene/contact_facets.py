@@ -35,8 +35,8 @@ def check_one_shape(scene: SceneParts) -> None:
                 raise InvalidInputError(
                     f"surfaces in contact or tied must have facets of one shape, {side.name!r} of body "
                     f"{side.body!r} has {np.count_nonzero(found)} triangles and {np.count_nonzero(~found)} "
-                    "quadrilaterals: mesh it with one of them, or name both as surfaces of their own, each "
-                    "with a pair"
+                    "quadrilaterals: mesh it with one of them; or name both as surfaces, and let each be the "
+                    "master of a pair by mortar"
                 )
 
 

@@ -87,6 +87,11 @@ def linear_cells(name: str, body: pv.UnstructuredGrid) -> tuple[np.ndarray, int,
     return cells[:, kind.pieces].reshape(-1, kind.pieces.shape[1]), len(kind.pieces), dim
 
 
+def cells_cut(name: str, body: pv.UnstructuredGrid) -> np.ndarray:
+    """Return the cell of a body that each cell of `linear` is a piece of, ascending."""
+    return np.repeat(np.arange(body.n_cells), linear_cells(name, body)[1])
+
+
 #: Shape of the linear cell at the corners of VTK's types of cells.
 _SHAPE_OF = {
     5: "triangle", 22: "triangle", 9: "quadrilateral", 23: "quadrilateral", 28: "quadrilateral",
@@ -105,7 +110,10 @@ def of_one_type(body: pv.UnstructuredGrid) -> pv.UnstructuredGrid:
     if not several or not np.isin(types, list(_SHAPE_OF)).all():
         return body
     dim = 2 if is_plane(body) else 3
-    nodes, starts = np.asarray(body.cell_connectivity), np.asarray(body.offset)[:-1]
+    nodes, starts = (
+        np.asarray(pv.convert_array(each))
+        for each in (body.GetCells().GetConnectivityArray(), body.GetCells().GetOffsetsArray())
+    )
     cells = np.empty((len(types), 2**dim), dtype=np.int64)
     for number in np.unique(types):
         mine = np.flatnonzero(types == number)

@@ -49,6 +49,7 @@ from fenics_contact.pictures.drawing import (
 from fenics_contact.pictures.section import (
     Bodies,
     Spot,
+    cells_cut,
     component,
     contact_places,
     draw_field,
@@ -279,7 +280,9 @@ def plot_field(
         values, entry = _named_field(drawn, field, named)
     else:
         meshes = state.scene.bodies if state else {}
-        cells = {k: meshes[k].mesh.n_cells if state else body.n_cells for k, body in chosen.items()}
+        cells = {
+            k: meshes[k].mesh.cells_cut if state else cells_cut(k, body) for k, body in chosen.items()
+        }
         values, entry = _own_field(drawn, cells, field, label)
     if revolved and ", " in entry["label"]:  # x, y, z in space are others than r, z and the way around
         entry = {**entry, "label": f"{entry['label']} of the section"}
@@ -334,17 +337,20 @@ def _named_field(bodies: Bodies, field: str, units: Units) -> tuple[dict[str, np
 
 
 def _own_field(
-    bodies: Bodies, cells: Mapping[str, int], field: Mapping[str, np.ndarray], label: str
+    bodies: Bodies, cells: Mapping[str, np.ndarray], field: Mapping[str, np.ndarray], label: str
 ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Return given values by body, for each node or drawn cell, and their range; `cells`: of the meshes."""
+    """Return given values by body, for each node or drawn cell, and their range.
+
+    `cells`: the cell of the mesh that each drawn cell is a piece of, ascending.
+    """
     values, extremes = {}, list[float]()
     for name, body in bodies.items():
         own = np.asarray(field[name], dtype=float) if name in field else np.zeros(0)
-        nodal = own.shape == (body.n_points,)
-        if not nodal and (own.ndim not in (1, 2) or len(own) != cells[name]):
+        nodal, count = own.shape == (body.n_points,), int(cells[name].max(initial=-1)) + 1
+        if not nodal and (own.ndim not in (1, 2) or len(own) != count):
             raise InvalidInputError(
                 f"values of your own on {name!r} must be one for each of its {body.n_points} nodes or "
-                f"{cells[name]} cells, or a row of Gauss points for each cell, got shape {own.shape}: "
+                f"{count} cells, or a row of Gauss points for each cell, got shape {own.shape}: "
                 "compute them on the mesh of the body"
             )
         if not np.isfinite(own).any():
@@ -354,7 +360,7 @@ def _own_field(
             )
         extremes += [float(np.nanmin(own)), float(np.nanmax(own))]
         means = own.mean(axis=1) if own.ndim == 2 else own
-        values[name] = means if nodal else np.repeat(means, body.n_cells // cells[name])
+        values[name] = means if nodal else means[cells[name]]
     drawn = np.concatenate(list(values.values()))
     return values, {"label": label or "given values", "unit": "", **range_of([drawn], [extremes])}
 
@@ -431,7 +437,7 @@ def plot_error(
     ends = given or (min(max(float(every.min()), SPAN * top), top / 10), top)
     facts = f"estimated discretisation error {written(100 * total, 3)} % in energy norm, by cell"
     bodies, named = drawn_bodies(state), units or Units()
-    shown = {name: np.repeat(part, bodies[name].n_cells // len(part)) for name, part in parts.items()}
+    shown = {name: part[state.scene.bodies[name].mesh.cells_cut] for name, part in parts.items()}
     words, label = headline(title, facts), "part of a cell, relative"
     colours, axes = (ERROR_MAP, LogNorm(*ends)), axes_of(state.scene)
     coloured = ColouredField(shown, *colours, label, words, 1.0, reach, named, width, axes)

@@ -24,6 +24,7 @@ from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity, J2Plasticity, NeoHooke, PlaneStrain
 from fenics_contact.mesh import bisection_partition, joined_cells, quadratic, refined, serendipity
 from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.faces import is_triangle
 from tests.linear.graded import pulled
 from tests.linear.mixed_cells import displacement_on, mixed_bar, mixed_plate, named_sides, shaken
 
@@ -152,6 +153,27 @@ def test_prisms_in_contact_pass_an_even_pressure(order: str) -> None:
     np.testing.assert_allclose(state.contact.pressure, 1.0, rtol=1e-8)
     exact = upper.points * [0.0, 0.0, -0.01]
     np.testing.assert_allclose(state.gather_displacement("upper"), exact, atol=1e-11)
+
+
+def test_triangles_and_quadrilaterals_are_masters_of_one_slave() -> None:
+    bar, soft = mixed_bar(), IsotropicElasticity(100.0, 0.0)
+    top = bar.surfaces["z1"]
+    parts = {"t": top[is_triangle(top)], "q": top[~is_triangle(top)]}
+    lower = BodyMesh(bar.points, bar.cells, {**bar.surfaces, **parts})
+    upper = block((0, 0, 1), (2, 1, 2), (3, 2, 1))
+    slave = Surface("upper", "z0")
+    scene = Scene(
+        {"bar": Body(lower, soft), "upper": Body(upper, soft)},
+        [
+            Support("bar", "z0"),
+            Support("upper", "x0", (0.0, None, None)),
+            Support("upper", "y0", (None, 0.0, None)),
+        ],
+        [Traction("upper", "z1", (0.0, 0.0, -1.0))],
+        [ContactPair(slave, Surface("bar", name), discretisation="mortar") for name in parts],
+    )
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-11)
+    np.testing.assert_allclose(state.gather_displacement("upper"), upper.points * [0, 0, -0.01], atol=1e-10)
 
 
 def test_what_is_not_built_is_refused_in_words() -> None:

@@ -13,11 +13,14 @@ from mpi4py import MPI
 from fenics_contact import Body, Scene, Support, Traction, solve_scene
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
-from fenics_contact.mesh import bisection_partition, completed, quadratic, serendipity
+from fenics_contact.mesh import bisection_partition, boundary_faces, completed, quadratic, serendipity
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.collapsed import SHAPES, by_shape
+from fenics_contact.mesh.faces import vector_areas
 from fenics_contact.mesh.quadratic_nodes import ordered
 from fenics_contact.output.paraview import write_vtu
+from fenics_contact.pictures import plot_field
+from fenics_contact.pictures.section import cells_of, linear
 from fenics_contact.readers.bodies import TaggedMesh, bodies_of
 from fenics_contact.readers.gmsh import from_gmsh_model
 from fenics_contact.readers.meshio import from_meshio, read_mesh
@@ -88,11 +91,11 @@ def check_even_stress(mesh: BodyMesh, subdomains: int) -> None:
 def test_a_model_of_all_shapes_is_one_body(gmsh: ModuleType) -> None:
     """Linear, quadratic and serendipity; one model, as this gmsh ends the process at a second one."""
     four_boxes(gmsh)
-    linear = from_gmsh_model()["bar"]
-    assert list(by_shape(linear.cells, 3)) == ["tetrahedron", "pyramid", "prism", "hexahedron"]
-    assert linear.volume == pytest.approx(4.0, rel=1e-12)
-    assert sorted(linear.surfaces) == ["x0", "x1", "y0", "y1", "z0", "z1"]
-    check_even_stress(linear, 3)
+    first = from_gmsh_model()["bar"]
+    assert list(by_shape(first.cells, 3)) == ["tetrahedron", "pyramid", "prism", "hexahedron"]
+    assert first.volume == pytest.approx(4.0, rel=1e-12)
+    assert sorted(first.surfaces) == ["x0", "x1", "y0", "y1", "z0", "z1"]
+    check_even_stress(first, 3)
     gmsh.model.mesh.setOrder(2)
     whole = from_gmsh_model(shapes=False)["bar"]
     assert whole.order == 2
@@ -169,3 +172,16 @@ def test_files_have_all_shapes_and_are_read_again(tmp_path) -> None:  # type: ig
     assert sorted(np.unique(grid.celltypes)) == [10, 12, 13, 14]
     assert grid.compute_cell_sizes()["Volume"].sum() == pytest.approx(2.0)
     np.testing.assert_allclose(grid.cell_data["von_mises"], state.gather_von_mises("bar"))
+    drawn = linear("bar", grid)
+    assert np.unique(drawn.celltypes).tolist() == [12]
+    assert drawn.n_cells == mesh.n_cells
+    skin, _ = boundary_faces(cells_of(drawn))
+    np.testing.assert_allclose(vector_areas(np.asarray(drawn.points), skin).sum(axis=0), 0.0, atol=1e-12)
+
+
+def test_pictures_of_quadratic_pyramids_have_a_colour_for_each_of_their_pieces(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    mesh = quadratic(mixed_bar())
+    scene = pulled(mesh, IsotropicElasticity(100.0, 0.3))
+    state = solve_scene(scene, MPI.COMM_SELF)
+    own = {"bar": np.arange(mesh.n_cells, dtype=float)}
+    assert plot_field(state, own, tmp_path / "cells.png").path.exists()
