@@ -27,7 +27,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos notebooks test test-core test-slow test-hard test-claims mutants docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces study-adaptive study-large lint setup setup-demo
+.PHONY: help demo demos notebooks test test-core test-slow test-hard test-claims mutants docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces study-adaptive study-large study-peers lint setup setup-demo
 
 help: ## Show this list
 	@echo "Targets:"
@@ -101,6 +101,9 @@ study-adaptive: $(prepare) ## Refine meshes where it pays, and everywhere; docs/
 
 study-large: $(prepare) ## Solve published problems of plasticity and large deformations; docs/studies/
 	$(python) -m benchmarks large_deformations $(if $(filter quick,$(BENCH)),--quick)
+
+study-peers: $(prepare) ## Solve the same scenes by other programs that are installed; docs/studies/
+	$(python) -m benchmarks peers $(if $(filter quick,$(BENCH)),--quick)
 
 benchmark: $(prepare) ## Measure time, memory and products; results in benchmarks/
 	$(python) -m benchmarks $(if $(filter quick,$(BENCH)),--quick)
