@@ -35,7 +35,7 @@ def demo(
 ) -> None:
     """List the demos, or run one; further arguments are passed to it (--size small).
 
-    Names that end in .toml are example scenes. Results go to output/NAME in the current folder.
+    Names that end in .toml are example scenes, in .inp decks. Results go to output/NAME in this folder.
     """
     console, there = console_of(context), shipped()
     if name is None:
@@ -49,7 +49,7 @@ def demo(
     chosen = there[name]
     if copy:
         _copy(console, chosen)
-    elif chosen.suffix != ".toml":
+    elif chosen.suffix == ".py":
         _run(chosen, list(context.args))
     elif context.args:
         raise InvalidInputError(
@@ -72,10 +72,11 @@ def folder_of_demos() -> Path:
 
 
 def shipped() -> dict[str, Path]:
-    """Return the files of all demos and example scenes by name; names of scenes include the suffix."""
+    """Return the files of all demos, scenes and decks by name; those of scenes and decks with suffix."""
     folder = folder_of_demos()
     demos = {path.stem.removeprefix("demo_"): path for path in sorted(folder.glob("demo_*.py"))}
-    return demos | {path.name: path for path in sorted(folder.glob("scenes/*.toml"))}
+    files = (*sorted(folder.glob("scenes/*.toml")), *sorted(folder.glob("decks/*.inp")))
+    return demos | {path.name: path for path in files}
 
 
 def _list(console: Console, there: dict[str, Path]) -> None:
@@ -86,7 +87,8 @@ def _list(console: Console, there: dict[str, Path]) -> None:
     for name, path in there.items():
         text = path.read_text(encoding="utf-8")
         options = sorted(set(re.findall(r'"(--[a-z-]+)"', text))) if path.suffix == ".py" else []
-        title = re.split(r"[.;](?: |$)", next(iter(re.findall(r"^#[# ]* (\S.*)$", text, re.MULTILINE)), ""))
+        lines = re.findall(r"^(?:#|\*\*)[# ]* (\S.*)$", text, re.MULTILINE)
+        title = re.split(r"[.;](?: |$)", next(iter(lines), ""))
         table.add_row(name, f"{title[0]} ({' '.join(options)})" if options else title[0])
     console.write(table)
     console.write("run one with `fenics-contact demo NAME`, copy its file to change it with --copy")
@@ -102,7 +104,7 @@ def _copy(console: Console, chosen: Path) -> None:
             schema = chosen.parent / "scene_file.schema.json"
             if chosen.suffix == ".toml" and schema.exists() and not (target.parent / schema.name).exists():
                 shutil.copyfile(schema, target.parent / schema.name)
-    program = f"fenics-contact {_command(chosen)}" if chosen.suffix == ".toml" else "python"
+    program = "python" if chosen.suffix == ".py" else f"fenics-contact {_command(chosen)}"
     console.write(f"copied to {target.name}; run it with `{program} {target.name}`")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -84,6 +85,7 @@ def test_demos_are_listed_with_their_titles(capsys: pytest.CaptureFixture[str]) 
         assert path.stem.removeprefix("demo_") in printed
     assert "Hertz: a steel ball on a steel block\n" in printed
     assert "two_blocks.toml" in printed
+    assert re.search(r"valve.inp +A valve on its seat, axisymmetric, pressed by 20 N/mm2\n", printed)
     assert folder_of_demos() == ROOT / "demos"
 
 

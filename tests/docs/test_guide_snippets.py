@@ -16,7 +16,7 @@ from tests.docs.pages import DOCS, GUIDE, ROOT, Snippet, agrees, fences_of, snip
 FILES = [*GUIDE.glob("*.md"), DOCS / "theory.md", ROOT / "README.md"]
 PAGES = sorted(path.relative_to(ROOT) for path in FILES)
 #: Pages of many seconds, which claims rest on.
-LONG = {"clamp_hub", "large_deformations", "not_converging", "shape_optimisation"}
+LONG = {"clamp_hub", "large_deformations", "not_converging", "shape_optimisation", "valve_deck"}
 MARKED = [
     pytest.param(page, marks=[pytest.mark.slow, pytest.mark.claim] if page.stem in LONG else [], id=page.stem)
     for page in PAGES
