@@ -56,6 +56,12 @@ class Following:
         means = sp.identity(size) - chosen.T @ apart
         return cls(sp.kron(means, every, format="csr"), sp.kron(apart, every, format="csr"))
 
+    def same_as(self, other: Following | None) -> bool:
+        """Return whether the same nodes of another subdomain, numbered alike, follow the same others."""
+        if other is None or self.apart.shape != other.apart.shape:
+            return False
+        return bool((self.apart != other.apart).nnz == 0)
+
     def stiffness(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
         """Return Tᵀ K T + s Cᵀ C, with s the mean of the diagonal's entries."""
         typical = float(np.abs(matrix.diagonal()).mean())

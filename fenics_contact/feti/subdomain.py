@@ -271,9 +271,15 @@ class Assembled:
         room = shape.size * rounding
         for other in self._known[id(mesh.space)].near(float(np.abs(shape).sum()), room):
             apart = np.abs(_from_own_origin(other.points) - shape).max()
-            if apart <= rounding and other.material.same_as(parts):
+            if apart <= rounding and other.material.same_as(parts) and _follow_alike(mesh, other.mesh):
                 return other
         return None
+
+
+def _follow_alike(mesh: SubdomainMesh, other: SubdomainMesh) -> bool:
+    if mesh.following is None:
+        return other.following is None
+    return mesh.following.same_as(other.following)
 
 
 def cut_out(
@@ -444,7 +450,7 @@ def _depends_on_shape_alone(
     beds: Sequence[ElasticFoundation],
 ) -> bool:
     """Return whether the stiffness depends on cells, numbering, materials and shape, but not on the place."""
-    special = bool(beds) or isinstance(body, ToolBody) or mesh.following is not None
+    special = bool(beds) or isinstance(body, ToolBody)
     return not (special or _dolfinx.is_revolved(body.cell_type) or _varies(parts, body, forms))
 
 

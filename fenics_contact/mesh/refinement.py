@@ -188,7 +188,7 @@ def _checked_marks(mesh: BodyMesh, marked: ArrayLike) -> np.ndarray:
     if (kind.order == 2 and not kind.is_simplex) or mesh.has_several_shapes:
         raise InvalidInputError(
             "refined needs simplices, or linear quadrilaterals or hexahedra, got "
-            f"{mesh.cells_in_words}: take linear cells, or a finer mesh of these"
+            f"{mesh.cells_in_words}: take linear cells of one shape, or a finer mesh of these"
         )
     if mesh.coincident_nodes or mesh.cuts:
         raise InvalidInputError(

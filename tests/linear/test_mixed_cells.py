@@ -11,6 +11,7 @@ from mpi4py import MPI
 from fenics_contact import (
     Body,
     ContactPair,
+    ElasticFoundation,
     Scene,
     Support,
     Surface,
@@ -19,10 +20,18 @@ from fenics_contact import (
     solve_scene,
 )
 from fenics_contact._accuracy.discretisation import discretisation_error
+from fenics_contact.design.motion import DesignGeometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity, J2Plasticity, NeoHooke, PlaneStrain
-from fenics_contact.mesh import bisection_partition, joined_cells, quadratic, refined, serendipity
+from fenics_contact.mesh import (
+    bisection_partition,
+    in_vtk_order,
+    joined_cells,
+    quadratic,
+    refined,
+    serendipity,
+)
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import is_triangle
 from tests.linear.graded import pulled
@@ -185,5 +194,17 @@ def test_what_is_not_built_is_refused_in_words() -> None:
         InvalidInputError, match=r"must have facets of one shape, 'z1' .* 8 triangles and 4 quadr"
     ):
         Scene({"bar": Body(mesh, soft), "upper": Body(upper, soft)}, [Support("bar", "z0")], [], [pair])
-    with pytest.raises(InvalidInputError, match=r"refined needs simplices, .* got .* pyramids"):
+    with pytest.raises(InvalidInputError, match=r"refined needs simplices, .* 28 pyramids, .* of one shape"):
         refined(mesh, [0])
+    bed = ElasticFoundation("bar", "z1", 1.0)
+    scene = Scene({"bar": Body(mesh, soft)}, [Support("bar", "x0")], foundations=[bed])
+    with pytest.raises(InvalidInputError, match=r"need facets of one shape, this one has triangles"):
+        solve_scene(scene, MPI.COMM_SELF)
+    with pytest.raises(InvalidInputError, match=r"designs need bodies with one shape .* 'bar' has 40 tetra"):
+        DesignGeometry(scene, None, [])
+    lean = serendipity(quadratic(block((0, 0, 0), (1, 1, 1), (1, 1, 1))))
+    whole = Scene({"box": Body(lean, soft)}, [Support("box", "x0")])
+    with pytest.raises(InvalidInputError, match=r"a design with body 'box' needs complete cells, .* 7 cen"):
+        DesignGeometry(whole, None, [])
+    with pytest.raises(InvalidInputError, match=r"a known number of nodes, .* 6/15/18 for prisms, .* 7:"):
+        in_vtk_order(mesh.points, np.arange(7)[None])

@@ -129,3 +129,19 @@ def test_cells_without_centres_are_refused_and_complete_ones_stay() -> None:
     two = serendipity(quadratic(block((0, 0, 0), (1, 1, 1), (2, 1, 1))))
     with pytest.raises(InvalidInputError, match=r"a section needs complete cells, .* mesh\.completed"):
         cut_between(two, "cut", np.array([0]), np.array([1]))
+
+
+def test_subdomains_alike_share_a_matrix_where_the_same_centres_follow() -> None:
+    whole = serendipity(quadratic(block((0, 0, 0), (2, 1, 1), (4, 1, 1))))
+    halves = (whole.points[whole.cells].mean(axis=1)[:, 0] > 1.0).astype(int)
+    for mesh, shared in ((whole, True), (completed(whole, "x0"), False)):
+        state = solve_scene(
+            pulled(mesh, IsotropicElasticity(100.0, 0.3)),
+            MPI.COMM_SELF,
+            partitions={"bar": halves},
+            tolerance=1e-12,
+        )
+        one, other = state.torn.subdomains
+        assert (one.matrix is other.matrix) == shared
+        exact = mesh.points * [0.01, -0.003, -0.003]
+        np.testing.assert_allclose(state.gather_displacement("bar"), exact, atol=1e-13)
