@@ -202,6 +202,7 @@ def build_bodies(
         {name: mesh.corners(faces) for name, faces in surfaces.items()},
         ("element set", "surface"),
         point_sets=node_sets,
+        coincident_nodes=True,
     )
     wanted = {
         name: regions if len(regions) > 1 else next(iter(regions.values()))

@@ -80,9 +80,6 @@ def read_sides(cards: Sequence[Card], known: Mapping[str, Interaction]) -> list[
     for card in cards:
         if card.name not in ("CONTACTPAIR", "TIE"):
             continue
-        for name in ("CYCLICSYMMETRY", "MULTISTAGE"):
-            if name in card.parameters:
-                raise card.error(f"the parameter {name} is not read: give CyclicSymmetry in Python")
         tied = card.name == "TIE" or interaction_of(card, known).tied
         for row, entries in enumerate(card.rows):
             if len(entries) != 2:

@@ -19,7 +19,7 @@ from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.supports import AnySupport
 from fenics_contact.decks.acting import Acting
-from fenics_contact.decks.cards import Card, Origin, read_cards
+from fenics_contact.decks.cards import Card, DeckError, Origin, read_cards
 from fenics_contact.decks.contact import (
     Sides,
     build_pairs,
@@ -33,7 +33,7 @@ from fenics_contact.decks.couplings import (
 from fenics_contact.decks.history import Moment
 from fenics_contact.decks.holding import Holding
 from fenics_contact.decks.model import Model
-from fenics_contact.decks.vocabulary import KNOWN, NOT_YET, PROCEDURES, WITHOUT_EFFECT
+from fenics_contact.decks.vocabulary import KNOWN, NOT_YET, PARAMETERS, PROCEDURES, WITHOUT_EFFECT
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import made_once
 
@@ -181,9 +181,20 @@ def _read(path: Path) -> Deck:
             )
         if card.name == "RESTART" and "READ" in card.parameters:
             raise card.error("states of the other program are not read: give the steps from the start")
+        strange = set(card.parameters) - PARAMETERS.get(card.name, set(card.parameters))
+        if strange:
+            raise card.error(
+                f"the parameter {min(strange)} is not read: "
+                f"{', '.join(sorted(PARAMETERS[card.name])) or 'none'} can be"
+            )
         if card.name in NOT_YET:
             raise card.error("this card is known, but not read yet: leave it out, or describe it in Python")
-    return _Builder(path.name, cards).deck()
+    try:
+        return _Builder(path.name, cards).deck()
+    except DeckError:
+        raise
+    except InvalidInputError as error:
+        raise DeckError(str(error), path.name) from error
 
 
 class _Builder:

@@ -140,7 +140,7 @@ class _Course:
         self.force, self.force_before = np.zeros(shape), np.zeros(shape)
         self.held_by, self.force_by = np.zeros(shape, dtype=int), np.zeros(shape, dtype=int)
         self.factors: list[Amplitude | None] = [None]
-        self.names: list[str] = [""]
+        self.names: list[tuple[str, float]] = [("", 0.0)]
         self.pressures: dict[tuple[str, ...], tuple[Pressed, int, float]] = {}
         self.weights: dict[tuple[str, str], tuple[Weight, int, float]] = {}
         self.temperature: np.ndarray | None = None
@@ -149,28 +149,28 @@ class _Course:
         self.targets: list[Held] = []
 
     def _by(self, card: Card) -> int:
-        name = card.name_of("AMPLITUDE")
+        """Return the number of the amplitude of a card, 0 without one."""
+        name, delay = card.name_of("AMPLITUDE"), card.number_of("TIMEDELAY")
         if not name:
+            if delay:
+                raise card.error("TIME DELAY needs an AMPLITUDE, there is none: add it, or leave it out")
             return 0
         if name not in self.amplitudes:
             raise card.error(
                 f"amplitude {name!r} is not there; the deck has {', '.join(self.amplitudes) or 'none'}"
             )
-        delay, factor = card.number_of("TIMEDELAY"), self.amplitudes[name]
-        if delay:
-            name, factor = f"{name} after {delay:g}", replace(factor, times=factor.times + delay)
-        if name not in self.names:
-            self.names.append(name)
-            self.factors.append(factor)
-        return self.names.index(name)
+        if (name, delay) not in self.names:
+            factor = self.amplitudes[name]
+            self.names.append((name, delay))
+            self.factors.append(replace(factor, times=factor.times + delay))
+        return self.names.index((name, delay))
 
     def boundary(self, card: Card, fresh: bool) -> None:
         """Hold nodes."""
         if card.name_of("OP") == "NEW" and fresh:
             self.held[:] = np.nan
-        for name in ("SUBMODEL", "USER", "LOADCASE", "TYPE"):
-            if name in card.parameters and card.name_of(name) != "DISPLACEMENT":
-                raise card.error(f"the parameter {name} is not read: prescribe displacements")
+        if card.name_of("TYPE") not in ("", "DISPLACEMENT"):
+            raise card.error(f"TYPE={card.name_of('TYPE')} is not read: prescribe displacements")
         fixed, by = "FIXED" in card.parameters, self._by(card)
         for row, entries in enumerate(card.rows):
             nodes = self.mesh.nodes_named(entries[0], card, row)
@@ -245,9 +245,6 @@ class _Course:
 
     def heat(self, card: Card, initial: np.ndarray, fresh: bool) -> None:
         """Give nodes temperatures."""
-        for name in ("FILE", "BSTEP", "USER"):
-            if name in card.parameters:
-                raise card.error(f"the parameter {name} is not read: list nodes and their temperatures")
         if self.temperature is None or (card.name_of("OP") == "NEW" and fresh):
             self.temperature = initial.copy()
         if self.temperature_before is None:

@@ -101,12 +101,14 @@ class Conditions:
         kind: That of the elements, see `Element.kind`.
         large: Whether a step has NLGEOM.
         temperature: The one temperature of all steps, None where it varies.
+        heated: Whether temperatures change.
         dilatation: Whether cells are linear hexahedra or quadrilaterals, whose changes of volume are means.
     """
 
     kind: str
     large: bool
     temperature: float | None
+    heated: bool
     dilatation: bool
 
 
@@ -114,6 +116,12 @@ def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> M
     """Return a material of a deck."""
     parts = cards.parts
     try:
+        stiff = [name for name in ("PLASTIC", "HYPERELASTIC") if name in parts] or ["NLGEOM"] * of.large
+        if "EXPANSION" in parts and of.heated and stiff:
+            raise parts["EXPANSION"].error(
+                f"thermal expansion with {'*' * (stiff != ['NLGEOM'])}{stiff[0]} has no counterpart: "
+                "leave one of the two out"
+            )
         if "HYPERELASTIC" in parts:
             return _hyperelastic(parts["HYPERELASTIC"], of)
         if "ELASTIC" not in parts:
@@ -173,9 +181,6 @@ def _isotropic(parts: Mapping[str, Card], of: Conditions) -> Material:
         return _plastic(parts["PLASTIC"], young, poisson, of)
     expansion = None if alpha is None else alpha[0]
     if of.large:
-        if expansion is not None:
-            card = parts["EXPANSION"]
-            raise card.error("thermal expansion with NLGEOM has no counterpart: leave one of the two out")
         if of.kind == "plane stress":
             raise parts["ELASTIC"].error("plane stress with NLGEOM has no counterpart: take solid elements")
         return StVenantKirchhoff(young, poisson)

@@ -144,7 +144,11 @@ class Model:
         for part in self.parts_of_mesh:
             mesh = self.parts.meshes[part.name]
             of = Conditions(
-                self.kind, large, self._temperature(), mesh.cell_type in ("hexahedron", "quadrilateral")
+                self.kind,
+                large,
+                self._temperature(),
+                self._heated(),
+                mesh.cell_type in ("hexahedron", "quadrilateral"),
             )
             given = {}
             for region, section in regions_of(self.sections, part).items():
@@ -168,6 +172,14 @@ class Model:
         cards = self.materials[section.material]
         self.origins["material", section.material] = cards.card.origin
         return build_material(cards, self.axes.get(section.orientation), of)
+
+    def _heated(self) -> bool:
+        """Return whether the temperature of any node changes."""
+        moments = [moment for step in self.history.steps for moment in step.moments]
+        return any(
+            moment.temperatures is not None and bool((moment.temperatures != self.history.initial).any())
+            for moment in moments
+        )
 
     def _temperature(self) -> float | None:
         """Return the temperature if it is the same everywhere and always."""

@@ -34,6 +34,7 @@ class TaggedMesh:
         node_sets: Label to node numbers, in any order: the facets on the boundary of a body all of whose
             corners are among them.
         point_sets: Label to node numbers of sets of single nodes.
+        coincident_nodes: Whether nodes of one body may coincide.
     """
 
     source: str
@@ -44,6 +45,7 @@ class TaggedMesh:
     words: tuple[str, str]
     node_sets: Mapping[Label, np.ndarray] = field(default_factory=dict)
     point_sets: Mapping[str, np.ndarray] = field(default_factory=dict)
+    coincident_nodes: bool = False
 
     @property
     def dim(self) -> int:
@@ -284,7 +286,10 @@ def _body(
     held = {label: number[inside][number[inside] >= 0] for label, inside in mesh.point_sets.items()}
     held = {label: inside for label, inside in held.items() if len(inside) and label not in surfaces}
     try:
-        return BodyMesh(mesh.points[nodes], local, surfaces, regions=named, node_sets=held)
+        return BodyMesh(
+            mesh.points[nodes], local, surfaces, regions=named, node_sets=held,
+            coincident_nodes=mesh.coincident_nodes,
+        )  # fmt: skip
     except InvalidInputError as error:
         raise InvalidInputError(f"body '{name}' of {mesh.source} is no sound mesh: {error}") from error
 

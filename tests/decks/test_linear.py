@@ -190,6 +190,18 @@ def test_an_amplitude_cuts_a_step_where_it_turns(tmp_path: Path) -> None:
     assert len(found.solve(MPI.COMM_SELF)) == 1, "one state for a step of the deck"
 
 
+def test_an_amplitude_may_start_later(tmp_path: Path) -> None:
+    text = (
+        BAR
+        + "*AMPLITUDE, NAME=RAMP\n0., 1., 1., 2., 2., 3.\n*BOUNDARY\nBAR_X0, 1, 3\n*STEP\n*STATIC\n1.5, 1.5\n"
+    )
+    late = "*CLOAD, AMPLITUDE=RAMP, TIME DELAY=1.\n24, 2, 4.\n*END STEP\n"
+    found = read_deck(deck(tmp_path, text + late))
+    assert [each.time for each in found.steps] == [1.0, 1.5]
+    forces = [load.value[1] for each in found.steps for load in each.loads if isinstance(load, PointForce)]
+    assert forces == pytest.approx([4.0, 6.0])
+
+
 def test_nodes_that_are_no_face_are_held_as_nodes(tmp_path: Path) -> None:
     held = "*BOUNDARY\n1, 1, 3\n5, 2\nBAR_X0, 1, 1\n3, 2, 6\n"
     found = read_deck(deck(tmp_path, BAR + END + held + step(PULLED)))

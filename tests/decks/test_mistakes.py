@@ -143,6 +143,20 @@ WRONG = [
         "*AMPLITUDE",
         r"needs pairs of a time and a value, got 3 numbers",
     ),
+    ("*CLOAD\n", "*CLOAD, LOAD CASE=2\n", "*CLOAD", r"the parameter LOADCASE is not read: AMPLITUDE, OP"),
+    ("*CLOAD\n", "*CLOAD, TIME DELAY=1.\n", "*CLOAD", r"TIME DELAY needs an AMPLITUDE"),
+    (
+        "BAR_X0, 1, 3",
+        "BAR_X0, 1, 3\n*BOUNDARY, TYPE=VELOCITY\n1, 1",
+        "*BOUNDARY, T",
+        r"TYPE=VELOCITY is not read",
+    ),
+    (
+        "*CLOAD\nBAR_X1, 1, 10.",
+        "*TEMPERATURE\nBAR_X1, 90.\n*MATERIAL, NAME=STEEL\n*ELASTIC\n2., 0.\n*PLASTIC\n1.\n*EXPANSION\n1.",
+        "*EXPANSION",
+        r"thermal expansion with \*PLASTIC has no counterpart",
+    ),
 ]
 
 
