@@ -41,6 +41,7 @@ from fenics_contact.mesh.quadratic import quadratic
 from fenics_contact.readers import cad, dolfinx
 from fenics_contact.readers import gmsh as gmsh_module
 from fenics_contact.readers import meshio as meshio_module
+from fenics_contact.readers.deck_bodies import read_deck_mesh
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -298,12 +299,26 @@ class MeshFile(Placed):
         False, description="drop all nodes but the corners of quadratic cells (not for CAD, .msh and .xdmf)"
     )
 
+    deck: bool = Field(
+        False,
+        description="read a deck (.inp) as CalculiX and Abaqus do: bodies are elements that share nodes, "
+        "sections their regions, with surfaces and node sets",
+    )
+
     def shapes(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
         """Read the file on rank 0. Collective."""
         return {name: Shaped(mesh) for name, mesh in self._read(folder / self.file, comm).items()}
 
     def _read(self, path: Path, comm: MPI.Comm) -> Mapping[str, BodyMesh]:
         kind, groups = path.suffix.lower(), (self.bodies, made_choice(self.surfaces))
+        if self.deck:
+            others = (*groups, self.labels, self.size, self.sizes)
+            if any(each is not None for each in others) or self.order > 1 or self.corners_only:
+                raise InvalidInputError(
+                    f"a mesh with deck = true has the bodies and surfaces that {self.file!r} names: leave "
+                    "all other keys of the mesh out, or deck"
+                )
+            return read_deck_mesh(path, comm)
         if kind in (*CAD, ".msh", ".xdmf") and (self.labels is not None or self.corners_only):
             raise InvalidInputError(
                 f"labels and corners_only are for other formats than CAD, .msh and .xdmf, got {self.file!r}: "

@@ -548,6 +548,7 @@ LOADS = (
     TotalMomentLoad,
     table_of(loads.Pressure, _Load, kind="pressure"),
     table_of(loads.BodyForce, _Load, kind="body_force"),
+    table_of(loads.PointForce, _Load, kind="point_force"),
     GravityLoad,
     CentrifugalLoad,
     PointMassLoad,

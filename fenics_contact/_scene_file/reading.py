@@ -43,7 +43,7 @@ from fenics_contact._scene_file.design import (
     objective_of,
 )
 from fenics_contact._scene_file.document import Document, load_steps, refused_python
-from fenics_contact._scene_file.model import TriangulationPart
+from fenics_contact._scene_file.model import RollerPart, SupportPart, TriangulationPart
 from fenics_contact._scene_file.source import (
     Mistake,
     SceneFileError,
@@ -167,10 +167,12 @@ class Builder:
 
     def _check_surfaces(self, bodies: Mapping[str, Body]) -> None:
         for path, part in surface_parts(self._document):
-            surfaces = bodies[part.body].mesh.surfaces
-            if part.surface not in surfaces:
+            mesh = bodies[part.body].mesh
+            on_nodes = isinstance(part, SupportPart | RollerPart) or path[0] == "springs"
+            known = {**mesh.surfaces, **mesh.node_sets} if on_nodes else mesh.surfaces
+            if part.surface not in known:
                 what, where = f"a surface of the body {part.body!r}", (*path, "surface")
-                self._mistakes.append(unknown(self._source, where, part.surface, what, sorted(surfaces)))
+                self._mistakes.append(unknown(self._source, where, part.surface, what, sorted(known)))
         self._check()
 
     def _at(self, *path: str | int) -> AbstractContextManager[None]:

@@ -18,16 +18,16 @@ from fenics_contact._scene.loads import (
     centrifugal,
     gravity,
 )
-from fenics_contact.decks.bodies import (
-    Component,
-)
 from fenics_contact.decks.couplings import (
     Driven,
 )
 from fenics_contact.decks.history import Moment, Pressed, Weight
 from fenics_contact.decks.holding import Holding
-from fenics_contact.decks.mesh import Faces
 from fenics_contact.decks.model import Model, NodeValues
+from fenics_contact.readers.deck_bodies import (
+    Component,
+)
+from fenics_contact.readers.deck_mesh import Faces
 
 
 class Acting:

@@ -10,9 +10,9 @@ import numpy as np
 
 from fenics_contact._scene.pairs import ContactPair, Coulomb, Surface, Tie
 from fenics_contact._scene.surface_laws import ClosureLaw, ClosureTable, ExponentialClosure, LinearClosure
-from fenics_contact.decks.cards import Card
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.readers.deck_cards import Card
 
 #: Keeps what is worth knowing of a card.
 Note: TypeAlias = Callable[[Card, str], None]

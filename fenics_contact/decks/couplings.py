@@ -9,9 +9,9 @@ import numpy as np
 
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.supports import RigidSurface
-from fenics_contact.decks.cards import Card
 from fenics_contact.decks.history import Moment
-from fenics_contact.decks.mesh import DeckMesh, Faces
+from fenics_contact.readers.deck_cards import Card
+from fenics_contact.readers.deck_mesh import DeckMesh, Faces
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,6 @@ from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.supports import AnySupport
 from fenics_contact.decks.acting import Acting
-from fenics_contact.decks.cards import Card, DeckError, Origin, read_cards
 from fenics_contact.decks.contact import (
     Sides,
     build_pairs,
@@ -36,6 +35,7 @@ from fenics_contact.decks.model import Model
 from fenics_contact.decks.vocabulary import KNOWN, NOT_YET, PARAMETERS, PROCEDURES, WITHOUT_EFFECT
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import made_once
+from fenics_contact.readers.deck_cards import Card, DeckError, Origin, read_cards
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -81,6 +81,7 @@ class Deck:
         element_numbers: Body -> numbers in the deck of the cells of its mesh.
         node_sets: Name -> numbers of nodes in the deck, ascending.
         element_sets: Name -> numbers of elements in the deck, ascending.
+        mesh_text: The deck with its mesh alone, sets and surfaces named as in the scene.
     """
 
     name: str
@@ -94,6 +95,7 @@ class Deck:
     element_numbers: Mapping[str, np.ndarray]
     node_sets: Mapping[str, np.ndarray]
     element_sets: Mapping[str, np.ndarray]
+    mesh_text: str = field(repr=False)
     _origins: Mapping[tuple[str, str], Origin] = field(default_factory=dict, repr=False)
 
     def _facts(self) -> dict[str, Any]:
@@ -238,6 +240,7 @@ class _Builder:
             {part.name: mesh.element_numbers[part.elements] for part in model.parts_of_mesh},
             {name: np.sort(mesh.numbers[members]) for name, members in mesh.node_sets.items()},
             {name: np.sort(mesh.element_numbers[members]) for name, members in mesh.element_sets.items()},
+            model.mesh_text(),
             model.origins,
         )
 
@@ -299,7 +302,7 @@ class _Builder:
                 f"surface {name!r} must lie on the boundary of a body, a face of element {number} lies "
                 "between two elements: correct it", of.row,
             )  # fmt: skip
-        label = name if known or name not in self.model.mesh.surfaces else f"{name} faces"
+        label = name if known or name not in self.model.mesh.surfaces else f"{name} FACES"
         self.model.surfaces[label] = faces
         self.sides_by_name[name] = label
 

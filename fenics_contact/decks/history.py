@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact.decks.cards import Card, plain
-from fenics_contact.decks.mesh import DeckMesh
 from fenics_contact.decks.vocabulary import KNOWN, PRINT_CARDS, PROCEDURES
+from fenics_contact.readers.deck_cards import Card, plain
+from fenics_contact.readers.deck_mesh import DeckMesh
 
 
 @dataclass(frozen=True, eq=False)

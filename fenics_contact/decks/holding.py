@@ -13,17 +13,17 @@ from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.preloads import Section as CutAt
 from fenics_contact._scene.springs import Spring
 from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support
-from fenics_contact.decks.bodies import (
-    Component,
-)
 from fenics_contact.decks.couplings import (
     Bolt,
     Driven,
     rigid_surface,
 )
 from fenics_contact.decks.history import Held, Moment
-from fenics_contact.decks.mesh import Faces
 from fenics_contact.decks.model import Model, NodeValues
+from fenics_contact.readers.deck_bodies import (
+    Component,
+)
+from fenics_contact.readers.deck_mesh import Faces
 
 
 class Holding:
@@ -144,9 +144,9 @@ class Holding:
             if name:
                 faces = self.model.faces_of(self.model.mesh.surface_named(name, driven.card))
             elif driven.nodes is not None:
-                name, faces = f"{driven.name} rigid", self.model.exterior.covering(driven.nodes)
+                name, faces = f"{driven.name} RIGID", self.model.exterior.covering(driven.nodes)
             else:
-                name, faces = f"{driven.name} rigid", self._whole(driven)
+                name, faces = f"{driven.name} RIGID", self._whole(driven)
             if faces is None or not self.model.exterior.holds(faces).all():
                 raise driven.card.error(
                     f"{driven.name!r} must be faces on the boundary of a body, or all nodes of some "
@@ -205,13 +205,13 @@ class Holding:
                     "is neither: use a tie, a rigid surface or a plane of symmetry", each.row,
                 )  # fmt: skip
             for node in each.nodes:
-                self.model.node_sets[f"node {self.model.mesh.numbers[node]}"] = np.array([node])
+                self.model.node_sets[f"NODE {self.model.mesh.numbers[node]}"] = np.array([node])
 
     def equations(self) -> tuple[list[Roller], list[Spring]]:
         """Return the equations: nodes that slide along planes, and pairs that move alike."""
         rollers, springs = [], []
         for each in self.model.equations:
-            names = [f"node {self.model.mesh.numbers[node]}" for node in each.nodes]
+            names = [f"NODE {self.model.mesh.numbers[node]}" for node in each.nodes]
             ends = [
                 Surface(body, name)
                 for node, name in zip(each.nodes, names, strict=True)

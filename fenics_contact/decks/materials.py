@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fenics_contact.decks.cards import Card
 from fenics_contact.decks.vocabulary import MATERIAL_CARDS, WITHOUT_EFFECT
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.elastic import IsotropicElasticity, Material, PlaneStrain, PlaneStress
 from fenics_contact.materials.hyperelastic import MooneyRivlin, Ogden, StVenantKirchhoff
 from fenics_contact.materials.orthotropic import OrthotropicElasticity, OrthotropicPlaneStress, material_axes
 from fenics_contact.materials.plastic import FinitePlasticity, J2Plasticity
+from fenics_contact.readers.deck_cards import Card
 
 
 @dataclass(eq=False)
@@ -116,7 +116,11 @@ def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> M
     """Return a material of a deck."""
     parts = cards.parts
     try:
-        stiff = [name for name in ("PLASTIC", "HYPERELASTIC") if name in parts] or ["NLGEOM"] * of.large
+        stiff = [
+            name
+            for name in ("PLASTIC", "HYPERELASTIC", "NLGEOM")
+            if name in parts or name == "NLGEOM" * of.large
+        ]
         if "EXPANSION" in parts and of.heated and stiff:
             raise parts["EXPANSION"].error(
                 f"thermal expansion with {'*' * (stiff != ['NLGEOM'])}{stiff[0]} has no counterpart: "

@@ -12,17 +12,6 @@ from scipy.spatial import cKDTree
 
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.body import Body
-from fenics_contact.decks.bodies import (
-    Exterior,
-    Parts,
-    Section,
-    build_bodies,
-    components,
-    integration_of,
-    read_sections,
-    regions_of,
-)
-from fenics_contact.decks.cards import Card, Origin
 from fenics_contact.decks.couplings import (
     in_global_axes,
     read_axes,
@@ -32,7 +21,18 @@ from fenics_contact.decks.couplings import (
 )
 from fenics_contact.decks.history import History, read_history
 from fenics_contact.decks.materials import Conditions, build_material, read_materials
-from fenics_contact.decks.mesh import DeckMesh, Faces, Named, read_mesh_cards
+from fenics_contact.readers.deck_bodies import (
+    integration_of,
+    Exterior,
+    Parts,
+    Section,
+    build_bodies,
+    components,
+    read_sections,
+    regions_of,
+)
+from fenics_contact.readers.deck_cards import Card, Origin
+from fenics_contact.readers.deck_mesh import DeckMesh, Faces, Named, mesh_text, read_mesh_cards
 
 
 @displayed
@@ -134,6 +134,14 @@ class Model:
             f"deck '{self.name}'",
         )
 
+    def mesh_text(self) -> str:
+        """Return the cards of the mesh, with everything that is named for the scene."""
+        sections = {s.name: self.mesh.element_sets[s.name] for s in self.sections}
+        alone = {part.name: part.elements for part in self.parts_of_mesh if part.name not in sections}
+        text = mesh_text(self.mesh, {**sections, **alone}, self.surfaces, self.node_sets)
+        cards = [f"*SOLID SECTION, ELSET={s.name}, MATERIAL={s.material}" for s in self.sections]
+        return text + "\n".join([*cards, ""])
+
     def bodies(self) -> dict[str, Body]:
         """Return the bodies with their materials."""
         large = any(step.large for step in self.history.steps)
@@ -201,10 +209,10 @@ class Model:
         """Name nodes as a surface if they are all nodes of some faces, else as a set of nodes."""
         faces = self.exterior.covering(nodes)
         if faces is not None:
-            name = f"{name} faces" if name in self.mesh.surfaces else name
+            name = f"{name} FACES" if name in self.mesh.surfaces else name
             self.surfaces[name] = faces
         else:
-            name = f"{name} nodes" if name in self.mesh.surfaces else name
+            name = f"{name} NODES" if name in self.mesh.surfaces else name
             self.node_sets[name] = np.unique(nodes)
         return name
 

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from fenics_contact.decks.cards import Card
-from fenics_contact.decks.mesh import Block, DeckMesh, Faces
+from fenics_contact._base.checks import require_file
+from fenics_contact.errors.ranks import made_once
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.quadratic_nodes import with_centres
 from fenics_contact.mesh.quality import thickness
 from fenics_contact.readers.bodies import Label, TaggedMesh, bodies_of, one_array
+from fenics_contact.readers.deck_cards import Card, read_cards
+from fenics_contact.readers.deck_mesh import Block, DeckMesh, Faces, read_mesh_cards
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,3 +286,40 @@ def integration_of(
             "take one type of elements"
         )
     return "reduced" if found.pop() else "full"
+
+
+def read_deck_mesh(path: str | Path, comm: MPI.Comm | None = None) -> dict[str, BodyMesh]:
+    """Read the mesh of a deck of CalculiX or Abaqus: its bodies, with regions, surfaces and node sets.
+
+    Bodies are elements that share nodes, named by their element sets; sections are regions where a body has
+    several. Surfaces are those of ``*SURFACE`` on the boundary, node sets those of ``*NSET``. All other cards
+    are of no concern to a mesh; `fenics_contact.decks.read_deck` reads whole decks.
+
+    Args:
+        path: The file, mostly ``.inp``.
+        comm: If given, rank 0 reads the file and all ranks receive the bodies.
+
+    Raises:
+        InvalidInputError: If the file is missing, or elements, sets or surfaces do not fit each other, with
+            card and line.
+
+    Note:
+        Collective on ``comm`` if given.
+    """
+    return made_once(comm, lambda: _read(Path(path)))
+
+
+def _read(path: Path) -> dict[str, BodyMesh]:
+    require_file(path, "a deck")
+    cards = read_cards(path)
+    mesh = read_mesh_cards(cards)
+    sections, of_element = read_sections(cards, mesh)
+    exterior = Exterior.of(mesh)
+    surfaces = {}
+    for name, given in mesh.surfaces.items():
+        faces = given.faces if given.nodes is None else exterior.covering(given.nodes)
+        if faces is not None and exterior.holds(faces).all():
+            surfaces[name] = faces
+    parts = components(mesh, sections, of_element)
+    sets = {name: nodes for name, nodes in mesh.node_sets.items() if name not in surfaces}
+    return dict(build_bodies(mesh, parts, of_element, sections, surfaces, sets, f"deck '{path.name}'").meshes)

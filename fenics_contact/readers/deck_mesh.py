@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fenics_contact.decks.cards import Card, DeckError, plain
+from fenics_contact.readers.deck_cards import Card, DeckError, plain
 
 
 @dataclass(frozen=True, eq=False)
@@ -391,3 +391,42 @@ def joined(parts: Iterable[Faces]) -> Faces:
     )
     once = np.unique(rows, axis=0)
     return Faces(once[:, 0], once[:, 1])
+
+
+def mesh_text(
+    mesh: DeckMesh,
+    elements: Mapping[str, np.ndarray],
+    surfaces: Mapping[str, Faces],
+    sets: Mapping[str, np.ndarray],
+) -> str:
+    """Return the cards of nodes and elements of a deck, with other sets, surfaces and sections.
+
+    `elements`: name -> positions of elements, of which those of sections; `sets`: name -> positions of nodes.
+    """
+    used = np.unique(np.concatenate([block.nodes.ravel() for block in mesh.blocks]))
+    lines = ["*NODE"]
+    lines += [
+        f"{number}, {x!r}, {y!r}, {z!r}"
+        for number, (x, y, z) in zip(mesh.numbers[used].tolist(), mesh.points[used].tolist(), strict=True)
+    ]
+    for block in mesh.blocks:
+        lines.append(f"*ELEMENT, TYPE={block.element.name}")
+        rows = np.column_stack([block.numbers, mesh.numbers[block.nodes]])
+        lines += [line for row in rows.tolist() for line in _wrapped(row)]
+    for name, members in elements.items():
+        lines += [f"*ELSET, ELSET={name}", *_wrapped(mesh.element_numbers[members].tolist())]
+    for name, faces in surfaces.items():
+        lines.append(f"*SURFACE, NAME={name}, TYPE=ELEMENT")
+        numbers = mesh.element_numbers[faces.elements].tolist()
+        lines += [
+            f"{number}, S{side + 1}" for number, side in zip(numbers, faces.sides.tolist(), strict=True)
+        ]
+    for name, nodes in sets.items():
+        lines += [f"*NSET, NSET={name}", *_wrapped(mesh.numbers[nodes].tolist())]
+    return "\n".join([*lines, ""])
+
+
+def _wrapped(numbers: Sequence[int], most: int = 12) -> list[str]:
+    """Return numbers on lines, each but the last with a comma at its end."""
+    lines = [", ".join(map(str, numbers[k : k + most])) for k in range(0, len(numbers), most)]
+    return [*(f"{line}," for line in lines[:-1]), lines[-1]]
