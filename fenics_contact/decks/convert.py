@@ -82,7 +82,7 @@ class _Writer:
         """Write all files."""
         mesh = self.path.with_name(f"{self.path.stem}_mesh.inp")
         document = self._document(mesh.name)
-        self.files[mesh] = self.deck.mesh_text
+        self.files[mesh] = self.deck.mesh.text()
         text = f"# Written from {self.deck.name}\n" + tomlkit.dumps(document)
         for file, content in {self.path: text, **self.files}.items():
             file.write_text(content, encoding="utf-8")

@@ -36,6 +36,7 @@ from fenics_contact.decks.vocabulary import KNOWN, NOT_YET, PARAMETERS, PROCEDUR
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import made_once
 from fenics_contact.readers.deck_cards import Card, DeckError, Origin, read_cards
+from fenics_contact.readers.deck_mesh import MeshCards
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -81,7 +82,7 @@ class Deck:
         element_numbers: Body -> numbers in the deck of the cells of its mesh.
         node_sets: Name -> numbers of nodes in the deck, ascending.
         element_sets: Name -> numbers of elements in the deck, ascending.
-        mesh_text: The deck with its mesh alone, sets and surfaces named as in the scene.
+        mesh: Its mesh with sets and surfaces named as in the scene.
     """
 
     name: str
@@ -95,7 +96,7 @@ class Deck:
     element_numbers: Mapping[str, np.ndarray]
     node_sets: Mapping[str, np.ndarray]
     element_sets: Mapping[str, np.ndarray]
-    mesh_text: str = field(repr=False)
+    mesh: MeshCards = field(repr=False)
     _origins: Mapping[tuple[str, str], Origin] = field(default_factory=dict, repr=False)
 
     def _facts(self) -> dict[str, Any]:
@@ -240,7 +241,7 @@ class _Builder:
             {part.name: mesh.element_numbers[part.elements] for part in model.parts_of_mesh},
             {name: np.sort(mesh.numbers[members]) for name, members in mesh.node_sets.items()},
             {name: np.sort(mesh.element_numbers[members]) for name, members in mesh.element_sets.items()},
-            model.mesh_text(),
+            model.mesh_cards(),
             model.origins,
         )
 

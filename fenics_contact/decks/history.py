@@ -118,7 +118,7 @@ class Held:
     """Nodes that a card holds.
 
     Attributes:
-        label: Name of the set, or number of the node.
+        label: Name of the set, or number of the node; "" for single nodes.
         components: Components from zero.
     """
 
@@ -172,20 +172,35 @@ class _Course:
         if card.name_of("TYPE") not in ("", "DISPLACEMENT"):
             raise card.error(f"TYPE={card.name_of('TYPE')} is not read: prescribe displacements")
         fixed, by = "FIXED" in card.parameters, self._by(card)
+        if card.numbers_alone is not None and card.numbers_alone.shape[1] > 1:
+            self._hold_single(card, card.numbers_alone, fixed, by)
+            return
         for row, entries in enumerate(card.rows):
             nodes = self.mesh.nodes_named(entries[0], card, row)
             components, value = _components(card, row, entries)
-            if max(components) > 5:
-                raise card.error(
-                    f"component {max(components) + 1} is no displacement: 1 to 3, of nodes that drive rigid "
-                    "surfaces 4 to 6", row,
-                )  # fmt: skip
+            _check_span(card, row, min(components) + 1, max(components) + 1)
             inside = tuple(components)
             self.targets.append(Held(plain(entries[0]), nodes, inside, card, row))
             for k in inside:
                 self.held[nodes, k] = self.held_before[nodes, k] if fixed else value
                 self.held_by[nodes, k] = by
                 self.fixed[nodes, k] = fixed
+
+    def _hold_single(self, card: Card, table: np.ndarray, fixed: bool, by: int) -> None:
+        """Hold single nodes by their numbers, lines alike in their components at once."""
+        nodes = self.mesh.positions(table[:, 0].astype(np.int64), "node", card, by_row=True)
+        first = table[:, 1].astype(int)
+        last = np.where(table[:, 2] > 0, table[:, 2], first).astype(int) if table.shape[1] > 2 else first
+        value = table[:, 3] if table.shape[1] > 3 else np.zeros(len(table))
+        for span in np.unique(np.column_stack([first, last]), axis=0).tolist():
+            rows = np.flatnonzero((first == span[0]) & (last == span[1]))
+            _check_span(card, int(rows[0]), *span)
+            inside = tuple(range(span[0] - 1, span[1]))
+            self.targets.append(Held("", nodes[rows], inside, card, int(rows[0])))
+            for k in inside:
+                self.held[nodes[rows], k] = self.held_before[nodes[rows], k] if fixed else value[rows]
+                self.held_by[nodes[rows], k] = by
+                self.fixed[nodes[rows], k] = fixed
 
     def forces(self, card: Card, fresh: bool, touched: np.ndarray) -> None:
         """Load nodes. Forces of one step add up, those of earlier steps are replaced.
@@ -194,7 +209,14 @@ class _Course:
         """
         if card.name_of("OP") == "NEW" and fresh:
             self.force[:] = 0.0
-        by = self._by(card)
+        by, table = self._by(card), card.numbers_alone
+        if table is not None and table.shape[1] > 2 and ((table[:, 1] >= 1) & (table[:, 1] <= 6)).all():
+            nodes = self.mesh.positions(table[:, 0].astype(np.int64), "node", card, by_row=True)
+            at = nodes, table[:, 1].astype(int) - 1
+            self.force[at] = np.where(touched[at], self.force[at], 0.0)
+            np.add.at(self.force, at, table[:, 2])
+            self.force_by[at], touched[at] = by, True
+            return
         for row, entries in enumerate(card.rows):
             nodes = self.mesh.nodes_named(entries[0], card, row)
             numbers = card.floats(row, 1)
@@ -250,8 +272,7 @@ class _Course:
         if self.temperature_before is None:
             self.temperature_before = initial.copy()
         self.temperature_by = self._by(card)
-        for row, entries in enumerate(card.rows):
-            self.temperature[self.mesh.nodes_named(entries[0], card, row)] = card.floats(row, 1)[0]
+        _assign(self.temperature, card, self.mesh)
 
     def at(self, step_time: float, period: float, start: float) -> Moment:
         """Return what acts at a time of the step: what has no amplitude grows in proportion to the time."""
@@ -304,6 +325,31 @@ class _Course:
             self.weights[key] = load, by, next(w.value for w in last.weights if (w.where, w.kind) == key)
         if last.temperatures is not None:
             self.temperature_before = last.temperatures.copy()
+
+
+def _assign(values: np.ndarray, card: Card, mesh: DeckMesh) -> None:
+    """Give nodes the values of a card, in place."""
+    table = card.numbers_alone
+    if table is not None and table.shape[1] > 1:
+        values[mesh.positions(table[:, 0].astype(np.int64), "node", card, by_row=True)] = table[:, 1]
+        return
+    for row, entries in enumerate(card.rows):
+        given = card.floats(row, 1)
+        if not given:
+            raise card.error("needs a node or set and its temperature: complete the line", row)
+        values[mesh.nodes_named(entries[0], card, row)] = given[0]
+
+
+def _check_span(card: Card, row: int, first: int, last: int) -> None:
+    """Reject components that are no displacements or rotations."""
+    if first < 1:
+        raise card.error(
+            "needs a node or set and the first component to hold, from 1: complete the line", row
+        )
+    if last > 6:
+        raise card.error(
+            f"component {last} is no displacement: 1 to 3, of nodes that drive rigid surfaces 4 to 6", row
+        )
 
 
 def _components(card: Card, row: int, entries: Sequence[str]) -> tuple[range | tuple[int, ...], float]:
@@ -374,8 +420,7 @@ def _initial(cards: Sequence[Card], mesh: DeckMesh) -> np.ndarray:
         if card.name == "INITIALCONDITIONS":
             if card.name_of("TYPE") != "TEMPERATURE":
                 raise card.error(f"TYPE={card.name_of('TYPE')} is not read: only temperatures are")
-            for row, entries in enumerate(card.rows):
-                found[mesh.nodes_named(entries[0], card, row)] = card.floats(row, 1)[0]
+            _assign(found, card, mesh)
     return found
 
 

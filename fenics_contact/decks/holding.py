@@ -37,25 +37,23 @@ class Holding:
         """Return what is held by name: nodes and components. Single nodes are put together."""
         inside = self.model.nodes_of_bodies()
         found: dict[str, tuple[np.ndarray, set[int]]] = {}
-        single: dict[int, set[int]] = {}
+        single = np.zeros((len(inside), 3), dtype=bool)
         for target in self.model.history.targets:
             nodes = target.nodes[inside[target.nodes]]
-            held = {k for k in target.components if k < self.model.dim}
+            inner = [k for k in target.components if k < self.model.dim]
             self._check_turns(target, nodes)
             if not len(nodes):
                 if not np.isin(target.nodes, self.model.references).any():
                     self.model.note(target.card, f"nodes {target.label} belong to no element")
-            elif target.label.isdecimal() and held:
-                single.setdefault(int(nodes[0]), set()).update(held)
-            elif held:
-                found.setdefault(target.label, (nodes, set()))[1].update(held)
+            elif not target.label or target.label.isdecimal():
+                single[np.ix_(nodes, inner)] = True
+            elif inner:
+                found.setdefault(target.label, (nodes, set()))[1].update(inner)
                 self.model.origins.setdefault(("support", target.label), target.card.origin)
-        together: dict[tuple[int, ...], list[int]] = {}
-        for node, held in single.items():
-            together.setdefault(tuple(sorted(held)), []).append(node)
-        for alike, several in together.items():
-            name = "BOUNDARY " + " ".join(str(k + 1) for k in alike)
-            found[name] = np.array(several), set(alike)
+        for alike in np.unique(single[single.any(axis=1)], axis=0):
+            components = np.flatnonzero(alike)
+            name = "BOUNDARY " + " ".join(str(k + 1) for k in components)
+            found[name] = np.flatnonzero((single == alike).all(axis=1)), set(components.tolist())
         result = {}
         for name, (nodes, held) in found.items():
             result[self.model.place(name, nodes)] = np.unique(nodes), tuple(sorted(held))
@@ -68,8 +66,9 @@ class Holding:
         free = nodes[~np.isin(nodes, self.model.references)]
         moments = [moment for step in self.model.history.steps for moment in step.moments]
         if turned and any(np.nan_to_num(moment.held[free][:, turned]).any() for moment in moments):
+            name = target.label or self.model.mesh.numbers[free[0]]
             raise target.card.error(
-                f"nodes of solid elements have no rotation, but {target.label} is turned: drive the "
+                f"nodes of solid elements have no rotation, but {name} is turned: drive the "
                 "surface by a node, with *RIGID BODY or *COUPLING", target.row,
             )  # fmt: skip
 

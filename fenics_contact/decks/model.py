@@ -32,7 +32,7 @@ from fenics_contact.readers.deck_bodies import (
     regions_of,
 )
 from fenics_contact.readers.deck_cards import Card, Origin
-from fenics_contact.readers.deck_mesh import DeckMesh, Faces, Named, mesh_text, read_mesh_cards
+from fenics_contact.readers.deck_mesh import DeckMesh, Faces, MeshCards, Named, read_mesh_cards
 
 
 @displayed
@@ -134,13 +134,12 @@ class Model:
             f"deck '{self.name}'",
         )
 
-    def mesh_text(self) -> str:
-        """Return the cards of the mesh, with everything that is named for the scene."""
+    def mesh_cards(self) -> MeshCards:
+        """Return the mesh with everything that is named for the scene."""
         sections = {s.name: self.mesh.element_sets[s.name] for s in self.sections}
         alone = {part.name: part.elements for part in self.parts_of_mesh if part.name not in sections}
-        text = mesh_text(self.mesh, {**sections, **alone}, self.surfaces, self.node_sets)
         cards = [f"*SOLID SECTION, ELSET={s.name}, MATERIAL={s.material}" for s in self.sections]
-        return text + "\n".join([*cards, ""])
+        return MeshCards(self.mesh, {**sections, **alone}, self.surfaces, self.node_sets, cards)
 
     def bodies(self) -> dict[str, Body]:
         """Return the bodies with their materials."""

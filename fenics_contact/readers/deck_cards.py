@@ -149,6 +149,14 @@ class Card:
             result[row, : len(entries)] = entries
         return result
 
+    @cached_property
+    def numbers_alone(self) -> np.ndarray | None:
+        """The data lines as rows of numbers, None where lines are not alike or hold names."""
+        text = [line.rstrip().rstrip(",") for line in self.lines]
+        count = {line.count(",") for line in text}
+        values = _numbers(",".join(text), float) if len(count) == 1 else None
+        return None if values is None else values.reshape(len(text), -1)
+
     def integers(self, width: int) -> np.ndarray:
         """Return records of a number of integers each, which may go over several lines, shape (n, width)."""
         text = [line.strip().rstrip(",") for line in self.lines]

@@ -173,9 +173,16 @@ class DeckMesh:
         """Number of the block of each element, (n_elements,)."""
         return np.repeat(np.arange(len(self.blocks)), [len(block.numbers) for block in self.blocks])
 
+    @property
+    def _element_order(self) -> np.ndarray:
+        return np.argsort(self.element_numbers, kind="stable")
+
     def nodes_named(self, token: str, card: Card, row: int | None = None) -> np.ndarray:
         """Return the positions of the nodes of a set, or of one node by its number."""
         if token.isdecimal():
+            place = int(np.searchsorted(self.numbers, int(token)))
+            if place < len(self.numbers) and self.numbers[place] == int(token):
+                return np.array([place])
             return self.positions(np.array([int(token)]), "node", card, row)
         return _known(self.node_sets, token, "node set", card, row)
 
@@ -189,15 +196,22 @@ class DeckMesh:
         """Return a surface."""
         return _known(self.surfaces, token, "surface", card, row)
 
-    def positions(self, numbers: np.ndarray, what: str, card: Card, row: int | None = None) -> np.ndarray:
-        """Return the positions of nodes or elements by their numbers."""
-        known = self.numbers if what == "node" else self.element_numbers
-        order = np.argsort(known, kind="stable")
-        place = np.minimum(np.searchsorted(known[order], numbers), len(known) - 1)
+    def positions(
+        self, numbers: np.ndarray, what: str, card: Card, row: int | None = None, by_row: bool = False
+    ) -> np.ndarray:
+        """Return the positions of nodes or elements by their numbers.
+
+        `by_row`: whether each number is of a data line, for errors.
+        """
+        known, order = self.numbers, np.arange(len(self.numbers))  # ascending
+        if what == "element":
+            known, order = self.element_numbers, self._element_order
+        place = np.minimum(np.searchsorted(known[order], numbers), max(len(known) - 1, 0))
         found = order[place] if len(known) else place
-        lost = numbers if not len(known) else numbers[known[found] != numbers]
+        lost = np.flatnonzero(known[found] != numbers) if len(known) else np.arange(len(numbers))
         if len(lost):
-            raise card.error(f"{what} {lost[0]} is not there: correct the number, or add it", row)
+            line = int(lost[0]) if by_row else row
+            raise card.error(f"{what} {numbers[lost[0]]} is not there: correct the number, or add it", line)
         return np.asarray(found)
 
     def corners(self, faces: Faces) -> list[np.ndarray]:
@@ -393,37 +407,47 @@ def joined(parts: Iterable[Faces]) -> Faces:
     return Faces(once[:, 0], once[:, 1])
 
 
-def mesh_text(
-    mesh: DeckMesh,
-    elements: Mapping[str, np.ndarray],
-    surfaces: Mapping[str, Faces],
-    sets: Mapping[str, np.ndarray],
-) -> str:
-    """Return the cards of nodes and elements of a deck, with other sets, surfaces and sections.
+@dataclass(frozen=True, eq=False)
+class MeshCards:
+    """The mesh of a deck with other sets, surfaces and sections.
 
-    `elements`: name -> positions of elements, of which those of sections; `sets`: name -> positions of nodes.
+    Attributes:
+        elements: Name -> positions of elements.
+        sets: Name -> positions of nodes.
+        sections: The cards of its sections.
     """
-    used = np.unique(np.concatenate([block.nodes.ravel() for block in mesh.blocks]))
-    lines = ["*NODE"]
-    lines += [
-        f"{number}, {x!r}, {y!r}, {z!r}"
-        for number, (x, y, z) in zip(mesh.numbers[used].tolist(), mesh.points[used].tolist(), strict=True)
-    ]
-    for block in mesh.blocks:
-        lines.append(f"*ELEMENT, TYPE={block.element.name}")
-        rows = np.column_stack([block.numbers, mesh.numbers[block.nodes]])
-        lines += [line for row in rows.tolist() for line in _wrapped(row)]
-    for name, members in elements.items():
-        lines += [f"*ELSET, ELSET={name}", *_wrapped(mesh.element_numbers[members].tolist())]
-    for name, faces in surfaces.items():
-        lines.append(f"*SURFACE, NAME={name}, TYPE=ELEMENT")
-        numbers = mesh.element_numbers[faces.elements].tolist()
+
+    mesh: DeckMesh
+    elements: Mapping[str, np.ndarray]
+    surfaces: Mapping[str, Faces]
+    sets: Mapping[str, np.ndarray]
+    sections: Sequence[str]
+
+    def text(self) -> str:
+        """Return the cards of the mesh."""
+        used = np.unique(np.concatenate([block.nodes.ravel() for block in self.mesh.blocks]))
+        lines = ["*NODE"]
         lines += [
-            f"{number}, S{side + 1}" for number, side in zip(numbers, faces.sides.tolist(), strict=True)
+            f"{number}, {x!r}, {y!r}, {z!r}"
+            for number, (x, y, z) in zip(
+                self.mesh.numbers[used].tolist(), self.mesh.points[used].tolist(), strict=True
+            )
         ]
-    for name, nodes in sets.items():
-        lines += [f"*NSET, NSET={name}", *_wrapped(mesh.numbers[nodes].tolist())]
-    return "\n".join([*lines, ""])
+        for block in self.mesh.blocks:
+            lines.append(f"*ELEMENT, TYPE={block.element.name}")
+            rows = np.column_stack([block.numbers, self.mesh.numbers[block.nodes]])
+            lines += [line for row in rows.tolist() for line in _wrapped(row)]
+        for name, members in self.elements.items():
+            lines += [f"*ELSET, ELSET={name}", *_wrapped(self.mesh.element_numbers[members].tolist())]
+        for name, faces in self.surfaces.items():
+            lines.append(f"*SURFACE, NAME={name}, TYPE=ELEMENT")
+            numbers = self.mesh.element_numbers[faces.elements].tolist()
+            lines += [
+                f"{number}, S{side + 1}" for number, side in zip(numbers, faces.sides.tolist(), strict=True)
+            ]
+        for name, nodes in self.sets.items():
+            lines += [f"*NSET, NSET={name}", *_wrapped(self.mesh.numbers[nodes].tolist())]
+        return "\n".join([*lines, *self.sections, ""])
 
 
 def _wrapped(numbers: Sequence[int], most: int = 12) -> list[str]:

@@ -10,28 +10,7 @@ from mpi4py import MPI
 
 from fenics_contact import ClosureTable, Coulomb, ExponentialClosure, LinearClosure, Tie
 from fenics_contact.decks import Deck, DeckError, read_deck
-from fenics_contact.gallery import block
-from tests.decks.texts import STEEL, deck, mesh_cards
-
-#: Both blocks have no lateral contraction and are 1 mm high; meshes match.
-BLOCKS = (
-    mesh_cards({"LOW": block((0, 0, 0), (2, 2, 1), (2, 2, 1)), "UP": block((0, 0, 1), (2, 2, 2), (2, 2, 1))})
-    + STEEL.replace("0.3", "0.")
-    + "*SOLID SECTION, ELSET=LOW, MATERIAL=STEEL\n*SOLID SECTION, ELSET=UP, MATERIAL=STEEL\n"
-    "*SURFACE, NAME=FEET\nUP, S1\n*SURFACE, NAME=TABLE\nLOW, S2\n*SURFACE, NAME=NODES, TYPE=NODE\nUP_Z0\n"
-    "*BOUNDARY\nLOW_Z0, 1, 3\n"
-)
-PAIR = "*CONTACT PAIR, INTERACTION=DRY, TYPE=SURFACE TO SURFACE\nFEET, TABLE\n"
-GUIDED = "UP_X0, 1\nUP_Y0, 2\n"
-
-
-def law(behavior: str, friction: str = "") -> str:
-    text = "*SURFACE INTERACTION, NAME=DRY\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=" + behavior + "\n"
-    return text + (f"*FRICTION\n{friction}\n" if friction else "")
-
-
-def pressed(contact: str, more: str = "", step: str = "*DLOAD\nUP, P2, 42.\n") -> str:
-    return BLOCKS + GUIDED + contact + more + "*STEP\n*STATIC\n" + step + "*END STEP\n"
+from tests.decks.texts import BLOCKS, PAIR, deck, law, pressed
 
 
 def lowered(found: Deck) -> float:

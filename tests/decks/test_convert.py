@@ -14,11 +14,27 @@ from fenics_contact.decks import read_deck, write_scene_file
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import quadratic
-from tests.decks.test_contact import BLOCKS, PAIR, law, pressed
-from tests.decks.test_couplings import BAR as PLAIN_BAR
-from tests.decks.test_couplings import FIXED, KINEMATIC, REFERENCE, RIGID, SPREAD
-from tests.decks.test_linear import BAR, END, FREE_TO_CONTRACT, PULLED, SECTION, step
-from tests.decks.texts import STEEL, deck, mesh_cards
+from tests.decks.texts import (
+    BAR,
+    BLOCKS,
+    END,
+    FIXED,
+    FREE_TO_CONTRACT,
+    KINEMATIC,
+    PAIR,
+    PLAIN_BAR,
+    PULLED,
+    REFERENCE,
+    RIGID,
+    SECTION,
+    SPREAD,
+    STEEL,
+    deck,
+    law,
+    mesh_cards,
+    pressed,
+    step,
+)
 
 BOLT = (
     "*NODE\n900, 0., 0., 0.\n*SURFACE, NAME=CUT\n2, S4\n"

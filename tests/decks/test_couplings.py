@@ -11,22 +11,19 @@ from mpi4py import MPI
 from fenics_contact import RigidSurface, Roller, Spring, Support, TotalForce
 from fenics_contact.decks import DeckError, read_deck
 from fenics_contact.gallery import block, rectangle
-from tests.decks.texts import STEEL, deck, mesh_cards
-
-SECTION = "*SOLID SECTION, ELSET=BAR, MATERIAL=STEEL\n"
-BAR = mesh_cards({"BAR": block((0, 0, 0), (4, 1, 1), (4, 1, 1))}) + STEEL.replace("0.3", "0.") + SECTION
-FIXED = "*BOUNDARY\nBAR_X0, 1, 3\n"
-#: Two nodes beside the bar: they drive its end by displacements and rotations.
-REFERENCE = (
-    "*NODE, NSET=REF\n501, 4., 0.5, 0.5\n*NODE, NSET=ROT\n502, 4., 0.5, 0.5\n*SURFACE, NAME=TIP\n4, S4\n"
+from tests.decks.texts import (
+    FIXED,
+    KINEMATIC,
+    REFERENCE,
+    RIGID,
+    SECTION,
+    SPREAD,
+    STEEL,
+    deck,
+    mesh_cards,
+    step,
 )
-RIGID = "*RIGID BODY, NSET=BAR_X1, REF NODE=501, ROT NODE=502\n"
-KINEMATIC = "*COUPLING, REF NODE=501, SURFACE=TIP, CONSTRAINT NAME=C\n*KINEMATIC\n1, 6\n"
-SPREAD = "*COUPLING, REF NODE=501, SURFACE=TIP, CONSTRAINT NAME=C\n*DISTRIBUTING\n1, 6\n"
-
-
-def step(cards: str) -> str:
-    return f"*STEP\n*STATIC\n{cards}*END STEP\n"
+from tests.decks.texts import PLAIN_BAR as BAR
 
 
 @pytest.mark.parametrize("coupling", [RIGID, KINEMATIC])

@@ -13,17 +13,8 @@ from fenics_contact.decks import Deck, read_deck
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStress
 from fenics_contact.mesh import joined_cells, quadratic
-from tests.decks.texts import STEEL, deck, mesh_cards
+from tests.decks.texts import BAR, END, FREE_TO_CONTRACT, PULLED, SECTION, STEEL, deck, mesh_cards, step
 from tests.linear.mixed_cells import named_sides
-
-SECTION = "*SOLID SECTION, ELSET=BAR, MATERIAL=STEEL\n"
-#: A corner, a line and a side hold a bar so that it may contract.
-FREE_TO_CONTRACT = "*BOUNDARY\nBAR_X0, 1\nBAR_Y0, 2\nBAR_Z0, 3\n"
-BAR = mesh_cards({"BAR": block((0, 0, 0), (3, 1, 1), (3, 2, 1))}) + STEEL + SECTION
-
-
-def step(cards: str, more: str = "") -> str:
-    return f"*STEP{more}\n*STATIC\n{cards}*END STEP\n"
 
 
 def displacement(found: Deck, body: str = "BAR", number: int = -1) -> np.ndarray:
@@ -34,10 +25,6 @@ def stretched(points: np.ndarray, stress: float) -> np.ndarray:
     """Return the displacement of a bar under tension along x."""
     strain = stress / 210000.0
     return points * [strain, -0.3 * strain, -0.3 * strain][: points.shape[1]]
-
-
-PULLED = "*DLOAD\nEND, P4, -100.\n"
-END = "*ELSET, ELSET=END\n5, 6\n"
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fenics_contact import BodyMesh
+from fenics_contact.gallery import block
 from fenics_contact.mesh.collapsed import SHAPES, by_shape
 
 #: Name of the elements of each type of cells.
@@ -63,3 +64,45 @@ def deck(folder: Path, text: str, name: str = "model.inp") -> Path:
     path = folder / name
     path.write_text(text)
     return path
+
+
+SECTION = "*SOLID SECTION, ELSET=BAR, MATERIAL=STEEL\n"
+#: A corner, a line and a side hold a bar so that it may contract.
+FREE_TO_CONTRACT = "*BOUNDARY\nBAR_X0, 1\nBAR_Y0, 2\nBAR_Z0, 3\n"
+BAR = mesh_cards({"BAR": block((0, 0, 0), (3, 1, 1), (3, 2, 1))}) + STEEL + SECTION
+
+
+def step(cards: str, more: str = "") -> str:
+    return f"*STEP{more}\n*STATIC\n{cards}*END STEP\n"
+
+
+PULLED = "*DLOAD\nEND, P4, -100.\n"
+END = "*ELSET, ELSET=END\n5, 6\n"
+PLAIN_BAR = mesh_cards({"BAR": block((0, 0, 0), (4, 1, 1), (4, 1, 1))}) + STEEL.replace("0.3", "0.") + SECTION
+FIXED = "*BOUNDARY\nBAR_X0, 1, 3\n"
+#: Two nodes beside the bar: they drive its end by displacements and rotations.
+REFERENCE = (
+    "*NODE, NSET=REF\n501, 4., 0.5, 0.5\n*NODE, NSET=ROT\n502, 4., 0.5, 0.5\n*SURFACE, NAME=TIP\n4, S4\n"
+)
+RIGID = "*RIGID BODY, NSET=BAR_X1, REF NODE=501, ROT NODE=502\n"
+KINEMATIC = "*COUPLING, REF NODE=501, SURFACE=TIP, CONSTRAINT NAME=C\n*KINEMATIC\n1, 6\n"
+SPREAD = "*COUPLING, REF NODE=501, SURFACE=TIP, CONSTRAINT NAME=C\n*DISTRIBUTING\n1, 6\n"
+#: Both blocks have no lateral contraction and are 1 mm high; meshes match.
+BLOCKS = (
+    mesh_cards({"LOW": block((0, 0, 0), (2, 2, 1), (2, 2, 1)), "UP": block((0, 0, 1), (2, 2, 2), (2, 2, 1))})
+    + STEEL.replace("0.3", "0.")
+    + "*SOLID SECTION, ELSET=LOW, MATERIAL=STEEL\n*SOLID SECTION, ELSET=UP, MATERIAL=STEEL\n"
+    "*SURFACE, NAME=FEET\nUP, S1\n*SURFACE, NAME=TABLE\nLOW, S2\n*SURFACE, NAME=NODES, TYPE=NODE\nUP_Z0\n"
+    "*BOUNDARY\nLOW_Z0, 1, 3\n"
+)
+PAIR = "*CONTACT PAIR, INTERACTION=DRY, TYPE=SURFACE TO SURFACE\nFEET, TABLE\n"
+GUIDED = "UP_X0, 1\nUP_Y0, 2\n"
+
+
+def law(behavior: str, friction: str = "") -> str:
+    text = "*SURFACE INTERACTION, NAME=DRY\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=" + behavior + "\n"
+    return text + (f"*FRICTION\n{friction}\n" if friction else "")
+
+
+def pressed(contact: str, more: str = "", step: str = "*DLOAD\nUP, P2, 42.\n") -> str:
+    return BLOCKS + GUIDED + contact + more + "*STEP\n*STATIC\n" + step + "*END STEP\n"
