@@ -112,6 +112,7 @@ def _write(file: SceneFile, state: State, accurate: AccurateResult | None = None
         StepTable(file.folder / "steps.csv", file.comm).add(state, file.title)
         if file.scene.contacts:
             write_contact_table(state, file.folder / "contact.csv")
+    file.write_tables(state)
     known = state.known_errors is not None
     write_result(state, file.folder, more=_origin(file), errors=known, accuracy=accurate)
 
@@ -157,6 +158,7 @@ def _through_steps(console: Console, file: SceneFile, resume: bool | None) -> di
             with _keeping_last(console, file, keep_last):
                 state = sequence.advance(step)
             keep(state, number, number if step.time is None else step.time, step.name)
+            file.write_tables(state, number)
             rows.append(step_row(number, step.name, state))
             if number in chosen:
                 drawn[f"{number}: {step.name}"] = state

@@ -438,6 +438,9 @@ class SceneFile:
         """What the plan says besides, none of a scene file."""
         return ()
 
+    def write_tables(self, state: State, step: int = 0) -> None:
+        """Write the tables that a deck asks for; a scene file has others, see `output`. Collective."""
+
     @cached_property
     def _complete(self) -> Document:
         """The document with the fields of its files."""

@@ -1,7 +1,8 @@
 """Decks of CalculiX and Abaqus, read as scenes with their load steps."""
 
 from fenics_contact.decks.convert import write_scene_file
-from fenics_contact.decks.deck import Deck, Print, read_deck
+from fenics_contact.decks.deck import Deck, read_deck
+from fenics_contact.decks.tables import Print, PrintTable
 from fenics_contact.readers.deck_cards import DeckError, Origin
 
-__all__ = ["Deck", "DeckError", "Origin", "Print", "read_deck", "write_scene_file"]
+__all__ = ["Deck", "DeckError", "Origin", "Print", "PrintTable", "read_deck", "write_scene_file"]

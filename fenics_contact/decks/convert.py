@@ -105,6 +105,8 @@ class _Writer:
                 table["part"] = name
             if body.axisymmetric:
                 table["axisymmetric"] = True
+            if body.integration != "full":
+                table["integration"] = body.integration
             bodies[name] = table
         document: dict[str, Any] = {
             "title": Path(deck.name).stem,

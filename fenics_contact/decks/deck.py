@@ -32,6 +32,7 @@ from fenics_contact.decks.couplings import (
 from fenics_contact.decks.history import Moment
 from fenics_contact.decks.holding import Holding
 from fenics_contact.decks.model import Model
+from fenics_contact.decks.tables import Print, PrintTable, tables_of
 from fenics_contact.decks.vocabulary import KNOWN, NOT_YET, PARAMETERS, PROCEDURES, WITHOUT_EFFECT
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import made_once
@@ -42,27 +43,6 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from fenics_contact.results.state import State
-
-
-@displayed
-@dataclass(frozen=True)
-class Print:
-    """Results that a deck asks for.
-
-    Attributes:
-        step: Number of its load step, from 0.
-        card: "NODE PRINT", "EL PRINT", "CONTACT PRINT", "NODE FILE", ...
-        where: Set of nodes or elements, or surface; "" for all.
-        variables: "U", "RF", "S", ...
-        totals: Whether sums over the set are asked for: "", "YES" or "ONLY".
-    """
-
-    step: int
-    card: str
-    where: str
-    variables: tuple[str, ...]
-    totals: str
-    origin: Origin
 
 
 @displayed
@@ -145,6 +125,18 @@ class Deck:
         sequence.finish()
         last = [k for k, number in enumerate(self.step_of) if number not in self.step_of[k + 1 :]]
         return [states[k] for k in last]
+
+    def tables(self, state: State, step: int = 0) -> list[PrintTable]:
+        """Return the tables that the deck prints of a step. Collective.
+
+        Displacements (U) of nodes, forces of supports on them (RF), and mean stresses (S) of elements; with
+        TOTALS a last row, of number 0, has the sums.
+
+        Args:
+            state: The state at the end of the step.
+            step: Number of the deck's step, from 0.
+        """
+        return tables_of(self, state, step)
 
 
 def read_deck(path: str | Path, comm: MPI.Comm | None = None) -> Deck:
@@ -238,7 +230,7 @@ class _Builder:
             tuple(model.notes),
             model.thickness,
             {name: np.where(at < 0, 0, mesh.numbers[at]) for name, at in model.parts.nodes.items()},
-            {part.name: mesh.element_numbers[part.elements] for part in model.parts_of_mesh},
+            {part.name: mesh.element_numbers[model.in_cell_order(part)] for part in model.parts_of_mesh},
             {name: np.sort(mesh.numbers[members]) for name, members in mesh.node_sets.items()},
             {name: np.sort(mesh.element_numbers[members]) for name, members in mesh.element_sets.items()},
             model.mesh_cards(),

@@ -14,10 +14,13 @@ from fenics_contact._scene_file.reading import SceneFile
 from fenics_contact._scene_file.source import Source
 from fenics_contact._scene_file.validation import validated
 from fenics_contact.decks.deck import Deck, read_deck
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.decks.tables import write_tables
+from fenics_contact.errors import InvalidInputError, together
 
 if TYPE_CHECKING:
     from mpi4py import MPI
+
+    from fenics_contact.results.state import State
 
 #: Tables of a scene file that a deck does not have; what it has are those of how it is solved and written.
 OWN = ("meshes", "materials", "bodies", "supports", "loads", "contacts", "ties", "steps", "design")
@@ -47,6 +50,16 @@ class DeckFile(SceneFile):
     def notes(self) -> Sequence[str]:
         """What is done otherwise than the deck says, and known cards without effect."""
         return self.deck.notes
+
+    def write_tables(self, state: State, step: int = 0) -> None:
+        """Write the tables that the deck prints at the end of one of its steps. Collective."""
+        numbers = self.deck.step_of
+        if step + 1 < len(numbers) and numbers[step + 1] == numbers[step]:
+            return  # a part of a step
+        tables = self.deck.tables(state, numbers[step])
+        with together(self.comm):
+            if self.comm.rank == 0 and tables:
+                write_tables(tables, self.folder / "prints" / f"step_{numbers[step] + 1}")
 
     @cached_property
     def _built(self) -> tuple[Scene, dict[str, Shaped]]:

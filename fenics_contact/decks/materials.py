@@ -180,8 +180,6 @@ def _isotropic(parts: Mapping[str, Card], of: Conditions) -> Material:
     young, poisson = _row(parts["ELASTIC"], 2, of, "Young's modulus and Poisson's ratio")
     alpha = _expansion(parts, of, 1)
     if "PLASTIC" in parts:
-        if alpha is not None:
-            raise parts["EXPANSION"].error("an expansion beside *PLASTIC has no counterpart: leave it out")
         return _plastic(parts["PLASTIC"], young, poisson, of)
     expansion = None if alpha is None else alpha[0]
     if of.large:

@@ -21,13 +21,15 @@ from fenics_contact.decks.couplings import (
 )
 from fenics_contact.decks.history import History, read_history
 from fenics_contact.decks.materials import Conditions, build_material, read_materials
+from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.readers.deck_bodies import (
-    integration_of,
+    Component,
     Exterior,
     Parts,
     Section,
     build_bodies,
     components,
+    integration_of,
     read_sections,
     regions_of,
 )
@@ -134,6 +136,11 @@ class Model:
             f"deck '{self.name}'",
         )
 
+    def in_cell_order(self, part: Component) -> np.ndarray:
+        """Return the elements of a body in the order of its cells: type by type, by their names."""
+        kinds = np.array([block.element.cell for block in self.mesh.blocks])[self.mesh.block_of]
+        return part.elements[np.argsort(kinds[part.elements], kind="stable")]
+
     def mesh_cards(self) -> MeshCards:
         """Return the mesh with everything that is named for the scene."""
         sections = {s.name: self.mesh.element_sets[s.name] for s in self.sections}
@@ -160,6 +167,7 @@ class Model:
             given = {}
             for region, section in regions_of(self.sections, part).items():
                 given[region] = self._material(section, of)
+                self._note_units(section.card, given[region], mesh)
             material = given if len(given) > 1 else next(iter(given.values()))
             integration = integration_of(self.mesh, part, self.note)
             revolved = self.kind == "axisymmetric"
@@ -179,6 +187,28 @@ class Model:
         cards = self.materials[section.material]
         self.origins["material", section.material] = cards.card.origin
         return build_material(cards, self.axes.get(section.orientation), of)
+
+    def _note_units(
+        self, card: Card, material: Any, mesh: BodyMesh, gigapascals: tuple[float, float] = (40.0, 420.0)
+    ) -> None:
+        """Report a Young's modulus that looks like one in other units than the lengths.
+
+        `gigapascals`: the range of metals, in which plastics and rubber in N/mm² hardly are.
+        """
+        young, size = getattr(material, "young_modulus", 0.0), float(np.ptp(mesh.points, axis=0).max())
+        low, high = gigapascals
+        if low <= young <= high and size >= 50.0:
+            self.note(
+                card,
+                f"odd units? a Young's modulus of {young:g} is that of a metal in GPa, the body is {size:.4g}"
+                f" long: with lengths in mm and forces in N it would be {1e3 * young:g}",
+            )
+        elif low * 1e9 <= young <= high * 1e9 and size >= 50.0:
+            self.note(
+                card,
+                f"odd units? a Young's modulus of {young:g} is that of a metal in Pa, the body is {size:.4g} "
+                "long: with it lengths are in metres",
+            )
 
     def _heated(self) -> bool:
         """Return whether the temperature of any node changes."""

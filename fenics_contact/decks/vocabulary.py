@@ -31,6 +31,7 @@ WITHOUT_EFFECT = {
     "ENERGYPRINT": "output",
     "ELOUTPUT": "output",
     "SECTIONPRINT": "output",
+    "FACEPRINT": "output",
     "MONITOR": "output",
     "TIMEPOINTS": "times of output",
     "RESTART": "output",

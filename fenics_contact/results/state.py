@@ -15,6 +15,7 @@ from fenics_contact._base.costs import Costs, costs_of
 from fenics_contact._base.display import counted, displayed, in_lines
 from fenics_contact._base.libraries import MPI
 from fenics_contact._fem.forms import temperature_of
+from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.pairs import ContactPair
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import RigidSurface
@@ -457,6 +458,17 @@ class State(ABC):
             >>> state.reactions()[0].torque((0, 0, 0), (0, 0, 1))  # doctest: +SKIP
         """
         return support_reactions(self.torn, self._nodal_forces, about)
+
+    @collectively("State.nodal_reactions", comm_of)
+    def nodal_reactions(self, body: str) -> np.ndarray:
+        """Return the force of all supports together on each node of a body, on every rank. Collective.
+
+        Returns:
+            Shape (n_nodes, dim), zero on free components, [force].
+        """
+        numbers = NodeNumbers.of(self.scene)
+        first = numbers.first_of(body)
+        return self._nodal_forces.reaction[first : first + self.scene.bodies[body].mesh.n_nodes]
 
     @collectively("State.foundations", comm_of)
     def foundations(self, about: GivenVector | np.ndarray | None = None) -> Resultants:

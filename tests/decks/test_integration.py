@@ -54,8 +54,9 @@ def test_linear_elements_with_a_letter_are_noted(tmp_path: Path) -> None:
 
 def test_an_expansion_of_plastic_material_is_refused(tmp_path: Path) -> None:
     plastic = STEEL + "*PLASTIC\n300., 0.\n*EXPANSION\n1.E-5\n"
-    with pytest.raises(DeckError, match="an expansion beside"):
-        read_deck(deck(tmp_path, mesh_cards({"BAR": CUBE}) + plastic + SECTION + NOTHING))
+    heated = "*STEP\n*STATIC\n*TEMPERATURE\nBAR_X1, 5.\n*END STEP\n"
+    with pytest.raises(DeckError, match=r"thermal expansion with \*PLASTIC has no counterpart"):
+        read_deck(deck(tmp_path, mesh_cards({"BAR": CUBE}) + plastic + SECTION + heated))
 
 
 def test_a_delay_shifts_an_amplitude(tmp_path: Path) -> None:

@@ -177,6 +177,17 @@ def test_an_amplitude_cuts_a_step_where_it_turns(tmp_path: Path) -> None:
     assert len(found.solve(MPI.COMM_SELF)) == 1, "one state for a step of the deck"
 
 
+@pytest.mark.parametrize(("young", "words"), [("210.", "in GPa"), ("2.1E11", "in Pa"), ("2.1E5", "")])
+def test_odd_units_are_reported(young: str, words: str, tmp_path: Path) -> None:
+    text = mesh_cards({"BAR": block((0, 0, 0), (1000, 100, 100), (2, 1, 1))}) + STEEL.replace(
+        "210000.", young
+    )
+    found = read_deck(deck(tmp_path, text + SECTION + "*BOUNDARY\nBAR_X0, 1, 3\n" + step("")))
+    odd = [note for note in found.notes if "odd units?" in note]
+    assert len(odd) == bool(words)
+    assert all(words in note and "the body is 1000 long" in note for note in odd)
+
+
 def test_an_amplitude_may_start_later(tmp_path: Path) -> None:
     text = (
         BAR
@@ -218,3 +229,45 @@ def test_bodies_are_elements_that_share_nodes_and_regions_are_sections(tmp_path:
     np.testing.assert_array_equal(found.node_numbers["UP"], 13 + np.arange(12))
     np.testing.assert_array_equal(found.element_numbers["UP"], [3, 4])
     assert str(found.source("body", "UP")).startswith("*SOLID SECTION, model.inp line")
+
+
+PRINTS = (
+    "*NODE PRINT, NSET=BAR_X1, TOTALS=YES\nU\n*NODE PRINT, NSET=BAR_X0, TOTALS=ONLY\nRF\n"
+    "*EL PRINT, ELSET=END\nS, E\n*NODE FILE\nU\n"
+)
+
+
+def test_a_deck_prints_what_it_asks_for(tmp_path: Path) -> None:
+    found = read_deck(deck(tmp_path, BAR + END + FREE_TO_CONTRACT + step(PULLED + PRINTS)))
+    (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-12)
+    moved, forces, stress = found.tables(state)
+    assert [table.name for table in (moved, forces, stress)] == [
+        "NODE PRINT U BAR_X1",
+        "NODE PRINT RF BAR_X0",
+        "EL PRINT S END",
+    ]
+    assert moved.columns == ("node", "ux", "uy", "uz")
+    np.testing.assert_array_equal(moved.rows[:-1, 0], found.node_sets["BAR_X1"])
+    np.testing.assert_allclose(moved.rows[:-1, 1], 300.0 / 210000.0)
+    assert moved.rows[-1, 1] == pytest.approx(6 * 300.0 / 210000.0)
+    np.testing.assert_allclose(forces.rows, [[0.0, -100.0, 0.0, 0.0]], atol=1e-8)
+    np.testing.assert_allclose(stress.rows, [[5, 100, 0, 0, 0, 0, 0], [6, 100, 0, 0, 0, 0, 0]], atol=1e-8)
+    assert [each.card for each in found.prints] == ["NODE PRINT", "NODE PRINT", "EL PRINT", "NODE FILE"]
+
+
+def test_tables_of_elements_of_several_types_have_their_numbers(tmp_path: Path) -> None:
+    """A hexahedron between two others of wedges: the numbers of the deck go with the cells that have them."""
+    nodes = "*NODE\n" + "".join(
+        f"{1 + k + 4 * i}, {i}., {y}., {z}.\n"
+        for i in range(3)
+        for k, (y, z) in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)])
+    )
+    elements = "*ELEMENT, TYPE=C3D6, ELSET=BAR\n7, 5, 6, 7, 9, 10, 11\n8, 5, 7, 8, 9, 11, 12\n"
+    elements += "*ELEMENT, TYPE=C3D8, ELSET=BAR\n3, 1, 5, 6, 2, 4, 8, 7, 3\n"
+    text = nodes + elements + STEEL + SECTION + "*BOUNDARY\n1, 1, 3\n2, 1\n3, 1\n4, 1, 2\n"
+    found = read_deck(deck(tmp_path, text + step("*CLOAD\n9, 1, 1.\n*EL PRINT, ELSET=BAR\nS\n")))
+    mesh = found.scene.bodies["BAR"].mesh
+    middles = dict(
+        zip(found.element_numbers["BAR"].tolist(), mesh.points[mesh.cells].mean(axis=1)[:, 0], strict=True)
+    )
+    assert middles[3] < 1.0 < min(middles[7], middles[8])
