@@ -50,7 +50,8 @@ class Element:
     @cached_property
     def face_nodes(self) -> Sequence[Sequence[int]]:
         """Positions of all nodes of its faces: corners, then those in the middle of edges."""
-        edges, inner = _EDGES[self.shape], range(_CORNERS[self.shape], self.count)
+        corners = 1 + max(max(face) for face in self.faces)
+        edges, inner = _EDGES[self.shape], range(corners, self.count)
         return [
             [*face, *(n for n, edge in zip(inner, edges, strict=False) if set(edge) <= set(face))]
             for face in self.faces
@@ -89,7 +90,6 @@ _EDGES: dict[str, Sequence[tuple[int, int]]] = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
     "quadrilateral": ((0, 1), (1, 2), (2, 3), (3, 0)),
 }  # fmt: skip
-_CORNERS = {"tetrahedron": 4, "hexahedron": 8, "wedge": 6, "triangle": 3, "quadrilateral": 4}
 _TYPE = re.compile(r"(C3D|CPS|CPE|CAX)(\d+)([RIHMT]*)")
 
 

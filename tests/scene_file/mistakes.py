@@ -124,8 +124,8 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         'kind = "traction"\n',
         "",
         "scene.toml, line 31: loads.0 must have 'kind', one of 'traction', 'total_force', 'total_moment', "
-        "'pressure', 'body_force', 'gravity', 'centrifugal', 'point_mass', 'thermal', got only body, "
-        "surface, value",
+        "'pressure', 'body_force', 'point_force', 'gravity', 'centrifugal', 'point_mass', 'thermal', got "
+        "only body, surface, value",
     ),
     "a formula is no arithmetic": (
         "value = [10.0, 0.0, -100.0]",
