@@ -34,7 +34,8 @@ class Rates:
         workspace: Of MUMPS and PETSc for each entry of a matrix that is condensed, for each of the condensed
             one, and relative to the factors of both.
         modes: Of each row of one that is stored compactly.
-        holes: What workspaces of matrices that are condensed leave in holes for a while, for each entry.
+        holes: What workspaces of condensed matrices leave in holes for a while, for each entry of a matrix,
+            and for each of the condensed one at most.
         until: Subdomains after which holes return to the system.
         factored: Of each unknown of a sparse factor in addition to its entries.
         inverting: Of each entry of a condensed matrix while it is inverted.
@@ -49,7 +50,7 @@ class Rates:
     whole: int = 8
     workspace: tuple[float, float, float] = (27.0, 24.0, 0.5)
     modes: float = 32.0
-    holes: float = 34.0
+    holes: tuple[float, float] = (34.0, 5.5)
     until: int = 8
     factored: float = 300.0
     inverting: float = 18.0
@@ -252,7 +253,7 @@ def _factors(
 ) -> tuple[float, float]:
     """Return the bytes of factors of some subdomains, and of the workspaces while the last are made."""
     _, first, members = np.unique(parts.kind[mine], return_index=True, return_counts=True)
-    held, largest, during, entries = 0.0, 0.0, list[float](), list[float]()
+    held, largest, during, holes = 0.0, 0.0, list[float](), list[float]()
     by_matrix, by_condensed, by_factor = rates.workspace
     for index, count in zip(mine[first], members, strict=True):
         n, b, couplings = int(parts.size[index]), int(parts.interface[index]), parts.couplings[index]
@@ -267,10 +268,10 @@ def _factors(
             held += whole * 6.0 * b**2
         largest = max(largest, rates.inverting * b**2)
         during.append(by_matrix * couplings * n + by_condensed * b**2 + by_factor * factor_bytes(n, dim))
-        entries.append(couplings * n)
+        holes.append(min(rates.holes[0] * couplings * n, rates.holes[1] * b**2))
     workspaces = largest + max(during, default=0.0)
     if compact:  # elsewhere what stays fills the holes
-        workspaces += rates.holes * min(rates.until, len(entries)) * float(np.mean(entries))
+        workspaces += min(rates.until, len(holes)) * float(np.mean(holes))
     return held, workspaces
 
 
