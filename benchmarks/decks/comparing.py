@@ -17,7 +17,8 @@ from fenics_contact.results.state import State
 
 #: Order of components of the stress in .dat files.
 PRINTED_STRESS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-#: CalculiX replaces a body of revolution by a sector of two degrees.
+#: CalculiX replaces a body of revolution by a sector of two degrees, whose forces .dat files have; those in
+#: .frd files are of the whole revolution.
 SECTORS = 180.0
 
 
@@ -73,14 +74,18 @@ def _moved(deck: Deck, state: State, blocks: Sequence[Block]) -> Pairs:
         own = state.gather_displacement(body)
         for block in blocks:
             rows, nodes = _places(deck, body, block)
-            pairs.append((own[nodes], block.values[rows][:, : own.shape[1]]))
+            # Nodes of a section are there twice, and either program may keep the number on another side.
+            cuts = state.scene.bodies[body].mesh.cuts.values()
+            whole = (
+                ~np.isin(nodes, np.concatenate([cut.pairs.ravel() for cut in cuts])) if cuts else slice(None)
+            )
+            pairs.append((own[nodes][whole], block.values[rows][:, : own.shape[1]][whole]))
     return pairs
 
 
 def _held(deck: Deck, state: State, blocks: Sequence[Block]) -> Pairs:
     """Return forces on nodes along the components that supports hold, own and CalculiX's."""
     scene, forces = state.scene, state._nodal_forces
-    factor = np.array(1.0 / SECTORS if scene.axisymmetric else deck.thickness)
     heated = any(isinstance(load, ThermalStrain) for load in scene.loads)
     tearing = state.torn.decomposition.tearing
     pairs = []
@@ -102,16 +107,15 @@ def _held(deck: Deck, state: State, blocks: Sequence[Block]) -> Pairs:
                 rows, nodes = _places(deck, body, block)
                 chosen = held[nodes]
                 theirs = block.values[rows][:, : own.shape[1]]
-                # On the axis CalculiX prints the force of the whole revolution.
-                scale = np.where(scene.bodies[body].on_axis[nodes], 1.0, factor)[:, None]
-                pairs.append(((scale * own[nodes])[chosen], theirs[chosen]))
+                factor = 1.0 / SECTORS if scene.axisymmetric and block.place else deck.thickness
+                pairs.append((factor * own[nodes][chosen], theirs[chosen]))
     return pairs
 
 
 def _largest_force(deck: Deck, state: State) -> float:
-    factor = 1.0 / SECTORS if state.scene.axisymmetric else deck.thickness
     forces = state._nodal_forces
-    return factor * float(max(np.abs(forces.load).max(), np.abs(forces.reaction).max()))
+    every = forces.load, forces.reaction, forces.contact, forces.tie
+    return deck.thickness * max(float(np.abs(each).max(initial=0.0)) for each in every)
 
 
 def _stressed(deck: Deck, state: State, blocks: Sequence[Block]) -> Pairs:

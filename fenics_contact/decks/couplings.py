@@ -109,12 +109,17 @@ def rigid_surface(
 
 @dataclass(frozen=True, eq=False)
 class Bolt:
-    """A pre-tension section: faces through a body, and the node that draws them together."""
+    """A pre-tension section: faces through a body, and the node that draws them together.
+
+    Attributes:
+        sense: −1 where its normal points into the elements of the faces: what the node has presses apart.
+    """
 
     card: Card
     name: str
     faces: Faces
     node: int
+    sense: float
 
 
 def read_bolts(cards: Sequence[Card], mesh: DeckMesh) -> list[Bolt]:
@@ -126,8 +131,21 @@ def read_bolts(cards: Sequence[Card], mesh: DeckMesh) -> list[Bolt]:
             given = mesh.surface_named(name, card)
             if given.faces is None:
                 raise card.error(f"needs a surface of faces, {name!r} has nodes: give TYPE=ELEMENT")
-            found.append(Bolt(card, name, given.faces, int(mesh.nodes_named(card.required("NODE"), card)[0])))
+            node = int(mesh.nodes_named(card.required("NODE"), card)[0])
+            found.append(Bolt(card, name, given.faces, node, _sense(card, mesh, given.faces)))
     return found
+
+
+def _sense(card: Card, mesh: DeckMesh, faces: Faces) -> float:
+    """Return whether the normal of a section, if it is given, points out of the elements of its faces."""
+    if not card.lines:
+        return 1.0
+    outward = np.zeros(3)
+    for rows, element, side, _ in mesh.parts_of(faces):
+        block = mesh.blocks[mesh.block_of[faces.elements[rows[0]]]]
+        nodes = mesh.points[block.nodes[faces.elements[rows] - block.first]]
+        outward += (nodes[:, list(element.faces[side])].mean(axis=1) - nodes.mean(axis=1)).sum(axis=0)
+    return -1.0 if np.array([*card.floats(0), 0.0, 0.0, 0.0])[:3] @ outward < 0.0 else 1.0
 
 
 def drawn(bolt: Bolt, held: Preload, moment: Moment, before: Moment | None) -> Preload | None:
@@ -137,8 +155,9 @@ def drawn(bolt: Bolt, held: Preload, moment: Moment, before: Moment | None) -> P
         same = before is not None and before.held[bolt.node, 0] == shortening
         if same or moment.fixed[bolt.node, 0]:
             return None
-        return Preload(held.body, held.section, shortening=float(shortening), name=held.name)
-    return Preload(held.body, held.section, force=float(force), name=held.name)
+        drawn = bolt.sense * float(shortening)
+        return Preload(held.body, held.section, shortening=drawn, name=held.name)
+    return Preload(held.body, held.section, force=bolt.sense * float(force), name=held.name)
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,6 +58,8 @@ def _axes(card: Card | None) -> tuple[tuple[float, float, float], ...]:
             f"SYSTEM={card.name_of('SYSTEM')} is not read for materials that are not isotropic, whose "
             "axes are the same everywhere: give rectangular axes, or sections of few elements"
         )
+    if card.name_of("DEFINITION") not in ("", "COORDINATES"):
+        raise card.error("DEFINITION must be COORDINATES: give axes by the coordinates of two points")
     numbers = card.floats(0)
     if len(numbers) < 6 or len(card.lines) > 1:
         raise card.error("needs one line with two points of three coordinates each: correct it", 0)

@@ -22,6 +22,7 @@ from fenics_contact.decks.couplings import (
 from fenics_contact.decks.history import History, read_history
 from fenics_contact.decks.materials import Conditions, build_material, read_materials
 from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.serendipity_cells import completed
 from fenics_contact.readers.deck_bodies import (
     Component,
     Exterior,
@@ -135,6 +136,17 @@ class Model:
             self.node_sets,
             f"deck '{self.name}'",
         )
+        meshes = dict(self.parts.meshes)
+        for bolt in self.bolts:
+            for part in self.parts_of_mesh:
+                if (
+                    np.isin(bolt.faces.elements, part.elements).any()
+                    and meshes[part.name].centres is not None
+                ):
+                    meshes[part.name] = completed(meshes[part.name])
+                    words = f"body {part.name} is cut, its cells have 27 or 9 nodes and full integration"
+                    self.note(bolt.card, words)
+        self.parts = replace(self.parts, meshes=meshes)
 
     def in_cell_order(self, part: Component) -> np.ndarray:
         """Return the elements of a body in the order of its cells: type by type, by their names."""
@@ -170,6 +182,8 @@ class Model:
                 self._note_units(section.card, given[region], mesh)
             material = given if len(given) > 1 else next(iter(given.values()))
             integration = integration_of(self.mesh, part, self.note)
+            if mesh.centres is None:
+                integration = "full"
             revolved = self.kind == "axisymmetric"
             bodies[part.name] = Body(mesh, material, axisymmetric=revolved, integration=integration)
             self.origins["body", part.name] = self.sections[part.sections[0]].card.origin

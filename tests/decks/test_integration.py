@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from fenics_contact.decks import DeckError, read_deck
 from fenics_contact.gallery import block
+from fenics_contact.mesh import quadratic, serendipity
 from tests.decks.texts import STEEL, deck, mesh_cards
 from tests.linear.columns import COLUMN
 
@@ -59,6 +60,22 @@ def test_an_expansion_of_plastic_material_is_refused(tmp_path: Path) -> None:
         read_deck(deck(tmp_path, mesh_cards({"BAR": CUBE}) + plastic + SECTION + heated))
 
 
+@pytest.mark.parametrize("normal", ["", "1., 0., 0.\n", "-1., 0., 0.\n"])
+def test_a_bolt_of_cells_with_centres_is_drawn(normal: str, tmp_path: Path) -> None:
+    mesh = serendipity(quadratic(block((0, 0, 0), (4, 1, 1), (4, 1, 1))))
+    text = mesh_cards({"BAR": mesh}, "C3D20R") + STEEL + SECTION
+    ends = "*BOUNDARY\nBAR_X0, 1\nBAR_X1, 1\nBAR_Y0, 2\nBAR_Z0, 3\n"
+    bolt = "*NODE\n9000, 2., 0.5, 0.5\n*SURFACE, NAME=CUT\n2, S4\n"
+    drawn = f"*PRE-TENSION SECTION, SURFACE=CUT, NODE=9000\n{normal}"
+    sense = -1.0 if normal.startswith("-") else 1.0  # S4 of the second element faces x, unless it is said
+    step = f"*STEP\n*STATIC\n*CLOAD\n9000, 1, {500 * sense}\n*END STEP\n"
+    found = read_deck(deck(tmp_path, text + bolt + ends + drawn + step))
+    assert any("BAR is cut" in note for note in found.notes)
+    state = found.solve(MPI.COMM_SELF, tolerance=1e-10)[-1]
+    assert state.preloads()["CUT"].force == pytest.approx(500.0, rel=1e-6)
+    np.testing.assert_allclose(state.gather_stress("BAR")[:, 0, 0], 500.0, rtol=1e-6)
+
+
 def test_a_delay_shifts_an_amplitude(tmp_path: Path) -> None:
     text = mesh_cards({"BAR": CUBE}) + STEEL + SECTION + "*BOUNDARY\nBAR_X0, 1, 3\n"
     rising = "*AMPLITUDE, NAME=A\n0., 0., 4., 8.\n*STEP\n*STATIC\n1., 3.\n"
@@ -74,3 +91,18 @@ def test_states_of_the_other_program_are_not_read(tmp_path: Path) -> None:
         read_deck(deck(tmp_path, text + "*RESTART, READ, STEP=1\n" + NOTHING))
     found = read_deck(deck(tmp_path, text + "*RESTART, WRITE, FREQUENCY=1\n" + NOTHING))
     assert any("RESTART" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("definition", ["COORDINATES", "NODES"])
+def test_axes_are_given_by_coordinates(definition: str, tmp_path: Path) -> None:
+    lines = "*MATERIAL, NAME=STEEL\n*ELASTIC, TYPE=ENGINEERING CONSTANTS\n"
+    steel = lines + "3e3, 2e3, 1e3, 0.1, 0.1, 0.1, 500., 500.\n500.,\n"
+    axes = f"*ORIENTATION, NAME=AXES, DEFINITION={definition}\n0., 1., 0., -1., 0., 0.\n"
+    section = "*SOLID SECTION, ELSET=BAR, MATERIAL=STEEL, ORIENTATION=AXES, OFFSET=0.\n"
+    held = "*BOUNDARY\nBAR_X0, 1, 3\n"
+    path = deck(tmp_path, mesh_cards({"BAR": CUBE}) + steel + axes + section + held + NOTHING)
+    if definition == "NODES":
+        with pytest.raises(DeckError, match="DEFINITION must be COORDINATES"):
+            read_deck(path)
+    else:
+        assert "0.0, 1.0, 0.0" in repr(read_deck(path).scene.bodies["BAR"].materials[0])
