@@ -139,6 +139,11 @@ class Holding:
     def name_surfaces(self) -> None:
         """Name the surfaces that nodes drive or load."""
         for driven in self.model.driven:
+            if {driven.node, driven.turning} & set(self.model.local_axes):
+                raise driven.card.error(
+                    "the node of a rigid surface must move along x, y and z, it has axes of its own by "
+                    "*TRANSFORM: leave it out of that set"
+                )
             name = driven.surface
             if name:
                 faces = self.model.faces_of(self.model.mesh.surface_named(name, driven.card))
@@ -203,6 +208,11 @@ class Holding:
                     "plane of symmetry, or the same component of two nodes of elements is equal; this one "
                     "is neither: use a tie, a rigid surface or a plane of symmetry", each.row,
                 )  # fmt: skip
+            if not same and any(node in self.model.local_axes for node in each.nodes):
+                raise each.card.error(
+                    "an equation between nodes with axes of their own, by *TRANSFORM, is along these and "
+                    "is not read: write it along x, y and z", each.row,
+                )  # fmt: skip
             for node in each.nodes:
                 self.model.node_sets[f"NODE {self.model.mesh.numbers[node]}"] = np.array([node])
 
@@ -218,8 +228,10 @@ class Holding:
                 if len(self.model.in_body(body, np.array([node]))[0])
             ]
             if len(set(each.nodes)) == 1:
-                normal = np.zeros(self.model.dim)
+                normal = np.zeros(3)
                 np.add.at(normal, list(each.components), each.factors)
+                axes = self.model.local_axes.get(each.nodes[0], np.eye(3))
+                normal = (normal @ axes)[: self.model.dim]
                 rollers.append(Roller(ends[0].body, names[0], 0.0, tuple(normal.tolist())))
             else:
                 stiffness = np.where(np.arange(self.model.dim) == each.components[0], np.inf, 0.0)

@@ -115,7 +115,26 @@ def test_equations_let_nodes_slide_and_move_alike(tmp_path: Path) -> None:
     assert moved[18][2] == pytest.approx(moved[20][2], abs=1e-10)
 
 
+def test_an_equation_of_a_node_with_axes_is_along_these(tmp_path: Path) -> None:
+    """Local components 1 and 2 are y and −x."""
+    turned = "*NSET, NSET=T\n17\n*TRANSFORM, NSET=T, TYPE=R\n0., 1., 0., -1., 0., 0.\n"
+    slide = "*EQUATION\n2\n17, 1, 3., 17, 2, 1.\n"
+    found = read_deck(deck(tmp_path, BAR + FIXED + turned + slide + step("*CLOAD\n18, 2, 5.\n")))
+    (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-10)
+    moved = dict(zip(found.node_numbers["BAR"].tolist(), state.gather_displacement("BAR"), strict=True))
+    assert abs(moved[17][1]) > 1e-8
+    assert 3 * moved[17][1] == pytest.approx(moved[17][0], abs=1e-12)
+
+
 WRONG = [
+    (
+        "*TRANSFORM, NSET=BAR_X1, TYPE=R\n0., 1., 0., -1., 0., 0.\n*EQUATION\n2\n17, 1, 1., 18, 1, -1.\n",
+        r"an equation between nodes with axes of their own",
+    ),
+    (
+        "*TRANSFORM, NSET=REF, TYPE=R\n0., 1., 0., -1., 0., 0.\n" + KINEMATIC,
+        r"the node of a rigid surface must move along x, y and z",
+    ),
     (
         RIGID.replace("NSET=BAR_X1", "NSET=FEW").replace("*RIGID", "*NSET, NSET=FEW\n17, 18\n*RIGID"),
         r"'FEW' must be faces on the boundary",
