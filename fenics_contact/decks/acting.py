@@ -194,8 +194,23 @@ class Acting:
             found.append(self._weight(weight, part, density))
         return found
 
+    def _check_direction(self, weight: Weight, numbers: np.ndarray) -> None:
+        """Reject directions that plane bodies and bodies of revolution do not have."""
+        if self.model.dim == 3:
+            return
+        revolved, spins = self.model.kind == "axisymmetric", weight.kind == "CENTRIF"
+        point, along = (numbers[:3], numbers[3:]) if spins else (np.zeros(3), numbers)
+        across = along[[0, 2]] if revolved else along[:2] if spins else along[2:]
+        if across.any() or (revolved and spins and point[0]):
+            needed = "the axis of revolution, y" if revolved else "z" if spins else "the plane"
+            raise weight.card.error(
+                f"{weight.kind} of these elements must be along {needed}, got {numbers.tolist()}: correct it",
+                weight.row,
+            )
+
     def _weight(self, weight: Weight, part: Component, density: float) -> BodyForce:
         numbers = np.array(weight.numbers)
+        self._check_direction(weight, numbers)
         if weight.kind == "GRAV":
             return gravity(part.name, density, (weight.value * numbers)[: self.model.dim].tolist())
         speed = float(np.sqrt(weight.value))

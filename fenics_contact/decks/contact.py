@@ -156,6 +156,9 @@ def build_pairs(
     `names`: name of a surface in the deck -> that in the meshes.
     """
     found: list[tuple[Sides, ContactPair | Tie]] = []
+    for both, (card, _) in given.items():
+        if both not in {(each.slave, each.master) for each in sides if not each.tied}:
+            raise card.error(f"there is no contact pair of {both[0]} on {both[1]}: correct the names")
     for each in sides:
         slave, master = names[each.slave], names[each.master]
         pairs = [

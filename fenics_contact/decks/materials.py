@@ -198,7 +198,8 @@ def _plastic(card: Card, young: float, poisson: float, of: Conditions) -> Materi
             "plane stress with plasticity has no counterpart: take solid or plane strain elements"
         )
     rows = np.array([[*card.floats(k), 0.0, 0.0, 0.0][:3] for k in range(len(card.lines))])
-    rows = rows[rows[:, 2] == rows[0, 2]] if len(rows) else np.zeros((0, 3))
+    if len(rows) and np.ptp(rows[:, 2]) > 0.0:
+        raise card.error("a yield stress that depends on the temperature is not read: give one temperature")
     kind = card.name_of("HARDENING") or "ISOTROPIC"
     if kind not in ("ISOTROPIC", "KINEMATIC") or not len(rows):
         raise card.error(

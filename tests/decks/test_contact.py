@@ -87,6 +87,11 @@ def test_friction_holds_up_to_its_bound(tmp_path: Path) -> None:
 
 
 WRONG = [
+    (
+        PAIR + "*CLEARANCE, SLAVE=TABLE, MASTER=FEET, VALUE=1.E-3\n",
+        "*CLEARANCE",
+        r"there is no contact pair of TABLE on FEET",
+    ),
     (PAIR.replace("DRY", "WET"), "*CONTACT", r"surface interaction 'WET' is not there; the deck has DRY"),
     (PAIR.replace("TABLE", "CHAIR"), "FEET, CHAIR", r"surface 'CHAIR' is not there"),
     (PAIR.replace("FEET, TABLE", "FEET"), "FEET\n", r"needs a slave and a master surface in each line"),

@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import PointForce, Pressure, Support, ThermalStrain
-from fenics_contact.decks import Deck, read_deck
+from fenics_contact.decks import Deck, DeckError, read_deck
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStress
 from fenics_contact.mesh import joined_cells, quadratic
@@ -271,3 +271,32 @@ def test_tables_of_elements_of_several_types_have_their_numbers(tmp_path: Path) 
         zip(found.element_numbers["BAR"].tolist(), mesh.points[mesh.cells].mean(axis=1)[:, 0], strict=True)
     )
     assert middles[3] < 1.0 < min(middles[7], middles[8])
+
+
+@pytest.mark.parametrize(
+    ("element", "load"),
+    [
+        ("CAX4", "CENTRIF, 1., 0., 0., 0., 1., 0., 0."),
+        ("CAX4", "CENTRIF, 1., 2., 0., 0., 0., 1., 0."),
+        ("CAX4", "GRAV, 1., 1., 0., 0."),
+        ("CPS4", "CENTRIF, 1., 0., 0., 0., 0., 1., 0."),
+        ("CPE4", "GRAV, 1., 0., 0., 1."),
+    ],
+)
+def test_loads_out_of_the_plane_are_refused(element: str, load: str, tmp_path: Path) -> None:
+    text = (
+        mesh_cards({"BAR": rectangle((1.0, 0.0), (2.0, 1.0), (1, 1))}, element)
+        + STEEL
+        + "*DENSITY\n1.\n"
+        + SECTION
+    )
+    with pytest.raises(
+        DeckError, match=r"(CENTRIF|GRAV) of these elements must be along (the axis|z|the plane)"
+    ):
+        read_deck(deck(tmp_path, text + "*BOUNDARY\nBAR_Y0, 1, 2\n" + step(f"*DLOAD\nBAR, {load}\n")))
+
+
+def test_a_yield_stress_by_temperature_is_refused(tmp_path: Path) -> None:
+    text = BAR.replace("0.3\n", "0.3\n*PLASTIC\n300., 0., 20.\n200., 0., 300.\n", 1) + FREE_TO_CONTRACT
+    with pytest.raises(DeckError, match=r"a yield stress that depends on the temperature is not read"):
+        read_deck(deck(tmp_path, text + step("")))
