@@ -593,7 +593,7 @@ def planes_of(scene: SceneParts) -> np.ndarray | None:
 
 def _plane(scene: SceneParts, support: AnySupport) -> np.ndarray | None:
     """Return the normal of the flat side that a roller holds across, if it is one of symmetry."""
-    if not isinstance(support, Roller) or callable(support.displacement):
+    if not isinstance(support, Roller) or callable(support.displacement) or callable(support.direction):
         return None
     mesh = scene.bodies[support.body].mesh
     normal = flat_normal(mesh, support.surface)

@@ -103,6 +103,14 @@ def test_nodes_of_a_ring_are_pushed_along_their_radii(tmp_path: Path) -> None:
     np.testing.assert_allclose(outer, exact, rtol=5e-3)
 
 
+def test_nodes_of_a_cylinder_turn_from_x_to_y(tmp_path: Path) -> None:
+    text = BAR + "*TRANSFORM, NSET=BAR_X1, TYPE=C\n0., 0., 0., 0., 0., 1.\n" + FIXED
+    found = read_deck(deck(tmp_path, text + step("*BOUNDARY\nBAR_X1, 1, 1\nBAR_X1, 2, 2, 0.01\n")))
+    (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-10)
+    moved = dict(zip(found.node_numbers["BAR"].tolist(), state.gather_displacement("BAR"), strict=True))
+    np.testing.assert_allclose(moved[17][:2], [0.0, 0.01], atol=1e-12)  # at y = 0
+
+
 def test_equations_let_nodes_slide_and_move_alike(tmp_path: Path) -> None:
     slide = "*EQUATION\n2\n17, 1, 1., 17, 2, 1.\n2\n18, 3, 1., 20, 3, -1.\n"
     found = read_deck(deck(tmp_path, BAR + FIXED + slide + step("*CLOAD\n17, 2, 5.\n20, 3, -4.\n")))

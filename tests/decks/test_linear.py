@@ -300,3 +300,20 @@ def test_a_yield_stress_by_temperature_is_refused(tmp_path: Path) -> None:
     text = BAR.replace("0.3\n", "0.3\n*PLASTIC\n300., 0., 20.\n200., 0., 300.\n", 1) + FREE_TO_CONTRACT
     with pytest.raises(DeckError, match=r"a yield stress that depends on the temperature is not read"):
         read_deck(deck(tmp_path, text + step("")))
+
+
+def test_forces_of_many_sizes_on_a_plate_are_per_thickness_and_add_up(tmp_path: Path) -> None:
+    mesh = rectangle((0, 0), (1, 7), (1, 7))
+    nodes = 1 + np.unique(mesh.surfaces["x1"])
+    lines = "".join(f"{node}, 1, {k + 1}.\n" for k, node in enumerate(nodes)) + f"{nodes[0]}, 1, 9.\n"
+    text = mesh_cards({"BAR": mesh}) + STEEL + SECTION + "4.0\n*BOUNDARY\nBAR_X0, 1, 2\n"
+    found = read_deck(
+        deck(tmp_path, text + step("*CLOAD\n" + lines + "*NODE PRINT, NSET=BAR_X0, TOTALS=ONLY\nRF\n"))
+    )
+    (load,) = found.steps[0].loads or ()
+    assert isinstance(load, PointForce)
+    read = found.scene.bodies["BAR"].mesh
+    forces = load.at(read.points[read.nodes_of(load.nodes)], 2)
+    assert sorted(forces[:, 0]) == pytest.approx(sorted([10.0, *range(2, 9)] / np.array(4.0)))
+    (table,) = found.tables(found.solve(MPI.COMM_SELF, tolerance=1e-10)[0])
+    assert table.rows[0, 1] == pytest.approx(-45.0, rel=1e-6)

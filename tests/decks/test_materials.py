@@ -1,0 +1,112 @@
+"""Materials of decks: the constants are those of the programs' formulas."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fenics_contact.decks import DeckError, read_deck
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.materials import (
+    FinitePlasticity,
+    IsotropicElasticity,
+    J2Plasticity,
+    Material,
+    MooneyRivlin,
+    Ogden,
+    OrthotropicElasticity,
+    OrthotropicPlaneStress,
+    StVenantKirchhoff,
+)
+from tests.decks.texts import SECTION, deck, mesh_cards
+
+CUBE = mesh_cards({"BAR": block((0, 0, 0), (1, 1, 1), (1, 1, 1), "tetrahedron")})
+PLATE = mesh_cards({"BAR": rectangle((0, 0), (1, 1), (1, 1))}, "CPS4")
+STEEL = "*ELASTIC\n2.E5, 0.3\n"
+
+
+def material(
+    folder: Path, cards: str, large: bool = False, mesh: str = CUBE, section: str = SECTION
+) -> Material:
+    nlgeom = ", NLGEOM" if large else ""
+    end = f"*BOUNDARY\nBAR_X0, 1, 2\n*STEP{nlgeom}\n*STATIC\n*END STEP\n"
+    found = read_deck(deck(folder, mesh + "*MATERIAL, NAME=STEEL\n" + cards + section + end))
+    (one,) = found.scene.bodies["BAR"].materials
+    return one
+
+
+@pytest.mark.parametrize(
+    ("cards", "large", "wanted"),
+    [
+        (STEEL, False, IsotropicElasticity(2e5, 0.3)),
+        (STEEL, True, StVenantKirchhoff(2e5, 0.3)),
+        ("*HYPERELASTIC, NEO HOOKE\n1.5, 0.02\n", True, MooneyRivlin(1.5, 0.0, 100.0)),
+        ("*HYPERELASTIC, MOONEY-RIVLIN\n1.5, 0.5, 0.02\n", True, MooneyRivlin(1.5, 0.5, 100.0)),
+        ("*HYPERELASTIC, OGDEN, N=2\n3., 2., 1., 4., 0.1, 0.\n", True, Ogden((3.0, 0.5), (2.0, 4.0), 20.0)),
+        (STEEL + "*PLASTIC\n300., 0.\n500., 0.1\n", False, J2Plasticity(2e5, 0.3, 300.0, 2000.0)),
+        (STEEL + "*PLASTIC\n300., 0.\n500., 0.1\n", True, FinitePlasticity(2e5, 0.3, 300.0, 2000.0)),
+        (
+            STEEL + "*PLASTIC, HARDENING=KINEMATIC\n300., 0.\n500., 0.1\n",
+            False,
+            J2Plasticity(2e5, 0.3, 300.0, kinematic_hardening=2000.0),
+        ),
+    ],
+)
+def test_constants_become_those_of_the_models(
+    cards: str, large: bool, wanted: Material, tmp_path: Path
+) -> None:
+    assert material(tmp_path, cards, large) == wanted
+
+
+def test_rubber_without_compressibility_is_that_of_calculix(tmp_path: Path) -> None:
+    """Poisson's ratio 0.475: K = 2 μ (1 + ν) / (3 (1 − 2 ν)) with μ = 2 C10."""
+    rubber = material(tmp_path, "*HYPERELASTIC, NEO HOOKE\n1.5, 0.\n", True)
+    assert isinstance(rubber, MooneyRivlin)
+    assert rubber.bulk_modulus == pytest.approx(2 * 3.0 * 1.475 / (3 * 0.05))
+
+
+def test_stiffnesses_and_engineering_constants_are_one_material(tmp_path: Path) -> None:
+    axes = "*ORIENTATION, NAME=OR\n0., 1., 0., -1., 0., 0.\n"
+    section = axes + SECTION.replace("MATERIAL", "ORIENTATION=OR, MATERIAL")
+    constants = "*ELASTIC, TYPE=ENGINEERING CONSTANTS\n9., 5., 3., 0.2, 0.25, 0.1, 2., 1.5,\n1.2\n"
+    known = material(tmp_path, constants, section=section)
+    assert isinstance(known, OrthotropicElasticity)
+    assert known.young_moduli == (9.0, 5.0, 3.0)
+    assert known.orientation[0] == pytest.approx((0.0, 1.0, 0.0))
+    plain = OrthotropicElasticity((9.0, 5.0, 3.0), (0.2, 0.25, 0.1), (2.0, 1.5, 1.2)).stiffness_matrix
+    numbers = [plain[0, 0], plain[0, 1], plain[1, 1], plain[0, 2], plain[1, 2], plain[2, 2], 2.0, 1.5, 1.2]
+    text = ", ".join(f"{n:.15g}" for n in numbers[:8]) + f"\n{numbers[8]}\n"
+    other = material(tmp_path, f"*ELASTIC, TYPE=ORTHO\n{text}", section=section)
+    assert isinstance(other, OrthotropicElasticity)
+    np.testing.assert_allclose(other.stiffness_matrix, known.stiffness_matrix, rtol=1e-9, atol=1e-12)
+    flat = material(tmp_path, constants, mesh=PLATE, section=section)
+    assert flat == OrthotropicPlaneStress((9.0, 5.0), 0.2, 2.0, float(np.pi / 2))
+
+
+@pytest.mark.parametrize(
+    ("cards", "large", "message"),
+    [
+        ("*DENSITY\n1.\n", False, r"needs \*ELASTIC or \*HYPERELASTIC behind it, has \*DENSITY"),
+        ("*HYPERELASTIC, YEOH\n1., 0.\n", True, r"the model YEOH has no counterpart"),
+        ("*HYPERELASTIC, OGDEN, N=2\n3., 2., 1., 4., 0.1, 0.2\n", True, r"D2, D3, \.\.\. of \*HYPERELASTIC"),
+        (STEEL + "*PLASTIC\n3., 0.\n4., 0.1\n4.5, 0.2\n", False, r"a hardening curve of one straight line"),
+        (
+            STEEL + "*PLASTIC, HARDENING=COMBINED\n3., 0.\n",
+            False,
+            r"HARDENING must be ISOTROPIC or KINEMATIC",
+        ),
+        (STEEL + "*PLASTIC, HARDENING=KINEMATIC\n3., 0.\n", True, r"kinematic hardening with NLGEOM has no"),
+        (
+            "*ELASTIC, TYPE=ORTHO\n1., 0., 1., 0., 0., 1., 1., 1.,\n1.\n",
+            True,
+            r"TYPE=ORTHO with NLGEOM has no",
+        ),
+    ],
+)
+def test_a_material_without_counterpart_is_refused(
+    cards: str, large: bool, message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(DeckError, match=message):
+        material(tmp_path, cards, large)
