@@ -255,12 +255,7 @@ def test_ranks_have_the_same_pressures(mpirun: Callable[..., str]) -> None:
     code = """
         from mpi4py import MPI
         from fenics_contact import solve_scene
-        from fenics_contact.mesh import quadratic
-from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
-from fenics_contact.qp import FaceNewton
-from fenics_contact.readers import gmsh_model
-from fenics_contact.results import ContactResult
-from tests.contact.press_fits import BORE, INTERFERENCE, NU, RIM, SEAT, YOUNG, lame, press_fit
+        from fenics_contact.qp import FaceNewton
         from tests.pairing.pressed_boxes import unevenly
         contact = solve_scene(unevenly(), MPI.COMM_WORLD, solver=FaceNewton(tolerance=1e-11)).contact
         if MPI.COMM_WORLD.rank == 0:
