@@ -11,7 +11,14 @@ import numpy as np
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.collapsed import has_collapsed, joined_cells, shape_of
-from fenics_contact.mesh.faces import boundary_faces, cell_faces, corners_of, match_faces, widened
+from fenics_contact.mesh.faces import (
+    boundary_faces,
+    cell_faces,
+    coincident_pairs,
+    corners_of,
+    match_faces,
+    widened,
+)
 from fenics_contact.mesh.quadratic_nodes import with_centres
 from fenics_contact.mesh.serendipity_cells import serendipity
 
@@ -286,9 +293,10 @@ def _body(
     held = {label: number[inside][number[inside] >= 0] for label, inside in mesh.point_sets.items()}
     held = {label: inside for label, inside in held.items() if len(inside) and label not in surfaces}
     try:
+        points = mesh.points[nodes]
+        cracked = mesh.coincident_nodes and len(coincident_pairs(points)) > 0
         return BodyMesh(
-            mesh.points[nodes], local, surfaces, regions=named, node_sets=held,
-            coincident_nodes=mesh.coincident_nodes,
+            points, local, surfaces, regions=named, node_sets=held, coincident_nodes=cracked
         )  # fmt: skip
     except InvalidInputError as error:
         raise InvalidInputError(f"body '{name}' of {mesh.source} is no sound mesh: {error}") from error

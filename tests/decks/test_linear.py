@@ -12,7 +12,7 @@ from fenics_contact import PointForce, Pressure, Support, ThermalStrain
 from fenics_contact.decks import Deck, DeckError, read_deck
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStress
-from fenics_contact.mesh import joined_cells, quadratic
+from fenics_contact.mesh import joined_cells, quadratic, refined
 from tests.decks.texts import BAR, END, FREE_TO_CONTRACT, PULLED, SECTION, STEEL, deck, mesh_cards, step
 from tests.linear.mixed_cells import named_sides
 
@@ -51,6 +51,7 @@ def test_tetrahedra_with_nodes_on_edges_are_read_in_their_order(tmp_path: Path) 
     assert read.volume == pytest.approx(3.0)
     assert set(read.surfaces) >= {"BAR_X0", "BAR_Y0", "BAR_Z0", "BAR_X1", "TIP"}
     assert found.source("surface", "TIP").card == "*SURFACE"
+    assert refined(read, [0]).mesh.n_cells > read.n_cells, "a mesh without a crack can be refined"
 
 
 @pytest.mark.parametrize("element", ["C3D20R", "C3D20", "CPS8R", "CPE8"])
