@@ -31,3 +31,9 @@ def bent_bar(mesh: BodyMesh, subdomains: int, comm: MPI.Comm = MPI.COMM_SELF) ->
 def bent(subdomains: int, comm: MPI.Comm = MPI.COMM_SELF) -> tuple[BodyMesh, State]:
     mesh = distorted(serendipity(quadratic(block((0.0, 0.0, 0.0), (4.0, 1.0, 1.0), (3, 1, 2)))))
     return mesh, bent_bar(mesh, subdomains, comm)
+
+
+def displacement_on(comm: MPI.Comm) -> list[list[float]]:
+    """Return the displacement of the bent bar in four subdomains. Collective."""
+    displacement: list[list[float]] = bent(4, comm)[1].gather_displacement("bar").tolist()
+    return displacement

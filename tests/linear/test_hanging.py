@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -17,6 +15,7 @@ from fenics_contact.mesh import bisection_partition, refined
 from fenics_contact.results.linear_state import LinearState
 from tests.linear import monolithic
 from tests.linear.graded import displacement_on, graded, pulled, striped
+from tests.linear.several_ranks import displacement_of
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -86,20 +85,10 @@ def test_large_strains_are_even_as_well() -> None:
     np.testing.assert_allclose(state.gather_displacement("bar"), exact, atol=1e-7)
 
 
-SCRIPT = """
-    import json, sys
-    from mpi4py import MPI
-    from tests.linear.graded import displacement_on
-    result = displacement_on(MPI.COMM_WORLD)
-    if MPI.COMM_WORLD.rank == 0:
-        sys.stdout.write(json.dumps(result))
-"""
-
-
 def test_every_number_of_ranks_has_the_same_answer(mpirun) -> None:  # type: ignore[no-untyped-def]
     alone = np.array(displacement_on(MPI.COMM_SELF))
     for ranks in (2, 4):
-        answer = np.array(json.loads(mpirun(SCRIPT, ranks)))
+        answer = displacement_of("tests.linear.graded", ranks, mpirun)
         np.testing.assert_allclose(answer, alone, atol=1e-9 * np.abs(alone).max())
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -36,6 +34,7 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import is_triangle
 from tests.linear.graded import pulled
 from tests.linear.mixed_cells import displacement_on, mixed_bar, mixed_plate, named_sides, shaken
+from tests.linear.several_ranks import displacement_of
 
 ORDERS = {
     "linear": lambda mesh: mesh,
@@ -96,21 +95,11 @@ def test_quadratic_cells_bend_exactly() -> None:
         np.testing.assert_allclose(state.gather_displacement("bar"), given(mesh.points), atol=1e-12)
 
 
-SCRIPT = """
-    import json, sys
-    from mpi4py import MPI
-    from tests.linear.mixed_cells import displacement_on
-    result = displacement_on(MPI.COMM_WORLD)
-    if MPI.COMM_WORLD.rank == 0:
-        sys.stdout.write(json.dumps(result))
-"""
-
-
 def test_every_number_of_ranks_has_the_same_answer(mpirun) -> None:  # type: ignore[no-untyped-def]
     alone = np.array(displacement_on(MPI.COMM_SELF))
     assert np.abs(alone).max() > 0.01
     for ranks in (2, 4):
-        answer = np.array(json.loads(mpirun(SCRIPT, ranks)))
+        answer = displacement_of("tests.linear.mixed_cells", ranks, mpirun)
         np.testing.assert_allclose(answer, alone, atol=1e-9 * np.abs(alone).max())
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -16,7 +14,8 @@ from fenics_contact.mesh import bisection_partition, completed, quadratic, seren
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cuts import cut_between
 from tests.linear.graded import pulled
-from tests.linear.serendipity import bent, bent_bar
+from tests.linear.serendipity import bent, bent_bar, displacement_on
+from tests.linear.several_ranks import displacement_of
 
 #: Displacements of two nodes of `bent_bar` by CalculiX 2.20, elements C3D20 and forces at nodes.
 BAR = {23: [-0.004937768, 0.005703146, 0.0231773], 35: [-0.0002680208, 0.0002864461, 0.001039807]}
@@ -56,20 +55,10 @@ def test_a_bent_bar_of_distorted_cells_moves_as_in_calculix() -> None:
     assert np.abs(complete.gather_displacement("bar") - moved).max() > 1e-3 * np.abs(moved).max()
 
 
-SCRIPT = """
-import json
-from mpi4py import MPI
-from tests.linear.serendipity import bent
-moved = bent(4, MPI.COMM_WORLD)[1].gather_displacement("bar")
-if MPI.COMM_WORLD.rank == 0:
-    print(json.dumps(moved.tolist()))
-"""
-
-
 def test_every_number_of_ranks_has_the_same_answer(mpirun) -> None:  # type: ignore[no-untyped-def]
-    alone = bent(4)[1].gather_displacement("bar")
+    alone = np.array(displacement_on(MPI.COMM_SELF))
     for ranks in (2, 4):
-        answer = np.array(json.loads(mpirun(SCRIPT, ranks)))
+        answer = displacement_of("tests.linear.serendipity", ranks, mpirun)
         np.testing.assert_allclose(answer, alone, atol=1e-9 * np.abs(alone).max())
 
 
