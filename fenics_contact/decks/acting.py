@@ -52,13 +52,8 @@ class Acting:
                 continue
             sides[name] = pressed
             faces = self._faces(pressed)
-            outer = self.model.exterior.holds(faces)
-            if not outer.all():
-                number = self.model.mesh.element_numbers[faces.elements[~outer][0]]
-                raise pressed.card.error(
-                    f"a pressure must act on the boundary of a body, a face of element {number} lies "
-                    "between two elements: correct the set or the label", pressed.row,
-                )  # fmt: skip
+            what, remedy = "a pressure must act", "correct the set or the label"
+            self.model.exterior.require(faces, pressed.card, pressed.row, what, remedy)
             for key in zip(faces.elements.tolist(), faces.sides.tolist(), strict=True):
                 other = taken.setdefault(key, name)
                 if other != name:

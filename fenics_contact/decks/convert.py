@@ -183,10 +183,8 @@ class _Writer:
             "at": list(support.at),
             "value": [self._value(v, "") for v in support.motion],
         }
-        for key in ("force", "moment"):
-            if getattr(support, key) is not None:
-                table[key] = self._value(getattr(support, key), "")
-        return table
+        given = _given(support, "force", "moment")
+        return table | {key: self._value(value, "") for key, value in given.items()}
 
     def _held(self, support: Support, name: str) -> list[Any]:
         return [self._value(each, f"{name} {axis}") for each, axis in zip(support.value, "xyz", strict=False)]
@@ -212,10 +210,8 @@ class _Writer:
             return {"kind": "body_force", **table, "value": value}
         assert isinstance(load, TotalForce)
         table |= {"kind": "total_force", "surface": load.surface, "value": value}
-        for key in ("moment", "at"):
-            if getattr(load, key) is not None:
-                table[key] = self._value(getattr(load, key), "")
-        return table
+        given = _given(load, "moment", "at")
+        return table | {key: self._value(value, "") for key, value in given.items()}
 
     def _history(self, steps: Sequence[LoadStep]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
         """Return the loads before the first step, zero, and the steps."""
@@ -241,12 +237,7 @@ class _Writer:
             table = {"name": step.name, "duration": end - begin, "supports": held, "loads": values}
             if step.preloads is not None:
                 table["preloads"] = {
-                    each.label: {
-                        k: v
-                        for k, v in (("force", each.force), ("shortening", each.shortening))
-                        if v is not None
-                    }
-                    for each in step.preloads
+                    each.label: _given(each, "force", "shortening") for each in step.preloads
                 }
             tables.append(table)
             begin = end
@@ -295,6 +286,12 @@ def _nothing(table: Mapping[str, Any]) -> Any:
     return [0.0] * len(value) if isinstance(value, list) else 0.0
 
 
+def _given(part: object, *names: str) -> dict[str, Any]:
+    """Return those of some attributes that are not None."""
+    values = {name: getattr(part, name) for name in names}
+    return {name: value for name, value in values.items() if value is not None}
+
+
 def _side(surface: Surface) -> dict[str, str]:
     return {"body": surface.body, "surface": surface.name}
 
@@ -314,9 +311,7 @@ def _pair(pair: ContactPair) -> dict[str, Any]:
         table["closure"] = law
     if not pair.reason:
         table["discretisation"] = pair.discretisation
-    for key in ("gap", "interference", "adjust"):
-        if getattr(pair, key) is not None:
-            table[key] = getattr(pair, key)
+    table |= _given(pair, "gap", "interference", "adjust")
     return table
 
 
@@ -325,12 +320,8 @@ def _preload(preload: Preload) -> dict[str, Any]:
     assert isinstance(section, CutAt)
     table: dict[str, Any] = {"name": preload.label, "body": preload.body}
     table |= {"point": list(section.point), "normal": list(section.normal)}
-    for key in ("radius",):
-        if getattr(section, key) is not None:
-            table[key] = getattr(section, key)
-    for key in ("force", "shortening"):
-        if getattr(preload, key) is not None:
-            table[key] = getattr(preload, key)
+    table |= _given(section, "radius")
+    table |= _given(preload, "force", "shortening")
     return table
 
 

@@ -17,7 +17,8 @@ from fenics_contact._scene.body import Body
 from fenics_contact._scene.pairs import ContactPair, Tie
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.scene import LoadStep, Scene
-from fenics_contact._scene.supports import AnySupport
+from fenics_contact._scene.springs import Spring
+from fenics_contact._scene.supports import AnySupport, Roller
 from fenics_contact.decks.acting import Acting
 from fenics_contact.decks.contact import (
     Sides,
@@ -26,9 +27,7 @@ from fenics_contact.decks.contact import (
     read_interactions,
     read_sides,
 )
-from fenics_contact.decks.couplings import (
-    drawn,
-)
+from fenics_contact.decks.couplings import drawn
 from fenics_contact.decks.history import Moment
 from fenics_contact.decks.holding import Holding
 from fenics_contact.decks.model import Model
@@ -218,8 +217,10 @@ class _Builder:
         bodies = model.bodies()
         preloads = self.holding.preloads()
         supports = self.holding.supports(supported, None)
-        scene = self._scene(bodies, supports, *self._pairs(sides), preloads)
-        steps, step_of = self._steps(bodies, supported, loaded, preloads)
+        rollers, springs = self.holding.equations()
+        supports = (*supports, *rollers)
+        scene = self._scene(bodies, supports, *self._pairs(sides), preloads, springs)
+        steps, step_of = self._steps(bodies, supported, loaded, preloads, rollers)
         mesh = model.mesh
         return Deck(
             model.name,
@@ -243,6 +244,7 @@ class _Builder:
         supported: Mapping[str, tuple[np.ndarray, tuple[int, ...]]],
         loaded: Mapping[int, Sequence[tuple[str, np.ndarray | None]]],
         preloads: Sequence[Preload],
+        rollers: Sequence[Roller],
     ) -> tuple[tuple[LoadStep, ...], tuple[int, ...]]:
         """Return the load steps, and the step of the deck of each."""
         steps: list[LoadStep] = []
@@ -253,7 +255,7 @@ class _Builder:
             for moment in step.moments:
                 part = "" if moment is step.moments[-1] else f", time {moment.time:g}"
                 loads = self.acting.loads(moment, loaded[id(moment)], bodies)
-                supports = (*self.holding.supports(supported, moment), *self.holding.equations()[0])
+                supports = (*self.holding.supports(supported, moment), *rollers)
                 acting = None
                 if self.model.bolts:
                     pairs = zip(self.model.bolts, preloads, strict=True)
@@ -281,20 +283,14 @@ class _Builder:
             faces, known = self.model.exterior.covering(self.model.mesh.node_sets[name]), False
         else:
             given = self.model.mesh.surface_named(name, of.card, of.row)
-            faces, nodes, known = self.model.faces_of(given), given.nodes, True
+            faces, nodes, known = self.model.exterior.faces_of(given), given.nodes, True
         if faces is None:
             raise of.card.error(
                 f"contact is between faces, but the {0 if nodes is None else len(nodes)} nodes of "
                 f"{name!r} are not all nodes of some faces: give the faces, as *SURFACE with TYPE=ELEMENT",
                 of.row,
             )  # fmt: skip
-        outer = self.model.exterior.holds(faces)
-        if not outer.all():
-            number = self.model.mesh.element_numbers[faces.elements[~outer][0]]
-            raise of.card.error(
-                f"surface {name!r} must lie on the boundary of a body, a face of element {number} lies "
-                "between two elements: correct it", of.row,
-            )  # fmt: skip
+        self.model.exterior.require(faces, of.card, of.row, f"surface {name!r} must lie", "correct it")
         label = name if known or name not in self.model.mesh.surfaces else f"{name} FACES"
         self.model.surfaces[label] = faces
         self.sides_by_name[name] = label
@@ -322,6 +318,7 @@ class _Builder:
         contacts: Sequence[ContactPair],
         ties: Sequence[Tie],
         preloads: Sequence[Preload],
+        springs: Sequence[Spring],
     ) -> Scene:
         """Return the scene before the first step; what does not suit the bodies is told with its card."""
         for kind, parts in (("contact", contacts), ("tie", ties)):
@@ -330,13 +327,12 @@ class _Builder:
                     Scene(bodies, **{f"{kind}s" if kind == "tie" else "contacts": (part,)})  # type: ignore[arg-type]
                 except InvalidInputError as error:
                     raise self.model.origins[kind, part.place].error(str(error)) from error
-        rollers, springs = self.holding.equations()
-        return Scene(bodies, (*supports, *rollers), (), contacts, ties, preloads, springs=springs)
+        return Scene(bodies, supports, (), contacts, ties, preloads, springs=springs)
 
     def _named_surfaces(self) -> None:
         """Take all surfaces of the deck that lie on the boundary of bodies."""
         for name, given in self.model.mesh.surfaces.items():
-            faces = self.model.faces_of(given)
+            faces = self.model.exterior.faces_of(given)
             if faces is not None and len(faces) and self.model.exterior.holds(faces).all():
                 self.model.surfaces.setdefault(name, faces)
                 self.model.origins["surface", name] = given.card.origin

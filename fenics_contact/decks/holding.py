@@ -146,7 +146,7 @@ class Holding:
                 )
             name = driven.surface
             if name:
-                faces = self.model.faces_of(self.model.mesh.surface_named(name, driven.card))
+                faces = self.model.exterior.faces_of(self.model.mesh.surface_named(name, driven.card))
             elif driven.nodes is not None:
                 name, faces = f"{driven.name} RIGID", self.model.exterior.covering(driven.nodes)
             else:

@@ -35,7 +35,7 @@ from fenics_contact.readers.deck_bodies import (
     regions_of,
 )
 from fenics_contact.readers.deck_cards import Card, Origin
-from fenics_contact.readers.deck_mesh import DeckMesh, Faces, MeshCards, Named, read_mesh_cards
+from fenics_contact.readers.deck_mesh import DeckMesh, Faces, MeshCards, read_mesh_cards
 
 
 @displayed
@@ -258,10 +258,6 @@ class Model:
             name = f"{name} NODES" if name in self.mesh.surfaces else name
             self.node_sets[name] = np.unique(nodes)
         return name
-
-    def faces_of(self, surface: Named) -> Faces | None:
-        """Return the faces of a surface, of one of nodes those that have all of them, or None."""
-        return surface.faces if surface.nodes is None else self.exterior.covering(surface.nodes)
 
     def set_of(self, nodes: np.ndarray) -> str:
         """Return the name of exactly these nodes, a new one if there is none."""

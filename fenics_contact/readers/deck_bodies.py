@@ -18,7 +18,7 @@ from fenics_contact.mesh.quadratic_nodes import with_centres
 from fenics_contact.mesh.quality import thickness
 from fenics_contact.readers.bodies import Label, TaggedMesh, bodies_of, one_array
 from fenics_contact.readers.deck_cards import Card, read_cards
-from fenics_contact.readers.deck_mesh import Block, DeckMesh, Faces, read_mesh_cards
+from fenics_contact.readers.deck_mesh import Block, DeckMesh, Faces, Named, read_mesh_cards
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -142,12 +142,26 @@ class Exterior:
         known = self.faces.elements * 8 + self.faces.sides
         return np.isin(faces.elements * 8 + faces.sides, known)
 
+    def require(self, faces: Faces, card: Card, row: int, what: str, remedy: str) -> None:
+        """Refuse faces that are no exterior ones, with the line of a card."""
+        outer = self.holds(faces)
+        if not outer.all():
+            number = self.mesh.element_numbers[faces.elements[~outer][0]]
+            raise card.error(
+                f"{what} on the boundary of a body, a face of element {number} lies between two elements: "
+                f"{remedy}", row,
+            )  # fmt: skip
+
     def within(self, nodes: np.ndarray) -> Faces:
         """Return the faces all of whose nodes are among some."""
         mark = np.append(np.zeros(len(self.mesh.points), dtype=bool), True)  # −1 counts as one of them
         mark[nodes] = True
         inside = mark[self.nodes].all(axis=1)
         return Faces(self.faces.elements[inside], self.faces.sides[inside])
+
+    def faces_of(self, surface: Named) -> Faces | None:
+        """Return the faces of a surface, of one of nodes those that have all of them, or None."""
+        return surface.faces if surface.nodes is None else self.covering(surface.nodes)
 
     def covering(self, nodes: np.ndarray) -> Faces | None:
         """Return faces that have these nodes and no others, None if there are none."""
@@ -317,7 +331,7 @@ def _read(path: Path) -> dict[str, BodyMesh]:
     exterior = Exterior.of(mesh)
     surfaces = {}
     for name, given in mesh.surfaces.items():
-        faces = given.faces if given.nodes is None else exterior.covering(given.nodes)
+        faces = exterior.faces_of(given)
         if faces is not None and exterior.holds(faces).all():
             surfaces[name] = faces
     parts = components(mesh, sections, of_element)
