@@ -131,6 +131,10 @@ class TangentNewton:
         slipped: Part of the slip bound within which a disc counts as slipping at the start of a load step:
             what slipped in the last one mostly goes on.
         nested: Tolerance of contact problems that are solved as a whole, at the start of a history.
+        few: Rows of gluing and supports up to which linear systems without contact are solved to `sharp`:
+            there products are cheap beside a tangent, and where a body hardly resists some motion, as a bar
+            the tilting of an end that a pressure pulls, a small residual hides a large error.
+        sharp: Largest residual of these, relative to its start.
 
     References:
         S. C. Eisenstat, H. F. Walker, Choosing the forcing terms in an inexact Newton method, SIAM J. Sci.
@@ -152,6 +156,8 @@ class TangentNewton:
     enough: float = 0.5
     slipped: float = 1e-6
     nested: float = 1e-2
+    few: int = 500
+    sharp: float = 1e-9
 
     def __post_init__(self) -> None:
         """Check the numbers.
@@ -160,13 +166,13 @@ class TangentNewton:
             InvalidInputError: If one is not between 0 and 1, or a count is not positive.
         """
         ratios = ("tolerance", "forcing", "care", "caution", "room")
-        for name in (*ratios, "near", "least_care", "fine", "hidden", "enough", "slipped", "nested"):
+        for name in (*ratios, "near", "least_care", "fine", "hidden", "enough", "slipped", "nested", "sharp"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise InvalidInputError(
                     f"{name} of TangentNewton must lie between 0 and 1, got {getattr(self, name)!r}: it is a "
                     f"ratio, by default {getattr(TangentNewton, name)}"
                 )
-        for name in ("max_steps", "max_products", "patience"):
+        for name in ("max_steps", "max_products", "patience", "few"):
             check_count(getattr(self, name), f"{name} of TangentNewton")
 
     def solve(
@@ -193,8 +199,14 @@ class TangentNewton:
         Raises:
             ConvergenceError: With the history, which ends with the reason.
         """
-        run = _Run(self, equations, load, timer)
+        run = _Run(self._sharpened(load.torn), equations, load, timer)
         return run_newton(run, run.init(start, known, moved))
+
+    def _sharpened(self, torn: TornSystem) -> TangentNewton:
+        """Return the method for a system, in which few rows are solved for sharply."""
+        if torn.points.count or torn.n_equality > self.few:
+            return self
+        return replace(self, forcing=min(self.forcing, self.sharp))
 
 
 @dataclass(frozen=True)
@@ -388,9 +400,7 @@ class _Run:
             return FaceNewton(self.method.nested)
         return FaceNewton(self.method.nested, max_products=self.method.max_products, doubts=False)
 
-    def _damped(
-        self, state: _State, moved: Vector, change: Vector, turned: Vector
-    ) -> Damped[ResidualState]:
+    def _damped(self, state: _State, moved: Vector, change: Vector, turned: Vector) -> Damped[ResidualState]:
         """Return the end of a step as long as cells allow, or a better point of it. Collective.
 
         Forces out of balance are no reason for that: a step that turns a body strains it until the next one.

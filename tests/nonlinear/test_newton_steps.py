@@ -307,6 +307,25 @@ def test_friction_and_plastic_flow_do_not_depend_on_how_a_load_step_is_cut(
     assert max(apart) > 1e-3, f"the way to the same place matters: {apart}"
 
 
+def test_a_bar_that_a_pressure_pulls_stays_straight_in_few_steps() -> None:
+    """The pressure turns with the end: but for rounding nothing resists its tilting."""
+    mesh = block((0, 0, 0), (1, 1, 8), (2, 2, 8))
+    corners = {f"corner{n}": np.flatnonzero((mesh.points == (n, 0, 0)).all(axis=1)) for n in (0, 1)}
+    supports = [Support("bar", "z0", (None, None, 0)), Support("bar", "corner0", (0, 0, None))]
+    scene = Scene(
+        {"bar": Body(replace(mesh, node_sets=corners), LIMIT_RUBBER)},
+        [*supports, Support("bar", "corner1", (None, 0, None))],
+        [Pressure("bar", "z1", -0.2)],
+    )
+    state = solve_scene(scene, MPI.COMM_SELF)
+    assert isinstance(state, DeformedState)
+    assert state.fractions == (1.0,)
+    assert len(state.solution.history) <= 6
+    strain = state.gather_displacement("bar") / np.maximum(mesh.points, 1e-12)
+    np.testing.assert_allclose(strain[mesh.points[:, 2] == 8.0, 2], strain[-1, 2], rtol=1e-6)
+    np.testing.assert_allclose(strain[mesh.points[:, 0] == 1.0, 0], strain[-1, 0], rtol=1e-3)
+
+
 def test_parts_that_the_search_needs_have_the_friction_of_one_step(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = dragged_in_parts(SOFT_RUBBER, RigidSphere((0.6, 1.5), 0.5), (0.6, 0.1))
     cut = followed(scene, AutomaticSteps())

@@ -397,13 +397,13 @@ def inflated(
     through: int,
     pieces: tuple[int, int],
     pressure: float,
-    forcing: float = TangentNewton.forcing,
+    few: int = TangentNewton.few,
 ) -> DeformedState:
     mesh, polar = quarter(around, through)
     rollers = [Support("ring", "y0", (None, 0.0)), Support("ring", "y1", (0.0, None))]
     scene = Scene({"ring": Body(mesh, RUBBER)}, rollers, [Pressure("ring", "x0", pressure)])
     parts = {"ring": box_partition(replace(mesh, points=polar), pieces)}
-    steps = AutomaticSteps(TangentNewton(forcing=forcing))
+    steps = AutomaticSteps(TangentNewton(few=few))
     state = solve_scene(scene, MPI.COMM_SELF, partitions=parts, tolerance=1e-10, steps=steps)
     assert isinstance(state, DeformedState)
     return state
@@ -451,14 +451,14 @@ def test_newton_is_quadratic_where_rims_slide_in_planes_of_symmetry_and_neighbou
     a, b = (state.gather_displacement("ring") for state in (whole, torn))
     assert np.abs(a - b).max() < 1e-8 * np.abs(a).max()
     for state in (whole, torn):
-        assert len(state.solution.history) <= 8  # 6 to 8 by rounding: linear systems are solved roughly
-        *_, before, last = [line.residuals.worst for line in state.solution.history]
-        assert last < 1e-2 * before
-    for pieces in ((1, 1), (2, 3)):
-        exact = inflated(12, 6, pieces, 0.15, forcing=1e-8)
-        residuals = [line.residuals.worst for line in exact.solution.history]
+        residuals = [line.residuals.worst for line in state.solution.history]
         assert len(residuals) <= 5
         assert all(after < before**2 for before, after in itertools.pairwise(residuals[1:4]))
+    for pieces in ((1, 1), (2, 3)):
+        rough = inflated(12, 6, pieces, 0.15, few=1)
+        assert len(rough.solution.history) <= 8  # 6 to 8 by rounding: linear systems are solved roughly
+        *_, before, last = [line.residuals.worst for line in rough.solution.history]
+        assert last < 1e-2 * before
     balance = torn.balance()
     inner = 1.0 + a[0, 0]
     assert balance.loads.force == pytest.approx([0.15 * inner] * 2, rel=5e-3), "on the deformed surface"
