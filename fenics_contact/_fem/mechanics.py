@@ -207,7 +207,10 @@ class HistoryMechanics:
             nominal = end.stress.reshape(*shape, 3, 3)
             stress[cells] = cauchy(nominal, gradient[cells]) if material.finite else nominal
             force += self._gauss.force(nominal if means is None else means.averaged(nominal), cells)
-            entries += self._gauss.stiffness(end.tangent.reshape(*shape, 3, 3, 3, 3), cells, means)
+            tangent = end.tangent.reshape(*shape, 3, 3, 3, 3)
+            if not material.symmetric:
+                tangent = 0.5 * (tangent + tangent.transpose(0, 1, 4, 5, 2, 3))
+            entries += self._gauss.stiffness(tangent, cells, means)
         rest = None if self._others is None else self._others.at(displacement, step)
         return Response(
             force=force if rest is None else force + rest.force,

@@ -32,7 +32,7 @@ from fenics_contact.gallery import links as links_module
 from fenics_contact.gallery import round as whole
 from fenics_contact.gallery.links import DesignSurface, Link
 from fenics_contact.gallery.ring import LinkShape
-from fenics_contact.materials import elastic, hyperelastic
+from fenics_contact.materials import elastic, hyperelastic, neo_hookean_metal
 from fenics_contact.materials import orthotropic as orthotropic_module
 from fenics_contact.materials import plastic as plastic_module
 from fenics_contact.materials.elastic import Material
@@ -138,6 +138,7 @@ MATERIALS = (
     ),
     table_of(plastic_module.J2Plasticity, _Material, model="j2_plasticity"),
     table_of(plastic_module.FinitePlasticity, _Material, model="finite_plasticity"),
+    table_of(neo_hookean_metal.NeoHookeanPlasticity, _Material, model="neo_hookean_plasticity"),
     table_of(hyperelastic.NeoHooke, _Material, model="neo_hooke"),
     table_of(hyperelastic.StVenantKirchhoff, _Material, model="st_venant_kirchhoff"),
     table_of(hyperelastic.MooneyRivlin, _Material, model="mooney_rivlin"),

@@ -439,6 +439,10 @@ Triple: TypeAlias = Annotated[
     tuple[float, float, float], _row(float, 3, 3, "three finite numbers in brackets")
 ]
 Vector: TypeAlias = Annotated[tuple[float, ...], _row(float, 2, 3, "two or three finite numbers in brackets")]
+Pairs: TypeAlias = Annotated[
+    tuple[tuple[float, float], ...],
+    _row(Pair, 0, None, "pairs of finite numbers in brackets, such as [[0.02, 290.0], [0.1, 340.0]]"),
+]
 CountPair: TypeAlias = Annotated[tuple[int, int], _row(_COUNT, 2, 2, f"two {_COUNTS}")]
 #: Number of control points along a curve, or along both directions of a surface.
 Net: TypeAlias = Annotated[

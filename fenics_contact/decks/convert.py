@@ -31,6 +31,7 @@ from fenics_contact.decks.model import NodeValues
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.elastic import IsotropicElasticity, PlaneStrain, PlaneStress
 from fenics_contact.materials.hyperelastic import MooneyRivlin, Ogden, StVenantKirchhoff
+from fenics_contact.materials.neo_hookean_metal import NeoHookeanPlasticity
 from fenics_contact.materials.orthotropic import OrthotropicElasticity, OrthotropicPlaneStress
 from fenics_contact.materials.plastic import FinitePlasticity, J2Plasticity
 
@@ -42,6 +43,7 @@ _MODELS: dict[type, str] = {
     OrthotropicPlaneStress: "orthotropic_plane_stress",
     J2Plasticity: "j2_plasticity",
     FinitePlasticity: "finite_plasticity",
+    NeoHookeanPlasticity: "neo_hookean_plasticity",
     StVenantKirchhoff: "st_venant_kirchhoff",
     MooneyRivlin: "mooney_rivlin",
     Ogden: "ogden",
@@ -135,8 +137,8 @@ class _Writer:
             value = getattr(material, field.name)
             if field.name == "orientation":
                 table["axis_1"], table["axis_2"] = list(value[0]), list(value[1])
-            elif value is not None and value is not False:
-                table[field.name] = list(value) if isinstance(value, tuple) else value
+            elif value is not None and value is not False and value != ():
+                table[field.name] = _listed(value)
         for name, other in known.items():
             if other == table:
                 return name
@@ -338,3 +340,8 @@ def _spring(spring: Spring) -> dict[str, Any]:
         "second": _side(spring.second),
         "stiffness": list(stiffness) if isinstance(stiffness, tuple) else stiffness,
     }
+
+
+def _listed(value: Any) -> Any:
+    """Return tuples, and those in them, as lists."""
+    return [_listed(each) for each in value] if isinstance(value, tuple) else value

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from fenics_contact.decks.vocabulary import MATERIAL_CARDS, WITHOUT_EFFECT
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.elastic import IsotropicElasticity, Material, PlaneStrain, PlaneStress
+from fenics_contact.materials.hardening import Points
 from fenics_contact.materials.hyperelastic import MooneyRivlin, Ogden, StVenantKirchhoff
+from fenics_contact.materials.neo_hookean_metal import NeoHookeanPlasticity
 from fenics_contact.materials.orthotropic import OrthotropicElasticity, OrthotropicPlaneStress, material_axes
-from fenics_contact.materials.plastic import FinitePlasticity, J2Plasticity
+from fenics_contact.materials.plastic import J2Plasticity
 from fenics_contact.readers.deck_cards import Card
 
 
@@ -182,7 +185,7 @@ def _isotropic(parts: Mapping[str, Card], of: Conditions) -> Material:
     young, poisson = _row(parts["ELASTIC"], 2, of, "Young's modulus and Poisson's ratio")
     alpha = _expansion(parts, of, 1)
     if "PLASTIC" in parts:
-        return _plastic(parts["PLASTIC"], young, poisson, of)
+        return _plastic(parts, young, poisson, of)
     expansion = None if alpha is None else alpha[0]
     if of.large:
         if of.kind == "plane stress":
@@ -192,37 +195,44 @@ def _isotropic(parts: Mapping[str, Card], of: Conditions) -> Material:
     return kind(young, poisson, expansion)
 
 
-def _plastic(card: Card, young: float, poisson: float, of: Conditions) -> Material:
+def _plastic(parts: Mapping[str, Card], young: float, poisson: float, of: Conditions) -> Material:
+    """Return a metal; tables are of true stress over logarithmic plastic strain where strains are large."""
+    card = parts["PLASTIC"]
     if of.kind == "plane stress":
         raise card.error(
             "plane stress with plasticity has no counterpart: take solid or plane strain elements"
         )
-    rows = np.array([[*card.floats(k), 0.0, 0.0, 0.0][:3] for k in range(len(card.lines))])
-    if len(rows) and np.ptp(rows[:, 2]) > 0.0:
-        raise card.error("a yield stress that depends on the temperature is not read: give one temperature")
     kind = card.name_of("HARDENING") or "ISOTROPIC"
-    if kind not in ("ISOTROPIC", "KINEMATIC") or not len(rows):
+    if kind not in ("ISOTROPIC", "KINEMATIC", "COMBINED"):
+        raise card.error(f"HARDENING must be ISOTROPIC, KINEMATIC or COMBINED, got {kind}: give one of them")
+    if (kind == "COMBINED") != ("CYCLICHARDENING" in parts):
         raise card.error(
-            f"HARDENING must be ISOTROPIC or KINEMATIC with a table, got {kind} with {len(rows)} rows"
+            f"HARDENING=COMBINED and *CYCLIC HARDENING need each other, got {kind} "
+            f"{'with' if kind != 'COMBINED' else 'without'} the other: give both or neither"
         )
-    slopes = np.diff(rows[:, 0]) / np.diff(rows[:, 1]) if len(rows) > 1 else np.zeros(1)
-    if len(slopes) > 1 and np.ptp(slopes) > 1e-6 * max(abs(slopes).max(), 1e-300):
-        raise card.error(
-            "a hardening curve of one straight line is read, this one has several slopes, "
-            f"{', '.join(f'{s:.4g}' for s in slopes[:4])}: give two points"
-        )
-    slope = float(slopes[0])
-    if kind == "KINEMATIC":
-        if of.large:
-            raise card.error("kinematic hardening with NLGEOM has no counterpart: take isotropic hardening")
-        return J2Plasticity(
-            young, poisson, float(rows[0, 0]), kinematic_hardening=slope, mean_dilatation=of.dilatation
-        )
+    first, rest = _curve(card)
+    own: dict[str, Any] = {"hardening_curve": rest}
+    if kind != "ISOTROPIC":
+        own = {"kinematic_curve": tuple((strain, stress - first) for strain, stress in rest)}
+    if kind == "COMBINED":
+        first, own["hardening_curve"] = _curve(parts["CYCLICHARDENING"])
     if of.large:
-        return FinitePlasticity(young, poisson, float(rows[0, 0]), isotropic_hardening=slope)
-    return J2Plasticity(
-        young, poisson, float(rows[0, 0]), isotropic_hardening=slope, mean_dilatation=of.dilatation
-    )
+        return NeoHookeanPlasticity(young, poisson, first, **own)
+    return J2Plasticity(young, poisson, first, mean_dilatation=of.dilatation, **own)
+
+
+def _curve(card: Card) -> tuple[float, Points]:
+    """Return the yield stress of a table, and the points of its curve beyond it."""
+    rows = np.array([[*card.floats(k), 0.0, 0.0, 0.0][:3] for k in range(len(card.lines))]).reshape(-1, 3)
+    if not len(rows):
+        raise card.error("needs a table of stress and plastic strain, it has no data line: add it")
+    if np.ptp(rows[:, 2]) > 0.0:
+        raise card.error("a yield stress that depends on the temperature is not read: give one temperature")
+    if rows[0, 1] != 0.0:
+        raise card.error(
+            f"a table must begin at plastic strain zero, the first is {rows[0, 1]:g}: add the yield stress", 0
+        )
+    return float(rows[0, 0]), tuple((float(strain), float(stress)) for stress, strain, _ in rows[1:])
 
 
 def _orthotropic(parts: Mapping[str, Card], kind: str, axes: Card | None, of: Conditions) -> Material:

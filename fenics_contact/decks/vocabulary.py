@@ -4,7 +4,8 @@ from __future__ import annotations
 
 #: Cards of a material, behind *MATERIAL.
 MATERIAL_CARDS = {
-    "ELASTIC", "PLASTIC", "HYPERELASTIC", "EXPANSION", "DENSITY", "CONDUCTIVITY", "SPECIFICHEAT",
+    "ELASTIC", "PLASTIC", "CYCLICHARDENING", "HYPERELASTIC", "EXPANSION", "DENSITY", "CONDUCTIVITY",
+    "SPECIFICHEAT",
 }  # fmt: skip
 #: Cards of nodes, elements and sets.
 MESH_CARDS = {"NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"}
@@ -65,6 +66,7 @@ PARAMETERS: dict[str, set[str]] = {
     "MATERIAL": {"NAME"},
     "ELASTIC": {"TYPE"},
     "PLASTIC": {"HARDENING"},
+    "CYCLICHARDENING": set(),
     "EXPANSION": {"TYPE", "ZERO"},
     "DENSITY": set(),
     "ORIENTATION": {"NAME", "SYSTEM", "DEFINITION"},

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         StVenantKirchhoff,
     )
     from fenics_contact.materials.kernels import rigid_body_modes
+    from fenics_contact.materials.neo_hookean_metal import NeoHookeanPlasticity
     from fenics_contact.materials.orthotropic import (
         OrthotropicElasticity,
         OrthotropicPlaneStress,
@@ -51,6 +52,7 @@ __all__ = [
     "MooneyRivlin",
     "NearlyIncompressible",
     "NeoHooke",
+    "NeoHookeanPlasticity",
     "Ogden",
     "OrthotropicElasticity",
     "OrthotropicPlaneStress",

@@ -27,6 +27,15 @@ from fenics_contact.materials.elastic import (
     to_vector,
     upper_triangle,
 )
+from fenics_contact.materials.hardening import (
+    NO_BACK_STRESS,
+    Curve,
+    Hardening,
+    Points,
+    check_plastic,
+    checked_curve,
+    radial_return,
+)
 
 
 @displayed
@@ -56,6 +65,9 @@ class HistoryMaterial(Elasticity):
     symmetric part alone (small strain). With `mean_dilatation`, in small strain, it gets the mean change of
     volume of each cell at all of its points, against locking where flow keeps the volume.
 
+    `symmetric` states whether tangents are, A_ijkl = A_klij. Of others Newton's method takes the symmetric
+    part, and converges linearly, the faster the smaller the rest.
+
     Example:
         A Maxwell fluid: a spring that a damper relaxes, with its stress as history.
 
@@ -84,6 +96,7 @@ class HistoryMaterial(Elasticity):
 
     nonlinear: ClassVar[bool] = True
     finite: ClassVar[bool] = False
+    symmetric: ClassVar[bool] = True
     mean_dilatation: bool = False
 
     def __init_subclass__(cls, **given: Any) -> None:
@@ -215,145 +228,6 @@ class HistoryMaterial(Elasticity):
         return stress if dim == 3 else [stress[0], stress[1], stress[5]]
 
 
-@dataclass(frozen=True)
-class Hardening:
-    """Yield stress by equivalent plastic strain α, σ_y = σ_0 + H α + (σ_∞ − σ_0)(1 − exp(−δ α)).
-
-    Attributes:
-        yield_stress: σ_0, [force / length²].
-        slope: H, [force / length²].
-        saturation_stress: σ_∞, [force / length²].
-    """
-
-    yield_stress: float
-    slope: float
-    saturation_stress: float
-    saturation_rate: float
-
-    def at(self, alpha: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the yield stress, which does not fall below zero, and its derivative by α."""
-        gain, left = self.saturation_stress - self.yield_stress, np.exp(-self.saturation_rate * alpha)
-        stress = self.yield_stress + self.slope * alpha + gain * (1 - left)
-        slope = self.slope + gain * self.saturation_rate * left
-        return np.maximum(stress, 0.0), np.where(stress > 0, slope, 0.0)
-
-
-def check_plastic(
-    young_modulus: float, yield_stress: float, slope: float, kinematic: float, saturation: tuple[float, float]
-) -> None:
-    """Reject constants for which plastic flow does not exist or is not unique."""
-    if not (np.isfinite(yield_stress) and yield_stress > 0):
-        raise InvalidInputError(
-            f"yield_stress must be a positive number, got {yield_stress!r}: give it in force per area, for "
-            "structural steel 235 N/mm²; a body that does not yield is IsotropicElasticity"
-        )
-    if not (np.isfinite(kinematic) and kinematic >= 0):
-        raise InvalidInputError(
-            f"kinematic_hardening must be a number of at least 0, got {kinematic!r}: give the slope of the "
-            "back stress by plastic strain in tension, in force per area"
-        )
-    if not (np.isfinite(slope) and slope + kinematic > -young_modulus):
-        raise InvalidInputError(
-            f"isotropic_hardening must be a number above −E − kinematic_hardening = "
-            f"{-young_modulus - kinematic:.6g}, got {slope!r}: with less, stress in tension falls faster "
-            "than the bar unloads, and the strain is not unique"
-        )
-    stress, rate = saturation
-    if not (np.isfinite(stress) and stress >= yield_stress and np.isfinite(rate) and rate >= 0):
-        raise InvalidInputError(
-            f"saturation_stress must be a number of at least yield_stress {yield_stress!r} and "
-            f"saturation_rate one of at least 0, got {stress!r} and {rate!r}: give the stress at which "
-            "hardening ends and how fast it is approached, 1/α, or neither"
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Returned:
-    """Where the return mapping ends.
-
-    Attributes:
-        stress: Shape (n, 3, 3), [force / length²].
-        moduli: Consistent tangent ∂σ/∂ε, shape (n, 3, 3, 3, 3).
-        flow: Increment of plastic strain, shape (n, 3, 3); zero where the step is elastic.
-        alpha: Equivalent plastic strain at the end of the step, shape (n,).
-    """
-
-    stress: np.ndarray
-    moduli: np.ndarray
-    flow: np.ndarray
-    alpha: np.ndarray
-
-
-def radial_return(
-    strain: np.ndarray,
-    back: np.ndarray,
-    alpha: np.ndarray,
-    elastic: tuple[float, float],
-    hardening: Hardening,
-    kinematic: float = 0.0,
-) -> Returned:
-    """Map an elastic trial state back to the yield surface.
-
-    Backward Euler for von Mises' yield function with associated flow, isotropic and Prager's kinematic
-    hardening; the normal of the trial state is that of the final one.
-
-    `strain`: trial elastic strain, shape (n, 3, 3); `back`: back stress at the start of the step, deviatoric,
-    shape (n, 3, 3); `alpha`: equivalent plastic strain there, shape (n,).
-
-    References:
-        J. C. Simo, T. J. R. Hughes: Computational Inelasticity. Springer 1998, Boxes 3.1 and 3.2.
-    """
-    bulk, shear = elastic
-    one = np.eye(3)
-    volume = np.trace(strain, axis1=1, axis2=2)
-    deviator = 2 * shear * (strain - volume[:, None, None] / 3 * one)
-    relative = deviator - back
-    length = np.linalg.norm(relative, axis=(1, 2))
-    stiffness = 2 * shear + 2 / 3 * kinematic
-    multiplier, slope = _multipliers(length, alpha, stiffness, hardening)
-    normal = relative / np.where(length > 0, length, 1.0)[:, None, None]
-    flow = multiplier[:, None, None] * normal
-    theta = 1 - 2 * shear * multiplier / np.where(length > 0, length, 1.0)
-    along = np.where(multiplier > 0, 2 * shear / (stiffness + 2 / 3 * slope) - 1 + theta, 0.0)
-    spherical = np.einsum("ij,kl->ijkl", one, one)
-    symmetric = np.einsum("ik,jl->ijkl", one, one)
-    symmetric = 0.5 * (symmetric + symmetric.swapaxes(0, 1))
-    moduli = (
-        bulk * spherical
-        + 2 * shear * theta[:, None, None, None, None] * (symmetric - spherical / 3)
-        - 2 * shear * along[:, None, None, None, None] * np.einsum("nij,nkl->nijkl", normal, normal)
-    )
-    stress = deviator - 2 * shear * flow + bulk * volume[:, None, None] * one
-    return Returned(stress, moduli, flow, alpha + np.sqrt(2 / 3) * multiplier)
-
-
-def _multipliers(
-    length: np.ndarray, alpha: np.ndarray, stiffness: float, hardening: Hardening
-) -> tuple[np.ndarray, np.ndarray]:
-    """Solve ‖ξ‖ − stiffness Δγ = √(2/3) σ_y(α + √(2/3) Δγ) for Δγ ≥ 0; return Δγ and dσ_y/dα there.
-
-    Newton's method, with bisection where it leaves the bracket: softening ends with a kink at σ_y = 0.
-    """
-    multiplier, slope = np.zeros_like(length), np.zeros_like(length)
-    root = np.sqrt(2.0 / 3.0)  # radius of the yield surface in deviatoric stress, per unit of yield stress
-    radius = root * hardening.at(alpha)[0]
-    flows = np.flatnonzero(length > radius * (1 + 1e-12))  # a state on the surface is elastic, not rounding
-    size, alpha = length[flows], alpha[flows]
-    low, high = np.zeros_like(size), size / stiffness
-    guess = low
-    for _ in range(60):
-        stress, rate = hardening.at(alpha + root * guess)
-        rest = size - stiffness * guess - root * stress
-        low, high = np.where(rest >= 0, guess, low), np.where(rest <= 0, guess, high)
-        step = guess + rest / (stiffness + 2 / 3 * rate)
-        inside = (step >= low) & (step <= high)
-        guess = np.where(inside, step, 0.5 * (low + high))
-        if not (np.abs(rest) > 1e-14 * size).any():
-            break
-    multiplier[flows], slope[flows] = guess, hardening.at(alpha + root * guess)[1]
-    return multiplier, slope
-
-
 class VonMisesMetal(HistoryMaterial):
     """Isotropic elasticity with a yield stress that grows with the equivalent plastic strain."""
 
@@ -363,29 +237,46 @@ class VonMisesMetal(HistoryMaterial):
     isotropic_hardening: float
     saturation_stress: float | None
     saturation_rate: float
+    hardening_curve: Points
+    kinematic_hardening: float = 0.0
+    kinematic_curve: Points = ()
 
     def __post_init__(self) -> None:
         """Reject constants without a unique answer."""
         check_isotropic(self.young_modulus, self.poisson_ratio, None)
-        law = self.hardening
-        saturation = law.saturation_stress, law.saturation_rate
-        check_plastic(self.young_modulus, law.yield_stress, law.slope, self._back_slope, saturation)
+        for name, first in (("hardening_curve", self.yield_stress), ("kinematic_curve", 0.0)):
+            if getattr(self, name):
+                object.__setattr__(self, name, checked_curve(name, getattr(self, name), first))
+        self._require_one("hardening_curve", ("isotropic_hardening", "saturation_rate"))
+        self._require_one("kinematic_curve", ("kinematic_hardening",))
+        check_plastic(self.young_modulus, self.hardening, self.back_stress)
         if (self.saturation_stress is None) != (self.saturation_rate == 0.0):
             raise InvalidInputError(
                 "saturation_stress and saturation_rate must be given together, got "
                 f"{self.saturation_stress!r} and {self.saturation_rate!r}: one alone has no effect"
             )
 
-    @property
-    def _back_slope(self) -> float:
-        """Slope of the back stress by plastic strain."""
-        return 0.0
+    def _require_one(self, curve: str, others: tuple[str, ...]) -> None:
+        given = [name for name in others if getattr(self, name)]
+        if getattr(self, curve) and given:
+            raise InvalidInputError(
+                f"a {curve} is all of that hardening, got {given[0]} = {getattr(self, given[0])!r} beside "
+                "it: give one of them"
+            )
 
     @property
     def hardening(self) -> Hardening:
         """Yield stress by equivalent plastic strain."""
-        final = self.yield_stress if self.saturation_stress is None else self.saturation_stress
-        return Hardening(self.yield_stress, self.isotropic_hardening, final, self.saturation_rate)
+        gain = 0.0 if self.saturation_stress is None else self.saturation_stress - self.yield_stress
+        curve = Curve(((0.0, self.yield_stress), *self.hardening_curve), self.isotropic_hardening)
+        return Hardening(curve, gain, self.saturation_rate)
+
+    @property
+    def back_stress(self) -> Curve:
+        """Back stress in tension by equivalent plastic strain."""
+        if not (self.kinematic_curve or self.kinematic_hardening):
+            return NO_BACK_STRESS
+        return Curve(((0.0, 0.0), *self.kinematic_curve), self.kinematic_hardening)
 
     @property
     def history_size(self) -> int:
@@ -394,14 +285,15 @@ class VonMisesMetal(HistoryMaterial):
 
 
 @dataclass(frozen=True)
-@checked()
+@checked("hardening_curve", "kinematic_curve")
 class J2Plasticity(VonMisesMetal):
     """Elastic-plastic metals in small strain: von Mises' yield function, associated flow, no creep.
 
-    Yields where √(3/2) ‖dev σ − β‖ = σ_y(α), with σ_y = σ_0 + H α + (σ_∞ − σ_0)(1 − exp(−δ α)) and Prager's
-    back stress β = ⅔ C ε_p; elastic strain is isotropic. Plane bodies are in plane strain. The stress is that
-    at the end of each step by the radial return with its consistent tangent, exact to rounding for steps
-    along one direction of strain. Internal variables: plastic strain (xx, yy, zz, yz, xz, xy), α.
+    Yields where √(3/2) ‖dev σ − β‖ = σ_y(α), with σ_y = σ_0 + H α + (σ_∞ − σ_0)(1 − exp(−δ α)) or a curve,
+    and the back stress β̇ = ⅔ C ε̇_p, C constant or the slope of a curve at α; elastic strain is isotropic.
+    Plane bodies are in plane strain. The stress is that at the end of each step by the radial return with
+    its consistent tangent, exact to rounding for steps along one direction of strain. Internal variables:
+    plastic strain (xx, yy, zz, yz, xz, xy), α, with a kinematic curve β (xx, ...).
 
     Attributes:
         young_modulus: Young's modulus E > 0, [force / length²].
@@ -415,6 +307,10 @@ class J2Plasticity(VonMisesMetal):
         saturation_rate: How fast it is approached, δ ≥ 0, per plastic strain.
         mean_dilatation: Whether changes of volume are the means of cells: plastic flow keeps the volume, and
             linear hexahedra and quadrilaterals lock without it.
+        hardening_curve: Yield stress by plastic strain in place of H and δ: pairs (α, σ_y) beyond
+            (0, σ_0), straight between them, constant beyond the last.
+        kinematic_curve: Back stress by plastic strain in tension in place of C: pairs (α, β) beyond (0, 0),
+            straight between them, constant beyond the last. In cycles α is all plastic strain there was.
 
     Example:
         Half the strain beyond yield is plastic where H = E:
@@ -423,6 +319,13 @@ class J2Plasticity(VonMisesMetal):
         >>> steel = J2Plasticity(2e5, 0.3, 235.0, isotropic_hardening=2e5)
         >>> steel.history_size, steel.nonlinear, steel.finite
         (7, True, False)
+
+        A measured curve:
+
+        >>> steel = J2Plasticity(2e5, 0.3, 235.0, hardening_curve=((0.02, 290.0), (0.1, 340.0)))
+        >>> stress, slope = steel.hardening.at(np.array([0.01, 0.2]))
+        >>> stress.tolist(), slope.tolist()
+        ([262.5, 340.0], [2750.0, 0.0])
     """
 
     young_modulus: float
@@ -433,27 +336,33 @@ class J2Plasticity(VonMisesMetal):
     saturation_stress: float | None = None
     saturation_rate: float = 0.0
     mean_dilatation: bool = False
+    hardening_curve: Points = ()
+    kinematic_curve: Points = ()
 
     @property
-    def _back_slope(self) -> float:
-        return self.kinematic_hardening
+    def history_size(self) -> int:
+        """Plastic strain, the equivalent plastic strain, and the back stress where it has a curve."""
+        return 13 if self.kinematic_curve else 7
 
     def respond(self, gradient: np.ndarray, history: np.ndarray, duration: float) -> MaterialResponse:
         """Return σ, the consistent tangent and the new plastic strain; nothing depends on the duration."""
         plastic = to_tensor(history[:, :6])
         strain = 0.5 * (gradient + gradient.swapaxes(1, 2))
         back = 2 / 3 * self.kinematic_hardening * plastic
+        if self.kinematic_curve:
+            back = to_tensor(history[:, 7:])
         end = radial_return(
             strain - plastic,
             back,
             history[:, 6],
             elastic_moduli(self.young_modulus, self.poisson_ratio),
             self.hardening,
-            self.kinematic_hardening,
+            self.back_stress,
         )
-        return MaterialResponse(
-            end.stress, end.moduli, np.column_stack([to_vector(plastic + end.flow), end.alpha])
-        )
+        after = [to_vector(plastic + end.flow), end.alpha]
+        if self.kinematic_curve:
+            after.append(to_vector(back + end.back))
+        return MaterialResponse(end.stress, end.moduli, np.column_stack(after))
 
 
 def elastic_moduli(young_modulus: float, poisson_ratio: float) -> tuple[float, float]:
@@ -463,7 +372,7 @@ def elastic_moduli(young_modulus: float, poisson_ratio: float) -> tuple[float, f
 
 
 @dataclass(frozen=True)
-@checked()
+@checked("hardening_curve")
 class FinitePlasticity(VonMisesMetal):
     """Elastic-plastic metals in large deformations: multiplicative von Mises plasticity, F = F_e F_p.
 
@@ -482,6 +391,8 @@ class FinitePlasticity(VonMisesMetal):
         saturation_stress: Yield stress σ_∞ ≥ σ_0 that is approached exponentially, [force / length²]. None
             for none.
         saturation_rate: How fast it is approached, δ ≥ 0, per plastic strain.
+        hardening_curve: Yield stress by plastic strain in place of H and δ: pairs (α, σ_y) beyond
+            (0, σ_0), straight between them, constant beyond the last.
 
     References:
         J. C. Simo: Algorithms for static and dynamic multiplicative plasticity that preserve the classical
@@ -498,6 +409,7 @@ class FinitePlasticity(VonMisesMetal):
     isotropic_hardening: float = 0.0
     saturation_stress: float | None = None
     saturation_rate: float = 0.0
+    hardening_curve: Points = ()
 
     def admissible(self, history: np.ndarray) -> np.ndarray:
         """Return plastic deformations that keep the volume, and α; a mean of such is a little too large."""

@@ -10,11 +10,11 @@ import pytest
 from fenics_contact.decks import DeckError, read_deck
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
-    FinitePlasticity,
     IsotropicElasticity,
     J2Plasticity,
     Material,
     MooneyRivlin,
+    NeoHookeanPlasticity,
     Ogden,
     OrthotropicElasticity,
     OrthotropicPlaneStress,
@@ -45,12 +45,24 @@ def material(
         ("*HYPERELASTIC, NEO HOOKE\n1.5, 0.02\n", True, MooneyRivlin(1.5, 0.0, 100.0)),
         ("*HYPERELASTIC, MOONEY-RIVLIN\n1.5, 0.5, 0.02\n", True, MooneyRivlin(1.5, 0.5, 100.0)),
         ("*HYPERELASTIC, OGDEN, N=2\n3., 2., 1., 4., 0.1, 0.\n", True, Ogden((3.0, 0.5), (2.0, 4.0), 20.0)),
-        (STEEL + "*PLASTIC\n300., 0.\n500., 0.1\n", False, J2Plasticity(2e5, 0.3, 300.0, 2000.0)),
-        (STEEL + "*PLASTIC\n300., 0.\n500., 0.1\n", True, FinitePlasticity(2e5, 0.3, 300.0, 2000.0)),
+        (
+            STEEL + "*PLASTIC\n300., 0.\n400., 0.1\n450., 0.3\n",
+            False,
+            J2Plasticity(2e5, 0.3, 300.0, hardening_curve=((0.1, 400.0), (0.3, 450.0))),
+        ),
+        (STEEL + "*PLASTIC\n300., 0.\n", True, NeoHookeanPlasticity(2e5, 0.3, 300.0)),
         (
             STEEL + "*PLASTIC, HARDENING=KINEMATIC\n300., 0.\n500., 0.1\n",
             False,
-            J2Plasticity(2e5, 0.3, 300.0, kinematic_hardening=2000.0),
+            J2Plasticity(2e5, 0.3, 300.0, kinematic_curve=((0.1, 200.0),)),
+        ),
+        (
+            STEEL
+            + "*PLASTIC, HARDENING=COMBINED\n300., 0.\n500., 0.1\n*CYCLIC HARDENING\n310.,0.\n320.,0.2\n",
+            True,
+            NeoHookeanPlasticity(
+                2e5, 0.3, 310.0, hardening_curve=((0.2, 320.0),), kinematic_curve=((0.1, 200.0),)
+            ),
         ),
     ],
 )
@@ -91,13 +103,12 @@ def test_stiffnesses_and_engineering_constants_are_one_material(tmp_path: Path) 
         ("*DENSITY\n1.\n", False, r"needs \*ELASTIC or \*HYPERELASTIC behind it, has \*DENSITY"),
         ("*HYPERELASTIC, YEOH\n1., 0.\n", True, r"the model YEOH has no counterpart"),
         ("*HYPERELASTIC, OGDEN, N=2\n3., 2., 1., 4., 0.1, 0.2\n", True, r"D2, D3, \.\.\. of \*HYPERELASTIC"),
-        (STEEL + "*PLASTIC\n3., 0.\n4., 0.1\n4.5, 0.2\n", False, r"a hardening curve of one straight line"),
-        (
-            STEEL + "*PLASTIC, HARDENING=COMBINED\n3., 0.\n",
-            False,
-            r"HARDENING must be ISOTROPIC or KINEMATIC",
-        ),
-        (STEEL + "*PLASTIC, HARDENING=KINEMATIC\n3., 0.\n", True, r"kinematic hardening with NLGEOM has no"),
+        (STEEL + "*PLASTIC\n3., 0.1\n4., 0.2\n", False, r"a table must begin at plastic strain zero"),
+        (STEEL + "*PLASTIC\n3., 0.\n4., 0.2\n5., 0.1\n", False, r"plastic strains of hardening_curve must"),
+        (STEEL + "*PLASTIC\n3., 0., 20.\n4., 0., 70.\n", False, r"that depends on the temperature is not"),
+        (STEEL + "*PLASTIC\n", False, r"needs a table of stress and plastic strain, it has no data line"),
+        (STEEL + "*PLASTIC, HARDENING=USER\n3., 0.\n", False, r"HARDENING must be ISOTROPIC, KINEMATIC or"),
+        (STEEL + "*PLASTIC, HARDENING=COMBINED\n3., 0.\n", False, r"and \*CYCLIC HARDENING need each other"),
         (
             "*ELASTIC, TYPE=ORTHO\n1., 0., 1., 0., 0., 1., 1., 1.,\n1.\n",
             True,

@@ -357,9 +357,9 @@ MUTATIONS = (
     ),
     Mutation(
         "the tangent of plastic flow forgets that its direction turns",
-        "materials/plastic.py",
-        "slope) - 1 + theta, 0.0)",
-        "slope), 0.0)",
+        "materials/hardening.py",
+        "/ slope - 1 + theta, 0.0)",
+        "/ slope, 0.0)",
         (
             "tests/scene/test_plasticity.py::test_the_tangent_is_that_of_the_stress_when_loading_unloading_and"
             "_reversing",
@@ -440,7 +440,7 @@ MUTATIONS = (
     ),
     Mutation(
         "a yield stress that has fallen to zero still has a slope",
-        "materials/plastic.py",
+        "materials/hardening.py",
         "np.where(stress > 0, slope, 0.0)",
         "slope",
         (

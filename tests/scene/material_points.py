@@ -6,6 +6,14 @@ import numpy as np
 
 from fenics_contact.materials import HistoryMaterial, MaterialResponse
 
+#: A quarter turn about z.
+TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+def deformations(size: float, n: int = 20, seed: int = 1) -> np.ndarray:
+    """Return random displacement gradients, shape (n, 3, 3)."""
+    return size * np.random.default_rng(seed).standard_normal((n, 3, 3))
+
 
 def at_rest(material: HistoryMaterial, n: int = 1) -> np.ndarray:
     """Return the history of n points of an unloaded body."""

@@ -18,18 +18,12 @@ from fenics_contact.materials import (
     J2Plasticity,
     MaterialResponse,
 )
-from tests.scene.material_points import at_rest, in_tension, tangent_error
+from tests.scene.material_points import TURN, at_rest, deformations, in_tension, tangent_error
 
 E, NU, YIELD = 2e5, 0.3, 200.0
 SMALL = J2Plasticity(E, NU, YIELD, 2e3, 5e3, 300.0, 30.0)
 LARGE = FinitePlasticity(E, NU, YIELD, 2e3, 300.0, 30.0)
 EITHER = pytest.mark.parametrize(("material", "size"), [(SMALL, 3e-3), (LARGE, 0.1)], ids=["small", "large"])
-#: A quarter turn about z.
-TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-
-
-def deformations(size: float, n: int = 20, seed: int = 1) -> np.ndarray:
-    return size * np.random.default_rng(seed).standard_normal((n, 3, 3))
 
 
 @EITHER
@@ -313,3 +307,96 @@ def test_parameters_that_raise_are_told_with_their_material() -> None:
 
     with pytest.raises(UserCodeError, match=r"reading .* of material Unknown failed with OSError: no"):
         Body(block((0, 0, 0), (1, 1, 1), (1, 1, 1)), Unknown(1.0, 0.3))
+
+
+CURVE = ((0.002, 260.0), (0.01, 300.0), (0.03, 300.0), (0.04, 280.0))
+
+
+def test_tension_follows_a_curve_and_stays_at_its_last_stress() -> None:
+    """Small strain in terms of σ, large in terms of τ by the logarithmic strain."""
+    strains = np.array([5e-4, 1.5e-3, 2.5e-3, 0.007, 0.02, 0.035, 0.06, 0.061, 0.1])
+    known = np.array([[0.0, YIELD], *CURVE]).T
+    small = J2Plasticity(E, NU, YIELD, hardening_curve=CURVE)
+    stress, history = in_tension(small, strains)
+    alpha = history[:, 6]
+    assert set(np.searchsorted(known[0], alpha[1:], side="right")) == {1, 2, 3, 4, 5}
+    np.testing.assert_allclose(stress[1:], np.interp(alpha[1:], *known), rtol=1e-10)
+    np.testing.assert_allclose(alpha[1:], (strains - stress / E)[1:], atol=1e-12)
+    large = FinitePlasticity(E, NU, YIELD, hardening_curve=CURVE)
+    nominal, history = in_tension(large, strains)
+    kirchhoff, alpha = nominal * (1 + strains), history[:, 6]
+    np.testing.assert_allclose(kirchhoff[1:], np.interp(alpha[1:], *known), rtol=1e-9)
+    np.testing.assert_allclose(alpha[1:], (np.log(1 + strains) - kirchhoff / E)[1:], atol=1e-11)
+
+
+def test_one_step_over_several_slopes_is_as_exact_as_many() -> None:
+    strains = np.linspace(0.0, 0.05, 101)[1:]
+    for metal in (
+        J2Plasticity(E, NU, YIELD, hardening_curve=CURVE, kinematic_curve=((0.005, 30.0), (0.02, 60.0))),
+        FinitePlasticity(E, NU, YIELD, hardening_curve=CURVE),
+    ):
+        many, few = in_tension(metal, strains), in_tension(metal, strains[-1:])
+        assert few[0][-1] == pytest.approx(many[0][-1], rel=1e-9)
+        np.testing.assert_allclose(few[1][-1], many[1][-1], atol=1e-8)
+
+
+def test_the_back_stress_follows_its_curve_when_the_load_turns() -> None:
+    """Reverse yielding at β − σ_0, and later slopes are those of all plastic strain there was."""
+    rise = ((0.004, 40.0), (0.02, 80.0))
+    metal = J2Plasticity(E, NU, YIELD, kinematic_curve=rise)
+    path = np.concatenate([np.linspace(0, 0.008, 41)[1:], np.linspace(0.008, -0.03, 381)[1:]])
+    stress, history = in_tension(metal, path)
+    alpha, known = history[:, 6], np.array([(0.0, 0.0), *rise]).T
+    turn = 39
+    first = np.interp(alpha[turn], *known)
+    assert stress[turn] == pytest.approx(YIELD + first, rel=1e-10)
+    later = np.flatnonzero(alpha > alpha[turn] + 1e-12)
+    back = first - (np.interp(alpha[later], *known) - first)
+    np.testing.assert_allclose(stress[later], back - YIELD, rtol=1e-9)
+    assert stress[later[0] - 1] > first - YIELD > stress[later[0]]
+    assert alpha[-1] > 0.02  # beyond the last point
+    assert 1.5 * history[-1, 7] == pytest.approx(stress[-1] + YIELD, rel=1e-9)
+
+
+def test_one_slope_is_the_same_in_words_and_as_a_curve() -> None:
+    plain = J2Plasticity(E, NU, YIELD, 2e3, 5e3)
+    curves = J2Plasticity(E, NU, YIELD, hardening_curve=((1.0, YIELD + 2e3),), kinematic_curve=((1.0, 5e3),))
+    first, second = deformations(0.01), deformations(0.01, seed=2)
+    pairs = []
+    for metal in (plain, curves):
+        end = metal.answer(first, at_rest(metal, 20), 0.0)
+        pairs.append(metal.answer(second, end.history, 0.0))
+    np.testing.assert_allclose(pairs[0].stress, pairs[1].stress, atol=1e-9 * YIELD)
+    np.testing.assert_allclose(pairs[0].tangent, pairs[1].tangent, atol=1e-9 * E)
+    np.testing.assert_allclose(pairs[0].history, pairs[1].history[:, :7], atol=1e-12)
+    assert tangent_error(curves, second, end.history, 1e-7) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (
+            {"hardening_curve": ((0.0, 250.0),)},
+            r"the plastic strains of hardening_curve must ascend from above",
+        ),
+        ({"hardening_curve": ((0.2, 250.0), (0.1, 300.0))}, r"hardening_curve must ascend"),
+        ({"hardening_curve": ((0.2, -1.0),)}, r"its stresses be at least zero"),
+        (
+            {"hardening_curve": (0.2, 250.0)},
+            r"hardening_curve must be pairs of a plastic strain and a stress",
+        ),
+        (
+            {"hardening_curve": ((0.2, 300.0),), "isotropic_hardening": 1.0},
+            r"got isotropic_hardening = 1.0 b",
+        ),
+        ({"kinematic_curve": ((0.2, 30.0),), "kinematic_hardening": 1.0}, r"got kinematic_hardening = 1.0 b"),
+        (
+            {"kinematic_curve": ((0.1, 30.0), (0.2, 20.0))},
+            r"kinematic_hardening must be a number of at least",
+        ),
+        ({"hardening_curve": ((1e-4, 100.0),)}, r"must be a number above −E"),
+    ],
+)
+def test_curves_that_say_no_hardening_are_refused(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        J2Plasticity(E, NU, YIELD, **given)

@@ -64,6 +64,7 @@ from fenics_contact.materials import (
     Material,
     MooneyRivlin,
     NeoHooke,
+    NeoHookeanPlasticity,
     Ogden,
     OrthotropicElasticity,
     OrthotropicPlaneStress,
@@ -341,6 +342,7 @@ SAMPLES: dict[type, Any] = {
         OrthotropicElasticity((1.0,) * 3, (0.1,) * 3, (1.0,) * 3),  # type: ignore[arg-type]
         NeoHooke(1.0, 0.3), MooneyRivlin(1.0, 0.5, 10.0), StVenantKirchhoff(1.0, 0.3),
         Ogden((1.0,), (2.0,), 10.0), J2Plasticity(1.0, 0.3, 0.1), FinitePlasticity(1.0, 0.3, 0.1),
+        NeoHookeanPlasticity(1.0, 0.3, 0.1),
     )
 }  # fmt: skip
 

@@ -119,6 +119,16 @@ def test_the_parts_of_a_chain_are_its_links() -> None:
             plastic.J2Plasticity(2.1e5, 0.3, 235, 2e3, 1e3),
         ),
         (
+            {
+                "model": "j2_plasticity", "young_modulus": 2.1e5, "poisson_ratio": 0.3, "yield_stress": 235,
+                "hardening_curve": [[0.02, 290], [0.1, 340]], "kinematic_curve": [[0.1, 9]],
+            },
+            plastic.J2Plasticity(
+                2.1e5, 0.3, 235.0, hardening_curve=((0.02, 290.0), (0.1, 340.0)),
+                kinematic_curve=((0.1, 9.0),),
+            ),
+        ),
+        (
             YIELDING | {"model": "finite_plasticity", "saturation_stress": 300, "saturation_rate": 9},
             plastic.FinitePlasticity(2.1e5, 0.3, 235, 2e3, 300, 9),
         ),
@@ -139,7 +149,7 @@ def test_the_parts_of_a_chain_are_its_links() -> None:
             hyperelastic.StVenantKirchhoff(10.0, 0.2),
         ),
     ],
-    ids=["isotropic", "orthotropic", "j2", "finite", "neo", "mooney", "ogden", "st_venant"],
+    ids=["isotropic", "orthotropic", "j2", "curves", "finite", "neo", "mooney", "ogden", "st_venant"],
 )  # fmt: skip
 def test_materials_are_those_of_the_package(given: dict[str, Any], built: elastic.Material) -> None:
     assert file_of(material=given).scene.bodies["a"].material == built
