@@ -2,8 +2,8 @@
 
 What a script needs is here; nothing is loaded before it is used:
 
-Scenes: Scene, Body, BodyMesh, Surface, Support, Roller, RigidSurface, ContactPair, Tie, CyclicSymmetry,
-    AutomaticContact, LoadStep, Preload, Section, ElasticFoundation, Spring, box_partition
+Scenes: Scene, Body, BodyMesh, Surface, Support, Roller, RigidSurface, Kept, ContactPair, Tie,
+    CyclicSymmetry, AutomaticContact, LoadStep, Preload, Section, ElasticFoundation, Spring, box_partition
 
 Laws of surfaces: Coulomb, Tresca, FrictionTable, FrictionCurve, SlipTable, LinearClosure, ExponentialClosure,
     ClosureTable, ClosureLaw, FluidPressure
@@ -115,6 +115,7 @@ if TYPE_CHECKING:
     from fenics_contact._scene.scene import Scene as Scene
     from fenics_contact._scene.sectors import CyclicSymmetry as CyclicSymmetry
     from fenics_contact._scene.springs import Spring as Spring
+    from fenics_contact._scene.supports import Kept as Kept
     from fenics_contact._scene.supports import RigidSurface as RigidSurface
     from fenics_contact._scene.supports import Roller as Roller
     from fenics_contact._scene.supports import Support as Support
@@ -152,8 +153,7 @@ __version__ = "0.2.0"
 
 #: Public modules.
 _ROOMS = (
-    "decks design errors feti gallery materials mesh output pictures qp "
-    "readers results shapes study theory"
+    "decks design errors feti gallery materials mesh output pictures qp readers results shapes study theory"
 ).split()
 
 #: Modules of the names that users take from here.

@@ -9,6 +9,8 @@ import numpy as np
 
 from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._equilibrium.carried import CarriedState
+from fenics_contact._equilibrium.other_rows import prescribed_as_is
+from fenics_contact._equilibrium.starts import carried_over
 from fenics_contact._equilibrium.static_admissibility import (
     check_held,
     require_resisted,
@@ -24,9 +26,12 @@ from fenics_contact._large_deformations.loading import Loading
 from fenics_contact._large_deformations.moving_contact import Contact, ContactConfiguration, MovingContact
 from fenics_contact._large_deformations.newton import Effort, NonlinearEquilibrium, NotHeldError
 from fenics_contact._large_deformations.rigid_surfaces import driven_further
+from fenics_contact._scene.local_axes import free_part
 from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact._scene.supports import RigidSurface
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact.errors import InfeasibleError, InvalidInputError, LoadStepError
+from fenics_contact.feti.averages import nodal_mean_transposed, nodal_sum
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.preloads import shortening_columns, shortening_scales
 from fenics_contact.feti.torn import TornSystem
@@ -57,7 +62,7 @@ class DeformedEquilibria:
         """Prepare the forms of all materials. Collective."""
         _require_elastic(scene)
         self.scene, self._steps = scene, steps or AutomaticSteps()
-        self._decomposition, self._timer = decomposition, timer
+        self.decomposition, self._timer = decomposition, timer
         self._equations = Equations(scene, decomposition)
         self._assembled: TornSystem | None = None if known is None else known._assembled
         self._unresisted: tuple[UnheldMotion, ...] | None = None
@@ -90,6 +95,8 @@ class DeformedEquilibria:
             elif isinstance(before, DeformedState):
                 acted, known = before.load, before.equilibrium.linearisation
                 start = before.equilibrium.configuration
+                if before.torn.decomposition is not self.decomposition:
+                    (acted, start), known = self._held_otherwise(scene, before), None
         self._require_later(scene, start.time, time)
         with timer.phase("assemble"):
             load = self._loading(scene, time, step, overlap)
@@ -123,7 +130,7 @@ class DeformedEquilibria:
         timer, equations = self._timer, self._equations
         with timer.phase("assemble"):
             load = whole = self._loading(scene, float(stored["times"][1]))
-            at, load = stored_configuration(stored, load, equations.contact, self._decomposition)
+            at, load = stored_configuration(stored, load, equations.contact, self.decomposition)
             evaluation = equations.evaluate_at(load, at)
         near = evaluation.linearised(timer, None)
         evaluation = equations.evaluate_at(load, near.of(evaluation).at)
@@ -153,11 +160,11 @@ class DeformedEquilibria:
         contact = self._equations.contact.at(acted, moved, None)
         kept = before.history.carried(before.scene, scene, carried.transfers).values
         was = before.torn_displacement
-        squares = global_sum(self._decomposition.comm, was @ was, moved @ moved)
+        squares = global_sum(self.decomposition.comm, was @ was, moved @ moved)
         # Sizes of displacements are sums over nodes, of which there are others now.
         grown = float(np.sqrt(squares[1] / squares[0])) if squares[0] > 0.0 else 1.0
         history = tuple(
-            kept[mesh.body][mesh.cells] if mesh.body in kept else None for mesh in self._decomposition.meshes
+            kept[mesh.body][mesh.cells] if mesh.body in kept else None for mesh in self.decomposition.meshes
         )
         start = Configuration(
             displacement=moved,
@@ -168,28 +175,55 @@ class DeformedEquilibria:
             contact=contact,
             motions=at.motions,
         )
-        return acted, replace(start, multiplier=_balanced(self._equations.evaluate_at(acted, start)))
+        return acted, _balanced(self._equations.evaluate_at(acted, start))
+
+    def _held_otherwise(self, scene: Scene, before: DeformedState) -> tuple[Loading, Configuration]:
+        """Return what acted in a state and where it ended, with the supports of another scene. Collective.
+
+        What supports carried that are released acts as forces of the state before: they fall to zero in the
+        step.
+        """
+        places = [
+            {(each.body, each.surface) for each in at.supports if isinstance(each, RigidSurface)}
+            for at in (before.scene, scene)
+        ]
+        if new := sorted(places[1] - places[0]):
+            raise InvalidInputError(
+                f"a RigidSurface of a scene with nonlinear materials must be there from the first step on, "
+                f"that on surface {new[0][1]!r} of body {new[0][0]!r} is new: give it in the steps before, "
+                "too, with all components free"
+            )
+        at = before.equilibrium.configuration
+        assert at.contact is not None
+        acted = self._loading(
+            replace(before.scene, supports=scene.supports, contacts=scene.contacts), before.time, overlap=True
+        )
+        was = prescribed_as_is(before.torn, at.displacement, self.decomposition)
+        acted = acted.at_rest(was)
+        contact = self._equations.contact.at(acted, at.displacement, None)
+        forces = carried_over(at.contact.torn, at.multiplier, contact.torn)
+        start = replace(at, multiplier=forces, diagonal=None, contact=contact.from_here(forces))
+        evaluation = self._equations.evaluate_at(acted, start)
+        freed = before.torn.decomposition.fixed.any(axis=1)
+        nodes, axes = np.flatnonzero(freed), self.decomposition.axes
+        carried = nodal_sum(self.decomposition, evaluation.unbalanced)[nodes]
+        carried = free_part(carried, nodes, self.decomposition.fixed, axes)
+        acted = acted.with_forces(-nodal_mean_transposed(self.decomposition, nodes, carried))
+        return acted, _balanced(self._equations.evaluate_at(acted, start))
 
     def _loading(
         self, scene: Scene, time: float, step: LoadStep | None = None, overlap: bool = False
     ) -> Loading:
         """Return what acts at a time. Collective."""
-        load = Loading.of(scene, self._decomposition, time, self._assembled, step=step, overlap=overlap)
+        load = Loading.of(scene, self.decomposition, time, self._assembled, step=step, overlap=overlap)
         self._assembled = load.torn
         return load
 
 
-def _balanced(evaluation: ResidualState) -> np.ndarray:
-    """Return multipliers, owned, that glue what is out of balance as well as rows do one by one. Collective.
-
-    λ_i = b_i D⁻¹ r / b_i D⁻¹ b_iᵀ of rows b_i of gluing, with the forces r out of balance and the diagonal D.
-    """
-    torn, multiplier = evaluation.torn, evaluation.at.multiplier
-    flexibility = 1.0 / torn.decomposition.torn_stiffness
-    size = torn.numbering.to_owned(torn.B.multiply(torn.B) @ flexibility)
-    glued = torn.numbering.owned < torn.n_gluing
-    taken = torn.jump(flexibility * evaluation.unbalanced)
-    return np.where(glued, multiplier + taken / np.where(glued, size, 1.0), multiplier)
+def _balanced(evaluation: ResidualState) -> Configuration:
+    """Return a configuration whose gluing rows take what is out of balance. Collective."""
+    at, torn = evaluation.at, evaluation.torn
+    return replace(at, multiplier=at.multiplier + torn.gluing_of(evaluation.unbalanced))
 
 
 def drawn_as(before: DeformedState, acted: Loading, load: Loading) -> Loading:

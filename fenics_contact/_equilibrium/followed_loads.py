@@ -110,5 +110,7 @@ class FollowedLoads:
 
     def _free_load(self, torn: TornSystem) -> np.ndarray:
         """Return the loads of free motions before, those of now where other sections are free."""
-        free = [[each.is_free for each in at.scene.preloads] for at in (self.before.torn, torn)]
-        return self.before.torn.free.load if free[0] == free[1] else torn.free.load
+        before = self.before.torn
+        free = [[each.is_free for each in at.scene.preloads] for at in (before, torn)]
+        alike = free[0] == free[1] and before.free.count == torn.free.count
+        return before.free.load if alike else torn.free.load

@@ -15,6 +15,7 @@ from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._equilibrium.followed_loads import FollowedLoads
+from fenics_contact._equilibrium.other_rows import on_rows_of, with_kept
 from fenics_contact._equilibrium.starts import (
     CoarseStart,
     checked_start,
@@ -134,7 +135,10 @@ class LinearEquilibria:
             return before.slip_origin(
                 build_torn_system(scene, self._decomposition, overlap=True, previous=torn)
             )
-        return before.torn.slip_origin(before.torn_displacement, before.solution.multiplier)
+        if before.torn.decomposition is torn.decomposition:
+            return before.torn.slip_origin(before.torn_displacement, before.solution.multiplier)
+        was, multiplier = on_rows_of(before, torn)
+        return was.slip_origin(before.torn_displacement, multiplier)
 
     def _by_passes(
         self,
@@ -310,6 +314,8 @@ class ContactProblem:
 
     state: AnyState | None
     _decomposition: Decomposition | None
+    #: The scene whose supports hold what the decomposition does.
+    _held_by: Scene | None = None
     _deformed_equilibria: DeformedEquilibria | None = None
 
     def _facts(self) -> dict[str, Any]:
@@ -337,14 +343,18 @@ class ContactProblem:
 
     @property
     def decomposition(self) -> Decomposition:
-        """The subdomains of the scene. Collective on first use."""
-        return self._decomposed(self.scene)
+        """The subdomains of the scene, with the supports of the last one solved. Collective on first use."""
+        return self._decomposition or self._decomposed(self.scene)
 
     def _decomposed(self, scene: Scene) -> Decomposition:
-        """Return the subdomains, those of the first scene solved: its supports fix some nodes."""
+        """Return the subdomains with the rows of a scene's supports, those before on other meshes."""
+        held_by = self._held_by
         if self._decomposition is None:
             with self.timer.phase("decompose"):
                 self._decomposition = decompose(scene, self.partitions, self.comm, memory=self._memory)
+        elif held_by is not None and scene.supports != held_by.supports and scene.has_meshes_of(held_by):
+            self._decomposition = self._decomposition.holding(scene)
+        self._held_by = scene
         return self._decomposition
 
     @classmethod
@@ -362,7 +372,7 @@ class ContactProblem:
             state.scene, decomposition.comm,
             partitions=decomposition.partitions, solver=solver, tolerance=tolerance, steps=steps,
         )  # fmt: skip
-        problem._decomposition, problem.state = decomposition, state
+        problem._decomposition, problem._held_by, problem.state = decomposition, state.scene, state
         return problem
 
     def on(self, scene: Scene, partitions: Mapping[str, np.ndarray] | None = None) -> ContactProblem:
@@ -451,9 +461,9 @@ class ContactProblem:
             adjoint: Whether adjoints are wanted, as for errors of quantities, which need the dual system.
 
         Raises:
-            InvalidInputError: If scene or partition cannot be used, supports hold other components than
-                those of the scene that was solved first, or ``start`` is not on the meshes of the scene,
-                nor on those that the refinements lead from.
+            InvalidInputError: If scene or partition cannot be used, supports hold other components on other
+                meshes than before, or ``start`` is not on the meshes of the scene, nor on those that the
+                refinements lead from.
             InfeasibleError: If nothing holds some body against its load.
             ConvergenceError: If the solver does not reach its tolerance; the last solution stays unchanged.
 
@@ -474,6 +484,8 @@ class ContactProblem:
             if isinstance(before, CarriedState):
                 before.check(scene)
         last = before.state if isinstance(before, CarriedState) else before
+        if not isinstance(before, CarriedState):
+            scene = with_kept(scene, before)
         if scene.preloads:
             scene = replace(scene, preloads=held_at(scene, _lengths_after(last, scene)))
         kind = self._kind(scene, sensitivity=design or adjoint)
@@ -518,11 +530,10 @@ class ContactProblem:
         """Return what finds equilibria of nonlinear materials. Collective on first use."""
         from fenics_contact._equilibrium.deformed import DeformedEquilibria
 
-        equilibria = self._deformed_equilibria
-        if equilibria is None or not scene.has_meshes_of(equilibria.scene):
-            equilibria = DeformedEquilibria(
-                scene, self._decomposed(scene), self.steps, self.timer, known=equilibria
-            )
+        equilibria, decomposition = self._deformed_equilibria, self._decomposed(scene)
+        same = equilibria is not None and equilibria.decomposition is decomposition
+        if equilibria is None or not same or not scene.has_meshes_of(equilibria.scene):
+            equilibria = DeformedEquilibria(scene, decomposition, self.steps, self.timer, known=equilibria)
             self._deformed_equilibria = equilibria
         return equilibria
 

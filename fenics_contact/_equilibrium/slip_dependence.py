@@ -58,7 +58,9 @@ def consistent(
         U. Küttler, W. A. Wall, Fixed-point fluid–structure interaction solvers with dynamic relaxation,
         Comput. Mech. 43 (2008) 61–72.
     """
-    slip = np.zeros((torn.points.count, torn.components - 1)) if before is None else before.contact.total_slip
+    slip = np.zeros((torn.points.count, torn.components - 1))
+    if before is not None and before.contact.total_slip.shape == slip.shape:
+        slip = before.contact.total_slip
     mu, part, last = coefficients(torn, slip), 1.0, np.zeros(0)
     passes = Passes(solve, known)
     while passes.count < max_passes:

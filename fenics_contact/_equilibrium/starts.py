@@ -66,23 +66,25 @@ def first_guess(start: State | CoarseStart | None, system: DualSystem) -> np.nda
     old = known_system(start)
     if start is None or old is None or not isinstance(start.solution, DualSolution):
         return None
-    return carried_over(old, start.solution, system)
+    return carried_over(old.torn, start.solution.multiplier, system.torn)
 
 
-def carried_over(old: DualSystem, solution: DualSolution, new: DualSystem) -> np.ndarray:
-    """Return a start for ``new``, owned: unchanged gluing forces, contact forces in the new frames.
+def carried_over(before: TornSystem, multiplier: np.ndarray, after: TornSystem) -> np.ndarray:
+    """Return a start for the system after, owned: gluing forces, and contact forces in the new frames.
 
     Contact points are identified by pair and slave node; a new point starts open. Collective.
     """
-    before, after = old.torn, new.torn
-    start = np.zeros(len(after.numbering.owned))
-    # Ties of a moved scene may have other points; gluing rows are unchanged.
-    same = before.n_equality == after.n_equality
-    gluing_old = before.numbering.owned < (before.n_equality if same else before.n_gluing)
-    gluing_new = after.numbering.owned < (after.n_equality if same else after.n_gluing)
-    start[gluing_new] = solution.multiplier[gluing_old]
-    normal = before.numbering.gather(solution.multiplier, before.normal_rows)
-    tau = before.numbering.gather(solution.multiplier, before.tangential_rows.ravel()).reshape(
+    if before.decomposition.gluing is after.decomposition.gluing:
+        start = np.zeros(len(after.numbering.owned))
+        # Ties of a moved scene may have other points; gluing rows are unchanged.
+        same = before.n_equality == after.n_equality
+        gluing_old = before.numbering.owned < (before.n_equality if same else before.n_gluing)
+        gluing_new = after.numbering.owned < (after.n_equality if same else after.n_gluing)
+        start[gluing_new] = multiplier[gluing_old]
+    else:
+        start = _held_otherwise(before, multiplier, after)
+    normal = before.numbering.gather(multiplier, before.normal_rows)
+    tau = before.numbering.gather(multiplier, before.tangential_rows.ravel()).reshape(
         -1, before.components - 1
     )
     match = _matches(before.points, after.points)
@@ -94,6 +96,23 @@ def carried_over(old: DualSystem, solution: DualSolution, new: DualSystem) -> np
         friction[before.frictional] = np.einsum("na,nad->nd", tau, before.points.tangents[before.frictional])
     in_space = np.where(matched[:, None], friction[match], 0.0) if before.points.count else friction
     put_contact(after, start, values, in_space)
+    return start
+
+
+def _held_otherwise(before: TornSystem, multiplier: np.ndarray, after: TornSystem) -> np.ndarray:
+    """Return forces of gluing rows and ties where supports hold other components, owned. Collective.
+
+    What supports carried that are released is left out: the rows b of gluing, b · 1 = 0, take none of it.
+    """
+    held = before.numbering.owned < before.n_gluing
+    start = after.gluing_of(before.force(np.where(held, multiplier, 0.0)))
+    old, new = before.relations[0], after.relations[0]
+    forces = np.zeros((before.ties.count, before.components))
+    along = before.numbering.gather(multiplier, np.arange(before.n_gluing, before.n_equality))
+    np.add.at(forces, old.which, along[:, None] * old.directions)
+    match = _matches(before.ties, after.ties)[new.which]
+    kept = np.where(match >= 0, np.einsum("rd,rd->r", forces[match], new.directions), 0.0)
+    _put(after, start, np.arange(after.n_gluing, after.n_equality), kept)
     return start
 
 

@@ -21,6 +21,7 @@ from fenics_contact._base.display import counted, displayed
 from fenics_contact._base.files import CheckpointError
 from fenics_contact._base.fingerprint import described, differences, require_alike
 from fenics_contact._base.progress import Task
+from fenics_contact._equilibrium.other_rows import require_values_to_keep, with_kept
 from fenics_contact._equilibrium.problem import ContactProblem
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact.errors import InvalidInputError, collectively, together
@@ -219,7 +220,8 @@ class LoadSequence:
         """Compute the state at the end of the next step. Collective.
 
         Raises:
-            InvalidInputError: If it is no `LoadStep`, or its supports hold other components than before.
+            InvalidInputError: If it is no `LoadStep`, or a `RigidSurface` is new where materials are
+                nonlinear.
             InfeasibleError: If nothing holds some body against the new load.
             ConvergenceError: If the solver does not reach its tolerance.
             CheckpointError: If the checkpoint cannot be written.
@@ -255,6 +257,8 @@ class LoadSequence:
     def _advanced(self, step: LoadStep) -> AnyState:
         with together(self._comm):
             scene = step.applied_to(self.scene)
+            require_values_to_keep(step, scene)
+        scene = with_kept(scene, self.state)
         state = self._done.recalled(step, scene, self.problem)
         if state is None:
             time = self._number + 1.0 if step.time is None else step.time

@@ -231,17 +231,9 @@ class ResidualState:
 
         Returns change of multipliers, owned, zero but in gluing rows and those of supports, [force].
         """
-        torn = self.torn
-        taken = np.zeros(len(self.constraint_residual))
         if self.softening is None:
-            return taken
-        left = 0.5 * (self.softening.T - self.softening) @ moved
-        flexibility = 1.0 / torn.decomposition.torn_stiffness
-        # Of these rows B D⁻¹ Bᵀ is diagonal.
-        size = torn.numbering.to_owned(torn.B.multiply(torn.B) @ flexibility)
-        glued = torn.numbering.owned < torn.n_gluing
-        taken[glued] = torn.jump(flexibility * left)[glued] / size[glued]
-        return taken
+            return np.zeros(len(self.constraint_residual))
+        return self.torn.gluing_of(0.5 * (self.softening.T - self.softening) @ moved)
 
     def linearised(
         self, timer: PhaseTimer, known: Linearisation | None, *, springs: bool = True

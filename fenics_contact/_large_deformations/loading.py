@@ -118,8 +118,19 @@ class Loading:
         bent = self.prescribed.copy()
         for surface in turned:
             bent[surface.nodes] = surface.displacement
-        torn = _moved_further(self.torn, np.nan_to_num(bent - self.prescribed))
+        torn = self.torn.moved_further(np.nan_to_num(bent - self.prescribed))
         return replace(self, torn=torn, prescribed=bent, turned=turned)
+
+    def at_rest(self, prescribed: np.ndarray) -> Loading:
+        """Return the load with supports at other values, shape (n_nodes, dim), NaN where free, [length]."""
+        torn = self.torn.moved_further(np.nan_to_num(prescribed - self.prescribed))
+        return replace(self, torn=torn, prescribed=prescribed)
+
+    def with_forces(self, force: Vector) -> Loading:
+        """Return the load with further forces of this rank, torn, shape (torn_size,), [force]."""
+        parts = zip(self.torn.subdomains, self.torn.decomposition.parts, strict=True)
+        subdomains = tuple(replace(each, load=each.load + force[part]) for each, part in parts)
+        return replace(self, torn=replace(self.torn, subdomains=subdomains))
 
     @property
     def is_tracked(self) -> bool:
@@ -279,17 +290,6 @@ def _at_rim(facets: np.ndarray, dim: int) -> np.ndarray:
     )
     alone = count[number.reshape(corners.shape)] == 1
     return np.asarray(facets[alone.any(axis=1)])
-
-
-def _moved_further(torn: TornSystem, change: np.ndarray) -> TornSystem:
-    """Return a system whose supports have moved further, shape (n_nodes, dim), zero where free."""
-    gluing = torn.decomposition.gluing
-    supported = np.concatenate([relation.of_supports(change) for relation in torn.relations])
-    supported = np.concatenate([np.zeros(torn.n_gluing), supported])
-    right = -supported
-    right[: torn.n_gluing] = change.ravel()[gluing.dof]  # turned surfaces hold whole nodes
-    owned = torn.numbering.owned
-    return replace(torn, right=torn.right + right[owned], supported=torn.supported + supported[owned])
 
 
 @displayed

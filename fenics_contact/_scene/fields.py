@@ -27,6 +27,32 @@ if TYPE_CHECKING:
 OfPosition = Callable[[np.ndarray], np.ndarray]
 
 
+@displayed
+@dataclass(frozen=True, eq=False)
+class NodeValues:
+    """Values at nodes of a body, as a function of position: that of the nearest node.
+
+    Attributes:
+        points: Coordinates of the nodes, shape (n, dim), [length].
+        values: Shape (n,), or (n, k).
+    """
+
+    points: np.ndarray
+    values: np.ndarray
+
+    @cached_property
+    def _tree(self) -> KDTree:
+        return KDTree(self.points)
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Return the values at points, shape (n, dim)."""
+        return np.asarray(self.values[self._tree.query(points)[1]])
+
+    def __getstate__(self) -> dict[str, np.ndarray]:
+        """Pickle the values alone."""
+        return {"points": self.points, "values": self.values}
+
+
 @dataclass(frozen=True)
 @checked()
 class Ufl:

@@ -19,6 +19,22 @@ Component = float | OfPosition | None
 
 
 @dataclass(frozen=True)
+class Kept:
+    """What a support of a load step holds where it is when the step begins.
+
+    Give it as a component of `Support.value`, or as `Roller.displacement`: each node keeps the displacement
+    that it has. In a scene without a load step before it is zero.
+
+    Example:
+        >>> frozen = Support("bar", "x1", (Kept(), None, None))
+    """
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Return the displacements of undeformed bodies: zeros, shape (n,)."""
+        return np.zeros(len(points))
+
+
+@dataclass(frozen=True)
 @checked()
 class Support:
     """Displacement prescribed on a surface, or at single nodes, component by component.
@@ -29,7 +45,7 @@ class Support:
         value: Displacement [length] for x, y, z (for x, y on a plane body), by default zero in all directions
             of the body's space. Of bodies of revolution with torsion it is along the radius, the axis and the
             way around it. None leaves a component free; a function receives points, shape (n, dim), and
-            returns the component there, shape (n,).
+            returns the component there, shape (n,). `Kept` keeps what each node has when a load step begins.
 
     Raises:
         InvalidInputError: If nothing is prescribed, or something other than a finite number or a function.
@@ -103,7 +119,7 @@ class Roller:
         surface: Name of its surface; with a direction also of a node set of its mesh.
         displacement: Displacement along the direction, along the normal positive outwards, [length]: a
             number, zero by default, or a function that receives points, shape (n, dim), and returns it there,
-            shape (n,).
+            shape (n,); `Kept` as for `Support`.
         direction: The direction, of any length, or a function that receives points, shape (n, dim), and
             returns the directions there, shape (n, dim), as the radial one of a cylinder; the outward normal
             at every node by default.

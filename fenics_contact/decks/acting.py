@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.fields import NodeValues
 from fenics_contact._scene.loads import (
     BodyForce,
     Load,
@@ -23,7 +24,7 @@ from fenics_contact.decks.couplings import (
 )
 from fenics_contact.decks.history import Moment, Pressed, Weight
 from fenics_contact.decks.holding import Holding
-from fenics_contact.decks.model import Model, NodeValues
+from fenics_contact.decks.model import Model
 from fenics_contact.readers.deck_bodies import (
     Component,
 )

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from fenics_contact._scene.fields import NodeValues
 from fenics_contact._scene.loads import (
     BodyForce,
     Load,
@@ -24,10 +25,9 @@ from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.preloads import Section as CutAt
 from fenics_contact._scene.scene import LoadStep, Scene
 from fenics_contact._scene.springs import Spring
-from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support
+from fenics_contact._scene.supports import AnySupport, Kept, RigidSurface, Roller, Support
 from fenics_contact._scene.surface_laws import ClosureTable, ExponentialClosure, LinearClosure
 from fenics_contact.decks.deck import Deck
-from fenics_contact.decks.model import NodeValues
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.elastic import IsotropicElasticity, PlaneStrain, PlaneStress
 from fenics_contact.materials.hyperelastic import MooneyRivlin, Ogden, StVenantKirchhoff
@@ -219,6 +219,7 @@ class _Writer:
         """Return the loads before the first step, zero, and the steps."""
         named: dict[tuple[Any, ...], tuple[str, dict[str, Any]]] = {}
         tables, begin = [], 0.0
+        first = [_holds(each) for each in steps[0].supports or ()]  # type: ignore[union-attr]
         for number, step in enumerate(steps):
             assert not callable(step.loads)
             assert not callable(step.supports)
@@ -232,6 +233,11 @@ class _Writer:
             for key, (name, table) in named.items():
                 if name not in values:
                     values[name] = _nothing(table)
+            if [_holds(each) for each in step.supports or ()] != first:
+                raise InvalidInputError(
+                    f"a scene file has the same components held in all steps, {step.name} holds others than "
+                    "the first: run the deck, or read it in Python"
+                )
             end = float(number + 1) if step.time is None else step.time
             held = {
                 f"support {k}": self._moved(each, k, number) for k, each in enumerate(step.supports or ())
@@ -274,6 +280,18 @@ def _key(load: Load) -> tuple[Any, ...]:
     """Return what tells a load from others through the steps."""
     spins = isinstance(load, BodyForce) and isinstance(load.value, Spinning)
     return type(load), spins, load.body, getattr(load, "surface", getattr(load, "nodes", ""))
+
+
+def _holds(support: AnySupport) -> tuple[Any, ...]:
+    """Return where a support is, and of each component whether it is free or kept."""
+    if isinstance(support, Support):
+        values: tuple[Any, ...] = support.value
+    elif isinstance(support, Roller):
+        values = (support.displacement,)
+    else:
+        values = support.motion if isinstance(support, RigidSurface) else ()
+    how = tuple((each is None, isinstance(each, Kept)) for each in values)
+    return type(support), support.body, support.surface, how
 
 
 def _changed(table: Mapping[str, Any]) -> str:

@@ -87,6 +87,7 @@ class Moment:
         forces: Forces and moments on nodes, (n_nodes, 6), along their local axes.
         temperatures: (n_nodes,), or None where none are given.
         fixed: What is held as it was before the step, (n_nodes, 6).
+        kept: What of it was free before, so that `held` does not know its value, (n_nodes, 6).
     """
 
     time: float
@@ -96,6 +97,7 @@ class Moment:
     weights: Sequence[Weight]
     temperatures: np.ndarray | None
     fixed: np.ndarray
+    kept: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +138,9 @@ class _Course:
         shape = (len(mesh.points), 6)
         self.mesh, self.amplitudes = mesh, amplitudes
         self.held, self.held_before = np.full(shape, np.nan), np.zeros(shape)
-        self.fixed = np.zeros(shape, dtype=bool)
+        self.fixed, self.kept = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+        #: What has no value that the deck gives: it was free at the end of the step before, or kept then.
+        self.unknown = np.zeros(shape, dtype=bool)
         self.force, self.force_before = np.zeros(shape), np.zeros(shape)
         self.held_by, self.force_by = np.zeros(shape, dtype=int), np.zeros(shape, dtype=int)
         self.factors: list[Amplitude | None] = [None]
@@ -183,8 +187,7 @@ class _Course:
             self.targets.append(Held(plain(entries[0]), nodes, inside, card, row))
             for k in inside:
                 self.held[nodes, k] = self.held_before[nodes, k] if fixed else value
-                self.held_by[nodes, k] = by
-                self.fixed[nodes, k] = fixed
+                self._held_so(nodes, k, by, fixed)
 
     def _hold_single(self, card: Card, table: np.ndarray, fixed: bool, by: int) -> None:
         """Hold single nodes by their numbers, lines alike in their components at once."""
@@ -199,8 +202,11 @@ class _Course:
             self.targets.append(Held("", nodes[rows], inside, card, int(rows[0])))
             for k in inside:
                 self.held[nodes[rows], k] = self.held_before[nodes[rows], k] if fixed else value[rows]
-                self.held_by[nodes[rows], k] = by
-                self.fixed[nodes[rows], k] = fixed
+                self._held_so(nodes[rows], k, by, fixed)
+
+    def _held_so(self, nodes: np.ndarray, component: int, by: int, fixed: bool) -> None:
+        at = nodes, component
+        self.held_by[at], self.fixed[at], self.kept[at] = by, fixed, self.unknown[at] & fixed
 
     def forces(self, card: Card, fresh: bool, touched: np.ndarray) -> None:
         """Load nodes. Forces of one step add up, those of earlier steps are replaced.
@@ -299,7 +305,8 @@ class _Course:
             before = self.temperature if self.temperature_before is None else self.temperature_before
             heat = now(self.temperature, before, np.full(len(self.temperature), self.temperature_by))
         forces = now(self.force, self.force_before, self.force_by)
-        return Moment(start + step_time, held, forces, pressures, weights, heat, self.fixed.copy())
+        fixed, kept = self.fixed.copy(), self.kept & ~np.isnan(self.held)
+        return Moment(start + step_time, held, forces, pressures, weights, heat, fixed, kept)
 
     def times(self, period: float, start: float) -> list[float]:
         """Return the times of a step at which something changes its slope, and its end."""
@@ -318,6 +325,7 @@ class _Course:
     def finish(self, last: Moment) -> None:
         """Take the end of a step as the start of the next."""
         self.held_before, self.force_before = np.nan_to_num(last.held), last.forces.copy()
+        self.unknown = np.isnan(last.held) | last.kept
         # What had an amplitude keeps it; what was ramped has its value at the start of the next step.
         for where, (each, by, _) in list(self.pressures.items()):
             self.pressures[where] = each, by, next(p.value for p in last.pressures if p.where == where)

@@ -8,18 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from fenics_contact._scene.fields import NodeValues
 from fenics_contact._scene.pairs import Surface
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.preloads import Section as CutAt
 from fenics_contact._scene.springs import Spring
-from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support
+from fenics_contact._scene.supports import AnySupport, Kept, RigidSurface, Roller, Support
 from fenics_contact.decks.couplings import (
     Bolt,
     Driven,
     rigid_surface,
 )
 from fenics_contact.decks.history import Held, Moment
-from fenics_contact.decks.model import Model, NodeValues
+from fenics_contact.decks.model import Model
 from fenics_contact.readers.deck_bodies import (
     Component,
 )
@@ -34,7 +35,7 @@ class Holding:
         self.driven_at: dict[int, str] = {}
 
     def supported(self) -> dict[str, tuple[np.ndarray, tuple[int, ...]]]:
-        """Return what is held by name: nodes and components. Single nodes are put together."""
+        """Return what is held in any step by name: nodes and components. Single nodes are put together."""
         inside = self.model.nodes_of_bodies()
         found: dict[str, tuple[np.ndarray, set[int]]] = {}
         single = np.zeros((len(inside), 3), dtype=bool)
@@ -42,6 +43,7 @@ class Holding:
             nodes = target.nodes[inside[target.nodes]]
             inner = [k for k in target.components if k < self.model.dim]
             self._check_turns(target, nodes)
+            self._check_kept(target)
             if not len(nodes):
                 if not np.isin(target.nodes, self.model.references).any():
                     self.model.note(target.card, f"nodes {target.label} belong to no element")
@@ -50,15 +52,37 @@ class Holding:
             elif inner:
                 found.setdefault(target.label, (nodes, set()))[1].update(inner)
                 self.model.origins.setdefault(("support", target.label), target.card.origin)
-        for alike in np.unique(single[single.any(axis=1)], axis=0):
-            components = np.flatnonzero(alike)
+        # Nodes that are held alike in all steps are one set.
+        course = np.concatenate([single, *(single & marks for marks in self._marks())], axis=1)
+        for alike in np.unique(course[single.any(axis=1)], axis=0):
+            components = np.flatnonzero(alike[:3])
             name = "BOUNDARY " + " ".join(str(k + 1) for k in components)
-            found[name] = np.flatnonzero((single == alike).all(axis=1)), set(components.tolist())
-        result = {}
-        for name, (nodes, held) in found.items():
-            result[self.model.place(name, nodes)] = np.unique(nodes), tuple(sorted(held))
-        self._require_same(inside)
-        return result
+            name = next(n for n in (name, *(f"{name} {chr(65 + k)}" for k in range(26))) if n not in found)
+            found[name] = np.flatnonzero((course == alike).all(axis=1)), set(components.tolist())
+        return {
+            self.model.place(name, nodes): (np.unique(nodes), tuple(sorted(held)))
+            for name, (nodes, held) in found.items()
+        }
+
+    def _marks(self) -> list[np.ndarray]:
+        """Return what is held in the steps, (n_nodes, 3), each time that it changes."""
+        found: list[np.ndarray] = []
+        for step in self.model.history.steps:
+            now = ~np.isnan(step.moments[-1].held[:, :3])
+            if not found or (now != found[-1]).any():
+                found.append(now)
+        return found
+
+    def _check_kept(self, target: Held) -> None:
+        """Reject nodes that drive rigid surfaces and are fixed where their motion was free before."""
+        driving = {node for driven in self.model.driven for node in (driven.node, driven.turning)}
+        here = [node for node in target.nodes.tolist() if node in driving]
+        moments = [moment for step in self.model.history.steps for moment in step.moments]
+        if any(moment.kept[node, list(target.components)].any() for moment in moments for node in here):
+            raise target.card.error(
+                f"node {self.model.mesh.numbers[here[0]]}, which drives a surface, was free before it is "
+                "FIXED: give the displacement at which it is to be held", target.row,
+            )  # fmt: skip
 
     def _check_turns(self, target: Held, nodes: np.ndarray) -> None:
         """Reject rotations of nodes of elements, which have none, unless they are held at zero."""
@@ -72,24 +96,18 @@ class Holding:
                 "surface by a node, with *RIGID BODY or *COUPLING", target.row,
             )  # fmt: skip
 
-    def _require_same(self, inside: np.ndarray) -> None:
-        """Reject steps that hold other components than the first."""
-        moments = [(step, moment) for step in self.model.history.steps for moment in step.moments]
-        for step, moment in moments[1:]:
-            held, first = (~np.isnan(each.held[inside, : self.model.dim]) for each in (moment, moments[0][1]))
-            if (held != first).any():
-                node = self.model.mesh.numbers[inside][(held != first).any(axis=1)][0]
-                raise step.card.error(
-                    f"the same components must be held in all steps, here others than in the first, at "
-                    f"node {node}: hold them in all steps with OP=MOD, or make two decks"
-                )
-
     def supports(
         self, supported: Mapping[str, tuple[np.ndarray, tuple[int, ...]]], moment: Moment | None
     ) -> tuple[AnySupport, ...]:
-        """Return the supports at a time, at zero before all."""
+        """Return the supports at a time; before all those of the first step, at zero."""
         found = []
-        for name, (nodes, held) in supported.items():
+        marks = None if moment is None else ~np.isnan(moment.held)
+        if marks is None and self.model.history.steps:
+            marks = ~np.isnan(self.model.history.steps[0].moments[0].held)
+        for name, (nodes, components) in supported.items():
+            held = [k for k in components if marks is None or marks[nodes, k].all()]
+            if not held:
+                continue
             for body, mesh in self.model.parts.meshes.items():
                 mine, inner = self.model.in_body(body, nodes)
                 if not len(mine):
@@ -114,6 +132,9 @@ class Holding:
         amounts: list[Any] = [
             float(each[0]) if np.ptp(each) == 0.0 else NodeValues(points, each) for each in given
         ]
+        for place, k in enumerate(held):
+            if moment is not None and moment.kept[nodes, k].any():
+                amounts[place] = self._kept(name, moment.kept[nodes, k])
         turned = [self.model.local_axes[node] for node in nodes.tolist() if node in self.model.local_axes]
         whole = len(held) == self.model.dim and not any(each.any() for each in given)
         if not turned or (whole and self._always_zero(nodes, held)):
@@ -131,10 +152,24 @@ class Holding:
             found.append(Roller(body, name, amount, direction))
         return found
 
+    def _kept(self, name: str, kept: np.ndarray) -> Kept:
+        """Return a support that keeps what all of its nodes have."""
+        if not kept.all():
+            target = next(each for each in self.model.history.targets if "FIXED" in each.card.parameters)
+            raise target.card.error(
+                f"nodes of {name!r} that are FIXED were partly free before: give those that were in a set of "
+                "their own", target.row,
+            )  # fmt: skip
+        return Kept()
+
     def _always_zero(self, nodes: np.ndarray, held: Sequence[int]) -> bool:
         """Return whether components of nodes are held at zero in all steps."""
         moments = [moment for step in self.model.history.steps for moment in step.moments]
-        return not any(np.nan_to_num(moment.held[nodes][:, list(held)]).any() for moment in moments)
+        held = list(held)
+        return not any(
+            np.nan_to_num(moment.held[nodes][:, held]).any() or moment.kept[nodes][:, held].any()
+            for moment in moments
+        )
 
     def name_surfaces(self) -> None:
         """Name the surfaces that nodes drive or load."""

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from fenics_contact._base.display import displayed
 from fenics_contact._scene.body import Body
 from fenics_contact.decks.couplings import (
     in_global_axes,
@@ -36,32 +33,6 @@ from fenics_contact.readers.deck_bodies import (
 )
 from fenics_contact.readers.deck_cards import Card, Origin
 from fenics_contact.readers.deck_mesh import DeckMesh, Faces, MeshCards, read_mesh_cards
-
-
-@displayed
-@dataclass(frozen=True, eq=False)
-class NodeValues:
-    """Values at nodes of a body, as a function of position: that of the nearest node.
-
-    Attributes:
-        points: Coordinates of the nodes, shape (n, dim), [length].
-        values: Shape (n,), or (n, k).
-    """
-
-    points: np.ndarray
-    values: np.ndarray
-
-    @cached_property
-    def _tree(self) -> cKDTree:
-        return cKDTree(self.points)
-
-    def __call__(self, points: np.ndarray) -> np.ndarray:
-        """Return the values at points, shape (n, dim)."""
-        return np.asarray(self.values[self._tree.query(points)[1]])
-
-    def __getstate__(self) -> dict[str, np.ndarray]:
-        """Pickle the values alone."""
-        return {"points": self.points, "values": self.values}
 
 
 class Model:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -286,15 +286,15 @@ class GluingRows:
         """Return c of the rows for displacements from `prescribed_along`."""
         if not same_axes(axes, self.axes):
             raise InvalidInputError(
-                "the supports of a scene may change their values, not what they hold: its rollers hold nodes "
-                "along other directions than when the scene was decomposed: decompose it again, or give the "
-                "rollers a direction, which stays"
+                "where the meshes of a scene change its supports may change their values, not what they "
+                "hold: its rollers hold nodes along other directions than when the scene was decomposed: "
+                "decompose it again, or give the rollers a direction, which stays"
             )
         if not np.array_equal(~np.isnan(prescribed), self.fixed):
             raise InvalidInputError(
-                "the supports of a scene may change their values, not what they hold: "
-                f"{np.count_nonzero(self.fixed)} components were prescribed when the scene was decomposed, "
-                f"now {np.count_nonzero(~np.isnan(prescribed))} or others are: decompose it again"
+                "where the meshes of a scene change its supports may change their values, not what they "
+                f"hold: {np.count_nonzero(self.fixed)} components were prescribed when the scene was "
+                f"decomposed, now {np.count_nonzero(~np.isnan(prescribed))} or others are: decompose it again"
             )
         return np.nan_to_num(prescribed).ravel()[self.dof]
 
@@ -462,6 +462,22 @@ class Decomposition:
     def axes(self) -> LocalAxes | None:
         """Axes of nodes along which components are prescribed or free; None: the coordinates' everywhere."""
         return self.gluing.axes
+
+    def holding(self, scene: Scene) -> Decomposition:
+        """Return the subdomains with the rows of a scene's supports: itself if it holds the same. Collective.
+
+        In Total FETI what supports hold is in these rows alone: matrices, kernels and factors stay.
+
+        `scene`: one with the same meshes.
+        """
+        with together(self.comm):
+            prescribed, axes = prescribed_along(scene, self.tearing)
+            fixed = ~np.isnan(prescribed)
+            if np.array_equal(fixed, self.fixed) and same_axes(axes, self.axes):
+                return self
+            dependent = dependent_nodes(scene, self.tearing)
+            gluing = gluing_rows(self.tearing, fixed, axes, dependent, self.comm.rank)
+        return replace(self, gluing=gluing)
 
 
 def decompose(

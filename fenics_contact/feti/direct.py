@@ -60,7 +60,8 @@ class DirectSystem:
         # Each row of a support holds one component, along the axes of its node.
         self._fixed = (torn.B if self._turn is None else _rounded(torn.B @ self._turn.T)).indices
         self._free = np.setdiff1d(np.arange(body.mesh.size), self._fixed)
-        if previous is not None and previous.torn.subdomains[0].matrix is body.matrix:
+        held = previous is not None and previous.torn.decomposition is torn.decomposition
+        if previous is not None and held and previous.torn.subdomains[0].matrix is body.matrix:
             self._factor = previous._factor
             return
         with (timer or PhaseTimer()).phase("factor"):

@@ -336,6 +336,26 @@ class TornSystem:
         """Numbers of the contact points without friction, shape (n_contact − n_friction,)."""
         return np.setdiff1d(np.arange(self.points.count), self.frictional, assume_unique=True)
 
+    def gluing_of(self, force: np.ndarray) -> np.ndarray:
+        """Return multipliers of gluing rows that take a force as well as rows do one by one. Collective.
+
+        λ_i = b_i D⁻¹ f / b_i D⁻¹ b_iᵀ of rows b_i of gluing and supports, owned, zero in others; `force`:
+        torn, of this rank, shape (torn_size,), [force].
+        """
+        flexibility = 1.0 / self.decomposition.torn_stiffness
+        size = self.numbering.to_owned(self.B.multiply(self.B) @ flexibility)
+        glued = self.numbering.owned < self.n_gluing
+        return np.where(glued, self.jump(flexibility * force) / np.where(glued, size, 1.0), 0.0)
+
+    def moved_further(self, change: np.ndarray) -> TornSystem:
+        """Return a system whose supports have moved, (n_nodes, dim), along axes of nodes, 0 where free."""
+        supported = np.concatenate([relation.of_supports(change) for relation in self.relations])
+        supported = np.concatenate([np.zeros(self.n_gluing), supported])
+        right = -supported
+        right[: self.n_gluing] = change.ravel()[self.decomposition.gluing.dof]
+        owned = self.numbering.owned
+        return replace(self, right=self.right + right[owned], supported=self.supported + supported[owned])
+
     def sliding(self, displacement: np.ndarray) -> np.ndarray:
         """Return the tangential displacement of points without friction, [length]. Collective.
 
@@ -526,9 +546,10 @@ def build_torn_system(
         prescribed, axes = prescribed_along(scene, decomposition.tearing)
         right = decomposition.gluing.right_side(prescribed, axes)
         free = free_motions(scene, decomposition.tearing)
-    if previous is not None and _meets_alike(scene, previous.scene) and previous.driven_as(prescribed):
+    alike = previous if previous is not None and _meets_alike(scene, decomposition, previous) else None
+    if alike is not None and alike.driven_as(prescribed):
         # Only loads and prescribed values changed: B stays the same object, which marks F as unchanged, too.
-        system = replace(previous, scene=scene, subdomains=subdomains, fluid=None)
+        system = replace(alike, scene=scene, subdomains=subdomains, fluid=None)
     else:
         system = _joined(scene, decomposition, subdomains, overlap, previous, prescribed)
     with together(comm):
@@ -557,8 +578,8 @@ def build_torn_system(
     return replace(system, supported=supported[owned], right=right[owned], slid=slid, free=free)
 
 
-def _meets_alike(scene: Scene, other: Scene) -> bool:
-    """Return whether two scenes have the same meshes and pairs of surfaces, whatever fluid is in them."""
+def _meets_alike(scene: Scene, decomposition: Decomposition, known: TornSystem) -> bool:
+    """Return whether two scenes have the same meshes, pairs and held components, whatever fluid is there."""
     pairs = [
         [
             *(c if c.fluid is None else replace(c, fluid=None) for c in each.contacts),
@@ -566,9 +587,10 @@ def _meets_alike(scene: Scene, other: Scene) -> bool:
             *each.springs,
             *(p.key for p in each.preloads),
         ]
-        for each in (scene, other)
+        for each in (scene, known.scene)
     ]
-    return scene.has_meshes_of(other) and pairs[0] == pairs[1]
+    same = scene.has_meshes_of(known.scene) and known.decomposition is decomposition
+    return same and pairs[0] == pairs[1]
 
 
 def _joined(

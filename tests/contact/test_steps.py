@@ -16,18 +16,15 @@ from mpi4py import MPI
 from fenics_contact import (
     Body,
     Checkpoint,
-    ContactPair,
     ContactProblem,
     Coulomb,
     FixedPoint,
     LoadSequence,
     LoadStep,
-    RigidPlane,
     Scene,
     State,
     Status,
     Support,
-    Surface,
     Traction,
     Tresca,
     box_partition,
@@ -41,22 +38,15 @@ from fenics_contact.qp import DualSolver, FaceNewton, Smalse
 from fenics_contact.results.deformed_state import AnyState
 from tests.conftest import run_on_ranks
 from tests.contact.checks import assert_solved
-from tests.contact.conic_reference import ConicReference
+from tests.contact.friction_steps import FRICTION, coulomb_reference, sheared_block
 from tests.contact.gallery import block_on_plane, crowned, partitions, two_blocks
 from tests.contact.step_cases import PATH as RESUMED_PATH
 from tests.contact.step_cases import collect, sequence
 from tests.contact.step_cases import shears as resumed_shears
 
-FRICTION, TOLERANCE = 0.3, 1e-9
-FLOOR = RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+TOLERANCE = 1e-9
 #: Pressed, sheared until all slips, let go, sheared the other way, let go, sheared again.
 PATH = (0.0, 0.006, 0.02, 0.008, 0.0, -0.02, -0.004, 0.0, 0.012, 0.02)
-
-
-def sheared_block(law: Coulomb | Tresca) -> Scene:
-    mesh = block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (5, 3, 3))
-    pair = ContactPair(Surface("block", "z0"), FLOOR, law)
-    return Scene({"block": Body(mesh, IsotropicElasticity(1000.0, 0.3))}, contacts=[pair])
 
 
 def shears(path: tuple[float, ...]) -> list[LoadStep]:
@@ -75,20 +65,6 @@ def solved(law: Coulomb | Tresca, path: tuple[float, ...] = PATH) -> tuple[AnySt
 
 def shear_force(state: AnyState) -> float:
     return float(state.contact.force[:, 0].sum())
-
-
-def coulomb_reference(scene: Scene, before: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """Return displacement and contact forces of one step: a fixed point of conic programs."""
-    reference = ConicReference(scene)
-    normal = np.full(len(reference.rows.gap), 0.5)
-    for _ in range(60):
-        found = reference.solve(FRICTION * normal, before)
-        change = np.abs(found.normal_force - normal).max() / found.normal_force.max()
-        normal = found.normal_force
-        if change < 1e-9:
-            break
-    assert change < 1e-7
-    return found.displacement, found.contact_force
 
 
 @pytest.fixture(scope="module")
@@ -195,14 +171,6 @@ def test_steps_must_be_load_steps() -> None:
         InvalidInputError, match=r"time of LoadStep 'a' must be a finite number or None, got nan"
     ):
         LoadStep("a", time=float("nan"))
-
-
-def test_steps_may_not_change_what_supports_hold() -> None:
-    sequence = LoadSequence(ContactProblem(sheared_block(Coulomb(0.3)), MPI.COMM_SELF))
-    sequence.advance(shears((0.0,))[0])
-    freed = LoadStep("free", supports=[Support("block", "z1", (None, 0.0, -0.01))])
-    with pytest.raises(InvalidInputError, match="may change their values, not what they hold"):
-        sequence.advance(freed)
 
 
 # An interrupted load history goes on from the last step that was done.

@@ -111,12 +111,6 @@ WRONG = [
     ("*STATIC\n0.1, 1.\n", "", "*STEP", r"needs \*STATIC: nothing else is solved here"),
     ("*STEP\n", "*CLOAD\nBAR_X1, 1, 1.\n*STEP\n", "*CLOAD", r"must be between \*STEP and \*END STEP"),
     (
-        "*END STEP\n",
-        "*END STEP\n*STEP\n*STATIC\n*BOUNDARY\nBAR_X1, 1\n*END STEP\n",
-        "*STEP\n*STATIC\n*B",
-        r"the same components must be held in all steps",
-    ),
-    (
         "*STEP\n",
         "*NSET, NSET=ODD, GENERATE\n9, 1, 2\n*STEP\n",
         "9, 1, 2",

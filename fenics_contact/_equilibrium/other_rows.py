@@ -1,0 +1,115 @@
+"""The state at the end of a load step on the rows of the next: its supports may hold other components."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fenics_contact._equilibrium.starts import carried_over
+from fenics_contact._scene.fields import NodeValues
+from fenics_contact._scene.local_axes import same_axes
+from fenics_contact._scene.scene import LoadStep, Scene
+from fenics_contact._scene.supports import AnySupport, Kept, RigidSurface, Roller, Support
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.averages import nodal_mean_at
+from fenics_contact.feti.decomposition import Decomposition, prescribed_along
+from fenics_contact.feti.torn import TornSystem, build_torn_system
+from fenics_contact.results.state import State
+
+
+def prescribed_as_is(torn: TornSystem, displacement: np.ndarray, after: Decomposition) -> np.ndarray:
+    """Return what supports would prescribe that hold nodes where those of a state have them. Collective.
+
+    What both hold keeps its numbers, so that what rests does so exactly; what is held newly has the
+    displacement of the state.
+
+    `torn`: the system of the state; `displacement`: torn, of this rank, [length]; `after`: the subdomains
+    with the supports that hold.
+
+    Returns shape (n_nodes, dim), NaN where free, along the axes of nodes, [length].
+    """
+    known, axes = prescribed_along(torn.scene, torn.decomposition.tearing)
+    there, nodes = np.zeros_like(known), np.flatnonzero(after.fixed.any(axis=1))
+    there[nodes] = nodal_mean_at(after, displacement, nodes)
+    there = there if after.axes is None else after.axes.to_local(there)
+    kept = ~np.isnan(known) & ~_moving(torn)[:, None]
+    if not same_axes(axes, after.axes):
+        for each in (axes, after.axes):
+            if each is not None:
+                kept[each.nodes] = False
+    return np.where(after.fixed, np.where(kept, known, there), np.nan)
+
+
+def _moving(torn: TornSystem) -> np.ndarray:
+    """Return the nodes of rigid surfaces whose motion is not prescribed, shape (n_nodes,)."""
+    marks = np.zeros(torn.decomposition.tearing.n_nodes, dtype=bool)
+    for support in torn.scene.supports:
+        if isinstance(support, RigidSurface) and support.free.any():
+            own = torn.scene.bodies[support.body].mesh.nodes_to_hold(support.surface)
+            marks[torn.decomposition.tearing.global_nodes(support.body, own)] = True
+    return marks
+
+
+def with_kept(scene: Scene, before: State | None) -> Scene:
+    """Return the scene of a load step with the displacements that its supports keep. Collective."""
+    if before is None or not any(_keeps(support) for support in scene.supports):
+        return scene
+    return replace(scene, supports=[_kept(support, scene, before) for support in scene.supports])
+
+
+def require_values_to_keep(step: LoadStep, scene: Scene) -> None:
+    """Reject supports that are functions of time and keep what nodes have: they are asked on the way, too."""
+    if callable(step.supports) and any(_keeps(support) for support in scene.supports):
+        raise InvalidInputError(
+            f"supports of LoadStep {step.name!r} that are functions of time must have values, got Kept: give "
+            "those that keep what they have in a list, supports=[...]"
+        )
+
+
+def _keeps(support: AnySupport) -> bool:
+    if isinstance(support, Roller):
+        return isinstance(support.displacement, Kept)
+    return isinstance(support, Support) and any(isinstance(each, Kept) for each in support.value)
+
+
+def _kept(support: AnySupport, scene: Scene, before: State) -> AnySupport:
+    """Return a support with displacements of a state where it keeps them. Collective."""
+    if not isinstance(support, Support | Roller) or not _keeps(support):
+        return support
+    mesh, tearing = scene.bodies[support.body].mesh, before.torn.decomposition.tearing
+    if isinstance(support, Support):
+        nodes, directions = mesh.nodes_to_hold(support.surface), None
+    else:
+        held = scene.directions_of(support)
+        nodes, directions = held.nodes, held.directions
+    every = tearing.global_nodes(support.body, nodes)
+    moved = nodal_mean_at(before.torn.decomposition, before.torn_displacement, every)
+    if isinstance(support, Roller):
+        assert directions is not None
+        along = np.einsum("nd,nd->n", moved, directions)
+        return replace(support, displacement=NodeValues(mesh.points[nodes], along))
+    known, axes = prescribed_along(before.torn.scene, tearing)
+    plain = ~_moving(before.torn)
+    if axes is not None:
+        plain[axes.nodes] = False
+    moved = np.where(~np.isnan(known[every]) & plain[every, None], known[every], moved)
+    value = [
+        NodeValues(mesh.points[nodes], moved[:, k]) if isinstance(each, Kept) else each
+        for k, each in enumerate(support.value)
+    ]
+    return replace(support, value=tuple(value))
+
+
+def on_rows_of(state: State, after: TornSystem) -> tuple[TornSystem, np.ndarray]:
+    """Return the system of a state on other rows, where its supports are, and its multipliers. Collective.
+
+    `after`: the system of a scene with the meshes of the state.
+    """
+    decomposition, displacement = after.decomposition, state.torn_displacement
+    scene = replace(state.scene, supports=after.scene.supports, contacts=after.scene.contacts)
+    torn = build_torn_system(scene, decomposition, overlap=True, previous=after)
+    now, _ = prescribed_along(scene, decomposition.tearing)
+    was = prescribed_as_is(state.torn, displacement, decomposition)
+    torn = torn.moved_further(np.nan_to_num(was - now))
+    return torn, carried_over(state.torn, state.solution.multiplier, torn)

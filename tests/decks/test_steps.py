@@ -1,0 +1,74 @@
+"""Steps of decks that hold other components than the first: *BOUNDARY with OP=NEW and FIXED."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import Kept, Support
+from fenics_contact.decks import DeckError, read_deck
+from tests.decks.texts import BAR, FREE_TO_CONTRACT, deck, step
+
+YOUNG, LENGTH, STRESS, PULL = 210000.0, 3.0, 50.0, 0.01
+#: A traction on the end face by its nodal forces: 3 by 2 nodes, the middle ones of two cells.
+PUSH = f"*DSLOAD, OP=NEW\nTIP, P, {-STRESS}\n"
+TIP = "*SURFACE, NAME=TIP\nLAST, S4\n"
+LAST = "*ELSET, ELSET=LAST\n5, 6\n"
+HISTORY = (
+    BAR + LAST + TIP + FREE_TO_CONTRACT
+    + step(f"*BOUNDARY\nBAR_X1, 1, 1, {PULL}\n")
+    + step(FREE_TO_CONTRACT.replace("*BOUNDARY", "*BOUNDARY, OP=NEW") + PUSH)
+    + step("*BOUNDARY, FIXED\nBAR_X1, 1\n*DSLOAD, OP=NEW\n")
+    + step("")
+    + step(FREE_TO_CONTRACT.replace("*BOUNDARY", "*BOUNDARY, OP=NEW"))
+)  # fmt: skip
+
+
+def test_supports_are_released_and_kept_from_step_to_step(tmp_path: Path) -> None:
+    found = read_deck(deck(tmp_path, HISTORY))
+    holding = [{s.surface for s in step.supports or () if isinstance(s, Support)} for step in found.steps]
+    there, free = {"BAR_X0", "BAR_Y0", "BAR_Z0", "BAR_X1"}, {"BAR_X0", "BAR_Y0", "BAR_Z0"}
+    assert holding == [there, free, there, there, free]
+    for number in (2, 3):
+        ends = [s for s in found.steps[number].supports or () if s.surface == "BAR_X1"]
+        assert ends == [Support("BAR", "BAR_X1", (Kept(), None, None))]
+    states = found.solve(MPI.COMM_SELF, tolerance=1e-11)
+    mesh = found.scene.bodies["BAR"].mesh
+    tip, stretch = mesh.points[:, 0] == LENGTH, STRESS * LENGTH / YOUNG
+    for state, expected in zip(states, (PULL, stretch, stretch, stretch, 0.0), strict=True):
+        np.testing.assert_allclose(state.gather_displacement("BAR")[tip, 0], expected, atol=1e-9 * PULL)
+    forces = [float(state.reactions()["BAR BAR_X0"].force[0]) for state in states]
+    np.testing.assert_allclose(forces, [-YOUNG * PULL / LENGTH, *[-STRESS] * 3, 0.0], atol=1e-6 * STRESS)
+
+
+def test_single_nodes_that_are_held_in_some_steps_are_sets_of_their_own(tmp_path: Path) -> None:
+    nodes = [line.split(",")[0] for line in BAR.partition("NSET=BAR_X1\n")[2].splitlines()[:6]]
+    alone = "".join(f"{node}, 1, 1, {PULL}\n" for node in nodes)
+    some = "".join(f"{node}, 1, 1, {PULL}\n" for node in nodes[:4])
+    text = BAR + FREE_TO_CONTRACT + step("*BOUNDARY\n" + alone)
+    text += step(FREE_TO_CONTRACT.replace("*BOUNDARY", "*BOUNDARY, OP=NEW") + "*BOUNDARY\n" + some)
+    found = read_deck(deck(tmp_path, text))
+    counts = []
+    for each in found.steps:
+        held = [s for s in each.supports or () if s.surface.startswith("BOUNDARY")]
+        meshes = found.scene.bodies["BAR"].mesh
+        counts.append(sum(len(meshes.nodes_to_hold(support.surface)) for support in held))
+    assert counts == [6, 4]
+    last = found.solve(MPI.COMM_SELF)[-1]
+    moved = last.gather_displacement("BAR")[:, 0]
+    assert (np.abs(moved - PULL) < 1e-9).sum() == 4
+
+
+def test_what_cannot_be_kept_is_refused(tmp_path: Path) -> None:
+    nodes = [line.split(",")[0] for line in BAR.partition("NSET=BAR_X1\n")[2].splitlines()[:6]]
+    text = BAR + FREE_TO_CONTRACT + step(f"*BOUNDARY\n{nodes[0]}, 1, 1, {PULL}\n")
+    text += step("*BOUNDARY, FIXED\nBAR_X1, 1\n")
+    with pytest.raises(DeckError, match=r"nodes of 'BAR_X1' that are FIXED were partly free before"):
+        read_deck(deck(tmp_path, text))
+    driven = BAR + "*NODE\n501, 3., 0.5, 0.5\n*RIGID BODY, NSET=BAR_X1, REF NODE=501\n" + FREE_TO_CONTRACT
+    driven += step("*CLOAD\n501, 1, 9.\n") + step("*BOUNDARY, FIXED\n501, 1\n")
+    with pytest.raises(DeckError, match=r"node 501, which drives a surface, was free before it is FIXED"):
+        read_deck(deck(tmp_path, driven))
