@@ -135,7 +135,8 @@ def tables(record: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     """Return the tables of the page by their names."""
     found = {scene: _of_scene(scene, record) for scene in MEASURED}
     loads = [each["load_average"] for each in record.values()]
-    load = f"Load of the machine in the minute before each run: {min(loads):.0f} to {max(loads):.0f}."
+    span = " to ".join(dict.fromkeys(f"{load:.0f}" for load in (min(loads), max(loads))))
+    load = f"Load of the machine in the minute before each run: {span}."
     return {"load": load, "better": _better(record), **found, "ironing": _ironing(record)}
 
 

@@ -287,7 +287,8 @@ class Way:
     def _estimated(self) -> tuple[float, float, float]:
         """Return the quantity of the state, corrected, and its error. Collective.
 
-        Where a spot is too small for its cells nothing is corrected, and the error is unknown.
+        Where a spot is too small for its cells, or an estimate is above the quantity itself, nothing is
+        corrected, and the error is unknown.
         """
         value = value_of(self._state, self.quantity) if self._doubted else 0.0
         if value != 0.0:  # what a single point presses follows from the load: its adjoint is rounding
@@ -299,6 +300,9 @@ class Way:
         self._shares = {name: estimate.by_cell(name) for name in self._state.scene.bodies}
         self._sums.append(float(sum(share.sum() for share in self._shares.values())))
         missing = estimate.known
+        if abs(missing) > abs(estimate.value):  # more than the quantity itself is no correction
+            self._corrected.append(float("nan"))
+            return estimate.value, estimate.value, float("inf")
         value = estimate.value + missing
         self._corrected.append(float("nan") if self._doubted else value)
         return estimate.value, value, self._error(missing, value)

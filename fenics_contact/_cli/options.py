@@ -219,7 +219,7 @@ def _show_outputs(console: Console, file: SceneFile, *, draws: bool, meshes: boo
         f", {', '.join(output.design)} files of the design" if file.document.design and output.design else ""
     )
     console.write(f"would write to {file.folder}/: result.json{kinds}{shapes}{pictures}")
-    console.write("nothing was solved (--dry-run)")
+    console.write("nothing was solved, this is the plan")
 
 
 @contextmanager
