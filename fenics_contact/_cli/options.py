@@ -39,7 +39,8 @@ def scene_command(
     def command(
         context: typer.Context,
         scene: Annotated[
-            Path, typer.Argument(
+            Path,
+            typer.Argument(
                 metavar="SCENE.toml", help="The scene file, or a deck (.inp).", show_default=False
             ),
         ],
