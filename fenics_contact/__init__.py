@@ -12,7 +12,7 @@ Rigid obstacles: RigidPlane, RigidSphere, RigidCylinder, DistanceObstacle, Movin
     RigidTool, ToolMotion
 
 Loads: Traction, Pressure, TotalForce, PointForce, BodyForce, gravity, centrifugal, point_mass,
-    ThermalStrain
+    ThermalStrain, InitialStress
 
 Values of loads: SampledField, read_field, Ufl
 
@@ -90,6 +90,7 @@ if TYPE_CHECKING:
     from fenics_contact._scene.fluid import FluidPressure as FluidPressure
     from fenics_contact._scene.foundations import ElasticFoundation as ElasticFoundation
     from fenics_contact._scene.loads import BodyForce as BodyForce
+    from fenics_contact._scene.loads import InitialStress as InitialStress
     from fenics_contact._scene.loads import PointForce as PointForce
     from fenics_contact._scene.loads import Pressure as Pressure
     from fenics_contact._scene.loads import ThermalStrain as ThermalStrain

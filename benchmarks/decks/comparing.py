@@ -102,6 +102,8 @@ def _held(deck: Deck, state: State, blocks: Sequence[Block]) -> Pairs:
             if isinstance(support, Support) and support.body == body:
                 nodes = scene.bodies[body].mesh.nodes_of(support.surface)
                 held[nodes] |= np.array([value is not None for value in support.value])[: own.shape[1]]
+        # Along the radius the forces around a ring of no radius balance: they mean nothing.
+        held[scene.bodies[body].on_axis, 0] = False
         for block in blocks:
             if block.labels.shape[1] == 1:
                 rows, nodes = _places(deck, body, block)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ from fenics_contact._fem.composition import Composition, as_in_space, integrate,
 from fenics_contact._fem.load_forms import (
     FIRST_COUNT,
     Symbol,
+    as_stress,
     from_ufl,
     load_fields,
     load_key,
@@ -35,7 +36,7 @@ from fenics_contact._fem.templates import (
     volume_measure,
 )
 from fenics_contact._scene.fields import Ufl, evaluate
-from fenics_contact._scene.loads import Load, PointForce, Pressure, ThermalStrain
+from fenics_contact._scene.loads import InitialStress, Load, PointForce, Pressure, ThermalStrain
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import together
 from fenics_contact.materials.elastic import Material, Transverse
@@ -100,16 +101,17 @@ class FormLibrary:
         points: np.ndarray,
         facets: tuple[np.ndarray, np.ndarray] | None = None,
         acted: np.ndarray | None = None,
+        cells: Mapping[int, np.ndarray] | None = None,
+        of_cells: np.ndarray | None = None,
     ) -> _dolfinx.fem.Form:
         """Return the linear form of ``load`` bound to ``space``.
 
         `points`: coordinates by input node of the mesh, shape (n, dim), [length]; `facets`: (cells, local
         facets) on which a surface load acts; `acted`: marks of the nodes of its surface by input node, shape
-        (n,).
+        (n,); `cells`: from `loaded_cells`; `of_cells`: an initial stress on the cells, (n_cells, 6).
         """
         template = self._templates[load_key(load, parts.materials, cell_type)]
-        cells = parts.cells if isinstance(load, ThermalStrain) else None
-        functions = load_fields(load, space, points, acted)
+        functions = load_fields(load, space, points, acted, of_cells)
         return template.bind([space], load_parameters(load, parts), functions, facets, cells=cells)
 
     def prepare_mechanics(self, scene: Scene) -> None:
@@ -250,38 +252,52 @@ def cell_stiffness(scene: Scene, forms: FormLibrary) -> dict[str, np.ndarray]:
 
 @dataclass(frozen=True)
 class Temperature:
-    """The sum of the temperature changes of one body.
+    """The sum of the temperature changes of one body, and of its initial stresses.
 
     Attributes:
         loads: The temperature changes; without any, no form depends on temperature.
+        initial: The initial stresses; without any, no form depends on them.
     """
 
     loads: tuple[ThermalStrain, ...] = ()
+    initial: tuple[InitialStress, ...] = ()
 
     @property
-    def key(self) -> tuple[bool, bool, tuple[Ufl, ...]]:
+    def key(self) -> tuple[bool, bool, tuple[Ufl, ...], bool]:
         """The key of everything on which a form depends."""
-        return bool(self._numbers), bool(self.of_position), tuple(load.value for load in self._ufl)
+        ufl_values = tuple(load.value for load in self._ufl)
+        return bool(self._numbers), bool(self.of_position), ufl_values, bool(self.initial)
 
     @property
     def numbers(self) -> tuple[float, ...]:
         """Values of the constants: the sum of the uniform changes."""
         return (sum(self._numbers),) if self._numbers else ()
 
-    def write(self, cell_type: str) -> tuple[Expr | None, Constants, tuple[ufl.Coefficient, ...]]:
-        """Return ΔT (UFL, None without loads), its constants and its coefficients."""
+    def write(self, cell_type: str) -> tuple[AtRest, Constants, tuple[ufl.Coefficient, ...]]:
+        """Return ΔT and initial stress (UFL), their constants and their coefficients."""
         constants = scalar_constants(cell_type, 1) if self._numbers else ()
         coefficients: tuple[ufl.Coefficient, ...] = ()
         if self.of_position:
             coefficients = (ufl.Coefficient(_dolfinx.nodal_space(cell_type), count=FIRST_COUNT),)
         terms = [*constants, *coefficients, *(from_ufl(load, load.value, cell_type) for load in self._ufl)]
-        return (sum(terms[1:], terms[0]) if terms else None), constants, coefficients
+        change = sum(terms[1:], terms[0]) if terms else None
+        if not self.initial:
+            return AtRest(change), constants, coefficients
+        stress = ufl.Coefficient(_dolfinx.cellwise_space(cell_type, (6,)), count=FIRST_COUNT + 1)
+        return AtRest(change, as_stress(stress)), constants, (*coefficients, stress)
 
-    def fields(self, mesh: _dolfinx.mesh.Mesh, points: np.ndarray) -> tuple[_dolfinx.fem.Function, ...]:
+    def fields(
+        self, mesh: _dolfinx.mesh.Mesh, points: np.ndarray, stress: np.ndarray | None = None
+    ) -> tuple[_dolfinx.fem.Function, ...]:
         """Return the Functions for the coefficients.
 
-        `points`: coordinates by input node, shape (n, dim), [length].
+        `points`: coordinates by input node, shape (n, dim), [length]; `stress`: the initial stress on this
+        rank's cells, where there is one, (n_owned, 6).
         """
+        if self.initial:
+            assert stress is not None
+            field = _dolfinx.cell_field(mesh, "initial_stress", stress)
+            return (*replace(self, initial=()).fields(mesh, points), field)
         if not self.of_position:
             return ()
         space = _dolfinx.scalar_space(mesh, 1)
@@ -306,30 +322,54 @@ class Temperature:
 
 
 def temperature_of(loads: Iterable[Load], body: str) -> Temperature:
-    """Return the temperature change of a body."""
-    return Temperature(tuple(load for load in loads if isinstance(load, ThermalStrain) and load.body == body))
+    """Return the temperature change of a body, and its initial stress."""
+    mine = [load for load in loads if load.body == body]
+    return Temperature(
+        tuple(load for load in mine if isinstance(load, ThermalStrain)),
+        tuple(load for load in mine if isinstance(load, InitialStress)),
+    )
 
 
-def stress_left(material: Any, u: Expr, constants: Constants, temperature: Expr | None) -> Expr:
-    """Return the stress (dim x dim, UFL) of a displacement at a temperature change."""
+@dataclass(frozen=True)
+class AtRest:
+    """What stresses a body that does not move.
+
+    Attributes:
+        temperature: ΔT (UFL), None without one.
+        stress: Initial stress, 3 x 3 (UFL), None without one.
+    """
+
+    temperature: Expr | None = None
+    stress: Expr | None = None
+
+
+def stress_left(material: Any, u: Expr, constants: Constants, at: AtRest) -> Expr:
+    """Return the stress (dim x dim, UFL) of a displacement of a body that had some at rest."""
     stress = material.stress(u, constants)
-    return stress if temperature is None else stress - temperature * material.thermal_stress(constants)
+    if at.temperature is not None:
+        stress = stress - at.temperature * material.thermal_stress(constants)
+    if at.stress is not None:
+        size = range(stress.ufl_shape[0])
+        stress = stress + ufl.as_matrix([[at.stress[i, j] for j in size] for i in size])
+    return stress
 
 
-def stress_in_space(material: Material, u: Expr, constants: Constants, temperature: Expr | None) -> Expr:
+def stress_in_space(material: Material, u: Expr, constants: Constants, at: AtRest) -> Expr:
     """Return the stress (3 x 3, UFL), in the plane including the component normal to it.
 
     Where the material is nonlinear it is Cauchy's.
     """
     if isinstance(material, Hyperelasticity):
         return material.cauchy(u, constants)
-    stress = stress_left(material, u, constants, temperature)
+    stress = stress_left(material, u, constants, at)
     if stress.ufl_shape == (3, 3):
         return stress
     normal: Expr | int = 0
     if isinstance(material, Transverse):
         normal = material.transverse_stress(u, constants)
-        if temperature is not None:
-            normal = normal - temperature * material.transverse_thermal_stress(constants)
+        if at.temperature is not None:
+            normal = normal - at.temperature * material.transverse_thermal_stress(constants)
+    if at.stress is not None:
+        normal = normal + at.stress[2, 2]
     rows = [[stress[i, j] for j in range(2)] + [0] for i in range(2)]
     return ufl.as_tensor([*rows, [0, 0, normal]])

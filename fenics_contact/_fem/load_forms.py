@@ -10,23 +10,28 @@ import ufl
 from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
-from fenics_contact._fem.composition import Composition, as_in_space, integrate
+from fenics_contact._fem.composition import Composition, as_in_space, integrate, on_cells
 from fenics_contact._fem.templates import (
+    LOADED,
     Constants,
     per_revolution,
     scalar_constants,
     surface_measure,
     volume_measure,
 )
+from fenics_contact._scene.body import Body
 from fenics_contact._scene.fields import Ufl, evaluate
-from fenics_contact._scene.loads import BodyForce, Load, Pressure, ThermalStrain
+from fenics_contact._scene.loads import BodyForce, InitialStress, Load, Pressure, ThermalStrain
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
-from fenics_contact.materials.elastic import Material, strain
+from fenics_contact.materials.elastic import Material, Plate, as_tensor, strain
 
 #: First number of the coefficients of loads, after those of displacement fields.
 FIRST_COUNT = 4
-KIND = {BodyForce: "body force", ThermalStrain: "thermal strain", Pressure: "pressure"}
+KIND = {
+    BodyForce: "body force", ThermalStrain: "thermal strain", InitialStress: "initial stress",
+    Pressure: "pressure",
+}  # fmt: skip
 
 
 def is_scalar(load: Load) -> bool:
@@ -37,7 +42,26 @@ def is_scalar(load: Load) -> bool:
 def load_name(load: Load, cell_type: str) -> tuple[str, str, str]:
     """Return the name of the form of a load: kind, type of its value, cell type."""
     given = "UFL" if isinstance(load.value, Ufl) else "of position" if callable(load.value) else "numbers"
-    return (KIND.get(type(load), "surface load"), given, cell_type)
+    kind = KIND.get(type(load), "surface load") + " on a region" * (region_of(load) is not None)
+    return (kind, given, cell_type)
+
+
+def region_of(load: Load) -> str | None:
+    """Return the name of the region on which alone a load acts, None for others."""
+    return load.region if isinstance(load, BodyForce | InitialStress) else None
+
+
+def loaded_cells(
+    load: Load, parts: Composition, body: Body, cells: np.ndarray
+) -> dict[int, np.ndarray] | None:
+    """Return the cells of one mesh by the tags of a load's form, None if it has none.
+
+    `cells`: the cells of the body that are those of the mesh, (n_cells,).
+    """
+    region = region_of(load)
+    if region is not None and not isinstance(load, InitialStress):
+        return {LOADED: np.flatnonzero(np.isin(cells, body.mesh.regions[region]))}
+    return parts.cells if isinstance(load, ThermalStrain) else None
 
 
 def load_key(load: Load, materials: tuple[Material, ...], cell_type: str) -> tuple[Hashable, ...]:
@@ -54,7 +78,11 @@ class Symbol:
         width = _dolfinx.components(cell_type)
         self.constants: Constants = ()
         self.coefficients: tuple[ufl.Coefficient, ...] = ()
-        if isinstance(load.value, Ufl):
+        if isinstance(load, InitialStress):
+            space = _dolfinx.cellwise_space(cell_type, (6,))
+            self.expression = ufl.Coefficient(space, count=FIRST_COUNT + number)
+            self.coefficients = (self.expression,)
+        elif isinstance(load.value, Ufl):
             self.expression = from_ufl(load, load.value, cell_type)
         elif callable(load.value):
             nodal = _dolfinx.nodal_space if is_scalar(load) else _dolfinx.displacement_space
@@ -83,19 +111,27 @@ def from_ufl(load: Load, value: Ufl, cell_type: str) -> Expr:
 
 def numbers_of(load: Load) -> tuple[float, ...]:
     """Return the values of a symbol's constants."""
-    if callable(load.value) or isinstance(load.value, Ufl):
+    if callable(load.value) or isinstance(load.value, Ufl) or isinstance(load, InitialStress):
         return ()
     return tuple(load.value) if isinstance(load.value, Sequence) else (float(load.value),)
 
 
 def load_fields(
-    load: Load, space: _dolfinx.fem.FunctionSpace, points: np.ndarray, acted: np.ndarray | None = None
+    load: Load,
+    space: _dolfinx.fem.FunctionSpace,
+    points: np.ndarray,
+    acted: np.ndarray | None = None,
+    of_cells: np.ndarray | None = None,
 ) -> tuple[_dolfinx.fem.Function, ...]:
     """Return the Functions for a symbol's coefficients.
 
     `points`: coordinates by input node of that mesh, shape (n, dim), [length]; `acted`: marks of the nodes on
-    the load's surface, shape (n,); the value is asked for only there.
+    the load's surface, shape (n,); the value is asked for only there; `of_cells`: values on the cells of that
+    mesh of an initial stress, (n_cells, 6).
     """
+    if isinstance(load, InitialStress):
+        assert of_cells is not None
+        return (_dolfinx.cell_field(space.mesh, "initial_stress", of_cells),)
     if isinstance(load.value, Ufl) or not callable(load.value):
         return ()
     space = _dolfinx.scalar_space(space.mesh, 1) if is_scalar(load) else space
@@ -118,15 +154,29 @@ def load_work(
         (along,) = as_in_space(cell_type, v)
 
         def thermal(material: Any, constants: Constants) -> Expr:
-            return value * ufl.inner(material.thermal_stress(constants), strain(along))
+            work = value * ufl.inner(material.thermal_stress(constants), strain(along))
+            return material.per_area(work, constants) if isinstance(material, Plate) else work
 
         return integrate(materials, cell_type, thermal, volume_measure(cell_type, 2))
+    if isinstance(load, InitialStress):
+        (along,) = as_in_space(cell_type, v)
+        size = len(along)
+        work = -ufl.inner(
+            ufl.as_matrix([[as_stress(value)[i, j] for j in range(size)] for i in range(size)]), strain(along)
+        )
+        return per_revolution(on_cells(work, cell_type), cell_type) * volume_measure(cell_type), ()
     work = ufl.dot(value, v) if not isinstance(load, Pressure) else None
     if work is None:
         along = ufl.as_vector([v[0], v[1]]) if _dolfinx.has_torsion(cell_type) else v
         work = -value * ufl.dot(ufl.FacetNormal(_dolfinx.template(cell_type)), along)
     measure = volume_measure(cell_type, 2) if isinstance(load, BodyForce) else surface_measure(cell_type)
+    measure = measure if region_of(load) is None else measure(LOADED)
     return per_revolution(work, cell_type) * measure, ()
+
+
+def as_stress(vector: Expr) -> Expr:
+    """Return the tensor (3 x 3, UFL) of six components xx, yy, zz, yz, xz, xy."""
+    return as_tensor([vector[k] for k in range(6)], 3)
 
 
 def load_parameters(load: Load, parts: Composition) -> tuple[float, ...]:

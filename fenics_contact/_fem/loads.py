@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -19,6 +19,7 @@ from fenics_contact._fem.templates import Templates, Written, per_revolution, su
 from fenics_contact._scene.fields import Ufl
 from fenics_contact._scene.loads import Load, Pressure, TotalForce, Traction
 from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.thickness import by_thickness, thickness_on
 from fenics_contact._surfaces.facets import SurfaceMoments, surface_moments
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.hyperelastic import cofactor, deformation_gradient
@@ -154,7 +155,8 @@ class TwistingTraction:
 def as_tractions(scene: Scene) -> tuple[Load, ...]:
     """Return the scene's loads with every resultant spread over the present shape of its surface."""
     return tuple(
-        spread_traction(scene, load) if isinstance(load, TotalForce) else load for load in scene.loads
+        spread_traction(scene, load) if isinstance(load, TotalForce) else load
+        for load in by_thickness(scene.loads, scene.bodies)
     )
 
 
@@ -166,6 +168,10 @@ def spread_traction(scene: Scene, load: TotalForce) -> Traction:
     """
     mesh = scene.bodies[load.body].mesh
     surface = surface_moments(mesh.points, mesh.surfaces[load.surface], scene.axisymmetric)
+    thickness = thickness_on(scene.bodies[load.body], load.surface, "the surface of a TotalForce")
+    if thickness != 1.0:
+        given = None if load.moment is None else float(np.asarray(load.moment)) / thickness
+        load = replace(load, value=tuple(each / thickness for each in load.value), moment=given)
     even = tuple(component / surface.area for component in load.value)
     if scene.torsion:
         around = surface.area * surface.centroid[0] ** 2 + surface.second_moment[0, 0]  # ∫ r²

@@ -47,6 +47,7 @@ from fenics_contact._scene.pairs import ContactPair, Surface, Tie
 from fenics_contact._scene.parts import surface_of
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
+from fenics_contact._scene.thickness import thickness_on
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import Projection, node_weights
@@ -416,6 +417,11 @@ def _points_of_pairs(
                 first = _measured(origin, pair, index, supported, comm, finer, told=True)
             slave = first.slave - NodeNumbers.of(scene).first_of(pair.slave.body)
             points = with_given_gaps(points, first, pair, mesh.points[slave], comm)
+        if scene.has_thickness:
+            thickness = thickness_on(
+                scene.bodies[pair.slave.body], pair.slave.name, f"the slave of {pair.place}"
+            )
+            points = replace(points, length=points.sizes, area=points.area * thickness)
         if scene.torsion:
             from fenics_contact._pairing.torsion import with_turn
 

@@ -13,7 +13,7 @@ from fenics_contact._base.checks import brief, checked
 from fenics_contact._base.display import counted, displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
-from fenics_contact.materials.elastic import Material
+from fenics_contact.materials.elastic import Material, thickness_of
 from fenics_contact.materials.hyperelastic import has_mean_dilatation, is_finite_strain
 from fenics_contact.materials.kernels import motions_of_revolution, rigid_body_modes
 from fenics_contact.materials.plastic import HistoryMaterial
@@ -21,7 +21,7 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import CELL_TYPES, quadrature, shape_values
 from fenics_contact.mesh.collapsed import places_of
 from fenics_contact.mesh.faces import computed_rounding
-from fenics_contact.mesh.quality import jacobians
+from fenics_contact.mesh.quality import cell_volumes, jacobians
 
 
 @displayed
@@ -70,6 +70,11 @@ class Body:
             _check_half_section(self.mesh)
         if isinstance(self.material, Mapping):
             _check_regions(self.mesh, self.material)
+        if self.has_thickness and any(thickness_of(each) is None for each in self.materials):
+            raise InvalidInputError(
+                "all materials of a body must have a thickness or none, got "
+                f"{[thickness_of(each) for each in self.materials]}: give it to the others, too"
+            )
         for material in self.materials:
             _check_material(material, self.mesh.dim, self.axisymmetric)
             if self.axisymmetric and not self.torsion:
@@ -125,13 +130,31 @@ class Body:
     @property
     def volume(self) -> float:
         """Its volume, of a plane body the area, [length³] or [length²]."""
-        if not self.axisymmetric:
+        return self.volume_of()
+
+    def volume_of(self, region: str | None = None) -> float:
+        """Return the volume of a region of its mesh, by default of all of it, see `volume`."""
+        if region is None and not self.axisymmetric:
             return self.mesh.volume
+        cells = self.mesh.cells if region is None else self.mesh.cells[self.mesh.regions[region]]
+        if not self.axisymmetric:
+            return float(cell_volumes(self.mesh.points, cells).sum())
         cell = CELL_TYPES[self.mesh.cell_type]
         positions, weights = quadrature(cell, 2 * cell.order)
-        radii = places_of(self.mesh.points, self.mesh.cells)[..., 0] @ shape_values(cell, positions).T
-        around = 2 * np.pi * radii * jacobians(self.mesh.points, self.mesh.cells, positions)
+        radii = places_of(self.mesh.points, cells)[..., 0] @ shape_values(cell, positions).T
+        around = 2 * np.pi * radii * jacobians(self.mesh.points, cells, positions)
         return float((around @ weights).sum())
+
+    @property
+    def has_thickness(self) -> bool:
+        """Whether its materials have a thickness, of a plane body: forces are then those of all of it."""
+        return any(thickness_of(material) is not None for material in self.materials)
+
+    @property
+    def thickness_of_cells(self) -> np.ndarray:
+        """Thickness of each cell of a plane body with one, [length], else ones; shape (n_cells,)."""
+        by_material = np.array([thickness_of(material) or 1.0 for material in self.materials])
+        return np.asarray(by_material[self.material_of_cells])
 
     @property
     def deforms_much(self) -> bool:

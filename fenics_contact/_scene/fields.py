@@ -165,7 +165,8 @@ class SampledField:
     Attributes:
         points: Coordinates, shape (n, dim), [length]. Points with three of which the last is the same
             everywhere suit plane bodies, too.
-        values: A number for each, shape (n,), or a vector, shape (n, dim).
+        values: A number for each, shape (n,), a vector, shape (n, dim), or the components of an
+            `InitialStress`, shape (n, 6).
         reach: Largest distance from the nearest point at which it may be asked for, [length]; by default
             twice the largest distance of a point from its nearest neighbour.
 
@@ -190,10 +191,10 @@ class SampledField:
                 f"SampledField.points must be rows of two or three finite numbers, got "
                 f"{_shape(points)}: give one row for each point"
             )
-        if values is None or values.shape not in ((len(points),), points.shape):
+        if values is None or values.shape not in ((len(points),), points.shape, (len(points), 6)):
             raise InvalidInputError(
-                f"SampledField.values must be {len(points)} finite numbers, or rows of {points.shape[1]}, "
-                f"one for each point, got {_shape(values)}: give a value for each point"
+                f"SampledField.values must be {len(points)} finite numbers, or rows of {points.shape[1]} or "
+                f"6, one for each point, got {_shape(values)}: give a value for each point"
             )
         if self.reach is not None and not (np.isfinite(self.reach) and self.reach > 0):
             raise InvalidInputError(
@@ -215,7 +216,7 @@ class SampledField:
             )
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
-        """Evaluate at points, shape (n, dim) -> (n,), or (n, dim) for a vector.
+        """Evaluate at points, shape (n, dim) -> (n,), or (n, dim) for a vector, (n, 6) for a stress.
 
         Raises:
             InvalidInputError: If one is farther than ``reach`` from all given ones, or in another space.
@@ -237,7 +238,8 @@ class SampledField:
                 f"SampledField.points must lie in the space of the bodies, they have {own} coordinates and "
                 f"the bodies {dim}: give {dim}"
             )
-        return self.points[:, :2], self.values[:, :2] if self.values.ndim == 2 else self.values
+        vectors = self.values.ndim == 2 and self.values.shape[1] == 3
+        return self.points[:, :2], self.values[:, :2] if vectors else self.values
 
     def _refuse_far(self, points: np.ndarray, known: np.ndarray) -> None:
         reach = self._reach if self.reach is None else self.reach

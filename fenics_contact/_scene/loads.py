@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact._base.checks import GivenVector, checked, floats, unit_vector
+from fenics_contact._base.checks import GivenVector, check_row, checked, floats, unit_vector
 from fenics_contact._scene.fields import (
     ScalarValue,
     Ufl,
@@ -24,6 +24,7 @@ from fenics_contact._scene.fields import (
     evaluate,
 )
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.body_mesh import BodyMesh
 
 
 @dataclass(frozen=True)
@@ -141,10 +142,12 @@ class BodyForce:
     Attributes:
         body: Name of the body.
         value: Force per volume, [force / length³].
+        region: Name of the region of its mesh that is loaded; all of the body by default.
     """
 
     body: str
     value: VectorValue
+    region: str | None = None
 
     def __post_init__(self) -> None:
         """Reject a value that is not a vector."""
@@ -177,6 +180,61 @@ class ThermalStrain:
     def value(self) -> ScalarValue:
         """ΔT, under the name that all loads have."""
         return self.temperature_change
+
+
+@dataclass(frozen=True)
+@checked("value")
+class InitialStress:
+    """A stress that a body has before anything loads or moves it: of welding, rolling, an earlier process.
+
+    The body relaxes it as far as its supports let it: σ = σ₀ + C : ε(u), and the work of σ₀ is
+    −∫ σ₀ : ε(v). A field that is in equilibrium with free surfaces moves nothing. Several add up. As with
+    `ThermalStrain` the energy of a state counts it as the work of a load.
+
+    Attributes:
+        body: Name of the body, whose materials must be linear.
+        value: σ₀, [force / length²], six numbers: xx, yy, zz, yz, xz, xy; of plane bodies yz and xz are
+            zero, in plane stress also zz; of bodies of revolution x, y and z are the radius, the axis and the
+            way around. A function receives the centres of cells (means of their nodes), shape (n, dim), and
+            returns the stress there, shape (n, 6), which is constant on each cell.
+        region: Name of the region of its mesh that has it; all of the body by default.
+
+    Example:
+        >>> skin = InitialStress("plate", (-300.0, -300.0, 0, 0, 0, 0), region="peened")  # N/mm²
+        >>> rolled = InitialStress("bar", lambda x: np.outer(x[:, 2] ** 2 - 8.3, (12.0, 0, 0, 0, 0, 0)))
+    """
+
+    body: str
+    value: VectorValue
+    region: str | None = None
+
+    def __post_init__(self) -> None:
+        """Reject a value that is neither six numbers nor a function."""
+        value = self.value
+        if isinstance(value, Ufl):
+            raise InvalidInputError(
+                f"InitialStress.value must be six numbers or a function of points, got {value!r}: UFL is for "
+                "loads that are integrated"
+            )
+        if not callable(value):
+            check_row(value, "InitialStress.value", 6)
+            object.__setattr__(self, "value", floats(np.asarray(value, dtype=np.float64)))
+
+    def on_cells(self, mesh: BodyMesh) -> np.ndarray:
+        """Return the stress of all cells of a mesh, (n_cells, 6).
+
+        Raises:
+            InvalidInputError: If a function does not return six finite numbers per point, or components
+                are not zero that plane bodies do not have.
+        """
+        where = np.arange(mesh.n_cells) if self.region is None else mesh.regions[self.region]
+        found = np.zeros((mesh.n_cells, 6))
+        if callable(self.value):
+            centres = mesh.points[mesh.cells[where]].mean(axis=1)
+            found[where] = evaluate(f"InitialStress on body {self.body!r}", self.value, centres, (6,))
+        else:
+            found[where] = self.value
+        return found
 
 
 @dataclass(frozen=True)
@@ -227,18 +285,32 @@ class PointForce:
 #: What acts on a surface.
 SurfaceLoad = Traction | TotalForce | Pressure
 #: What acts in the volume of a body.
-VolumeLoad = BodyForce | ThermalStrain
+VolumeLoad = BodyForce | ThermalStrain | InitialStress
 #: Any load of a scene.
 Load = SurfaceLoad | VolumeLoad | PointForce
 
 
-def gravity(body: str, density: float, acceleration: Sequence[float]) -> BodyForce:
-    """Return the weight of a body.
+def require_region(load: BodyForce | InitialStress, mesh: BodyMesh) -> None:
+    """Reject a region that a mesh does not have."""
+    if load.region is not None and load.region not in mesh.regions:
+        raise InvalidInputError(
+            f"{type(load).__name__} names region {load.region!r} of body {load.body!r}, whose mesh has "
+            f"{sorted(mesh.regions)}: use one of them, or none for the whole body"
+        )
+
+
+def gravity(body: str, density: float, acceleration: Sequence[float], region: str | None = None) -> BodyForce:
+    """Return the weight of a body, or of a region of it.
 
     Args:
         body: Name of the body.
         density: Mass per volume, in the scene's units, for steel in N, mm, s: 7.85e-9.
         acceleration: Acceleration of gravity, [length / time²], for instance (0, 0, -9810).
+        region: Name of the region of its mesh that has this density; all of the body by default.
+
+    Example:
+        >>> weights = [gravity("beam", rho, (0, 0, -9810), part) for part, rho in
+        ...            {"steel": 7.85e-9, "concrete": 2.4e-9}.items()]
     """
     mass, direction = checked_scalar("density", density), checked_vector("acceleration", acceleration)
     if callable(mass) or callable(direction):
@@ -246,7 +318,7 @@ def gravity(body: str, density: float, acceleration: Sequence[float]) -> BodyFor
             f"gravity needs numbers, got {density!r} and {acceleration!r}: give a BodyForce for what "
             "varies with position"
         )
-    return BodyForce(body, tuple(mass * component for component in direction))
+    return BodyForce(body, tuple(mass * component for component in direction), region)
 
 
 @dataclass(frozen=True)
@@ -291,6 +363,7 @@ def centrifugal(
     speed: float,
     point: GivenVector = (0.0, 0.0, 0.0),
     axis: GivenVector | None = None,
+    region: str | None = None,
 ) -> BodyForce:
     """Return the centrifugal force ρ ω² r on a body that turns about an axis; its supports turn with it.
 
@@ -303,6 +376,7 @@ def centrifugal(
         point: A point of the axis, three coordinates, two in the plane, [length].
         axis: Direction of the axis, of any length, by default that of z. A body of revolution turns about its
             own axis, (0, 1); another plane body about an axis normal to the plane, which has none here.
+        region: Name of the region of its mesh that has this density; all of the body by default.
 
     Raises:
         InvalidInputError: If numbers are not finite, or point and axis are not in one space.
@@ -320,7 +394,7 @@ def centrifugal(
     if axis is None and len(point) == 3:
         axis = (0.0, 0.0, 1.0)
     along = None if axis is None else unit_vector("the axis of a centrifugal force", axis, len(point))
-    return BodyForce(body, Spinning(float(density), float(speed), floats(np.asarray(point)), along))
+    return BodyForce(body, Spinning(float(density), float(speed), floats(np.asarray(point)), along), region)
 
 
 def point_mass(

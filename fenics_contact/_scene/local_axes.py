@@ -74,9 +74,7 @@ def same_axes(one: LocalAxes | None, other: LocalAxes | None, alike: float = 1e-
     return np.array_equal(one.nodes, other.nodes) and np.allclose(one.axes, other.axes, rtol=0.0, atol=alike)
 
 
-def free_part(
-    vectors: np.ndarray, node: np.ndarray, fixed: np.ndarray, axes: LocalAxes | None
-) -> np.ndarray:
+def free_part(vectors: np.ndarray, node: np.ndarray, fixed: np.ndarray, axes: LocalAxes | None) -> np.ndarray:
     """Return the parts of vectors at nodes along which these are free.
 
     `vectors`: shape (m, dim); `node`: the node of each, shape (m,); `fixed`: whether a component of a node

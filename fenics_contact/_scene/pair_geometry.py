@@ -11,7 +11,15 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact._base.display import counted, displayed
-from fenics_contact._scene.loads import BodyForce, Load, PointForce, Pressure, ThermalStrain, TotalForce
+from fenics_contact._scene.loads import (
+    BodyForce,
+    InitialStress,
+    Load,
+    PointForce,
+    Pressure,
+    ThermalStrain,
+    TotalForce,
+)
 from fenics_contact._scene.obstacles import RigidTool
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import in_words, surface_of
@@ -58,7 +66,7 @@ def displacement_along(scene: SceneParts, normal: np.ndarray) -> float:
 def force_along(scene: SceneParts, normal: np.ndarray) -> float | None:
     """Return the largest resultant, over the bodies, of the loads along a direction, [force].
 
-    None if a load is given as a function or in UFL.
+    None if a load is given as a function or in UFL, or bodies have a thickness.
     """
     total = {name: np.zeros(scene.dim) for name in scene.body_names}
     for load in scene.loads:
@@ -74,9 +82,9 @@ def force_along(scene: SceneParts, normal: np.ndarray) -> float | None:
 
 def _resultant(scene: SceneParts, load: Load) -> np.ndarray | None:
     """Return the resultant of a load that is given by numbers, shape (dim,), [force]."""
-    if isinstance(load, ThermalStrain):
+    if isinstance(load, ThermalStrain | InitialStress):
         return np.zeros(scene.dim)
-    if callable(load.value) or not isinstance(load.value, float | tuple):
+    if scene.has_thickness or callable(load.value) or not isinstance(load.value, float | tuple):
         return None
     body, value = scene.bodies[load.body], np.array(load.value)
     if isinstance(load, TotalForce):
@@ -84,7 +92,7 @@ def _resultant(scene: SceneParts, load: Load) -> np.ndarray | None:
     if isinstance(load, PointForce):
         return value * len(body.mesh.nodes_of(load.nodes))
     if isinstance(load, BodyForce):
-        return value * body.volume
+        return value * body.volume_of(load.region)
     points, facets = body.mesh.points, body.mesh.surfaces[load.surface]
     if isinstance(load, Pressure) and body.axisymmetric:
         normals = sum(at.normals.sum(axis=0) for at in gauss_points(points, facets, True))

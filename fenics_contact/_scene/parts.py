@@ -13,14 +13,17 @@ import numpy as np
 from fenics_contact._base.checks import checked
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.foundations import ElasticFoundation
+from fenics_contact._scene.initial_stress import require_components
 from fenics_contact._scene.loads import (
     BodyForce,
+    InitialStress,
     Load,
     Pressure,
     Spinning,
     SurfaceLoad,
     ThermalStrain,
     TotalForce,
+    require_region,
 )
 from fenics_contact._scene.local_axes import HeldDirections, LocalAxes, held_along, same_axes
 from fenics_contact._scene.obstacles import RigidObstacle
@@ -31,6 +34,7 @@ from fenics_contact._scene.rollers import direction_of, flat_normal, held_direct
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._scene.springs import Spring
 from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support, ToolMotion
+from fenics_contact._scene.thickness import require_thickness
 from fenics_contact._scene.tools import ToolBody, bodies_with_tools, with_motions
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
 from fenics_contact._surfaces.projection import surfaces_match
@@ -95,8 +99,12 @@ class SceneParts:
                 self._require_off_axis(part)
             if isinstance(part, TotalForce):
                 self._require_lever(part)
+            if isinstance(part, BodyForce | InitialStress):
+                require_region(part, self.bodies[part.body].mesh)
             if isinstance(part, BodyForce) and isinstance(part.value, Spinning):
                 part.value.require_axis(self.dim, self.axisymmetric)
+            if isinstance(part, InitialStress):
+                require_components(part, self.bodies[part.body])
             if isinstance(part, ThermalStrain):
                 self._require_expansion(part)
         pairs: list[ContactPair | AnyTie] = [*self.contacts, *self.ties]
@@ -115,6 +123,7 @@ class SceneParts:
                     self._require_sector(pair)
             else:
                 self._require_dimension(pair.master)
+        require_thickness(self.deforming, self.foundations, (*self.contacts, *self.ties))
         _require_different(self.contacts)
         _require_different(self.ties)
         pressures_of(self.contacts)
@@ -193,6 +202,8 @@ class SceneParts:
 
     def _require_components(self, part: Load | Support) -> None:
         """Reject a vector whose dimension is not that of its body."""
+        if isinstance(part, InitialStress):
+            return
         dim = self.bodies[part.body].components
         if self.torsion and isinstance(part, TotalForce):
             dim = 2  # forces around the axis balance each other, their moment is given in their place
@@ -326,8 +337,13 @@ class SceneParts:
 
     @property
     def is_plane(self) -> bool:
-        """Whether its bodies are plane, with forces a unit of thickness; bodies of revolution are not."""
-        return self.dim == 2 and not self.axisymmetric
+        """Whether its bodies are plane, with forces a unit of thickness; with a thickness they are not."""
+        return self.dim == 2 and not self.axisymmetric and not self.has_thickness
+
+    @property
+    def has_thickness(self) -> bool:
+        """Whether its bodies are plane and have a thickness, of which forces are those of all."""
+        return any(body.has_thickness for body in self.bodies.values())
 
     def fixed(self, body: str, supports: Sequence[AnySupport] | None = None) -> np.ndarray:
         """Return which components of a body's nodes supports prescribe, along the axes of `prescribed_along`.

@@ -32,6 +32,7 @@ from fenics_contact.gallery import links as links_module
 from fenics_contact.gallery import round as whole
 from fenics_contact.gallery.links import DesignSurface, Link
 from fenics_contact.gallery.ring import LinkShape
+from fenics_contact.materials import anisotropic as anisotropic_module
 from fenics_contact.materials import elastic, hyperelastic, neo_hookean_metal
 from fenics_contact.materials import orthotropic as orthotropic_module
 from fenics_contact.materials import plastic as plastic_module
@@ -99,7 +100,7 @@ class _Material(Part):
         return self.made()
 
 
-@keys_of(elastic.IsotropicElasticity)
+@keys_of(elastic.PlaneStress)
 class IsotropicMaterial(_Material):
     """Isotropic elasticity: of bodies in space, or of plane ones in plane strain or plane stress."""
 
@@ -109,14 +110,16 @@ class IsotropicMaterial(_Material):
 
     def build(self, folder: Path) -> Material:
         """Return the material."""
-        return ISOTROPIC[self.model](**{name: getattr(self, name) for name in self.given})
+        given = {name: getattr(self, name) for name in self.given}
+        if self.model == "isotropic" and given.pop("thickness", None) is not None:
+            raise InvalidInputError(
+                "a thickness is that of plane bodies, of the models plane_stress and plane_strain, this one "
+                "is in space: leave it out"
+            )
+        return ISOTROPIC[self.model](**given)
 
 
-@keys_of(orthotropic_module.OrthotropicElasticity, without=["orientation"])
-class OrthotropicMaterial(_Material):
-    """Orthotropic elasticity in space by nine engineering constants in material axes 1, 2, 3."""
-
-    model: Literal["orthotropic"]
+class _WithAxes(_Material):
     axis_1: Triple = Field((1.0, 0.0, 0.0), description="direction of material axis 1, any length")
     axis_2: Triple = Field(
         (0.0, 1.0, 0.0), description="a direction in the plane of the axes 1 and 2, any length"
@@ -127,9 +130,24 @@ class OrthotropicMaterial(_Material):
         return self.made(orientation=orthotropic_module.material_axes(self.axis_1, self.axis_2))
 
 
+@keys_of(orthotropic_module.OrthotropicElasticity, without=["orientation"])
+class OrthotropicMaterial(_WithAxes):
+    """Orthotropic elasticity in space by nine engineering constants in material axes 1, 2, 3."""
+
+    model: Literal["orthotropic"]
+
+
+@keys_of(anisotropic_module.AnisotropicElasticity, without=["orientation"])
+class AnisotropicMaterial(_WithAxes):
+    """Elasticity in space without symmetry, by a stiffness matrix in material axes 1, 2, 3."""
+
+    model: Literal["anisotropic"]
+
+
 MATERIALS = (
     IsotropicMaterial,
     OrthotropicMaterial,
+    AnisotropicMaterial,
     table_of(
         orthotropic_module.OrthotropicPlaneStress,
         _Material,

@@ -34,6 +34,7 @@ from fenics_contact._scene_file.values import (
     PlaceOfFile,
     Scalar,
     ScalarField,
+    StressOrFormulas,
     Triple,
     Vector,
     VectorExpression,
@@ -364,6 +365,14 @@ class ThermalLoad(_Load):
     temperature_change: ScalarField = Field(alias="value")
 
 
+@keys_of(loads.InitialStress)
+class InitialStressLoad(_Load):
+    """A stress that a body has before anything loads or moves it."""
+
+    kind: Literal["initial_stress"]
+    value: StressOrFormulas
+
+
 @keys_of(Support)
 class SupportPart(_Named):
     """Displacement prescribed on a surface, component by component."""
@@ -553,5 +562,6 @@ LOADS = (
     CentrifugalLoad,
     PointMassLoad,
     ThermalLoad,
+    InitialStressLoad,
 )
 AnyLoad: TypeAlias = Annotated[Any, one_of("kind", *LOADS)]

@@ -19,12 +19,15 @@ from fenics_contact._scene_file.values import (
     Pair,
     Pairs,
     ScalarField,
+    Six,
+    SixBySix,
     Triple,
     Vector,
     VectorOrFormulas,
 )
 
 _FORMULAS = "; numbers, formulas in x, y, z in quotes, or fields from files"
+SixNumbers = tuple[float, float, float, float, float, float]
 #: Types in files for declared types of arguments, with their descriptions; others are read as declared.
 IN_FILES: list[tuple[Any, Any, str]] = [
     (Sequence[float], Vector, ""),
@@ -36,6 +39,8 @@ IN_FILES: list[tuple[Any, Any, str]] = [
     (tuple[tuple[float, float], ...], Pairs, ""),
     (tuple[float, float, float], Triple, ""),
     (tuple[float, float, float] | None, Triple | None, ""),
+    (SixNumbers | None, Six | None, ""),
+    (tuple[SixNumbers, SixNumbers, SixNumbers, SixNumbers, SixNumbers, SixNumbers], SixBySix, ""),
     (tuple[str, ...], Names, ""),
     (tuple[int, int], CountPair, ""),
     (tuple[int, int, int], CountTriple, ""),

@@ -443,6 +443,11 @@ Pairs: TypeAlias = Annotated[
     tuple[tuple[float, float], ...],
     _row(Pair, 0, None, "pairs of finite numbers in brackets, such as [[0.02, 290.0], [0.1, 340.0]]"),
 ]
+Six: TypeAlias = Annotated[tuple[float, ...], _row(float, 6, 6, "six finite numbers in brackets")]
+#: A matrix of six rows and columns.
+SixBySix: TypeAlias = Annotated[
+    tuple[Six, ...], _row(Six, 6, 6, "six rows of six finite numbers, each in brackets, all in brackets")
+]
 CountPair: TypeAlias = Annotated[tuple[int, int], _row(_COUNT, 2, 2, f"two {_COUNTS}")]
 #: Number of control points along a curve, or along both directions of a surface.
 Net: TypeAlias = Annotated[
@@ -482,6 +487,16 @@ def field_or(table: Any, keys: str) -> Any:
 FieldOrMeasured: TypeAlias = Annotated[
     Literal["measured"] | Annotated[float, Field(ge=0)] | Formula | FieldFile,
     with_message(f"'measured', a number of at least 0, a formula in x, y and z in quotes, {_FIELD}"),
+]
+_OF_STRESS = f"six numbers or formulas in brackets, xx, yy, zz, yz, xz, xy, {_FIELD}"
+StressOrFormulas: TypeAlias = Annotated[
+    Any,
+    Read(
+        Annotated[
+            _row(float | Formula | FieldFile, 6, 6, _OF_STRESS).annotation | FieldFile,
+            with_message(_OF_STRESS),
+        ]
+    ),
 ]
 _FREE = Annotated[Literal["free"], AfterValidator(lambda _: None)]
 _OF_LOAD = f"three numbers or formulas {_AXES}, {_FIELD}"

@@ -11,6 +11,7 @@ from fenics_contact._scene.body import Body
 from fenics_contact._scene.fields import NodeValues
 from fenics_contact._scene.loads import (
     BodyForce,
+    InitialStress,
     Load,
     PointForce,
     Pressure,
@@ -25,6 +26,8 @@ from fenics_contact.decks.couplings import (
 from fenics_contact.decks.history import Moment, Pressed, Weight
 from fenics_contact.decks.holding import Holding
 from fenics_contact.decks.model import Model
+from fenics_contact.decks.regions import region_names
+from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.readers.deck_bodies import (
     Component,
 )
@@ -140,7 +143,28 @@ class Acting:
                 found += self._spread(driven, moment)
         if moment.temperatures is not None:
             found += self._heat(moment.temperatures, bodies)
-        return tuple(found)
+        return (*found, *self._stressed(bodies))
+
+    def _stressed(self, bodies: Mapping[str, Body]) -> list[Load]:
+        """Return the initial stresses of bodies."""
+        given, found = self.model.stressed, list[Load]()
+        if given is None:
+            return found
+        for part in self.model.parts_of_mesh:
+            stress = given.stress[self.model.in_cell_order(part)]
+            if not stress.any():
+                continue
+            if any(map(is_nonlinear, bodies[part.name].materials)):
+                raise given.card.error(
+                    f"initial stresses are read for linear materials without NLGEOM, body {part.name} has "
+                    f"{bodies[part.name].in_words}: leave them out"
+                )
+            mesh = bodies[part.name].mesh
+            value: Any = tuple(stress[0].tolist())
+            if np.ptp(stress, axis=0).any():
+                value = NodeValues(mesh.points[mesh.cells].mean(axis=1), stress)
+            found.append(InitialStress(part.name, value))
+        return found
 
     def _spread(self, driven: Driven, moment: Moment) -> list[Load]:
         """Return the force and moment of a node, spread over its surface."""
@@ -165,30 +189,29 @@ class Acting:
         ]
 
     def _weights(self, weight: Weight) -> list[Load]:
-        """Return gravity or centrifugal force on whole bodies."""
+        """Return gravity or centrifugal force on bodies, by region where some are not loaded or differ."""
         elements = self.model.mesh.elements_named(weight.where, weight.card, weight.row)
         found: list[Load] = []
         for part in self.model.parts_of_mesh:
-            mine = np.isin(part.elements, elements)
-            if not mine.any() or not weight.value:
+            if not weight.value:
                 continue
-            densities = {
-                self.model.materials[self.model.sections[k].material].density
-                for k in np.unique(self.model.of_element[part.elements])
-            }
-            if not mine.all() or len(densities) > 1:
-                raise weight.card.error(
-                    f"{weight.kind} must act on whole bodies of one density, on body {part.name} it does "
-                    "not: give all of its elements, and one density", weight.row,
-                )  # fmt: skip
-            density = densities.pop()
-            if not density:
-                name = self.model.sections[part.sections[0]].material
-                raise weight.card.error(
-                    f"{weight.kind} needs a *DENSITY of material {name}: add it", weight.row
-                )
-            found.append(self._weight(weight, part, density))
+            densities: dict[str | None, float] = {}
+            names = region_names(self.model.sections, part)
+            for number, region in names.items():
+                mine = part.elements[self.model.of_element[part.elements] == number]
+                if np.isin(mine, elements).any():
+                    densities[region] = self._density(weight, number)
+            if len(densities) == len(names) and len(set(densities.values())) == 1:
+                densities = {None: next(iter(densities.values()))}
+            found += [self._weight(weight, part, density, region) for region, density in densities.items()]
         return found
+
+    def _density(self, weight: Weight, section: int) -> float:
+        name = self.model.sections[section].material
+        density = self.model.materials[name].density
+        if not density:
+            raise weight.card.error(f"{weight.kind} needs a *DENSITY of material {name}: add it", weight.row)
+        return density
 
     def _check_direction(self, weight: Weight, numbers: np.ndarray) -> None:
         """Reject directions that plane bodies and bodies of revolution do not have."""
@@ -204,17 +227,17 @@ class Acting:
                 weight.row,
             )
 
-    def _weight(self, weight: Weight, part: Component, density: float) -> BodyForce:
+    def _weight(self, weight: Weight, part: Component, density: float, region: str | None) -> BodyForce:
         numbers = np.array(weight.numbers)
         self._check_direction(weight, numbers)
         if weight.kind == "GRAV":
-            return gravity(part.name, density, (weight.value * numbers)[: self.model.dim].tolist())
+            return gravity(part.name, density, (weight.value * numbers)[: self.model.dim].tolist(), region)
         speed = float(np.sqrt(weight.value))
         if self.model.dim == 3:
-            return centrifugal(part.name, density, speed, tuple(numbers[:3]), tuple(numbers[3:]))
+            return centrifugal(part.name, density, speed, tuple(numbers[:3]), tuple(numbers[3:]), region)
         if self.model.kind == "axisymmetric":
-            return centrifugal(part.name, density, speed, (0.0, 0.0), (0.0, 1.0))
-        return centrifugal(part.name, density, speed, tuple(numbers[:2]))
+            return centrifugal(part.name, density, speed, (0.0, 0.0), (0.0, 1.0), region)
+        return centrifugal(part.name, density, speed, tuple(numbers[:2]), region=region)
 
     def _heat(self, temperatures: np.ndarray, bodies: Mapping[str, Body]) -> list[Load]:
         """Return the changes of temperature of bodies that expand."""

@@ -13,6 +13,7 @@ import tomlkit
 from fenics_contact._scene.fields import NodeValues
 from fenics_contact._scene.loads import (
     BodyForce,
+    InitialStress,
     Load,
     PointForce,
     Pressure,
@@ -29,6 +30,7 @@ from fenics_contact._scene.supports import AnySupport, Kept, RigidSurface, Rolle
 from fenics_contact._scene.surface_laws import ClosureTable, ExponentialClosure, LinearClosure
 from fenics_contact.decks.deck import Deck
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials.anisotropic import AnisotropicElasticity
 from fenics_contact.materials.elastic import IsotropicElasticity, PlaneStrain, PlaneStress
 from fenics_contact.materials.hyperelastic import MooneyRivlin, Ogden, StVenantKirchhoff
 from fenics_contact.materials.neo_hookean_metal import NeoHookeanPlasticity
@@ -40,6 +42,7 @@ _MODELS: dict[type, str] = {
     PlaneStrain: "plane_strain",
     PlaneStress: "plane_stress",
     OrthotropicElasticity: "orthotropic",
+    AnisotropicElasticity: "anisotropic",
     OrthotropicPlaneStress: "orthotropic_plane_stress",
     J2Plasticity: "j2_plasticity",
     FinitePlasticity: "finite_plasticity",
@@ -198,7 +201,7 @@ class _Writer:
             axis = {} if spin.axis is None else {"axis": list(spin.axis)}
             return {
                 "kind": "centrifugal", "body": load.body, "density": spin.density, "speed": spin.speed,
-                "point": list(spin.point), **axis,
+                "point": list(spin.point), **axis, **_given(load, "region"),
             }  # fmt: skip
         value = self._value(load.value, name)
         table: dict[str, Any] = {"body": load.body}
@@ -206,10 +209,12 @@ class _Writer:
             return {"kind": "point_force", **table, "nodes": load.nodes, "value": value}
         if isinstance(load, Pressure):
             return {"kind": "pressure", **table, "surface": load.surface, "value": value}
+        if isinstance(load, InitialStress):
+            return {"kind": "initial_stress", **table, "value": value}
         if isinstance(load, ThermalStrain):
             return {"kind": "thermal", **table, "value": value}
         if isinstance(load, BodyForce):
-            return {"kind": "body_force", **table, "value": value}
+            return {"kind": "body_force", **table, "value": value, **_given(load, "region")}
         assert isinstance(load, TotalForce)
         table |= {"kind": "total_force", "surface": load.surface, "value": value}
         given = _given(load, "moment", "at")
@@ -276,10 +281,15 @@ class _Writer:
         return [self._value(v, "") for v in support.motion]
 
 
+def _listed(value: Any) -> Any:
+    return [_listed(each) for each in value] if isinstance(value, tuple) else value
+
+
 def _key(load: Load) -> tuple[Any, ...]:
     """Return what tells a load from others through the steps."""
     spins = isinstance(load, BodyForce) and isinstance(load.value, Spinning)
-    return type(load), spins, load.body, getattr(load, "surface", getattr(load, "nodes", ""))
+    where = getattr(load, "surface", getattr(load, "nodes", getattr(load, "region", "")))
+    return type(load), spins, load.body, where
 
 
 def _holds(support: AnySupport) -> tuple[Any, ...]:

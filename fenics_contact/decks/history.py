@@ -426,8 +426,10 @@ def _initial(cards: Sequence[Card], mesh: DeckMesh) -> np.ndarray:
     found = np.zeros(len(mesh.points))
     for card in cards:
         if card.name == "INITIALCONDITIONS":
+            if card.name_of("TYPE") == "STRESS":
+                continue
             if card.name_of("TYPE") != "TEMPERATURE":
-                raise card.error(f"TYPE={card.name_of('TYPE')} is not read: only temperatures are")
+                raise card.error(f"TYPE={card.name_of('TYPE')} is not read: TEMPERATURE and STRESS are")
             _assign(found, card, mesh)
     return found
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from fenics_contact.decks.vocabulary import MATERIAL_CARDS, WITHOUT_EFFECT
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials.anisotropic import AnisotropicElasticity
 from fenics_contact.materials.elastic import IsotropicElasticity, Material, PlaneStrain, PlaneStress
 from fenics_contact.materials.hardening import Points
 from fenics_contact.materials.hyperelastic import MooneyRivlin, Ogden, StVenantKirchhoff
@@ -107,6 +108,7 @@ class Conditions:
         large: Whether a step has NLGEOM.
         temperature: The one temperature of all steps, None where it varies.
         heated: Whether temperatures change.
+        thickness: That of a plane body where the deck has several, else None.
         dilatation: Whether cells are linear hexahedra or quadrilaterals, whose changes of volume are means.
     """
 
@@ -115,6 +117,7 @@ class Conditions:
     temperature: float | None
     heated: bool
     dilatation: bool
+    thickness: float | None = None
 
 
 def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> Material:
@@ -131,6 +134,10 @@ def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> M
                 f"thermal expansion with {'*' * (stiff != ['NLGEOM'])}{stiff[0]} has no counterpart: "
                 "leave one of the two out"
             )
+        if of.thickness is not None and stiff:
+            raise cards.card.error(
+                f"plane bodies of several thicknesses with {stiff[0]} have no counterpart: give one thickness"
+            )
         if "HYPERELASTIC" in parts:
             return _hyperelastic(parts["HYPERELASTIC"], of)
         if "ELASTIC" not in parts:
@@ -141,12 +148,14 @@ def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> M
         kind = parts["ELASTIC"].name_of("TYPE") or "ISO"
         if kind in ("ISO", "ISOTROPIC"):
             return _isotropic(parts, of)
+        if kind in ("ANISO", "ANISOTROPIC"):
+            kind = "ANISO"
         if "PLASTIC" in parts or of.large:
             what = "*PLASTIC" if "PLASTIC" in parts else "NLGEOM"
             raise parts["ELASTIC"].error(
                 f"TYPE={kind} with {what} has no counterpart: give isotropic constants"
             )
-        return _orthotropic(parts, kind, axes, of)
+        return (_anisotropic if kind == "ANISO" else _orthotropic)(parts, kind, axes, of)
     except InvalidInputError as error:
         if getattr(error, "card", ""):
             raise
@@ -167,17 +176,20 @@ def _expansion(parts: Mapping[str, Card], of: Conditions, count: int) -> list[fl
         return None
     card = parts["EXPANSION"]
     kind = card.name_of("TYPE") or "ISO"
-    if kind not in ("ISO", "ORTHO") or (kind == "ORTHO" and count == 1):
+    width = {"ISO": 1, "ORTHO": 3, "ANISO": 6, "ANISOTROPIC": 6}.get(kind, 0)
+    if not 0 < width <= count:
         raise card.error(
-            f"TYPE={kind} is not read for this material: give ISO, or ORTHO with *ELASTIC of that type"
+            f"TYPE={kind} is not read for this material: give ISO, ORTHO or ANISO as *ELASTIC has"
         )
-    width = 3 if kind == "ORTHO" else 1
     if of.temperature is None and depends_on_temperature(card, width):
         raise card.error(
             "an expansion that depends on the temperature is not read: give the mean one of the temperatures "
             "of the deck"
         )
     values = row_at(card, width, of.temperature or 0.0, "an expansion")
+    if count == 6:
+        along = values[:3] if width > 1 else values * 3
+        return [*along, *(values[k] for k in (5, 4, 3))] if width == 6 else [*along, 0.0, 0.0, 0.0]
     return values if len(values) == count else values * count
 
 
@@ -191,8 +203,10 @@ def _isotropic(parts: Mapping[str, Card], of: Conditions) -> Material:
         if of.kind == "plane stress":
             raise parts["ELASTIC"].error("plane stress with NLGEOM has no counterpart: take solid elements")
         return StVenantKirchhoff(young, poisson)
-    kind = {"plane strain": PlaneStrain, "plane stress": PlaneStress}.get(of.kind, IsotropicElasticity)
-    return kind(young, poisson, expansion)
+    if of.kind in ("plane strain", "plane stress"):
+        kind = PlaneStrain if of.kind == "plane strain" else PlaneStress
+        return kind(young, poisson, expansion, of.thickness)
+    return IsotropicElasticity(young, poisson, expansion)
 
 
 def _plastic(parts: Mapping[str, Card], young: float, poisson: float, of: Conditions) -> Material:
@@ -245,7 +259,7 @@ def _orthotropic(parts: Mapping[str, Card], kind: str, axes: Card | None, of: Co
         e1, e2, e3 = (float(v) for v in 1.0 / np.diag(c))
         n12, n13, n23 = float(-c[0, 1] * e1), float(-c[0, 2] * e1), float(-c[1, 2] * e2)
     else:
-        raise card.error(f"TYPE={kind} is not read: give ISO, ORTHO or ENGINEERING CONSTANTS")
+        raise card.error(f"TYPE={kind} is not read: give ISO, ORTHO, ENGINEERING CONSTANTS or ANISO")
     alpha = _expansion(parts, of, 3)
     rows = _axes(axes)
     if of.kind == "plane stress":
@@ -253,12 +267,29 @@ def _orthotropic(parts: Mapping[str, Card], kind: str, axes: Card | None, of: Co
             raise card.error("axes of a plane material must lie in the plane: correct *ORIENTATION")
         angle = float(np.arctan2(rows[0][1], rows[0][0]))
         return OrthotropicPlaneStress(
-            (e1, e2), n12, g12, angle, None if alpha is None else (alpha[0], alpha[1])
+            (e1, e2), n12, g12, angle, None if alpha is None else (alpha[0], alpha[1]), of.thickness
         )
     if of.kind == "plane strain":
         raise card.error(f"TYPE={kind} in plane strain has no counterpart: take solid elements")
     thermal = None if alpha is None else (alpha[0], alpha[1], alpha[2])
     return OrthotropicElasticity((e1, e2, e3), (n12, n13, n23), (g12, g13, g23), rows, thermal)  # type: ignore[arg-type]
+
+
+#: Place of 11, 22, 33, 12, 13, 23, the order of the deck, among xx, yy, zz, yz, xz, xy.
+_IN_VOIGT = np.array([0, 1, 2, 5, 4, 3])
+
+
+def _anisotropic(parts: Mapping[str, Card], kind: str, axes: Card | None, of: Conditions) -> Material:
+    card = parts["ELASTIC"]
+    if of.kind in ("plane stress", "plane strain"):
+        raise card.error(f"TYPE={kind} in {of.kind} has no counterpart: take solid elements")
+    values = _row(card, 21, of, "21 stiffnesses")
+    moduli = np.zeros((6, 6))
+    column, row = np.tril_indices(6)  # the upper triangle column by column
+    moduli[_IN_VOIGT[row], _IN_VOIGT[column]] = moduli[_IN_VOIGT[column], _IN_VOIGT[row]] = values
+    alpha = _expansion(parts, of, 6)
+    thermal = None if alpha is None else tuple(alpha)
+    return AnisotropicElasticity(moduli, _axes(axes), thermal)  # type: ignore[arg-type]
 
 
 def _hyperelastic(card: Card, of: Conditions) -> Material:

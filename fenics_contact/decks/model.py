@@ -17,7 +17,9 @@ from fenics_contact.decks.couplings import (
     read_equations,
 )
 from fenics_contact.decks.history import History, read_history
+from fenics_contact.decks.initial_stress import read_initial_stress
 from fenics_contact.decks.materials import Conditions, build_material, read_materials
+from fenics_contact.decks.regions import split_sections
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.serendipity_cells import completed
 from fenics_contact.readers.deck_bodies import (
@@ -55,6 +57,8 @@ class Model:
         self.parts: Parts
         self.surfaces: dict[str, Faces] = {}
         self.node_sets: dict[str, np.ndarray] = {}
+        self._split()
+        self.stressed = read_initial_stress(cards, self.mesh, self.note)
         self.driven = read_driven(cards, self.mesh)
         self.bolts = read_bolts(cards, self.mesh)
         self.equations = read_equations(cards, self.mesh)
@@ -64,6 +68,14 @@ class Model:
             [node for several in nodes for node in several if node >= 0], dtype=np.int64
         )
         self._turn_forces()
+
+    def _split(self) -> None:
+        """Cut sections where a part of them is loaded."""
+        weights = [w for step in self.history.steps for moment in step.moments for w in moment.weights]
+        loaded = {w.where: self.mesh.elements_named(w.where, w.card, w.row) for w in weights}
+        self.mesh, self.sections, self.of_element, self.parts_of_mesh = split_sections(
+            self.mesh, self.sections, self.of_element, self.parts_of_mesh, loaded.items()
+        )
 
     def note(self, card: Card, words: str) -> None:
         """Keep what is worth knowing of a card."""
@@ -88,13 +100,14 @@ class Model:
     def _thickness(self) -> float:
         if self.kind not in ("plane stress", "plane strain"):
             return 1.0
-        found = sorted({section.thickness for section in self.sections})
-        if len(found) > 1:
-            card = next(s.card for s in self.sections if s.thickness != self.sections[0].thickness)
-            raise card.error(
-                f"plane bodies must have one thickness, got {found[0]:g} and {found[-1]:g}: give one"
-            )
-        return found[0]
+        found = {section.thickness for section in self.sections}
+        return 1.0 if len(found) > 1 else found.pop()
+
+    @property
+    def _has_thicknesses(self) -> bool:
+        """Whether plane sections differ in their thickness, which their materials have then."""
+        plane = self.kind in ("plane stress", "plane strain")
+        return plane and len({section.thickness for section in self.sections}) > 1
 
     def build_meshes(self) -> None:
         """Make the meshes of the bodies, with everything that is named by now."""
@@ -149,7 +162,8 @@ class Model:
             )
             given = {}
             for region, section in regions_of(self.sections, part).items():
-                given[region] = self._material(section, of)
+                thickness = section.thickness if self._has_thicknesses else None
+                given[region] = self._material(section, replace(of, thickness=thickness))
                 self._note_units(section.card, given[region], mesh)
             material = given if len(given) > 1 else next(iter(given.values()))
             integration = integration_of(self.mesh, part, self.note)

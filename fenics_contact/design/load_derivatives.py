@@ -9,10 +9,10 @@ from typing import cast
 import numpy as np
 
 from fenics_contact import _dolfinx
-from fenics_contact._fem.load_forms import is_scalar, load_fields, load_parameters
+from fenics_contact._fem.load_forms import is_scalar, load_fields, load_parameters, loaded_cells
 from fenics_contact._fem.loads import LinearTraction, spread_traction
 from fenics_contact._scene.fields import OfPosition, gradients_of
-from fenics_contact._scene.loads import Load, PointForce, SurfaceLoad, ThermalStrain, TotalForce
+from fenics_contact._scene.loads import Load, PointForce, SurfaceLoad, TotalForce
 from fenics_contact._surfaces.facets import GaussPoint, gauss_points, surface_moments
 from fenics_contact.design.forms import ShapeForms, sets_in_use, sum_over_subdomains
 from fenics_contact.design.surface_derivatives import integral_pulled_back
@@ -212,7 +212,7 @@ def _load_by_shape(
         if len(facets[0]) == 0:
             return np.zeros(mesh.size)
         acted = np.isin(nodes, body.mesh.surfaces[load.surface])
-    cells = parts.cells if isinstance(load, ThermalStrain) else None
+    cells = loaded_cells(load, parts, body, mesh.cells)
     fields = load_fields(load, mesh.space, body.mesh.points[nodes], acted)
     values, given = load_parameters(load, parts), [*functions, *fields]
     template = forms.load_by_shape(load, parts.materials, body.cell_type)

@@ -15,6 +15,7 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.problem import ContactProblem
+from fenics_contact._scene.loads import InitialStress
 from fenics_contact._scene.scene import Scene
 from fenics_contact.design.adjoint import WeakChoice, linearise_face, require_from_rest
 from fenics_contact.design.base import SingleProblem, comm_of, with_fewest_weak_points, with_objective
@@ -94,6 +95,16 @@ def _check_differentiable(scene: Scene) -> None:
         raise InvalidInputError(
             "designs need bodies without torsion, this scene has torsion=True: optimise it with a tool that "
             "takes plain functions, see fenics_contact.SceneResponse, or leave torsion out"
+        )
+    if any(isinstance(load, InitialStress) for load in scene.loads):
+        raise InvalidInputError(
+            "designs need bodies without an InitialStress, whose cells would carry it along, this scene has "
+            "one: leave it out"
+        )
+    if scene.has_thickness:
+        raise InvalidInputError(
+            "designs of plane bodies need materials without a thickness, forces being those of a unit of "
+            "thickness, got one: leave the thickness out, and divide forces by it"
         )
     if not scene.is_nonlinear:
         return

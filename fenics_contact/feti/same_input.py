@@ -10,7 +10,7 @@ from fenics_contact._base.fingerprint import described, require_alike
 from fenics_contact._base.libraries import MPI
 from fenics_contact._fem.load_forms import is_scalar
 from fenics_contact._scene.fields import Ufl, evaluate
-from fenics_contact._scene.loads import PointForce, SurfaceLoad
+from fenics_contact._scene.loads import InitialStress, PointForce, SurfaceLoad
 from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.supports import Roller, Support
 from fenics_contact.errors import together
@@ -51,7 +51,8 @@ def _values(scene: Scene) -> dict[str, str]:
             descriptions.update(described(values, f"scene.supports[{number}] at some nodes"))
     for number, load in enumerate(scene.loads):
         if callable(load.value) and not isinstance(load.value, Ufl):
-            points, shape = _nodes(scene, load), () if is_scalar(load) else (scene.components,)
+            points, width = _nodes(scene, load), 6 if isinstance(load, InitialStress) else scene.components
+            shape = () if is_scalar(load) else (width,)
             values = evaluate(f"{type(load).__name__} on body {load.body!r}", load.value, points, shape)
             descriptions.update(described(values, f"scene.loads[{number}] at some nodes"))
     return descriptions

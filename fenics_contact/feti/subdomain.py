@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from hashlib import blake2b
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,11 +15,13 @@ from fenics_contact import _dolfinx
 from fenics_contact._base.display import displayed
 from fenics_contact._fem.composition import Composition, composition
 from fenics_contact._fem.forms import FormLibrary
+from fenics_contact._fem.load_forms import loaded_cells, region_of
 from fenics_contact._fem.model_checks import check_kernel, kernel_of
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.fields import Ufl
 from fenics_contact._scene.foundations import ElasticFoundation
-from fenics_contact._scene.loads import Load, PointForce, SurfaceLoad
+from fenics_contact._scene.initial_stress import initial_stress
+from fenics_contact._scene.loads import InitialStress, Load, PointForce, SurfaceLoad, ThermalStrain
 from fenics_contact._scene.tools import ToolBody
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.factor import fixing_nodes
@@ -359,15 +361,39 @@ def assemble(
             facets = mesh.facets_of(body, load.surface)
             acted = mesh.acted(body.mesh.surfaces[load.surface])
         places = mesh.by_input_node(points)
-        form = forms.load(load, parts, body.cell_type, mesh.space, places, facets, acted)
+        cells, of_cells = loaded_cells(load, parts, body, mesh.cells), None
+        if isinstance(load, InitialStress):
+            of_cells = initial_stress([load], body)[mesh.cells]
         absolute = isinstance(load.value, Ufl) or _varies(parts, body, forms)
         coordinates = places if absolute else _from_own_origin(places)
         _dolfinx.update_coordinates(mesh.space.mesh, coordinates)
-        force += mesh.force_of(_dolfinx.assemble_vector(form))
+        for thickness, on in _by_thickness(load, mesh, body, facets):
+            form = forms.load(load, parts, body.cell_type, mesh.space, places, on, acted, cells, of_cells)
+            force += thickness * mesh.force_of(_dolfinx.assemble_vector(form))
     _check_finite(force, mesh)
     if mesh.following is not None:
         force = mesh.following.force(force)
     return replace(earlier, loads=acting, load=force)
+
+
+_Facets: TypeAlias = tuple[np.ndarray, np.ndarray] | None
+
+
+def _by_thickness(
+    load: Load, mesh: SubdomainMesh, body: Body, facets: _Facets
+) -> Iterator[tuple[float, _Facets]]:
+    """Yield the thicknesses of what a load acts on, and its facets there; ones without a thickness."""
+    if isinstance(load, ThermalStrain) or not body.has_thickness:
+        yield 1.0, facets  # the material has it
+        return
+    thickness = body.thickness_of_cells
+    if facets is None:
+        region = region_of(load)
+        yield float(thickness[0 if region is None else body.mesh.regions[region][0]]), None
+        return
+    here = thickness[mesh.cells[facets[0]]]
+    for each in np.unique(here):
+        yield float(each), (facets[0][here == each], facets[1][here == each])
 
 
 def _at_points(load: PointForce, mesh: SubdomainMesh, body: Body) -> np.ndarray:
@@ -388,6 +414,9 @@ def _acts(load: Load, mesh: SubdomainMesh, body: Body) -> bool:
         return False
     if isinstance(load, PointForce):
         return bool(np.isin(body.mesh.nodes_of(load.nodes), mesh.nodes).any())
+    region = region_of(load)
+    if region is not None:
+        return bool(np.isin(mesh.cells, body.mesh.regions[region]).any())
     return not isinstance(load, SurfaceLoad) or len(mesh.facets_of(body, load.surface)[0]) > 0
 
 

@@ -6,6 +6,7 @@ from fenics_contact._base import form_language  # noqa: F401 (imports UFL at les
 from fenics_contact._base.late_names import late_names
 
 if TYPE_CHECKING:
+    from fenics_contact.materials.anisotropic import AnisotropicElasticity
     from fenics_contact.materials.elastic import (
         Elasticity,
         IsotropicElasticity,
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
+    "AnisotropicElasticity",
     "Elasticity",
     "EnergyModel",
     "FinitePlasticity",

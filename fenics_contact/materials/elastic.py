@@ -107,6 +107,42 @@ class Elasticity(ABC):
         return rigid_body_modes(points)
 
 
+class Plate(Elasticity):
+    """A plane model with a thickness: forces, moments and energies are those of the whole thickness.
+
+    It is the last of the parameters; stresses do not depend on it, work per area of the plane does.
+    """
+
+    thickness: float | None
+
+    @property
+    def of_thickness(self) -> tuple[float, ...]:
+        """The thickness where it was given, else nothing."""
+        return () if self.thickness is None else (self.thickness,)
+
+    def per_area(self, density: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return a density per volume as one per area of the plane (UFL)."""
+        return density if self.thickness is None else parameters[-1] * density
+
+    def stiffness(self, u: Expr, v: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return σ(u) : ε(v), times the thickness."""
+        return self.per_area(super().stiffness(u, v, parameters), parameters)
+
+
+def check_thickness(thickness: float | None) -> None:
+    """Reject a thickness that is not positive."""
+    if thickness is not None and not (np.isfinite(thickness) and thickness > 0):
+        raise InvalidInputError(
+            f"thickness must be a positive number, got {thickness!r}: give it as a length, or None for "
+            "forces per unit of thickness"
+        )
+
+
+def thickness_of(material: object) -> float | None:
+    """Return the thickness of a material of plane bodies, None without one."""
+    return material.thickness if isinstance(material, Plate) else None
+
+
 @dataclass(frozen=True)
 @checked()
 class Isotropic(Elasticity):
@@ -145,7 +181,7 @@ class LameModel(Isotropic):
 
     def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return (3λ + 2G) α I."""
-        lame_parameter, shear, expansion = parameters
+        lame_parameter, shear, expansion = parameters[:3]
         return (3 * lame_parameter + 2 * shear) * expansion * ufl.Identity(self.dims[0])
 
 
@@ -166,39 +202,23 @@ class IsotropicElasticity(LameModel):
 
 
 @dataclass(frozen=True)
-class PlaneStrain(LameModel):
+@checked()
+class PlaneStrain(Plate, LameModel):
     """A slice of a long body that cannot strain along its length, σ = λ tr(ε) I + 2 G ε − ΔT (3λ + 2G) α I.
 
     Attributes:
         young_modulus: Young's modulus E > 0, [force / length²].
         poisson_ratio: Poisson's ratio ν in (−1, 0.5), dimensionless.
         thermal_expansion: Thermal expansion α, strain per degree. None for a body without thermal strain.
+        thickness: Of the slice, [length]. None: forces of the scene are per unit of thickness.
     """
 
-    @property
-    def dims(self) -> tuple[int, ...]:
-        """Plane bodies."""
-        return (2,)
+    thickness: float | None = None
 
-    def transverse_stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
-        """Return λ tr(ε)."""
-        return parameters[0] * ufl.div(u)
-
-    def transverse_thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
-        """Return (3λ + 2G) α."""
-        lame_parameter, shear, expansion = parameters
-        return (3 * lame_parameter + 2 * shear) * expansion
-
-
-@dataclass(frozen=True)
-class PlaneStress(Isotropic):
-    """A thin plate without stress normal to it, σ = E/(1−ν²) ((1−ν) ε + ν tr(ε) I) − ΔT E/(1−ν) α I.
-
-    Attributes:
-        young_modulus: Young's modulus E > 0, [force / length²].
-        poisson_ratio: Poisson's ratio ν in (−1, 0.5), dimensionless.
-        thermal_expansion: Thermal expansion α, strain per degree. None for a body without thermal strain.
-    """
+    def __post_init__(self) -> None:
+        """Reject constants for which the strain energy is not positive."""
+        super().__post_init__()
+        check_thickness(self.thickness)
 
     @property
     def dims(self) -> tuple[int, ...]:
@@ -207,8 +227,47 @@ class PlaneStress(Isotropic):
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """E, [force / length²], ν, and α where it was given."""
-        return (self.young_modulus, self.poisson_ratio, *self.expansion)
+        """First Lamé parameter, shear modulus, [force / length²], and what was given of α and thickness."""
+        return (*super().parameters, *self.of_thickness)
+
+    def transverse_stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return λ tr(ε)."""
+        return parameters[0] * ufl.div(u)
+
+    def transverse_thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return (3λ + 2G) α."""
+        lame_parameter, shear, expansion = parameters[:3]
+        return (3 * lame_parameter + 2 * shear) * expansion
+
+
+@dataclass(frozen=True)
+@checked()
+class PlaneStress(Plate, Isotropic):
+    """A thin plate without stress normal to it, σ = E/(1−ν²) ((1−ν) ε + ν tr(ε) I) − ΔT E/(1−ν) α I.
+
+    Attributes:
+        young_modulus: Young's modulus E > 0, [force / length²].
+        poisson_ratio: Poisson's ratio ν in (−1, 0.5), dimensionless.
+        thermal_expansion: Thermal expansion α, strain per degree. None for a body without thermal strain.
+        thickness: Of the plate, [length]. None: forces of the scene are per unit of thickness.
+    """
+
+    thickness: float | None = None
+
+    def __post_init__(self) -> None:
+        """Reject constants for which the strain energy is not positive."""
+        super().__post_init__()
+        check_thickness(self.thickness)
+
+    @property
+    def dims(self) -> tuple[int, ...]:
+        """Plane bodies."""
+        return (2,)
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """E, [force / length²], ν, and what was given of α and thickness."""
+        return (self.young_modulus, self.poisson_ratio, *self.expansion, *self.of_thickness)
 
     def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return σ(u) in the plane."""
@@ -217,7 +276,7 @@ class PlaneStress(Isotropic):
 
     def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return E α / (1 − ν) I."""
-        E, nu, expansion = parameters
+        E, nu, expansion = parameters[:3]
         return E * expansion / (1 - nu) * ufl.Identity(2)
 
 
@@ -350,12 +409,14 @@ def thermal_stresses(
 ) -> tuple[float, ...]:
     """Return C : α in Voigt order, nothing without an expansion.
 
-    `axes`: material axes as rows, shape (dim, dim).
+    `axes`: material axes as rows, shape (dim, dim); `expansion`: along them, or all components of a tensor in
+    Voigt order.
     """
     if expansion is None:
         return ()
     along = np.zeros(len(C))
-    along[: len(axes)] = expansion
+    along[: len(expansion)] = expansion
+    along[len(axes) :] *= 2.0  # engineering shear
     return tuple(float(value) for value in C @ np.linalg.solve(strain_rotation(axes), along))
 
 

@@ -12,9 +12,11 @@ from ufl.core.expr import Expr
 
 from fenics_contact._base.checks import checked
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.materials.anisotropic import ALONG_XYZ, SpatialElasticity, Triple, checked_axes
 from fenics_contact.materials.elastic import (
-    Elasticity,
+    Plate,
     as_tensor,
+    check_thickness,
     checked_stiffness,
     numbers,
     rotated_stiffness,
@@ -24,8 +26,6 @@ from fenics_contact.materials.elastic import (
     thermal_stresses,
     upper_triangle,
 )
-
-Triple = tuple[float, float, float]
 
 
 def material_axes(first: Sequence[float], second: Sequence[float]) -> tuple[Triple, Triple, Triple]:
@@ -59,7 +59,7 @@ def material_axes(first: Sequence[float], second: Sequence[float]) -> tuple[Trip
 
 @dataclass(frozen=True)
 @checked("young_moduli", "poisson_ratios", "shear_moduli", "thermal_expansion")
-class OrthotropicElasticity(Elasticity):
+class OrthotropicElasticity(SpatialElasticity):
     """Small-strain orthotropic elasticity in space from nine engineering constants in material axes.
 
     The constants are those of uniaxial tests along the material axes 1, 2, 3: ν_ij is the contraction along j
@@ -77,7 +77,7 @@ class OrthotropicElasticity(Elasticity):
     young_moduli: Triple
     poisson_ratios: Triple
     shear_moduli: Triple
-    orientation: tuple[Triple, Triple, Triple] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    orientation: tuple[Triple, Triple, Triple] = ALONG_XYZ
     thermal_expansion: Triple | None = None
 
     def __post_init__(self) -> None:
@@ -93,24 +93,8 @@ class OrthotropicElasticity(Elasticity):
                 f"young_moduli and shear_moduli must be positive, got {self.young_moduli!r} and "
                 f"{self.shear_moduli!r}: give them in force per area"
             )
-        axes = np.array(self.orientation, dtype=np.float64)
-        if axes.shape != (3, 3) or not np.allclose(axes @ axes.T, np.eye(3), atol=1e-8):
-            raise InvalidInputError(
-                f"orientation must hold three orthonormal material axes as rows, got {self.orientation!r}: "
-                "build it with material_axes(first, second)"
-            )
-        object.__setattr__(self, "orientation", tuple(tuple(float(c) for c in axis) for axis in axes))
+        object.__setattr__(self, "orientation", checked_axes(self.orientation))
         _ = self.stiffness_matrix
-
-    @property
-    def dims(self) -> tuple[int, ...]:
-        """Bodies in space."""
-        return (3,)
-
-    @property
-    def expands(self) -> bool:
-        """Whether thermal expansions were given."""
-        return self.thermal_expansion is not None
 
     @cached_property
     def stiffness_matrix(self) -> np.ndarray:
@@ -126,24 +110,10 @@ class OrthotropicElasticity(Elasticity):
         constants = f"young_moduli {self.young_moduli} with poisson_ratios {self.poisson_ratios}"
         return rotated_stiffness(checked_stiffness(compliance, constants), np.array(self.orientation))
 
-    @property
-    def parameters(self) -> tuple[float, ...]:
-        """Upper triangle of the stiffness matrix, and the thermal stress per degree where it was given."""
-        C = self.stiffness_matrix
-        return upper_triangle(C) + thermal_stresses(C, np.array(self.orientation), self.thermal_expansion)
-
-    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
-        """Return C : ε(u)."""
-        return as_tensor(symmetric_product(parameters[:21], strain_vector(strain(u), 3)), 3)
-
-    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
-        """Return C : α, with the expansions as a strain."""
-        return as_tensor(list(parameters[21:]), 3)
-
 
 @dataclass(frozen=True)
 @checked("young_moduli", "thermal_expansion")
-class OrthotropicPlaneStress(Elasticity):
+class OrthotropicPlaneStress(Plate):
     """A thin orthotropic plate without stress normal to it.
 
     Attributes:
@@ -153,6 +123,7 @@ class OrthotropicPlaneStress(Elasticity):
         angle: From the x-axis to material axis 1, counterclockwise, in radians.
         thermal_expansion: Thermal expansion, strain per degree along the material axes. None for a body
             without thermal strain.
+        thickness: Of the plate, [length]. None: forces of the scene are per unit of thickness.
     """
 
     young_moduli: tuple[float, float]
@@ -160,6 +131,7 @@ class OrthotropicPlaneStress(Elasticity):
     shear_modulus: float
     angle: float = 0.0
     thermal_expansion: tuple[float, float] | None = None
+    thickness: float | None = None
 
     def __post_init__(self) -> None:
         """Reject constants for which the strain energy is not positive."""
@@ -175,6 +147,7 @@ class OrthotropicPlaneStress(Elasticity):
                 f"{moduli}, poisson_ratio {self.poisson_ratio!r}, shear_modulus {self.shear_modulus!r}, "
                 f"angle {self.angle!r}: give moduli in force per area and the angle in radians"
             )
+        check_thickness(self.thickness)
         _ = self.stiffness_matrix
 
     @property
@@ -202,9 +175,10 @@ class OrthotropicPlaneStress(Elasticity):
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """Upper triangle of the stiffness matrix, and the thermal stress per degree where it was given."""
+        """Upper triangle of the stiffness matrix, then thermal stress per degree and thickness, if given."""
         C = self.stiffness_matrix
-        return upper_triangle(C) + thermal_stresses(C, self._axes, self.thermal_expansion)
+        thermal = thermal_stresses(C, self._axes, self.thermal_expansion)
+        return upper_triangle(C) + thermal + self.of_thickness
 
     def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return C : ε(u)."""
@@ -212,4 +186,4 @@ class OrthotropicPlaneStress(Elasticity):
 
     def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return C : α, with the expansions as a strain."""
-        return as_tensor(list(parameters[6:]), 2)
+        return as_tensor(list(parameters[6:9]), 2)

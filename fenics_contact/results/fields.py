@@ -28,6 +28,7 @@ from fenics_contact._fem.templates import (
 )
 from fenics_contact._pairing.points import NodeNumbers
 from fenics_contact._scene.body import Body
+from fenics_contact._scene.initial_stress import initial_stress
 from fenics_contact._scene.scene import Scene
 from fenics_contact._surfaces.facets import filled_at_corners, filled_on_axis
 from fenics_contact.errors import together
@@ -140,7 +141,11 @@ class CellMeans:
             form, constants, coefficients = _weighted(
                 self._parts.materials, cell_type, q, temperature, quantity
             )
-            self._fields = temperature.fields(mesh, body.mesh.at_nodes_apart(body.mesh.points))
+            stress = None
+            if temperature.initial:
+                number = cells_of_body(mesh, body.mesh.apart[0])
+                stress = initial_stress(temperature.initial, body)[number]
+            self._fields = temperature.fields(mesh, body.mesh.at_nodes_apart(body.mesh.points), stress)
         self._form = Template(mesh.comm, form, constants, coefficients)
         self._numbers = temperature.numbers
         self._space = _dolfinx.scalar_space(mesh, 0)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import PointForce, Pressure, Support, ThermalStrain
-from fenics_contact.decks import Deck, DeckError, read_deck
+from fenics_contact import PointForce, Pressure, Support, ThermalStrain, read_scene_file
+from fenics_contact.decks import Deck, DeckError, read_deck, write_scene_file
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, PlaneStress
 from fenics_contact.mesh import joined_cells, quadratic, refined
@@ -125,6 +125,36 @@ def test_weight_hangs_as_in_theory(tmp_path: Path) -> None:
     found = read_deck(deck(tmp_path, text + step("*DLOAD\nBAR, GRAV, 1000., 0., 0., -1.\n")))
     # ρ g L² / (2 E), exact at nodes of linear cells.
     assert displacement(found)[:, 2].min() == pytest.approx(-1.0 * 64 / 2 / 210000.0, rel=1e-9)
+
+
+def test_a_weight_on_some_elements_of_several_densities(tmp_path: Path) -> None:
+    """Elements 1 to 4 are of steel, 5 to 8 of lead; 3 to 6 are loaded, and all of them by the second step."""
+    text = mesh_cards({"BAR": block((0, 0, 0), (1, 1, 8), (1, 1, 8))}) + STEEL.replace("0.3", "0.0")
+    text += "*DENSITY\n1.E-3,\n*MATERIAL, NAME=LEAD\n*ELASTIC\n16000., 0.\n*DENSITY\n3.E-3,\n"
+    for name, span in (("LOW", "1, 4"), ("HIGH", "5, 8"), ("MIDDLE", "3, 6")):
+        text += f"*ELSET, ELSET={name}, GENERATE\n{span}\n"
+    text += SECTION.replace("BAR", "LOW") + SECTION.replace("BAR", "HIGH").replace("STEEL", "LEAD")
+    text += "*BOUNDARY\nBAR_Z0, 1, 3\n"
+    found = read_deck(
+        deck(
+            tmp_path,
+            text
+            + step("*DLOAD\nMIDDLE, GRAV, 1000., 0., 0., -1.\n")
+            + step("*DLOAD, OP=NEW\nBAR, GRAV, 1000., 0., 0., -1.\n"),
+        )
+    )
+    assert len(found.scene.bodies["BAR"].materials) == 2
+    first, second = found.solve(MPI.COMM_SELF, tolerance=1e-12)
+    assert first.nodal_reactions("BAR")[:, 2].sum() == pytest.approx(2.0 + 6.0, rel=1e-9)
+    assert second.nodal_reactions("BAR")[:, 2].sum() == pytest.approx(4.0 + 12.0, rel=1e-9)
+    # Below z the column has the weight above it: N = −8 on both elements at the foot, −7.5 .. −6.5 in the
+    # next; means of the third to sixth fall by halves of their own weight.
+    means = first.gather_stress("BAR")[:, 2, 2]
+    np.testing.assert_allclose(means, [-8.0, -8.0, -7.5, -6.5, -4.5, -1.5, 0.0, 0.0], atol=1e-7)
+    path, *_ = write_scene_file(found, tmp_path / "bar.toml")
+    again = read_scene_file(path, MPI.COMM_SELF, overrides=["solver.tolerance=1e-11"]).solve()
+    wanted = second.gather_displacement("BAR")
+    np.testing.assert_allclose(again.gather_displacement("BAR"), wanted, atol=1e-8 * np.abs(wanted).max())
 
 
 def test_temperature_counts_from_the_initial_one(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 from fenics_contact.decks import DeckError, read_deck
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
+    AnisotropicElasticity,
     IsotropicElasticity,
     J2Plasticity,
     Material,
@@ -97,9 +98,25 @@ def test_stiffnesses_and_engineering_constants_are_one_material(tmp_path: Path) 
     assert flat == OrthotropicPlaneStress((9.0, 5.0), 0.2, 2.0, float(np.pi / 2))
 
 
+def test_21_stiffnesses_are_in_their_places(tmp_path: Path) -> None:
+    """D1111, D1122, D2222, D1133, ...: the upper triangle column by column of 11, 22, 33, 12, 13, 23."""
+    names = ("11", "22", "33", "12", "13", "23")
+    moduli = {(a, b): 1e4 * (a == b) + 10.0 * int(a) + int(b) for a in names for b in names if a <= b}
+    ordered = [moduli[tuple(sorted((a, b)))] for k, b in enumerate(names) for a in names[: k + 1]]
+    lines = ["".join(f"{n}, " for n in ordered[k : k + 8]) for k in (0, 8, 16)]
+    cards = "*ELASTIC, TYPE=ANISO\n" + "\n".join(lines) + "\n*EXPANSION, TYPE=ANISO\n1., 2., 3., 4., 5., 6.\n"
+    found = material(tmp_path, cards.replace("1., 2., 3.", "1.E-3, 2., 3."))
+    assert isinstance(found, AnisotropicElasticity)
+    assert found.thermal_expansion == (1e-3, 2.0, 3.0, 6.0, 5.0, 4.0)
+    ours = ("11", "22", "33", "23", "13", "12")
+    wanted = [[moduli[tuple(sorted((a, b)))] for b in ours] for a in ours]
+    np.testing.assert_array_equal(found.stiffness_matrix, wanted)
+
+
 @pytest.mark.parametrize(
     ("cards", "large", "message"),
     [
+        ("*ELASTIC, TYPE=ANISO\n1., 2., 1.\n", False, r"moduli must give a positive energy"),
         ("*DENSITY\n1.\n", False, r"needs \*ELASTIC or \*HYPERELASTIC behind it, has \*DENSITY"),
         ("*HYPERELASTIC, YEOH\n1., 0.\n", True, r"the model YEOH has no counterpart"),
         ("*HYPERELASTIC, OGDEN, N=2\n3., 2., 1., 4., 0.1, 0.2\n", True, r"D2, D3, \.\.\. of \*HYPERELASTIC"),

@@ -86,12 +86,6 @@ WRONG = [
         "GRAV",
         r"GRAV needs a \*DENSITY of material STEEL",
     ),
-    (
-        "*CLOAD\nBAR_X1, 1, 10.",
-        "*DLOAD\n1, GRAV, 1., 0., 0., 1.",
-        "1, GRAV",
-        r"GRAV must act on whole bodies of one density",
-    ),
     ("*CLOAD\nBAR_X1, 1, 10.", "*DLOAD\nBAR, BX, 1.", "BAR, BX", r"load 'BX' is not read: P1, P2"),
     (
         "*CLOAD\nBAR_X1, 1, 10.",

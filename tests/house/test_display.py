@@ -33,6 +33,7 @@ from fenics_contact import (
     FixedPoint,
     FluidPressure,
     FrictionTable,
+    InitialStress,
     Kept,
     LinearClosure,
     LoadSequence,
@@ -107,6 +108,7 @@ from fenics_contact.design.adjoint import linearise_face, solve_adjoint
 from fenics_contact.design.remeshed import Remeshing
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
+    AnisotropicElasticity,
     FinitePlasticity,
     J2Plasticity,
     MooneyRivlin,
@@ -206,6 +208,8 @@ def objects() -> dict[str, Any]:
         RigidTool("ball", RigidSphere((0, 0, 0), 1.0), (0, 0, 0)), ToolMotion("ball", (0, 0, None)),
         RigidCylinder((0, 0, 0), (0, 0, 1), 1.0), OrthotropicPlaneStress((2.0, 1.0), 0.1, 1.0),
         OrthotropicElasticity((3.0, 2.0, 1.0), (0.1, 0.1, 0.1), (1.0, 1.0, 1.0)),
+        InitialStress("block", (1.0,) * 6),
+        AnisotropicElasticity(np.eye(6)),  # type: ignore[arg-type]
         ContactForces(lambda contact: (0.0, np.zeros(1), np.zeros((1, 2)))),
         TotalPotential() + 2.0 * VolumeIntegral("motion", lambda u, x, stress: u[0], "block"),
         StrainEnergy(), PressureNorm(), PressureUnevenness(), ContactArea(), FrictionWork(),

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from fenics_contact import (
     Body,
     BodyForce,
+    InitialStress,
     Pressure,
     Scene,
     Support,
@@ -36,6 +37,9 @@ def scene_of(cell: str) -> Scene:
             ThermalStrain("heated", Ufl(lambda x: x[0] ** 2)),
             Pressure("heated", "x1", lambda points: points[:, 1]),
             BodyForce("plain", Ufl(lambda x: x)),
+            BodyForce("heated", (0.0, 2.0, 1.0)[: mesh.dim], "left"),
+            InitialStress("plain", lambda points: np.outer(points[:, 0], (3.0, -2.0, 1.0, 0.0, 0.0, 2.0))),
+            InitialStress("heated", (3.0, -2.0, 0.0, 0.0, 0.0, 2.0), "right"),
         ],
     )
 

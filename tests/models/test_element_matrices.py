@@ -32,6 +32,7 @@ from fenics_contact._fem.templates import Constants, volume_measure
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.materials import (
+    AnisotropicElasticity,
     IsotropicElasticity,
     J2Plasticity,
     Material,
@@ -143,6 +144,28 @@ def test_turning_body_and_material_together_turns_the_matrix(cell: str) -> None:
     np.testing.assert_allclose(Q @ turned @ Q.T, straight, atol=1e-12 * np.abs(straight).max())
     unturned = by_node(one_cell(OrthotropicElasticity(*WOOD), cell, vertices @ axes))
     assert np.abs(unturned - turned).max() > 0.01 * np.abs(turned).max()
+
+
+def any_moduli() -> np.ndarray:
+    """A stiffness matrix without a zero and without any symmetry of a crystal."""
+    roots = np.random.default_rng(3).uniform(-1.0, 1.0, (6, 6)) + 3.0 * np.eye(6)
+    return np.asarray(roots @ roots.T)
+
+
+@pytest.mark.parametrize("cell", SPACE)
+def test_an_anisotropic_body_has_the_matrix_it_is_given(cell: str) -> None:
+    C = any_moduli()
+    assert np.abs(C).min() > 0.01
+    material = AnisotropicElasticity(C)  # type: ignore[arg-type]
+    assert difference(material, cell, C) < 1e-12
+
+
+def test_an_orthotropic_body_is_an_anisotropic_one_in_the_same_axes() -> None:
+    axes = material_axes((1, 2, 0.5), (0, 1, 3))
+    straight, turned = OrthotropicElasticity(*WOOD), OrthotropicElasticity(*WOOD, axes)
+    found = AnisotropicElasticity(straight.stiffness_matrix, axes)  # type: ignore[arg-type]
+    np.testing.assert_allclose(found.stiffness_matrix, turned.stiffness_matrix, rtol=1e-12, atol=1e-12)
+    assert np.abs(turned.stiffness_matrix - straight.stiffness_matrix).max() > 0.1
 
 
 @pytest.mark.parametrize("cell", PLANE)

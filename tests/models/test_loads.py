@@ -30,6 +30,7 @@ from fenics_contact._scene.loads import Load
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
+    AnisotropicElasticity,
     IsotropicElasticity,
     Material,
     OrthotropicElasticity,
@@ -407,6 +408,25 @@ def test_a_free_orthotropic_body_expands_along_its_axes(cell: str) -> None:
     np.testing.assert_allclose(state.gather_displacement("body"), mesh.points @ strain, atol=1e-9)
     assert state.gather_von_mises("body").max() < 1e-9
     assert abs(strain[0, 1]) > 0.01, "the axes are not turned: nothing was tested"
+
+
+@pytest.mark.parametrize("cell", SPACE)
+def test_a_free_anisotropic_body_also_shears(cell: str) -> None:
+    axes = np.array(material_axes((1, 0.5, 0), (0, 1, 0.3)))
+    own = 1e-3 * np.array([[1.0, 0.3, -0.2], [0.3, -0.5, 0.4], [-0.2, 0.4, 2.0]])
+    roots = np.random.default_rng(3).uniform(-1.0, 1.0, (6, 6)) + 3.0 * np.eye(6)
+    crystal = AnisotropicElasticity(
+        roots @ roots.T,  # type: ignore[arg-type]
+        tuple(map(tuple, axes)),
+        (*np.diag(own), own[1, 2], own[0, 2], own[0, 1]),
+    )
+    mesh = bent(box(cell))
+    strain = WARMER * axes.T @ own @ axes
+    supports = [Support("body", name, _linear(strain)) for name in ("x0", "x1")]
+    scene = Scene({"body": Body(mesh, crystal)}, supports, [ThermalStrain("body", WARMER)])
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-10)
+    np.testing.assert_allclose(state.gather_displacement("body"), mesh.points @ strain, atol=1e-9)
+    assert state.gather_von_mises("body").max() < 1e-8
 
 
 def _linear(strain: np.ndarray) -> Any:

@@ -17,6 +17,7 @@ from fenics_contact._fem.model_checks import check_kernel, check_model
 from fenics_contact.errors import InvalidInputError, UserCodeError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
+    AnisotropicElasticity,
     Elasticity,
     EnergyModel,
     FinitePlasticity,
@@ -303,6 +304,25 @@ def test_orthotropic_constants_must_give_a_positive_energy() -> None:
         InvalidInputError, match=r"young_moduli must be 3 finite numbers, got .*: give those of the"
     ):
         OrthotropicElasticity((1.0, 1.0), (0.1, 0.1, 0.1), (1.0, 1.0, 1.0))  # type: ignore[arg-type]
+
+
+def test_moduli_of_an_anisotropic_body_must_be_symmetric_and_give_a_positive_energy() -> None:
+    def crystal(moduli: np.ndarray) -> AnisotropicElasticity:
+        return AnisotropicElasticity(moduli)  # type: ignore[arg-type]
+
+    good = np.eye(6) + 0.1
+    assert crystal(good).moduli[0] == (1.1, 0.1, 0.1, 0.1, 0.1, 0.1)
+    one_sided, negative, indefinite = good.copy(), good.copy(), good.copy()
+    one_sided[1, 3] = 0.3
+    negative[2, 2] = -1.0
+    indefinite[4, 5] = indefinite[5, 4] = 1.2
+    with pytest.raises(InvalidInputError, match=r"symmetric, got 0.3 in row 2, column 4 and 0.1 in row 4"):
+        crystal(one_sided)
+    for bad in (negative, indefinite, np.zeros((6, 6))):
+        with pytest.raises(InvalidInputError, match=r"moduli must give a positive energy, the smallest"):
+            crystal(bad)
+    with pytest.raises(InvalidInputError, match=r"moduli must be six rows of six finite numbers"):
+        crystal(np.eye(5))
 
 
 def test_an_orientation_must_be_a_rotation() -> None:

@@ -26,6 +26,7 @@ from fenics_contact import (
     ExponentialClosure,
     FluidPressure,
     FrictionTable,
+    InitialStress,
     Kept,
     LinearClosure,
     LoadStep,
@@ -59,6 +60,7 @@ from fenics_contact._base.checks import checked
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
+    AnisotropicElasticity,
     FinitePlasticity,
     IsotropicElasticity,
     J2Plasticity,
@@ -333,7 +335,8 @@ SAMPLES: dict[type, Any] = {
         FrictionTable((0.0, 1.0), (0.3, 0.2)), SlipTable((0.0, 1.0), (0.3, 0.2)),
         FluidPressure(1.0, "x0"),
         Support("a", "b"), Traction("a", "b", DOWN), TotalForce("a", "b", DOWN), Pressure("a", "b", 1),
-        BodyForce("a", DOWN), ThermalStrain("a", 1.0), Ufl(lambda x: x), LoadStep("a"), Scene({"a": BODY}),
+        BodyForce("a", DOWN), ThermalStrain("a", 1.0), InitialStress("a", (1.0,) * 6),
+        Ufl(lambda x: x), LoadStep("a"), Scene({"a": BODY}),
         RigidSphere((0, 0, 0), 1.0), RigidCylinder((0, 0, 0), (0, 0, 1), 1.0),
         ElasticFoundation("a", "b", 1.0), Spring(Surface("a", "b"), DOWN, 1.0), Section((0, 0, 0), DOWN),
         Preload("a", Section((0, 0, 0), DOWN)), PointForce("a", "b", DOWN),
@@ -341,6 +344,7 @@ SAMPLES: dict[type, Any] = {
         DistanceObstacle(lambda x: x[:, 0]), PlaneStrain(1.0, 0.3), PlaneStress(1.0, 0.3),
         OrthotropicPlaneStress((1.0, 1.0), 0.3, 1.0),
         OrthotropicElasticity((1.0,) * 3, (0.1,) * 3, (1.0,) * 3),  # type: ignore[arg-type]
+        AnisotropicElasticity(np.eye(6)),  # type: ignore[arg-type]
         NeoHooke(1.0, 0.3), MooneyRivlin(1.0, 0.5, 10.0), StVenantKirchhoff(1.0, 0.3),
         Ogden((1.0,), (2.0,), 10.0), J2Plasticity(1.0, 0.3, 0.1), FinitePlasticity(1.0, 0.3, 0.1),
         NeoHookeanPlasticity(1.0, 0.3, 0.1),

@@ -28,7 +28,7 @@ from fenics_contact.gallery import (
     hemisphere,
     rectangle,
 )
-from fenics_contact.materials import elastic, hyperelastic, orthotropic, plastic
+from fenics_contact.materials import anisotropic, elastic, hyperelastic, orthotropic, plastic
 from fenics_contact.readers import gmsh_model, read_msh
 from fenics_contact.shapes import Box, Cone
 from tests.conftest import ROOT
@@ -115,6 +115,12 @@ def test_the_parts_of_a_chain_are_its_links() -> None:
             ),
         ),
         (
+            {"model": "anisotropic", "moduli": np.eye(6).tolist(), "axis_1": [0, 2, 0], "axis_2": [-1, 1, 0]},
+            anisotropic.AnisotropicElasticity(
+                np.eye(6), orthotropic.material_axes((0, 1, 0), (-1, 0, 0))  # type: ignore[arg-type]
+            ),
+        ),
+        (
             YIELDING | {"model": "j2_plasticity", "kinematic_hardening": 1e3},
             plastic.J2Plasticity(2.1e5, 0.3, 235, 2e3, 1e3),
         ),
@@ -149,10 +155,19 @@ def test_the_parts_of_a_chain_are_its_links() -> None:
             hyperelastic.StVenantKirchhoff(10.0, 0.2),
         ),
     ],
-    ids=["isotropic", "orthotropic", "j2", "curves", "finite", "neo", "mooney", "ogden", "st_venant"],
+    ids=["isotropic", "orthotropic", "any", "j2", "curves", "finite", "neo", "mooney", "ogden", "st_venant"],
 )  # fmt: skip
 def test_materials_are_those_of_the_package(given: dict[str, Any], built: elastic.Material) -> None:
     assert file_of(material=given).scene.bodies["a"].material == built
+
+
+def test_plane_materials_have_a_thickness_and_others_none() -> None:
+    plate = {"model": "plane_stress", "young_modulus": 3, "poisson_ratio": 0.1, "thickness": 2}
+    flat = {"shape": "rectangle", "lower": [0, 0], "upper": [1, 1], "counts": [1, 1]}
+    found = file_of(material=plate, mesh=flat).scene.bodies["a"]
+    assert found.material == elastic.PlaneStress(3.0, 0.1, thickness=2.0)
+    with pytest.raises(SceneFileError, match=r"a thickness is that of plane bodies, .* this one is in space"):
+        _ = file_of(material=plate | {"model": "isotropic"}).scene
 
 
 OWN = """

@@ -1,0 +1,85 @@
+"""Stresses that a deck gives its elements before the first step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.readers.deck_cards import Card
+from fenics_contact.readers.deck_mesh import DeckMesh
+
+#: Place of 11, 22, 33, 12, 13, 23, the order of the deck, among xx, yy, zz, yz, xz, xy.
+_IN_VOIGT = [0, 1, 2, 5, 4, 3]
+
+
+@dataclass(frozen=True, eq=False)
+class StressGiven:
+    """Initial stresses of elements.
+
+    Attributes:
+        card: The last card that gives some.
+        stress: By element, xx, yy, zz, yz, xz, xy, (n_elements, 6), zero where none is given.
+    """
+
+    card: Card
+    stress: np.ndarray
+
+
+def read_initial_stress(
+    cards: Sequence[Card], mesh: DeckMesh, note: Callable[[Card, str], None]
+) -> StressGiven | None:
+    """Return the initial stresses of a deck, None without any.
+
+    Lines of eight entries have an element, an integration point and six stresses, as in CalculiX; others an
+    element or a set and its stresses, as in Abaqus. Elements have the mean of their points.
+    """
+    mine = [each for each in cards if each.name == "INITIALCONDITIONS" and each.name_of("TYPE") == "STRESS"]
+    if not mine:
+        return None
+    stress = np.zeros((len(mesh.element_numbers), 6))
+    for card in mine:
+        widths = {len(entries) for entries in card.rows}
+        if widths == {8}:
+            _at_points(card, mesh, stress, note)
+        elif 8 in widths:
+            raise card.error(
+                "lines must all have an element, an integration point and six stresses, or all an element or "
+                "set and its stresses, got both: make two cards of them"
+            )
+        else:
+            for row, entries in enumerate(card.rows):
+                numbers = card.floats(row, 1)
+                if not 1 <= len(numbers) <= 6:
+                    raise card.error("needs an element or set and up to six stresses: correct the line", row)
+                values = np.zeros(6)
+                values[_IN_VOIGT[: len(numbers)]] = numbers
+                stress[mesh.elements_named(entries[0], card, row)] = values
+    return StressGiven(mine[-1], stress)
+
+
+def _at_points(card: Card, mesh: DeckMesh, stress: np.ndarray, note: Callable[[Card, str], None]) -> None:
+    """Give elements the mean stress of their integration points, in place."""
+    table = card.numbers_alone
+    if table is None:
+        table = np.array([card.floats(row) for row in range(len(card.rows))])
+    element = mesh.positions(table[:, 0].astype(np.int64), "element", card, by_row=True)
+    point, given = table[:, 1].astype(int), table[:, 2:]
+    here, place, count = np.unique(element, return_inverse=True, return_counts=True)
+    place = place.ravel()
+    last = np.zeros(len(here), dtype=int)
+    np.maximum.at(last, place, point)
+    once = len(np.unique(np.column_stack([place, point]), axis=0)) == len(table)
+    if not once or (last != count).any() or point.min() < 1:
+        bad = here[last != count][:1] if once else here[:1]
+        raise card.error(
+            "the stress of an element must be given at all of its integration points, 1, 2, ..., each once; "
+            f"element {mesh.element_numbers[bad[0] if len(bad) else here[0]]} has others: complete them"
+        )
+    total = np.zeros((len(here), 6))
+    np.add.at(total, place, given)
+    mean = total / count[:, None]
+    stress[here[:, None], _IN_VOIGT] = mean
+    if np.abs(given - mean[place]).max() > 1e-9 * np.abs(given).max(initial=0.0):
+        note(card, "elements have the mean of the initial stresses at their integration points")
