@@ -281,10 +281,6 @@ class _Writer:
         return [self._value(v, "") for v in support.motion]
 
 
-def _listed(value: Any) -> Any:
-    return [_listed(each) for each in value] if isinstance(value, tuple) else value
-
-
 def _key(load: Load) -> tuple[Any, ...]:
     """Return what tells a load from others through the steps."""
     spins = isinstance(load, BodyForce) and isinstance(load.value, Spinning)
