@@ -72,7 +72,7 @@ class _Slave:
     def __init__(self, state: LinearState, index: int) -> None:
         """Find the nodes of the points of a pair."""
         torn, pair = state.torn, state.torn.scene.contacts[index]
-        self.surface = slave_of(torn.scene, pair, pair.geometry)
+        self.surface = slave_of(torn.scene, pair, pair.slave_geometry)
         self.nodes = torn.decomposition.tearing.global_nodes(pair.slave.body, self.surface.nodes)
         self.mine = np.flatnonzero(torn.points.pair == index)
         self.place = np.searchsorted(self.nodes, torn.points.slave[self.mine])

@@ -340,7 +340,7 @@ def _passing_nodes(state: State, number: int, moved: float) -> list[tuple[int, s
     `moved`: how far its surfaces move against each other, [length].
     """
     pair = state.scene.contacts[number]
-    if pair.by_mortar or not isinstance(pair.master, Surface) or pair.within_body:
+    if pair.by_mortar or not isinstance(pair.master, Surface) or pair.within_body or pair.nodes is not None:
         return []
     deep = _depth(state, number, pair, pair.master)
     if pair.closure is not None:

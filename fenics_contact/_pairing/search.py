@@ -49,6 +49,7 @@ from fenics_contact._scene.scene import Scene
 from fenics_contact._scene.sectors import AnyTie, CyclicSymmetry
 from fenics_contact._scene.thickness import thickness_on
 from fenics_contact._scene.tools import ToolBody
+from fenics_contact._scene.touching import may_touch
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import Projection, node_weights
 from fenics_contact._surfaces.true_surface import Geometry, wedges_of
@@ -443,7 +444,9 @@ def _measured(
     """Return the points of one pair with the gaps between its surfaces. Collective."""
     fixed, axes = supported
     numbers = NodeNumbers.of(scene)
-    slave = _Side.of(scene, pair.slave, pair.geometry, numbers, finer)
+    alone = isinstance(pair, ContactPair) and pair.nodes is not None
+    geometry = pair.slave_geometry if isinstance(pair, ContactPair) else pair.geometry
+    slave = _Side.of(scene, pair.slave, geometry, numbers, finer and not alone)
     if pair.discretisation == "mortar":
         slave = replace(slave, surface=slave.surface.with_areas_of_pieces())
     movable = ~fixed[slave.nodes].all(axis=1)
@@ -451,6 +454,7 @@ def _measured(
         axial = pair.axial_nodes(scene.bodies[pair.slave.body].mesh, pair.slave.name)
         movable &= ~np.isin(slave.nodes, numbers.global_nodes(pair.slave.body, axial))
     bearing = movable & (slave.surface.areas > 0.0) if isinstance(pair, ContactPair) else movable
+    bearing = bearing & may_touch(scene.bodies, pair, slave.surface)
     if not told:
         warn_of_surface(scene, pair.slave, pair.geometry, slave.surface, comm)
     if not isinstance(pair.master, Surface):
@@ -477,7 +481,7 @@ def _measured(
             points = _by_mortar(slave, bearing, master, comm, master_share(scene, pair))
         else:
             points = _by_projection(slave, bearing, master, comm)
-            if not told:
+            if not told and may_touch(scene.bodies, pair, slave.surface).all():
                 warn_of_uneven_pressure(scene, pair, slave.surface, master.surface, comm)
             if not isinstance(pair, ContactPair):
                 held = ~movable | np.isin(slave.nodes, points.slave)

@@ -13,8 +13,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from fenics_contact._scene.body import Body
-from fenics_contact._scene.pairs import Surface
+from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import SceneParts
+from fenics_contact._scene.sectors import AnyTie
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import is_triangle
@@ -40,13 +41,19 @@ def check_one_shape(scene: SceneParts) -> None:
                 )
 
 
+def _pressed(pair: ContactPair | AnyTie) -> tuple[object, ...]:
+    """Return the sides of a pair on which pressures act: none on a slave of which single nodes touch."""
+    alone = isinstance(pair, ContactPair) and pair.nodes is not None
+    return (pair.master,) if alone else (pair.slave, pair.master)
+
+
 def with_free_centres(scene: SceneParts) -> Mapping[str, Body]:
     """Return the bodies of a scene, the centres of facets in contact or tied as unknowns."""
     bodies = dict(scene.bodies)
     for name, body in scene.bodies.items():
         if body.mesh.centres is None:
             continue
-        sides = (side for pair in (*scene.contacts, *scene.ties) for side in (pair.slave, pair.master))
+        sides = (side for pair in (*scene.contacts, *scene.ties) for side in _pressed(pair))
         touching = tuple(
             sorted({side.name for side in sides if isinstance(side, Surface) and side.body == name})
         )

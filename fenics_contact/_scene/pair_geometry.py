@@ -331,7 +331,7 @@ class _Meeting:
 def pair_geometry(scene: SceneParts, pair: ContactPair) -> PairGeometry:
     """Return between which surfaces the gaps of a pair are measured."""
     geometry = "best" if pair.geometry == "faceted" else pair.geometry
-    slave = surface_of(scene, pair.slave, geometry)
+    slave = surface_of(scene, pair.slave, geometry if pair.nodes is None else "faceted")
     name = _name(scene, pair, pair.slave, slave)
     if not isinstance(pair.master, Surface):
         met = _meeting_obstacle(slave, pair.master)

@@ -157,11 +157,14 @@ class ContactPair:
         adjust: Slave points whose measured clearance or overlap is at most this, [length], are put in touch
             without strain, or get ``gap`` or ``interference`` if these are given; all others keep the
             measured gap. None: no point is put in touch, and ``gap`` and ``interference`` hold at all points.
+        nodes: Name of a node set of the slave's body, on the slave surface: its nodes alone may touch, as
+            those of a tip or an edge, each with its share of the slave surface as its area. Contact is by
+            nodes then. None: the whole slave may touch.
         reason: Why the scene chose the discretisation that it has, in words; empty where it was given.
 
     Raises:
         InvalidInputError: If the discretisation or geometry is unknown, or both gap and interference, or
-            negative lengths, are given.
+            negative lengths, or nodes by mortar or within a body, are given.
 
     Example:
         >>> pair = ContactPair(Surface("punch", "bottom"), Surface("block", "z1"), Coulomb(0.3), "mortar")
@@ -179,6 +182,7 @@ class ContactPair:
     adjust: float | None = None
     closure: ClosureLaw | None = None
     fluid: FluidPressure | None = None
+    nodes: str | None = None
     reason: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
@@ -193,12 +197,23 @@ class ContactPair:
             _check_length(f"ContactPair.{name}", getattr(self, name))
         if self.closure is not None:
             check_closing(self.closure)
+        if self.nodes is not None and (self.discretisation == "mortar" or self.within_body):
+            given = "a body that meets itself" if self.within_body else "discretisation='mortar'"
+            raise InvalidInputError(
+                f"contact of the nodes of {self.nodes!r} alone is by nodes and between two bodies, got "
+                f"{given}: leave the nodes out, or give no discretisation and a master of another body"
+            )
         forget_other_reason(self)
 
     @property
     def within_body(self) -> bool:
         """Whether a body meets itself, which needs large deformations."""
         return isinstance(self.master, Surface) and self.master.body == self.slave.body
+
+    @property
+    def slave_geometry(self) -> Geometry:
+        """The geometry of the slave: facets where single nodes touch, which may go around corners."""
+        return self.geometry if self.nodes is None else "faceted"
 
     @property
     def by_mortar(self) -> bool:

@@ -36,6 +36,7 @@ from fenics_contact._scene.springs import Spring
 from fenics_contact._scene.supports import AnySupport, RigidSurface, Roller, Support, ToolMotion
 from fenics_contact._scene.thickness import require_thickness
 from fenics_contact._scene.tools import ToolBody, bodies_with_tools, with_motions
+from fenics_contact._scene.touching import check_touching
 from fenics_contact._surfaces.facets import FacetedSurface, faceted_surface
 from fenics_contact._surfaces.projection import surfaces_match
 from fenics_contact._surfaces.true_surface import Geometry, true_surface
@@ -115,6 +116,8 @@ class SceneParts:
                 self._require_deforming(pair)
             if isinstance(pair, ContactPair) and pair.fluid is not None:
                 self._require_inlet(pair)
+            if isinstance(pair, ContactPair) and pair.nodes is not None:
+                check_touching(self.bodies[pair.slave.body].mesh, pair)
             if isinstance(pair, ContactPair) and pair.slip_table is not None:
                 self._require_linear_slip(pair)
             if isinstance(pair.master, Surface):
@@ -507,7 +510,8 @@ def _require_different(pairs: Sequence[ContactPair | AnyTie]) -> None:
     for number, pair in enumerate(pairs):
         for earlier in range(number):
             other = pairs[earlier]
-            if pair.slave == other.slave and pair.master == other.master:
+            alike = getattr(pair, "nodes", None) == getattr(other, "nodes", None)
+            if pair.slave == other.slave and pair.master == other.master and alike:
                 kind = type(pair).__name__
                 raise InvalidInputError(
                     f"the surfaces of {kind} {number}, {pair.place}, are those of {kind} {earlier}: how both "
@@ -569,6 +573,8 @@ def _choice(scene: SceneParts, pair: ContactPair | AnyTie) -> tuple[Discretisati
         return "node", RIGID
     if isinstance(pair, ContactPair) and pair.within_body:
         return "node", "as the body meets itself"
+    if isinstance(pair, ContactPair) and pair.nodes is not None:
+        return "node", f"as the nodes of {pair.nodes!r} touch"
     sides = pair.slave, pair.master
     slave, master = (scene.bodies[side.body].mesh.origin for side in sides)
     known = _KNOWN.setdefault(slave, WeakKeyDictionary()).setdefault(master, {})

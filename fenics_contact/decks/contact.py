@@ -149,11 +149,13 @@ def build_pairs(
     meshes: Mapping[str, BodyMesh],
     interactions: Mapping[str, Interaction],
     given: Mapping[tuple[str, str], tuple[Card, float]],
+    alone: Mapping[str, str],
     note: Note,
 ) -> list[tuple[Sides, ContactPair | Tie]]:
     """Return contact pairs and ties between bodies.
 
-    `names`: name of a surface in the deck -> that in the meshes.
+    `names`: name of a surface in the deck -> that in the meshes; `alone`: name of a slave whose nodes touch
+    one by one -> that of the node set in the meshes.
     """
     found: list[tuple[Sides, ContactPair | Tie]] = []
     for both, (card, _) in given.items():
@@ -175,7 +177,9 @@ def build_pairs(
                 continue
             try:
                 made: ContactPair | Tie = (
-                    Tie(one, other) if each.tied else _pair(one, other, each, interactions, given, note)
+                    Tie(one, other)
+                    if each.tied
+                    else _pair(one, other, each, interactions, given, alone, note)
                 )
             except InvalidInputError as error:
                 if getattr(error, "card", ""):
@@ -191,6 +195,7 @@ def _pair(
     of: Sides,
     interactions: Mapping[str, Interaction],
     given: Mapping[tuple[str, str], tuple[Card, float]],
+    alone: Mapping[str, str],
     note: Note,
 ) -> ContactPair:
     interaction, card = interaction_of(of.card, interactions), of.card
@@ -210,6 +215,7 @@ def _pair(
         friction_of(interaction),
         closure=closure_of(interaction, note),
         adjust=None if adjust is None else float(adjust),
+        nodes=alone.get(of.slave),
         **by_clearance,  # type: ignore[arg-type]
     )
 

@@ -337,7 +337,7 @@ def _pair(pair: ContactPair) -> dict[str, Any]:
         table["closure"] = law
     if not pair.reason:
         table["discretisation"] = pair.discretisation
-    table |= _given(pair, "gap", "interference", "adjust")
+    table |= _given(pair, "gap", "interference", "adjust", "nodes")
     return table
 
 

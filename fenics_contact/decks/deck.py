@@ -271,19 +271,26 @@ class _Builder:
         self.interactions = read_interactions(self.model.cards)
         sides = read_sides(self.model.cards, self.interactions)
         self.sides_by_name: dict[str, str] = {}
+        self.alone: dict[str, str] = {}
         for each in sides:
-            for name in (each.slave, each.master):
-                self._contact_surface(name, each)
+            self._contact_surface(each.slave, each, alone=not each.tied)
+            self._contact_surface(each.master, each)
         return sides
 
-    def _contact_surface(self, name: str, of: Sides) -> None:
-        """Take the faces of a surface, of one of nodes, or of a node set, those that have all of them."""
+    def _contact_surface(self, name: str, of: Sides, alone: bool = False) -> None:
+        """Take the faces of a surface, of one of nodes, or of a node set, those that have all of them.
+
+        `alone`: whether nodes that are not all nodes of some faces may touch one by one.
+        """
         if name not in self.model.mesh.surfaces and name in self.model.mesh.node_sets:
             nodes: np.ndarray | None = self.model.mesh.node_sets[name]
             faces, known = self.model.exterior.covering(self.model.mesh.node_sets[name]), False
         else:
             given = self.model.mesh.surface_named(name, of.card, of.row)
             faces, nodes, known = self.model.exterior.faces_of(given), given.nodes, True
+        if faces is None and alone and nodes is not None and len(nodes):
+            self._touching_nodes(name, nodes, of)
+            return
         if faces is None:
             raise of.card.error(
                 f"contact is between faces, but the {0 if nodes is None else len(nodes)} nodes of "
@@ -295,6 +302,20 @@ class _Builder:
         self.model.surfaces[label] = faces
         self.sides_by_name[name] = label
 
+    def _touching_nodes(self, name: str, nodes: np.ndarray, of: Sides) -> None:
+        """Let nodes touch one by one: their slave surface is that of the faces around them."""
+        if name not in self.alone:
+            label = f"{name} AROUND"
+            self.alone[name] = name if name not in self.model.mesh.surfaces else f"{name} NODES"
+            self.model.node_sets[self.alone[name]] = np.unique(nodes)
+            self.model.surfaces[label] = self.model.exterior.around(nodes)
+            self.sides_by_name[name] = label
+        self.model.note(
+            of.card,
+            f"the {len(nodes)} nodes of {name} are not all nodes of some faces and touch one by one, each "
+            "with its share of the faces around it as its area",
+        )
+
     def _pairs(self, sides: Sequence[Sides]) -> tuple[list[ContactPair], list[Tie]]:
         found = build_pairs(
             sides,
@@ -302,6 +323,7 @@ class _Builder:
             self.model.parts.meshes,
             self.interactions,
             clearances(self.model.cards),
+            self.alone,
             self.model.note,
         )
         for each, pair in found:

@@ -159,6 +159,13 @@ class Exterior:
         inside = mark[self.nodes].all(axis=1)
         return Faces(self.faces.elements[inside], self.faces.sides[inside])
 
+    def around(self, nodes: np.ndarray) -> Faces:
+        """Return the faces that have one of some nodes or more."""
+        mark = np.zeros(len(self.mesh.points) + 1, dtype=bool)  # the last is that of −1
+        mark[nodes] = True
+        near = mark[self.nodes].any(axis=1)
+        return Faces(self.faces.elements[near], self.faces.sides[near])
+
     def faces_of(self, surface: Named) -> Faces | None:
         """Return the faces of a surface, of one of nodes those that have all of them, or None."""
         return surface.faces if surface.nodes is None else self.covering(surface.nodes)

@@ -47,6 +47,24 @@ def test_nodes_that_make_faces_are_a_slave(tmp_path: Path) -> None:
     assert lowered(found) == pytest.approx(42.0 * 2 / 210000.0, rel=1e-6)
 
 
+def test_single_nodes_touch_one_by_one(tmp_path: Path) -> None:
+    """Four corners carry 168 N by a soft law, each on a quarter of the three faces around it, of 1 mm²."""
+    corners = "*NSET, NSET=LEGS\n19, 23, 31, 35\n*EQUATION\n" + "".join(
+        f"2\n{node}, 3, 1., 19, 3, -1.\n" for node in range(21, 36, 2)
+    )
+    contact = corners + law("LINEAR\n1.E4") + PAIR.replace("FEET", "LEGS")
+    found = read_deck(deck(tmp_path, pressed(contact)))
+    (pair,) = found.scene.contacts
+    assert (pair.nodes, pair.slave.name) == ("LEGS", "LEGS AROUND")
+    assert any(
+        "the 4 nodes of LEGS are not all nodes of some faces and touch one by one" in n for n in found.notes
+    )
+    (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-10)
+    assert state.contact.points.count == 4
+    assert state.contact.normal_force.sum() == pytest.approx(168.0, rel=1e-6)
+    np.testing.assert_allclose(state.contact.gap, -state.contact.normal_force / (1e4 * 0.75), rtol=1e-6)
+
+
 def test_a_clearance_closes_first_and_a_negative_one_presses(tmp_path: Path) -> None:
     clear = "*CLEARANCE, SLAVE=FEET, MASTER=TABLE, VALUE={}\n"
     apart, over = (
@@ -98,8 +116,8 @@ WRONG = [
     (PAIR.replace("SURFACE TO", "EDGE TO"), "*CONTACT", r"TYPE=EDGE TO SURFACE is not read"),
     (PAIR.replace("TYPE", "ADJUST=LOW_Z0, TYPE"), "*CONTACT", r"ADJUST=LOW_Z0 must be a distance"),
     (
-        "*NSET, NSET=FEW\n19, 20\n" + PAIR.replace("FEET", "FEW"),
-        "FEW, TABLE",
+        "*NSET, NSET=FEW\n1, 2\n" + PAIR.replace("TABLE", "FEW"),
+        "FEET, FEW",
         r"the 2 nodes of 'FEW' are not all nodes of some faces",
     ),
     (

@@ -18,6 +18,7 @@ from fenics_contact._scene.obstacles import RigidObstacle, RigidPlane
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import slave_of, surface_of
 from fenics_contact._scene.scene import Scene
+from fenics_contact._scene.touching import may_touch
 from fenics_contact._surfaces.facets import FacetedSurface
 from fenics_contact._surfaces.projection import Projection, join
 from fenics_contact.errors import InvalidInputError, together
@@ -202,6 +203,7 @@ def _meeting(scene: Scene, pair: ContactPair, fixed: np.ndarray, tied: np.ndarra
     slave = slave_of(scene, pair, "faceted")
     slave_nodes = numbers.global_nodes(pair.slave.body, slave.nodes)
     bearing = ~fixed[slave_nodes].all(axis=1) & ~np.isin(slave_nodes, tied)
+    bearing &= may_touch(scene.bodies, pair, slave)
     candidates = np.flatnonzero(bearing & (slave.areas > 0.0))
     own = np.zeros(len(candidates)), np.zeros(len(candidates), dtype=bool), slave.areas[candidates]
     if not isinstance(pair.master, Surface):
