@@ -16,7 +16,7 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 
 def check_touching(mesh: BodyMesh, pair: ContactPair) -> None:
     """Reject nodes that may touch without a node set of the slave's mesh, or off the slave surface."""
-    if pair.nodes not in mesh.node_sets:
+    if pair.nodes is None or pair.nodes not in mesh.node_sets:
         raise InvalidInputError(
             f"ContactPair.nodes names node set {pair.nodes!r} of body {pair.slave.body!r}, which has "
             f"{sorted(mesh.node_sets)}: use one of them"
