@@ -178,7 +178,7 @@ def of_pressures(state: LinearState, partials: Partials) -> float:
     total = 0.0
     for index, pair in enumerate(torn.scene.contacts):
         slave = None if pair.within_body else _Slave(state, index)
-        if slave is None or slave.surface.whole is not None:
+        if slave is None or slave.surface.order > 1:
             continue
         pressure = slave.at_nodes(state.contact.normal_force / points.area)
         by_force, every = slave.at_nodes(rows), np.ones(len(slave.nodes))

@@ -285,10 +285,13 @@ def _at_rim(facets: np.ndarray, dim: int) -> np.ndarray:
         sides = corners[..., None]
     else:
         sides = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1), axis=-1)
+        short = sides[..., 0] == sides[..., 1]  # of triangles among quadrilaterals
     _, number, count = np.unique(
         sides.reshape(-1, sides.shape[-1]), axis=0, return_inverse=True, return_counts=True
     )
     alone = count[number.reshape(corners.shape)] == 1
+    if dim > 2:
+        alone &= ~short
     return np.asarray(facets[alone.any(axis=1)])
 
 

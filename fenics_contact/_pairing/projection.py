@@ -165,7 +165,7 @@ def warn_of_uneven_pressure(
     `comm`: communicator of the ranks that share the work; rank 0 logs; `even`: errors of a uniform pressure
     up to this are not reported.
     """
-    if slave.whole is None and master.whole is None:
+    if slave.order == master.order == 1:
         return
     there = shared_projection(slave, np.arange(len(slave.nodes)), master, comm)
     back = shared_projection(master, np.arange(len(master.nodes)), slave, comm)

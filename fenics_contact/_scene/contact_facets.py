@@ -1,4 +1,4 @@
-"""Facets of surfaces in contact or tied: of one shape, and with their centres as unknowns.
+"""Facets of surfaces in contact or tied, with their centres as unknowns.
 
 By the functions of 8 nodes a uniform pressure pulls at the corners of a facet, by 1/12 of the force each, by
 those of 9 nodes it presses at all of them.
@@ -10,35 +10,15 @@ from collections.abc import Mapping
 from dataclasses import replace
 from weakref import WeakKeyDictionary
 
-import numpy as np
-
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.pairs import ContactPair, Surface
 from fenics_contact._scene.parts import SceneParts
 from fenics_contact._scene.sectors import AnyTie
-from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.faces import is_triangle
 from fenics_contact.mesh.serendipity_cells import completed
 
 _FREED: WeakKeyDictionary[BodyMesh, dict[tuple[str, ...], BodyMesh]] = WeakKeyDictionary()
 """Meshes with centres as unknowns: scenes made of the same bodies have the same meshes."""
-
-
-def check_one_shape(scene: SceneParts) -> None:
-    """Reject pairs with surfaces of triangles and quadrilaterals."""
-    for pair in (*scene.contacts, *scene.ties):
-        for side in (pair.slave, pair.master):
-            if not isinstance(side, Surface) or side.body not in scene.bodies:
-                continue
-            facets = scene.bodies[side.body].mesh.surfaces.get(side.name)
-            if facets is not None and (found := is_triangle(facets)).any():
-                raise InvalidInputError(
-                    f"surfaces in contact or tied must have facets of one shape, {side.name!r} of body "
-                    f"{side.body!r} has {np.count_nonzero(found)} triangles and {np.count_nonzero(~found)} "
-                    "quadrilaterals: mesh it with one of them; or name both as surfaces, and let each be the "
-                    "master of a pair by mortar"
-                )
 
 
 def _pressed(pair: ContactPair | AnyTie) -> tuple[object, ...]:

@@ -349,7 +349,7 @@ def pair_geometry(scene: SceneParts, pair: ContactPair) -> PairGeometry:
         height = 0.0
     names = name, _name(scene, pair, pair.master, master)
     wider, by_nodes = _wider(slave, master, met), not pair.by_mortar
-    onto_linear = slave.whole is not None and master.whole is None
+    onto_linear = slave.order > master.order
     geometry_of = PairGeometry(*names, height, approach, in_words(pair), pair.given_gap, wider, by_nodes)
     return replace(geometry_of, onto_linear=onto_linear)
 

@@ -21,6 +21,7 @@ from fenics_contact._surfaces.facets import has_midside_pressure
 from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cuts import pieces
+from fenics_contact.mesh.faces import of_one_shape
 
 if TYPE_CHECKING:
     from fenics_contact._scene.pair_geometry import PairGeometry
@@ -357,8 +358,10 @@ def _multipliers(scene: SceneParts, unknowns: int) -> dict[str, int]:
 
 def _bearing_nodes(scene: SceneParts, pair: ContactPair) -> int:
     facets = scene.bodies[pair.slave.body].mesh.surfaces[pair.slave.name]
-    at_midpoints = has_midside_pressure(facets) and not pair.by_mortar
-    return len(np.unique(facets[:, 3:])) if at_midpoints else _slave_nodes(scene, pair.slave)
+    if pair.by_mortar:
+        return _slave_nodes(scene, pair.slave)
+    parts = (some[:, 3:] if has_midside_pressure(some) else some for _, some in of_one_shape(facets))
+    return len(np.unique(np.concatenate([part.ravel() for part in parts])))
 
 
 def _slave_nodes(scene: SceneParts, surface: Surface) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 from fenics_contact._base.checks import checked
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.automatic import AutomaticContact
-from fenics_contact._scene.contact_facets import check_one_shape, with_free_centres
+from fenics_contact._scene.contact_facets import with_free_centres
 from fenics_contact._scene.loads import Load
 from fenics_contact._scene.pairs import with_pressures
 from fenics_contact._scene.parts import SceneParts, with_discretisation
@@ -75,7 +75,6 @@ class Scene(SceneParts):
         if self.preloads:
             object.__setattr__(self, "bodies", with_cuts(self))
         require_preloads(self)
-        check_one_shape(self)
         if any(body.mesh.centres is not None for body in self.bodies.values()):
             object.__setattr__(self, "bodies", with_free_centres(self))
         object.__setattr__(self, "contacts", with_discretisation(self, self.contacts))

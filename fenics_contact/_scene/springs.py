@@ -12,8 +12,9 @@ from fenics_contact._base.checks import GivenVector, checked, floats
 from fenics_contact._base.sparse import ROUNDING
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.pairs import Surface
-from fenics_contact._surfaces.facets import gauss_points, surface_moments
+from fenics_contact._surfaces.facets import nodal_areas, surface_moments
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.faces import of_one_shape
 
 
 class Around(Protocol):
@@ -177,12 +178,11 @@ def mean_weights(scene: Around, surface: Surface) -> tuple[np.ndarray, np.ndarra
         nodes = mesh.node_sets[surface.name]
         return nodes, np.full(len(nodes), 1.0 / len(nodes))
     facets = mesh.surfaces[surface.name]
-    weights = np.zeros(facets.shape)
-    for at in gauss_points(mesh.points, facets, scene.axisymmetric):
-        weights += at.areas[:, None] * at.values
-    nodes, place = np.unique(facets, return_inverse=True)
-    sums = np.bincount(place.ravel(), weights.ravel())
-    return nodes, sums / sums.sum()
+    sums = np.zeros(mesh.n_nodes)
+    for _, some in of_one_shape(facets):
+        np.add.at(sums, some, nodal_areas(mesh.points, some, scene.axisymmetric))
+    nodes = np.unique(facets)
+    return nodes, sums[nodes] / sums.sum()
 
 
 def _centre(scene: Around, end: Surface | GivenVector) -> np.ndarray:

@@ -15,10 +15,11 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact._surfaces.mixed_pieces import MixedPieces
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.cell_types import FACET_TYPES, CellType, quadrature, shape_gradients, shape_values
-from fenics_contact.mesh.faces import computed_rounding, is_triangle, of_one_shape
+from fenics_contact.mesh.cell_types import FACET_TYPES, quadrature, shape_gradients, shape_values
+from fenics_contact.mesh.faces import computed_rounding, in_columns, is_triangle, narrowed, of_one_shape
 
 
 def quadrature_areas(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> np.ndarray:
@@ -116,11 +117,7 @@ class GaussPoint:
 
 def gauss_points(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = False) -> Iterator[GaussPoint]:
     """Return the points of a quadrature rule on facets, of one shape; others as of `quadrature_areas`."""
-    if is_triangle(facets).any():
-        raise InvalidInputError(
-            "forces and springs on a surface need facets of one shape, this one has triangles and "
-            "quadrilaterals: name them as surfaces of their own"
-        )
+    assert not is_triangle(facets).any()
     kind = FACET_TYPES[facets.shape[1], points.shape[1]]
     positions, weights = quadrature(kind, 2 * kind.order)  # as in load forms: resultants are exact
     values, gradients = shape_values(kind, positions), shape_gradients(kind, positions)
@@ -148,6 +145,11 @@ def bearing_areas(points: np.ndarray, facets: np.ndarray, axisymmetric: bool = F
 
     The result has shape (n_facets, nodes of a facet), [length²] or [length].
     """
+    if is_triangle(facets).any():
+        result = np.zeros(facets.shape)
+        for numbers, some in of_one_shape(facets):
+            result[numbers] = in_columns(bearing_areas(points, some), facets.shape[1])
+        return result
     areas = nodal_areas(points, facets, axisymmetric)
     if axisymmetric and facets.shape[1] == 3:
         ends = np.where(points[facets[:, :2], 0] <= computed_rounding(points), areas[:, :2], 0.0)
@@ -204,9 +206,13 @@ def filled_at_corners(facets: np.ndarray, values: np.ndarray) -> np.ndarray:
     midpoints beside it and c is that opposite: between the mean beside it and the linear function through all
     three, so that quadratic fields on regular meshes are exact.
 
-    `facets`: node numbers, (n, nodes of a facet); values stay as they are unless there are six; `values`:
-    values at nodes, (n_nodes,) or (n_nodes, k).
+    `facets`: node numbers, (n, nodes of a facet); values stay as they are unless there are six, and at
+    corners of quadrilaterals among triangles; `values`: values at nodes, (n_nodes,) or (n_nodes, k).
     """
+    if (both := is_triangle(facets)).any():
+        filled = filled_at_corners(narrowed(facets[both]), values)
+        filled[facets[~both]] = values[facets[~both]]
+        return filled
     if not has_midside_pressure(facets):
         return values
     result, corners = values.copy(), facets[:, _CORNERS]
@@ -346,14 +352,16 @@ class FacetedSurface:
         mirrored: On which planes of symmetry the nodes lie, across which the normals have no component: a
             column for each plane, those normal to the axes first, shape (n, n_planes).
         relief: The true surface relative to the facets; None if it is unknown or coincides with them.
-        whole: The quadratic facets that were cut into these, as rows of positions in ``nodes``; None if they
-            are whole.
+        whole: The facets that were cut into these, as rows of positions in ``nodes``, quadratic ones, or
+            triangles and quadrilaterals together; None if they are whole.
         axisymmetric: Whether it is that of a body of revolution, half of its section.
         planes: Unit normals of the planes of symmetry, shape (n_planes, dim); None: they are the axes.
         followed: What makes values at hanging nodes the means of their masters', shape (n, n); None without
             any.
         by_pieces: Whether the areas of nodes are those of the linear pieces around them, all of them
             positive, as of slaves of mortar contact.
+        mixed: How these facets, all triangles, are pieces of triangles and quadrilaterals; None where all
+            are alike.
     """
 
     nodes: np.ndarray
@@ -368,6 +376,7 @@ class FacetedSurface:
     planes: np.ndarray | None = None
     followed: sp.csr_matrix | None = None
     by_pieces: bool = False
+    mixed: MixedPieces | None = None
 
     def within(self, vectors: np.ndarray, mirrored: np.ndarray) -> np.ndarray:
         """Return vectors without their components across planes of symmetry, both (n, dim), (n, n_planes)."""
@@ -389,6 +398,11 @@ class FacetedSurface:
     def corners(self) -> int:
         """Corners of a facet: 3 or 4, in the plane 2."""
         return int(self.facets.shape[1])
+
+    @property
+    def order(self) -> int:
+        """Degree of the facets of the body: 1 or 2."""
+        return 1 if self.whole is None or self.whole.shape[1] == 4 else 2
 
     @property
     def dim(self) -> int:
@@ -498,59 +512,6 @@ def _linear_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
     total = np.linalg.norm(corner_products(points, facets).sum(axis=1), axis=1)
     share = total / {2: 2, 3: 6, 4: 4}[corners] / corners
     return np.bincount(facets.ravel(), np.repeat(share, corners), minlength=len(points))
-
-
-def shape_weights(
-    facets: np.ndarray, facet: np.ndarray, weights: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nodes of quadratic facets and their weights at points of their linear pieces.
-
-    `facets`: node numbers of the quadratic facets, (n, nodes of a facet); `facet`: numbers of linear pieces,
-    consecutive ones of a facet, (m,); `weights`: linear shape functions of the pieces at the points, (m,
-    corners).
-
-    Returns node numbers and quadratic shape functions, (m, nodes of a facet) each.
-    """
-    kind, corners = _pieces(facets, facet)
-    places = np.einsum("mk,mkd->md", weights, corners)
-    return facets[facet // len(kind.pieces)], shape_values(kind, places)
-
-
-def shape_weight_gradients(
-    facets: np.ndarray, facet: np.ndarray, weights: np.ndarray, gradients: np.ndarray
-) -> np.ndarray:
-    """Return the derivatives of the weights that `shape_weights` returns by the pieces' local coordinates.
-
-    `facets`: node numbers of the quadratic facets, (n, nodes of a facet); `facet`: numbers of linear pieces,
-    (m,); `weights`: linear shape functions of the pieces at the points, (m, corners); `gradients`: their
-    derivatives, (m, corners, dim − 1).
-
-    The result has shape (m, nodes of a facet, dim − 1).
-    """
-    kind, corners = _pieces(facets, facet)
-    by_place = shape_gradients(kind, np.einsum("mk,mkd->md", weights, corners))
-    return np.asarray(by_place @ np.einsum("mka,mkd->mda", gradients, corners))
-
-
-def shape_weights_pulled_back(
-    facets: np.ndarray, facet: np.ndarray, weights: np.ndarray, by: np.ndarray
-) -> np.ndarray:
-    """Vector-Jacobian product of the functions that `shape_weights` returns with respect to ``weights``.
-
-    `by`: derivative by the functions, (m, nodes of a facet).
-
-    The result has shape (m, corners).
-    """
-    kind, corners = _pieces(facets, facet)
-    gradients = shape_gradients(kind, np.einsum("mk,mkd->md", weights, corners))
-    by_place = np.einsum("mk,mkd->md", by, gradients)
-    return np.asarray(np.einsum("md,mkd->mk", by_place, corners))
-
-
-def _pieces(facets: np.ndarray, facet: np.ndarray) -> tuple[CellType, np.ndarray]:
-    """Return the type of quadratic facets and the reference corners of pieces, (m, corners, dim − 1)."""
-    kind = FACET_TYPES[facets.shape[1], 2 if facets.shape[1] == 3 else 3]
-    return kind, kind.nodes[kind.pieces[facet % len(kind.pieces)]]
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from fenics_contact._surfaces.facets import FacetedSurface, heights, outside, shape_functions, shape_weights
-from fenics_contact.mesh.faces import coordinate_rounding
+from fenics_contact._surfaces.facets import FacetedSurface, heights, outside, shape_functions
+from fenics_contact._surfaces.pieces import shape_weights
+from fenics_contact.mesh.faces import coordinate_rounding, widened
 
 #: A facet is tried in the second round if its bounding ball is as near as the nearest centroid times this.
 REACH = 1.1
@@ -56,9 +57,9 @@ _EACH = ("point", "facet", "local", "gap", "normal", "beside")
 def node_weights(surface: FacetedSurface, hit: Projection) -> sp.csr_matrix:
     """Return the weights of nodes in the motion of a surface at projections, shape (n, n_nodes)."""
     values, _ = shape_functions(hit.local, surface.corners)
-    nodes, whole = surface.facets[hit.facet], surface.whole
-    if whole is not None:
-        nodes, values = shape_weights(whole, hit.facet, values)
+    nodes = surface.facets[hit.facet]
+    if surface.whole is not None:
+        nodes, values = shape_weights(surface, hit.facet, values)
     row = np.repeat(np.arange(len(nodes)), nodes.shape[1])
     return sp.csr_matrix((values.ravel(), (row, nodes.ravel())), shape=(len(nodes), len(surface.nodes)))
 
@@ -247,14 +248,15 @@ def surfaces_match(
     `near`: how far nodes may be apart, relative to the shortest edge of their facets; `first`: number of
     nodes that are projected first, those nearest to the master: one that meets it decides.
     """
-    if slave.corners != master.corners:
+    mine, theirs = _matched_facets(slave, master)
+    if mine.shape[1] != theirs.shape[1]:
         return False
     away, partner = cKDTree(master.points).query(slave.points)
     apart = master.points[partner] - slave.points
     apart -= np.einsum("nd,nd->n", apart, slave.normals)[:, None] * slave.normals
     reach = near * _shortest_edges(master)[partner] + coordinate_rounding(master.points)
     over = np.linalg.norm(apart, axis=1) <= reach
-    if not _same_facets(slave.facets[over[slave.facets].all(axis=1)], partner, master.facets):
+    if not _same_facets(mine[over[mine].all(axis=1)], partner, theirs):
         return False
     others = np.flatnonzero(~over)
     others = others[np.argsort(away[others], kind="stable")]
@@ -262,11 +264,26 @@ def surfaces_match(
     return not any(len(part) and _meet(slave, part, master) for part in parts)
 
 
+def _matched_facets(*surfaces: FacetedSurface) -> list[np.ndarray]:
+    """Return the facets of surfaces, whole ones where those of some are of several shapes."""
+    if all(surface.mixed is None for surface in surfaces):
+        return [surface.facets for surface in surfaces]
+    facets = [surface.facets if surface.whole is None else surface.whole for surface in surfaces]
+    width = max(each.shape[1] for each in facets)
+    return [widened(each, width) if (each.shape[1], width) in ((3, 4), (6, 9)) else each for each in facets]
+
+
 def _same_facets(facets: np.ndarray, partner: np.ndarray, master: np.ndarray) -> bool:
     """Return whether facets of a slave, at least one, are facets of the master between partners."""
-    mine = np.unique(np.sort(partner[facets], axis=1), axis=0)
-    known = np.unique(np.sort(master, axis=1), axis=0)
+    mine, known = (np.unique(_each_once(rows), axis=0) for rows in (partner[facets], master))
     return len(mine) > 0 and len(np.unique(np.concatenate([known, mine]), axis=0)) == len(known)
+
+
+def _each_once(rows: np.ndarray) -> np.ndarray:
+    """Return nodes in order, -1 in place of those that triangles among quadrilaterals list again."""
+    nodes = np.sort(rows, axis=1)
+    nodes[:, 1:][nodes[:, 1:] == nodes[:, :-1]] = -1
+    return np.sort(nodes, axis=1)
 
 
 def _meet(slave: FacetedSurface, nodes: np.ndarray, master: FacetedSurface) -> bool:

@@ -13,10 +13,9 @@ from fenics_contact._surfaces.facets import (
     corner_products,
     edges_at_corners,
     shape_functions,
-    shape_weight_gradients,
-    shape_weights,
 )
 from fenics_contact._surfaces.fitting import PolynomialFit
+from fenics_contact._surfaces.pieces import shape_weight_gradients, shape_weights
 from fenics_contact._surfaces.true_surface import Wedges, wedges_of
 from fenics_contact.shapes.simple import tangent_bases
 
@@ -54,10 +53,10 @@ def surface_tangents(surface: FacetedSurface, order: int = 2, steepest: float = 
     """
     wedges = wedges_of(surface)
     axes = _axes(surface, wedges)
-    if surface.whole is None:
+    if surface.order == 1:
         derivatives = _fitted_derivatives(surface, wedges, axes, order)
     else:
-        derivatives = _mean_derivatives(surface, surface.whole, wedges, axes)
+        derivatives = _mean_derivatives(surface, wedges, axes)
     of_corner, width = wedges.of_corner[:, :, None], surface.dim - 1
     edges = edges_at_corners(surface.points[surface.facets])
     along = np.einsum("nkad,nked->nkea", axes[wedges.of_corner][:, :, :-1], edges)
@@ -111,19 +110,14 @@ def _fitted_derivatives(
     return sp.csr_matrix(entries, shape=((dim - 1) * count, len(surface.points)))
 
 
-def _mean_derivatives(
-    surface: FacetedSurface, whole: np.ndarray, wedges: Wedges, axes: np.ndarray
-) -> sp.csr_matrix:
-    """Return the same of quadratic facets: the mean of those around a node, at the rim that of its facet.
-
-    `whole`: its quadratic facets, rows of positions in its nodes, shape (n, nodes of a facet).
-    """
+def _mean_derivatives(surface: FacetedSurface, wedges: Wedges, axes: np.ndarray) -> sp.csr_matrix:
+    """Return the same of quadratic facets: the mean of those around a node, at the rim that of its facet."""
     (count, corners), width = surface.facets.shape, surface.dim - 1
     _, slopes = shape_functions(corner_places(corners), corners)
     facet, at = np.repeat(np.arange(count), corners), wedges.of_corner.ravel()
     shares, slopes = np.tile(np.eye(corners), (count, 1)), np.tile(slopes, (count, 1, 1))
-    nodes, _ = shape_weights(whole, facet, shares)
-    slopes = shape_weight_gradients(whole, facet, shares, slopes)
+    nodes, _ = shape_weights(surface, facet, shares)
+    slopes = shape_weight_gradients(surface, facet, shares, slopes)
     by_local = np.einsum("mqa,mqd->mda", slopes, surface.points[nodes])
     by_axes = np.linalg.inv(axes[at, :width] @ by_local)
     values = np.swapaxes(slopes @ by_axes, 1, 2) / np.bincount(at)[at][:, None, None]

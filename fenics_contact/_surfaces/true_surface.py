@@ -22,10 +22,12 @@ from fenics_contact._surfaces.facets import (
     slopes,
 )
 from fenics_contact._surfaces.fitting import PolynomialFit, powers_of
+from fenics_contact._surfaces.mixed_pieces import MixedPieces
 from fenics_contact._surfaces.projection import interpolated_normal
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import computed_rounding
+from fenics_contact.mesh.linear_facets import has_both, linear_facets
 from fenics_contact.shapes.combined import Joined
 from fenics_contact.shapes.simple import SurfaceShape, evaluate_shape, tangent_bases
 
@@ -380,10 +382,16 @@ def true_surface(
 
 def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str, axisymmetric: bool) -> FacetedSurface:
     """Distribute the area of quadratic or turned facets over the nodes on which a uniform pressure bears."""
-    if mesh.order == 1 and not axisymmetric:
+    facets = mesh.surfaces[name]
+    both = has_both(facets)
+    if mesh.order == 1 and not (axisymmetric or both):
         return surface
-    if mesh.order > 1:
-        surface = replace(surface, whole=np.searchsorted(surface.nodes, mesh.surfaces[name]))
+    whole = np.searchsorted(surface.nodes, facets)
+    if mesh.order > 1 or both:
+        surface = replace(surface, whole=whole)
+    if both:
+        mixed = MixedPieces.of(surface.points, whole, linear_facets(facets, mesh.dim))
+        surface = replace(surface, mixed=mixed)
     surface = replace(surface, axisymmetric=axisymmetric)
     return replace(surface, areas=surface.areas_at(surface.points))
 

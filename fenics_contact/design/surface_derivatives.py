@@ -19,12 +19,11 @@ from fenics_contact._surfaces.facets import (
     gauss_points,
     heights,
     shape_functions,
-    shape_weight_gradients,
-    shape_weights,
     slopes,
 )
+from fenics_contact._surfaces.pieces import shape_weight_gradients, shape_weights
 from fenics_contact._surfaces.projection import interpolated_normal, newton_matrix
-from fenics_contact.mesh.faces import computed_rounding
+from fenics_contact.mesh.faces import computed_rounding, of_one_shape
 
 
 def normals_pulled_back(
@@ -90,21 +89,28 @@ def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarr
     """
     facets = surface.bearing
     if facets is not surface.facets or surface.axisymmetric:
-        by_nodal = bearing_pulled_back(by_areas[facets])
-        if surface.axisymmetric and facets.shape[1] == 3:
-            on_axis = surface.points[facets[:, :2], 0] <= computed_rounding(surface.points)
-            by_nodal[:, :2] = np.where(on_axis, by_nodal[:, 2:], by_nodal[:, :2])
-        return integral_pulled_back(
-            surface.points,
-            facets,
-            lambda at: (by_nodal @ at.values, np.zeros((1, 1))),
-            surface.axisymmetric,
+        return sum(
+            (_bearing_areas_pulled_back(surface, some, by_areas) for _, some in of_one_shape(facets)),
+            start=np.zeros_like(surface.points),
         )
     total = corner_products(surface.points, surface.facets).sum(axis=1)
     direction = total / np.linalg.norm(total, axis=1)[:, None]
     divisor = {2: 2, 3: 6, 4: 4}[surface.corners] * surface.corners
     by_total = by_areas[surface.facets].sum(axis=1)[:, None] * direction / divisor
     return _products_pulled_back(surface, np.repeat(by_total[:, None], surface.corners, axis=1))
+
+
+def _bearing_areas_pulled_back(
+    surface: FacetedSurface, facets: np.ndarray, by_areas: np.ndarray
+) -> np.ndarray:
+    """Return what whole facets of one shape have in `areas_pulled_back`, (n, dim)."""
+    by_nodal = bearing_pulled_back(by_areas[facets])
+    if surface.axisymmetric and facets.shape[1] == 3:
+        on_axis = surface.points[facets[:, :2], 0] <= computed_rounding(surface.points)
+        by_nodal[:, :2] = np.where(on_axis, by_nodal[:, 2:], by_nodal[:, :2])
+    return integral_pulled_back(
+        surface.points, facets, lambda at: (by_nodal @ at.values, np.zeros((1, 1))), surface.axisymmetric
+    )
 
 
 #: Returns an integrand at a Gauss point of every facet, shape (n_facets,), and its derivative by the place.
@@ -258,11 +264,10 @@ def carriers(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> t
     Returns positions among the surface's nodes, shape (n, nodes), and gradients, shape (n, nodes, dim − 1).
     """
     values, gradients = shape_functions(local, surface.corners)
-    whole = surface.whole
-    if whole is None:
+    if surface.whole is None:
         return surface.facets[facet], gradients
-    nodes, _ = shape_weights(whole, facet, values)
-    return nodes, shape_weight_gradients(whole, facet, values, gradients)
+    nodes, _ = shape_weights(surface, facet, values)
+    return nodes, shape_weight_gradients(surface, facet, values, gradients)
 
 
 def _tangential(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.foundations import ElasticFoundation
 from fenics_contact._surfaces.facets import gauss_points, quadrature_areas
-from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
+from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces, of_one_shape
 
 
 def foundation_stiffness(
@@ -31,8 +31,9 @@ def foundation_stiffness(
         if cells is not None:
             own, _ = boundary_faces(mesh.cells[cells], mesh.dim)
             facets = facets[match_faces(corners_of(facets, mesh.dim), corners_of(own, mesh.dim)) >= 0]
-        if len(facets):
-            total = total + _of_facets(foundation, body, facets) / area
+        for _, some in of_one_shape(facets):
+            if len(some):
+                total = total + _of_facets(foundation, body, some) / area
     return sp.csr_matrix(total)
 
 

@@ -16,7 +16,7 @@ from fenics_contact._base.checks import LARGEST, brief
 from fenics_contact._base.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import quality
-from fenics_contact.mesh.cell_types import FACET_TYPES, cell_type_of
+from fenics_contact.mesh.cell_types import cell_type_of
 from fenics_contact.mesh.chart import Chart, check_chart
 from fenics_contact.mesh.checked_surfaces import check_range, checked_surfaces, integers
 from fenics_contact.mesh.collapsed import check_collapsed, cut_into_linear, expanded, in_words, shapes_in
@@ -24,10 +24,9 @@ from fenics_contact.mesh.faces import (
     LAST_BITS,
     check_no_coincident_nodes,
     coordinate_rounding,
-    is_triangle,
-    narrowed,
 )
 from fenics_contact.mesh.hanging import Centres, DependentNodes, HangingNodes, nodes_to_hold
+from fenics_contact.mesh.linear_facets import has_both, linear_facets
 from fenics_contact.mesh.quadratic_nodes import check_node_order
 from fenics_contact.mesh.quality import check_shapes, jacobian_ratio, similarity, thickness
 from fenics_contact.shapes.combined import placed
@@ -567,7 +566,7 @@ class BodyMesh:
         triangles alone. There is no grid.
         """
         several = self.has_several_shapes
-        if self.order == 1 and not (several and any(map(_is_mixed, self.surfaces.values()))):
+        if self.order == 1 and not (several and any(map(has_both, self.surfaces.values()))):
             return self
         result = copy(self)
         result.__dict__.pop("apart", None)
@@ -581,7 +580,7 @@ class BodyMesh:
         parents = self.cells_cut
         result._set(
             cells=cells,
-            surfaces={name: _linear_facets(facets, self.dim) for name, facets in self.surfaces.items()},
+            surfaces={name: linear_facets(facets, self.dim).rows for name, facets in self.surfaces.items()},
             grid=None,
             regions={
                 name: np.flatnonzero(np.isin(parents, numbers)) for name, numbers in self.regions.items()
@@ -597,30 +596,6 @@ class BodyMesh:
         if self.has_several_shapes:
             return cut_into_linear(self.cells, self.dim)[1]
         return np.repeat(np.arange(self.n_cells), len(cell_type_of(self.cells, self.dim).pieces))
-
-
-def _is_mixed(facets: np.ndarray) -> bool:
-    """Whether there are triangles among facets of four corners."""
-    return bool(is_triangle(facets).any())
-
-
-def _linear_facets(facets: np.ndarray, dim: int) -> np.ndarray:
-    """Return the linear facets through the nodes of facets; triangles where some of these are."""
-    if _is_mixed(facets):
-        mine = is_triangle(facets)
-        parts = narrowed(facets[mine]), facets[~mine]
-        numbers = np.concatenate([np.flatnonzero(mine), np.flatnonzero(~mine)])
-        cut = []
-        for part in parts:
-            linear = _linear_facets(part, dim)
-            linear = linear[:, [[0, 1, 2], [0, 2, 3]]] if linear.shape[1] == 4 else linear
-            cut.append(linear.reshape(len(part), -1, 3))
-        each = zip(np.split(numbers, [mine.sum()]), cut, strict=True)
-        owners = np.concatenate([np.repeat(own, part.shape[1]) for own, part in each])
-        rows = np.concatenate([part.reshape(-1, 3) for part in cut])
-        return rows[np.argsort(owners, kind="stable")]
-    pieces = FACET_TYPES[facets.shape[1], dim].pieces
-    return facets[:, pieces].reshape(-1, pieces.shape[1])
 
 
 def _sizes(parts: Mapping[str, np.ndarray]) -> str:

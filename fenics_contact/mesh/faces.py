@@ -245,7 +245,8 @@ def is_triangle(faces: np.ndarray) -> np.ndarray:
     return np.asarray(faces[:, 2] == faces[:, 3])
 
 
-_NARROW = {4: [0, 1, 2], 9: [0, 1, 2, 4, 5, 7]}
+TRIANGLE_COLUMNS = {4: [0, 1, 2], 9: [0, 1, 2, 4, 5, 7]}
+"""Nodes of triangles that are written as faces of four corners, by the number of nodes of these."""
 _WIDE = {(3, 4): [0, 1, 2, 2], (6, 9): [0, 1, 2, 2, 3, 4, 2, 5, 2]}
 
 
@@ -266,7 +267,19 @@ def of_one_shape(faces: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
 
 def narrowed(faces: np.ndarray) -> np.ndarray:
     """Return faces that are all triangles with 3 or 6 nodes each; others as they are."""
-    return faces[:, _NARROW[faces.shape[1]]] if len(faces) and is_triangle(faces).all() else faces
+    return faces[:, TRIANGLE_COLUMNS[faces.shape[1]]] if len(faces) and is_triangle(faces).all() else faces
+
+
+def in_columns(values: np.ndarray, width: int) -> np.ndarray:
+    """Return values at the nodes of triangles, (n, 3 | 6), at those of faces of so many; others as they are.
+
+    They are zero where these repeat a node.
+    """
+    if values.shape[1] == width:
+        return values
+    result = np.zeros((len(values), width))
+    result[:, TRIANGLE_COLUMNS[width]] = values
+    return result
 
 
 def boundary_faces(

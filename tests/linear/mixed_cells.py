@@ -8,9 +8,15 @@ from mpi4py import MPI
 from fenics_contact import Body, Scene, Support, Traction, solve_scene
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity
-from fenics_contact.mesh import bisection_partition, boundary_faces, joined_cells
+from fenics_contact.mesh import bisection_partition, boundary_faces, joined_cells, quadratic, serendipity
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import HEXAHEDRON
+
+ORDERS = {
+    "linear": lambda mesh: mesh,
+    "quadratic": quadratic,
+    "serendipity": lambda m: serendipity(quadratic(m)),
+}
 
 
 def named_sides(points: np.ndarray, cells: np.ndarray) -> BodyMesh:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from types import ModuleType
-
 import meshio
 import numpy as np
 import pytest
@@ -13,7 +10,7 @@ from mpi4py import MPI
 from fenics_contact import Body, Scene, Support, Traction, solve_scene
 from fenics_contact.gallery import block
 from fenics_contact.materials import IsotropicElasticity
-from fenics_contact.mesh import bisection_partition, boundary_faces, completed, quadratic, serendipity
+from fenics_contact.mesh import boundary_faces, completed, quadratic, serendipity
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.collapsed import SHAPES, by_shape
 from fenics_contact.mesh.faces import vector_areas
@@ -22,93 +19,41 @@ from fenics_contact.output.paraview import write_vtu
 from fenics_contact.pictures import plot_field
 from fenics_contact.pictures.section import cells_of, linear
 from fenics_contact.readers.bodies import TaggedMesh, bodies_of
-from fenics_contact.readers.gmsh import from_gmsh_model
 from fenics_contact.readers.meshio import from_meshio, read_mesh
 from tests.linear.graded import pulled
 from tests.linear.mixed_cells import mixed_bar
-from tests.mesh_io.msh_files import name, own_gmsh
+from tests.linear.several_ranks import displacement_of
+from tests.mesh_io.four_boxes import bars_of_all_orders, displacement_on
 
 
-@pytest.fixture
-def gmsh() -> Iterator[ModuleType]:
-    with own_gmsh() as module:
-        yield module
+@pytest.fixture(scope="module")
+def bars() -> dict[str, BodyMesh]:
+    return bars_of_all_orders()
 
 
-def four_boxes(gmsh: ModuleType) -> None:
-    """Mesh a "bar" of 2 x 1 x 2: hexahedra, prisms beside them, tetrahedra and pyramids on top of both."""
-    geo, mesh = gmsh.model.geo, gmsh.model.mesh
-    at = {(x, y, z): geo.addPoint(x, y, z) for x in range(3) for y in range(2) for z in range(3)}
-    lines: dict[tuple, int] = {}
-    faces: dict[frozenset, int] = {}
-
-    def line(a: tuple, b: tuple) -> int:
-        if (b, a) in lines:
-            return -lines[b, a]
-        if (a, b) not in lines:
-            lines[a, b] = geo.addLine(at[a], at[b])
-        return lines[a, b]
-
-    def face(*corners: tuple) -> int:
-        key = frozenset(corners)
-        if key not in faces:
-            around = [line(a, b) for a, b in zip(corners, (*corners[1:], corners[0]), strict=True)]
-            faces[key] = geo.addPlaneSurface([geo.addCurveLoop(around)])
-        return faces[key]
-
-    boxes = {}
-    for x, z in ((0, 0), (1, 0), (0, 1), (1, 1)):
-        low, high = [[(x + a, b, z + c) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))] for c in (0, 1)]
-        around = [(low[i], low[j], high[j], high[i]) for i, j in ((0, 1), (1, 2), (2, 3), (3, 0))]
-        sides = [face(*low), face(*high), *(face(*each) for each in around)]
-        boxes[x, z] = geo.addVolume([geo.addSurfaceLoop(sides)]), sides, [at[c] for c in (*low, *high)]
-    geo.synchronize()
-    for tag in lines.values():
-        mesh.setTransfiniteCurve(tag, 3)
-    for tag in faces.values():
-        mesh.setTransfiniteSurface(tag)
-    for place, recombined in (((0, 0), range(6)), ((1, 0), range(2, 6))):
-        volume, sides, corners = boxes[place]
-        for side in recombined:
-            mesh.setRecombine(2, sides[side])
-        mesh.setTransfiniteVolume(volume, corners)
-    name(gmsh, 3, [volume for volume, _, _ in boxes.values()], "bar")
-    for axis, end in ((0, 2), (1, 1), (2, 2)):
-        for k, value in enumerate((0, end)):
-            there = [tag for corners, tag in faces.items() if all(c[axis] == value for c in corners)]
-            name(gmsh, 2, there, f"{'xyz'[axis]}{k}")
-    mesh.generate(3)
-
-
-def check_even_stress(mesh: BodyMesh, subdomains: int) -> None:
-    scene = pulled(mesh, IsotropicElasticity(100.0, 0.3))
-    partition = {"bar": bisection_partition(mesh, subdomains)}
-    state = solve_scene(scene, MPI.COMM_SELF, partitions=partition, tolerance=1e-12)
-    exact = mesh.points * [0.01, -0.003, -0.003]
-    np.testing.assert_allclose(state.gather_displacement("bar"), exact, atol=1e-10 * np.abs(exact).max())
-
-
-def test_a_model_of_all_shapes_is_one_body(gmsh: ModuleType) -> None:
-    """Linear, quadratic and serendipity; one model, as this gmsh ends the process at a second one."""
-    four_boxes(gmsh)
-    first = from_gmsh_model()["bar"]
+def test_a_model_of_all_shapes_is_one_body(bars: dict[str, BodyMesh]) -> None:
+    first = bars["linear"]
     assert list(by_shape(first.cells, 3)) == ["tetrahedron", "pyramid", "prism", "hexahedron"]
     assert first.volume == pytest.approx(4.0, rel=1e-12)
     assert sorted(first.surfaces) == ["x0", "x1", "y0", "y1", "z0", "z1"]
-    check_even_stress(first, 3)
-    gmsh.model.mesh.setOrder(2)
-    whole = from_gmsh_model(shapes=False)["bar"]
-    assert whole.order == 2
-    assert whole.centres is None
-    check_even_stress(whole, 2)
-    gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 1)
-    gmsh.model.mesh.setOrder(1)
-    gmsh.model.mesh.setOrder(2)
-    gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 0)
-    lean = from_gmsh_model(shapes=False)["bar"]
-    assert lean.centres is not None
-    assert lean.n_nodes == whole.n_nodes
-    check_even_stress(lean, 2)
+    assert bars["quadratic"].order == 2
+    assert bars["quadratic"].centres is None
+    assert bars["serendipity"].centres is not None
+    assert bars["serendipity"].n_nodes == bars["quadratic"].n_nodes
+
+
+def test_a_model_of_all_shapes_has_an_even_stress_on_every_number_of_ranks(
+    bars: dict[str, BodyMesh],
+    mpirun,  # type: ignore[no-untyped-def]
+) -> None:
+    """Linear, quadratic and serendipity, in five subdomains on 1, 2 and 4 ranks."""
+    exact = np.concatenate([mesh.points * [0.01, -0.003, -0.003] for mesh in bars.values()])
+    for ranks in (1, 2, 4):
+        if ranks == 1:
+            answer = np.array(displacement_on(MPI.COMM_SELF, bars))
+        else:
+            answer = displacement_of("tests.mesh_io.four_boxes", ranks, mpirun)
+        np.testing.assert_allclose(answer, exact, atol=1e-10 * np.abs(exact).max())
 
 
 def as_meshio(mesh: BodyMesh, lacking: bool) -> meshio.Mesh:

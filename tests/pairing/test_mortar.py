@@ -22,7 +22,7 @@ from fenics_contact._pairing.mortar.coupling import (
     mortar_coupling,
 )
 from fenics_contact._pairing.mortar.derivatives import weight_derivatives
-from fenics_contact._pairing.mortar.planes import local_coordinates, measure, rule
+from fenics_contact._pairing.mortar.planes import measure, rule
 from fenics_contact._surfaces.facets import (
     FacetedSurface,
     Relief,
@@ -30,6 +30,7 @@ from fenics_contact._surfaces.facets import (
     faceted_surface,
     nodal_areas,
 )
+from fenics_contact._surfaces.pieces import local_coordinates
 from fenics_contact.errors import InvalidInputError
 from tests.conftest import run_on_ranks
 from tests.pairing.mortar_on_ranks import collect, message_for_a_folded_facet

@@ -16,13 +16,13 @@ from fenics_contact._pairing.mortar.planes import (
     Planes,
     SumsBy,
     laid_flat,
-    local_coordinates,
     local_coordinates_pulled_back,
     measure,
     measure_pulled_back,
     rule,
 )
 from fenics_contact._surfaces.facets import FacetedSurface, facet_shape_values, shape_functions
+from fenics_contact._surfaces.pieces import local_coordinates
 from fenics_contact.mesh.near_surfaces import FACING
 
 

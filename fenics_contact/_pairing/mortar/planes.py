@@ -13,32 +13,6 @@ from fenics_contact.errors.kinds import FoldedFacetsError
 from fenics_contact.mesh.cell_types import CELL_TYPES, FACET_TYPES, quadrature
 
 
-def local_coordinates(points: np.ndarray, flat: np.ndarray) -> np.ndarray:
-    """Invert the (bi)linear map of flat facets.
-
-    A bilinear map x = c + a s + b t + d s t becomes s + d₁ s t = s₀, t + d₂ s t = t₀ in the axes (a, b). The
-    product p = s t solves d₁ d₂ p² − (1 + d₂ s₀ + d₁ t₀) p + s₀ t₀ = 0; of its roots the one that tends to
-    s₀ t₀ for d → 0 belongs to the inside of a convex facet.
-
-    `points`: points of each facet, shape (n, q, dim − 1); `flat`: corners, shape (n, corners, dim − 1).
-
-    Returns local coordinates as `shape_functions` takes them, shape (n, q, dim − 1).
-    """
-    corners = flat.shape[1]
-    if corners == 2:
-        middle, half = (flat[:, :1] + flat[:, 1:]) / 2, (flat[:, 1:] - flat[:, :1]) / 2
-        return (points - middle) / half
-    if corners == 3:
-        return _affine(points - flat[:, :1], flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0])
-    centre, a, b, d = (np.array(_SIGNS) / 4 @ flat).transpose(1, 0, 2)
-    start = _affine(points - centre[:, None], a, b)
-    twist = _affine(d[:, None], a, b)
-    s, t, d1, d2 = start[:, :, 0], start[:, :, 1], twist[:, :, 0], twist[:, :, 1]
-    product, sum_ = s * t, 1 + d2 * s + d1 * t
-    root = np.sqrt(np.maximum(sum_**2 - 4 * d1 * d2 * product, 0))
-    return start - (2 * product / (sum_ + root))[:, :, None] * twist
-
-
 def local_coordinates_pulled_back(
     local: np.ndarray, flat: np.ndarray, by_local: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -64,19 +38,6 @@ def local_coordinates_pulled_back(
             [first * b[:, :, 1] - second * a[:, :, 1], second * a[:, :, 0] - first * b[:, :, 0]], axis=2
         )
     return by_points, -values.reshape(n, points, -1).transpose(0, 2, 1) @ by_points
-
-
-#: Corners to the coefficients of 1, s, t and s t, times four.
-_SIGNS = [[1.0, 1, 1, 1], [-1, 1, 1, -1], [-1, -1, 1, 1], [1, -1, 1, -1]]
-
-
-def _affine(away: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the components of vectors (n, q, 2) in the axes a and b, each (n, 2)."""
-    det = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])[:, None]
-    x, y = away[:, :, 0], away[:, :, 1]
-    s = (x * b[:, None, 1] - y * b[:, None, 0]) / det
-    t = (y * a[:, None, 0] - x * a[:, None, 1]) / det
-    return np.stack([s, t], axis=2)
 
 
 def rule(dim: int, degree: int = 5) -> tuple[np.ndarray, np.ndarray]:

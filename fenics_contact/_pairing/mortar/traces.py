@@ -1,10 +1,11 @@
-"""Shape functions of displacements on facets and on linear pieces of quadratic ones, and their reverse mode.
+"""Shape functions of displacements on facets and on linear pieces of them, and their reverse mode.
 
 A quadratic facet is cut into linear pieces between its nodes. On them both surfaces are clipped, and the dual
 functions are those of the piecewise linear functions of the nodes: all multipliers have positive areas, and
 their cones are independent of each other. Displacements are those of the whole facet, so that a uniform
 pressure makes the nodal forces that it has in the bodies. Popp et al. transform the quadratic functions
-instead, so that they have positive means; their dual functions reach over whole facets.
+instead, so that they have positive means; their dual functions reach over whole facets. Triangles and
+quadrilaterals of one surface are cut into triangles in the same way.
 
 References:
     Popp, A., Wohlmuth, B. I., Gee, M. W., Wall, W. A.: Dual quadratic mortar finite element methods for 3D
@@ -18,14 +19,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact._pairing.mortar.cells import Cells
-from fenics_contact._surfaces.facets import FacetedSurface, shape_weights, shape_weights_pulled_back
+from fenics_contact._surfaces.facets import FacetedSurface
+from fenics_contact._surfaces.pieces import shape_weights, shape_weights_pulled_back, whole_nodes
 
 
 def trace_nodes(surface: FacetedSurface, facet: np.ndarray) -> np.ndarray:
     """Return the nodes whose displacements move facets, or pieces of them, shape (n, nodes)."""
     if surface.whole is None:
         return np.asarray(surface.facets[facet])
-    return np.asarray(surface.whole[facet // (len(surface.facets) // len(surface.whole))])
+    return whole_nodes(surface, facet)
 
 
 def trace_functions(surface: FacetedSurface, facet: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -38,7 +40,7 @@ def trace_functions(surface: FacetedSurface, facet: np.ndarray, values: np.ndarr
         return values
     count, points, corners = values.shape
     at_points = np.repeat(facet, points), values.reshape(count * points, corners)
-    _, functions = shape_weights(surface.whole, *at_points)
+    _, functions = shape_weights(surface, *at_points)
     return functions.reshape(count, points, functions.shape[1])
 
 
@@ -51,7 +53,7 @@ def trace_functions_pulled_back(
     count, points, corners = values.shape
     at_points = np.repeat(facet, points), values.reshape(count * points, corners)
     by = by.reshape(count * points, by.shape[2])
-    return shape_weights_pulled_back(surface.whole, *at_points, by).reshape(values.shape)
+    return shape_weights_pulled_back(surface, *at_points, by).reshape(values.shape)
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from fenics_contact._surfaces.facets import (
     corner_places,
     facet_shape_values,
     height_functions,
-    shape_weights,
 )
+from fenics_contact._surfaces.pieces import shape_weights
 from fenics_contact._surfaces.tangents import SurfaceTangents, surface_tangents
 from fenics_contact.mesh.cell_types import FACET_TYPES, CellType, quadrature, shape_values
 
@@ -371,7 +371,7 @@ class SmoothPatches:
     @classmethod
     def of(cls, surface: FacetedSurface, *, smooth: bool = True) -> SmoothPatches:
         """Return the patches of a surface in its reference configuration; its facets if not smooth."""
-        corners, order = surface.corners, 1 if surface.whole is None else 2
+        corners, order = surface.corners, surface.order
         first, functions = n_values(corners, order), n_functions(corners, order)
         positions, size = _positions(surface, first), first + 2 * corners
         if not smooth:
@@ -417,11 +417,11 @@ class SmoothPatches:
 def _positions(surface: FacetedSurface, count: int) -> sp.csr_matrix:
     """Return the weights of nodes in so many positions on each facet, shape (n_facets · count, n_nodes)."""
     nodes, values = surface.facets.reshape(-1, 1), np.ones((surface.facets.size, 1))
-    if surface.whole is not None:
+    if surface.order > 1:
         kinds = (FACET_TYPES[each, surface.dim] for each in (surface.corners, count))
         linear, quadratic = kinds
         shares = np.tile(shape_values(linear, quadratic.nodes), (len(surface.facets), 1))
-        nodes, values = shape_weights(surface.whole, np.repeat(np.arange(len(surface.facets)), count), shares)
+        nodes, values = shape_weights(surface, np.repeat(np.arange(len(surface.facets)), count), shares)
     row = np.repeat(np.arange(len(nodes)), nodes.shape[1])
     shape = len(nodes), len(surface.nodes)
     return sp.csr_matrix((values.ravel(), (row, nodes.ravel())), shape=shape)
