@@ -11,6 +11,7 @@ from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact._fem.composition import as_in_space, integrate
+from fenics_contact._fem.heated import as_stretched, heat_expands, on_stretched
 from fenics_contact._fem.templates import (
     UNSEEN,
     Constants,
@@ -39,6 +40,7 @@ class Fields(NamedTuple):
         v: Its test function.
         du: Its trial function.
         tests: Such polynomials as test and as trial function.
+        swelling: Cube of the thermal stretch: what is held beside the dilatation is so in its total.
     """
 
     u: Expr
@@ -48,6 +50,7 @@ class Fields(NamedTuple):
     pressure: Expr
     tests: tuple[Expr, Expr]
     unseen: bool
+    swelling: Expr | int = 1
 
 
 #: Returns an integrand from a material, the fields and the material's constants.
@@ -67,7 +70,10 @@ def have_mean_energy(materials: tuple[Material, ...]) -> bool:
 
 
 def _written(kind: str, materials: tuple[Material, ...], cell_type: str) -> Written:
-    """Return a form; its coefficients are the displacement and the fields of `MeanDilatation`."""
+    """Return a form; its coefficients are the displacement and the fields of `MeanDilatation`.
+
+    Where a nonlinear material expands the change of temperature is the last of them.
+    """
     (u,) = _dolfinx.field_symbols(cell_type, 1)
     space = _dolfinx.cellwise_space(cell_type, coefficient_shape(cell_type))
     means, pressures = (ufl.Coefficient(space, count=number) for number in (1, 2))
@@ -77,15 +83,31 @@ def _written(kind: str, materials: tuple[Material, ...], cell_type: str) -> Writ
     V = u.ufl_function_space()
     moved, v, du = as_in_space(cell_type, u, ufl.TestFunction(V), ufl.TrialFunction(V))
     fields = Fields(moved, v, du, dilatation, pressure, (q, r), cell_type in UNSEEN)
+    change = ufl.Coefficient(_dolfinx.nodal_space(cell_type), count=4)
     density = (FORMS | MEAN_FORMS)[kind]
 
     def integrand(material: Material, constants: Constants) -> Expr | None:
         if isinstance(material, HistoryMaterial):
             return None  # what it answers is added to the assembled forms
-        return density(material, fields, constants)
+        if not heat_expands(material):
+            return density(material, fields, constants)
+        stretch = 1 + constants[-1] * change
+        now = as_stretched(stretch, moved, v, du)
+        swelling = stretch**3
+        heated = fields._replace(
+            u=now[0], v=now[1], du=now[2], dilatation=dilatation / swelling, swelling=swelling
+        )
+        part = density(material, heated, constants)
+        return None if part is None else stretch ** POWERS.get(kind, 3) * on_stretched(part, cell_type)
 
     form, constants = integrate(materials, cell_type, integrand, volume_measure(cell_type))
-    return form, constants, (u, means, pressures, centre)
+    coefficients = (u, means, pressures, centre)
+    return form, constants, (*coefficients, change) if any(map(heat_expands, materials)) else coefficients
+
+
+def _held(material: Any, fields: Fields, constants: Constants) -> Expr:
+    """Return the modulus of what J has beside its projection."""
+    return fields.swelling * material.unseen_modulus(constants)
 
 
 def _apart(fields: Fields) -> Expr:
@@ -100,7 +122,7 @@ def _energy(material: Any, fields: Fields, constants: Constants) -> Expr:
         shape = material.shape_energy(gradient_in_space(F), constants)
         energy = shape + material.volume_energy(fields.dilatation, constants)
         if fields.unseen:
-            energy += material.unseen_modulus(constants) / 2 * _apart(fields) ** 2
+            energy += _held(material, fields, constants) / 2 * _apart(fields) ** 2
         return energy
     return (
         material.density(F, constants) if is_nonlinear(material) else material.stiffness(u, u, constants) / 2
@@ -123,7 +145,7 @@ def _tangent(material: Any, fields: Fields, constants: Constants) -> Expr:
         growth = ufl.derivative(volume_change(u, v), u, du)
         volume = _pressure_at(material, fields, constants) * growth
         if fields.unseen:
-            volume += material.unseen_modulus(constants) * volume_change(u, v) * volume_change(u, du)
+            volume += _held(material, fields, constants) * volume_change(u, v) * volume_change(u, du)
         return material.shape_tangent(u, du, v, constants) + volume
     if is_nonlinear(material):
         return material.tangent(u, du, v, constants)
@@ -134,7 +156,7 @@ def _pressure_at(material: Any, fields: Fields, constants: Constants) -> Expr:
     """Return the pressure at a point: that of the cell, and of what its dilatation leaves out."""
     if not fields.unseen:
         return fields.pressure
-    return fields.pressure + material.unseen_modulus(constants) * _apart(fields)
+    return fields.pressure + _held(material, fields, constants) * _apart(fields)
 
 
 def _volume_change(material: Any, fields: Fields, constants: Constants) -> Expr | None:
@@ -157,7 +179,7 @@ def _bulk_modulus(material: Any, fields: Fields, constants: Constants) -> Expr |
         return None
     modulus = material.bulk_modulus_at(fields.dilatation, constants)
     if fields.unseen:
-        modulus -= material.unseen_modulus(constants)
+        modulus -= _held(material, fields, constants)
     return fields.tests[0] * fields.tests[1] * modulus
 
 
@@ -169,3 +191,5 @@ MEAN_FORMS: dict[str, Density] = {
     "cell pressure": _pressure,
     "bulk modulus": _bulk_modulus,
 }
+#: Powers of the thermal stretch θ with which they grow, 3 for all others, as the volume of warm bodies does.
+POWERS = {"cell pressure": 0, "bulk modulus": -3}

@@ -14,11 +14,13 @@ from ufl.core.expr import Expr
 from fenics_contact import _dolfinx
 from fenics_contact._base.libraries import MPI
 from fenics_contact._fem.composition import Composition, as_in_space, integrate, material_sets
+from fenics_contact._fem.heated import as_stretched, on_stretched
 from fenics_contact._fem.load_forms import (
     FIRST_COUNT,
     Symbol,
     as_stress,
     from_ufl,
+    has_work,
     load_fields,
     load_key,
     load_name,
@@ -39,7 +41,7 @@ from fenics_contact._scene.fields import Ufl, evaluate
 from fenics_contact._scene.loads import InitialStress, Load, PointForce, Pressure, ThermalStrain
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import together
-from fenics_contact.materials.elastic import Material, Transverse
+from fenics_contact.materials.elastic import Material, Transverse, can_expand
 from fenics_contact.materials.hyperelastic import Hyperelasticity, is_nonlinear
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.mesh.quality import cell_volumes
@@ -83,7 +85,8 @@ class FormLibrary:
                 continue
             body = scene.bodies[load.body]
             for materials in material_sets(body):
-                self._prepare_load(load, materials, body.cell_type)
+                if has_work(load, materials):
+                    self._prepare_load(load, materials, body.cell_type)
 
     def stiffness(
         self, parts: Composition, cell_type: str, space: _dolfinx.fem.FunctionSpace
@@ -282,9 +285,9 @@ class Temperature:
         terms = [*constants, *coefficients, *(from_ufl(load, load.value, cell_type) for load in self._ufl)]
         change = sum(terms[1:], terms[0]) if terms else None
         if not self.initial:
-            return AtRest(change), constants, coefficients
+            return AtRest(change, None, cell_type), constants, coefficients
         stress = ufl.Coefficient(_dolfinx.cellwise_space(cell_type, (6,)), count=FIRST_COUNT + 1)
-        return AtRest(change, as_stress(stress)), constants, (*coefficients, stress)
+        return AtRest(change, as_stress(stress), cell_type), constants, (*coefficients, stress)
 
     def fields(
         self, mesh: _dolfinx.mesh.Mesh, points: np.ndarray, stress: np.ndarray | None = None
@@ -337,20 +340,25 @@ class AtRest:
     Attributes:
         temperature: ΔT (UFL), None without one.
         stress: Initial stress, 3 x 3 (UFL), None without one.
+        cell_type: That of the body's cells.
     """
 
-    temperature: Expr | None = None
-    stress: Expr | None = None
+    temperature: Expr | None
+    stress: Expr | None
+    cell_type: str
 
 
 def stress_left(material: Any, u: Expr, constants: Constants, at: AtRest) -> Expr:
     """Return the stress (dim x dim, UFL) of a displacement of a body that had some at rest."""
     stress = material.stress(u, constants)
-    if at.temperature is not None:
-        stress = stress - at.temperature * material.thermal_stress(constants)
+    axes = range(stress.ufl_shape[0])
+    if at.temperature is not None and can_expand(material):
+        free = material.thermal_stress(constants)
+        if free.ufl_shape != stress.ufl_shape:  # of a model for bodies in the plane and in space
+            free = ufl.as_tensor([[free[i, j] for j in axes] for i in axes])
+        stress = stress - at.temperature * free
     if at.stress is not None:
-        size = range(stress.ufl_shape[0])
-        stress = stress + ufl.as_matrix([[at.stress[i, j] for j in size] for i in size])
+        stress = stress + ufl.as_matrix([[at.stress[i, j] for j in axes] for i in axes])
     return stress
 
 
@@ -360,14 +368,17 @@ def stress_in_space(material: Material, u: Expr, constants: Constants, at: AtRes
     Where the material is nonlinear it is Cauchy's.
     """
     if isinstance(material, Hyperelasticity):
-        return material.cauchy(u, constants)
+        if at.temperature is None or not material.expands:
+            return material.cauchy(u, constants)
+        (moved,) = as_stretched(1 + constants[-1] * at.temperature, u)
+        return on_stretched(material.cauchy(moved, constants), at.cell_type)
     stress = stress_left(material, u, constants, at)
     if stress.ufl_shape == (3, 3):
         return stress
     normal: Expr | int = 0
     if isinstance(material, Transverse):
         normal = material.transverse_stress(u, constants)
-        if at.temperature is not None:
+        if at.temperature is not None and can_expand(material):
             normal = normal - at.temperature * material.transverse_thermal_stress(constants)
     if at.stress is not None:
         normal = normal + at.stress[2, 2]

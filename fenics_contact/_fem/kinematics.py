@@ -150,6 +150,7 @@ class GaussPoints:
         cell = CELL_TYPES[_dolfinx.of_mesh(cell_type)]
         positions, weights = quadrature(cell, quadrature_degree(cell_type))
         reference = shape_gradients(cell, positions)
+        self._values = shape_values(cell, positions)
         self._shape, self._cells = points.shape, _dolfinx.vtk_cell_dofs(space)
         self._points, self._cell_type = points, cell_type
         jacobian = np.einsum("cai,qaj->cqij", points[self._cells], reference)
@@ -157,10 +158,9 @@ class GaussPoints:
         self._weights = weights * determinants(jacobian)
         self._hoop: np.ndarray | None = None  # N / r
         if _dolfinx.is_revolved(cell_type):
-            values = shape_values(cell, positions)
-            radii = points[self._cells, 0] @ values.T
+            radii = points[self._cells, 0] @ self._values.T
             self._weights = 2 * np.pi * radii * self._weights
-            self._hoop = values / radii[..., None]
+            self._hoop = self._values / radii[..., None]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -179,6 +179,10 @@ class GaussPoints:
         if self._hoop is not None:
             gradient[..., 2, 2] = np.einsum("cqa,ca->cq", self._hoop, nodal[..., 0])
         return gradient
+
+    def interpolated(self, nodal: np.ndarray) -> np.ndarray:
+        """Return a scalar field at the points, (n_cells, n_gauss), of its values by block, (n,)."""
+        return np.asarray(nodal[self._cells] @ self._values.T)
 
     def force(self, stress: np.ndarray, cells: np.ndarray) -> np.ndarray:
         """Return ∫ P : ∇v over some cells by dof, shape (dim n,), [force].
@@ -310,7 +314,7 @@ class MeanDilatation:
     ) -> None:
         """Bind the forms."""
         self._dilatation, self._polynomials = dilatation, dilatation.polynomials
-        self._means, self._pressures, centres = fields[1:]
+        self._means, self._pressures, centres = fields[1:4]
         self._size = fields[0].x.array.size
         space, cellwise = (field.function_space for field in fields[:2])
         self._cells = _dolfinx.cell_dofs(cellwise).ravel()

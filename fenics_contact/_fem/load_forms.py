@@ -25,6 +25,7 @@ from fenics_contact._scene.loads import BodyForce, InitialStress, Load, Pressure
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.kinds import user_code
 from fenics_contact.materials.elastic import Material, Plate, as_tensor, strain
+from fenics_contact.materials.hyperelastic import is_nonlinear
 
 #: First number of the coefficients of loads, after those of displacement fields.
 FIRST_COUNT = 4
@@ -146,6 +147,11 @@ def load_fields(
     return (field,)
 
 
+def has_work(load: Load, materials: tuple[Material, ...]) -> bool:
+    """Return whether a load has a form: nonlinear materials feel temperatures themselves."""
+    return not isinstance(load, ThermalStrain) or not all(map(is_nonlinear, materials))
+
+
 def load_work(
     load: Load, materials: tuple[Material, ...], cell_type: str, value: Expr, v: Expr
 ) -> tuple[ufl.Form, Constants]:
@@ -153,7 +159,9 @@ def load_work(
     if isinstance(load, ThermalStrain):
         (along,) = as_in_space(cell_type, v)
 
-        def thermal(material: Any, constants: Constants) -> Expr:
+        def thermal(material: Any, constants: Constants) -> Expr | None:
+            if is_nonlinear(material):
+                return None  # it feels the temperature itself
             work = value * ufl.inner(material.thermal_stress(constants), strain(along))
             return material.per_area(work, constants) if isinstance(material, Plate) else work
 

@@ -15,6 +15,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._base.libraries import MPI
 from fenics_contact._fem.composition import Composition, material_sets
 from fenics_contact._fem.deformed_forms import FORMS, have_mean_energy, prepare_forms
+from fenics_contact._fem.heated import heat_expands
 from fenics_contact._fem.kinematics import Dilatation, GaussPoints, MeanDilatation, assembled, mean_fields
 from fenics_contact._fem.templates import Templates, quadrature_degree
 from fenics_contact._scene.body import Body
@@ -132,11 +133,13 @@ class MaterialStep:
         duration: Time since the start, for materials that creep.
         origin: Displacement at the start of the Newton step, None where there was none: tangents of mean
             dilatations have the pressures that this step foresaw.
+        temperature: Change of temperature by input node, shape (n,), None without any.
     """
 
     history: np.ndarray | None = None
     duration: float = np.nan
     origin: np.ndarray | None = None
+    temperature: np.ndarray | None = None
 
 
 FROM_REST = MaterialStep()
@@ -168,7 +171,7 @@ class HistoryMechanics:
         `points`: coordinates by input node, shape (n, dim), [length]; `others`: the mechanics of the
         materials without history, None where there are none.
         """
-        nodes, dofs = _dolfinx.node_dofs(space)
+        nodes, dofs = self._blocks = _dolfinx.node_dofs(space)
         by_block = np.empty_like(points)
         by_block[dofs] = points[nodes]
         self._gauss = GaussPoints(space, cell_type, by_block)
@@ -192,6 +195,7 @@ class HistoryMechanics:
         before, gradient = self._before(step.history), self._gauss.gradient(displacement)
         after, stress = before.copy(), np.full(gradient.shape, np.nan)
         force, entries = np.zeros(displacement.size), np.zeros(self._gauss.entries)
+        heat = self._heat(step.temperature)
         for material, cells in self._parts:
             if not len(cells):
                 continue
@@ -199,15 +203,19 @@ class HistoryMechanics:
             means = None
             if has_mean_dilatation(material):
                 means = self._gauss.mean_strain(cells, material.moduli)
-            given = gradient[cells] if means is None else means.averaged(gradient[cells])
+            given, stretch = _without_expansion(
+                material, gradient[cells], None if heat is None else heat[cells]
+            )
+            if means is not None:
+                given = means.averaged(given)
             end = material.answer(
                 given.reshape(-1, 3, 3), before[cells, :, :size].reshape(-1, size), step.duration
             )
             after[cells, :, :size] = end.history.reshape(*shape, size)
-            nominal = end.stress.reshape(*shape, 3, 3)
+            nominal = stretch**2 * end.stress.reshape(*shape, 3, 3)
             stress[cells] = cauchy(nominal, gradient[cells]) if material.finite else nominal
             force += self._gauss.force(nominal if means is None else means.averaged(nominal), cells)
-            tangent = end.tangent.reshape(*shape, 3, 3, 3, 3)
+            tangent = stretch[..., None, None] * end.tangent.reshape(*shape, 3, 3, 3, 3)
             if not material.symmetric:
                 tangent = 0.5 * (tangent + tangent.transpose(0, 1, 4, 5, 2, 3))
             entries += self._gauss.stiffness(tangent, cells, means)
@@ -225,6 +233,15 @@ class HistoryMechanics:
         """Return the smallest det F; see `Mechanics.least_jacobian`."""
         return self._dilatation.least(displacement)
 
+    def _heat(self, temperature: np.ndarray | None) -> np.ndarray | None:
+        """Return the change of temperature at the points, shape (n_cells, n_gauss)."""
+        if temperature is None:
+            return None
+        nodes, dofs = self._blocks
+        by_block = np.empty(len(nodes))
+        by_block[dofs] = temperature[nodes]
+        return self._gauss.interpolated(by_block)
+
     def _before(self, history: np.ndarray | None) -> np.ndarray:
         if history is None:
             return np.zeros(self.history_shape)
@@ -235,6 +252,25 @@ class HistoryMechanics:
                 "start with None"
             )
         return history
+
+
+def _without_expansion(
+    material: HistoryMaterial, gradient: np.ndarray, heat: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the displacement gradients that a material feels, and its thermal stretches θ.
+
+    Of large deformations P = θ² P(F / θ), as of the energy θ³ W(F / θ); else strains are subtracted, θ = 1.
+
+    `gradient`: shape (n_cells, n_gauss, 3, 3); `heat`: changes of temperature, shape (n_cells, n_gauss).
+
+    The stretches have the shape (n_cells, n_gauss, 1, 1), or (1, 1) where all are one.
+    """
+    if heat is None or material.thermal_expansion is None:
+        return gradient, np.ones((1, 1))
+    strain, one = (material.thermal_expansion * heat)[..., None, None], np.eye(3)
+    if not material.finite:
+        return gradient - strain * one, np.ones((1, 1))
+    return (gradient - strain * one) / (1 + strain), 1 + strain
 
 
 def cauchy(nominal: np.ndarray, gradient: np.ndarray) -> np.ndarray:
@@ -262,6 +298,10 @@ class HyperelasticMechanics:
         self._dilatation = Dilatation(space, cell_type, by_block)
         self._displacement = _dolfinx.fem.Function(space)
         fields = [self._displacement, *mean_fields(space.mesh, cell_type)]
+        self._heat: _dolfinx.fem.Function | None = None
+        if any(map(heat_expands, parts.materials)):
+            self._heat = _dolfinx.fem.Function(_dolfinx.scalar_space(space.mesh, 1))
+            fields.append(self._heat)
         self._energy, self._force, self._tangent = (
             templates[kind, parts.materials, cell_type].bind(
                 [space] * number, parts.parameters, fields, mesh=space.mesh, cells=parts.cells
@@ -276,19 +316,29 @@ class HyperelasticMechanics:
         """Assemble; see `Mechanics.at`."""
         _dolfinx.update_coordinates(self._mesh, self._points)
         self._displacement.x.array[:] = displacement
+        self._set_heat(step.temperature)
         if self._mean is not None:
             self._mean.follow(displacement)
         force, energy = _dolfinx.assemble_vector(self._force), _dolfinx.assemble_scalar(self._energy)
-        tangent = partial(self._stiffness, displacement.copy(), step.origin)
+        tangent = partial(self._stiffness, displacement.copy(), step)
         return Response(force, tangent, energy, self.least_jacobian(displacement))
 
-    def _stiffness(self, displacement: np.ndarray, origin: np.ndarray | None) -> sp.csr_matrix:
+    def _set_heat(self, temperature: np.ndarray | None) -> None:
+        """Set the change of temperature, by input node."""
+        if self._heat is None:
+            return
+        nodes, dofs = _dolfinx.node_dofs(self._heat.function_space)
+        self._heat.x.array[dofs] = 0.0 if temperature is None else temperature[nodes]
+
+    def _stiffness(self, displacement: np.ndarray, step: MaterialStep) -> sp.csr_matrix:
         """Return the tangent.
 
         Pressures that grow with the bulk modulus overshoot within a Newton step, by the square of its
         displacements: the tangent has those that the step foresaw.
         """
         _dolfinx.update_coordinates(self._mesh, self._points)
+        self._set_heat(step.temperature)
+        origin = step.origin
         if self._mean is not None and origin is not None:
             self._displacement.x.array[:] = origin
             self._mean.foresee(origin, displacement)

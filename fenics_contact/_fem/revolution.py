@@ -82,7 +82,7 @@ class _Replaced(MultiFunction):  # type: ignore[misc]
     def __init__(self, cell_type: str) -> None:
         super().__init__()
         x = ufl.SpatialCoordinate(_dolfinx.template(cell_type))
-        self._place = ufl.as_vector([x[0], x[1], 0])
+        self._place = x if len(x) == 3 else ufl.as_vector([x[0], x[1], 0])
 
     expr = MultiFunction.reuse_if_untouched
 

@@ -402,9 +402,10 @@ class Equations:
             each = zip(self._mechanics, self.decomposition.parts, at.history, strict=True)
             duration = load.time - at.time
             before = (None if origin is None else origin[part] for part in self.decomposition.parts)
+            heat = load.heat or (None,) * len(self._mechanics)
             responses = tuple(
-                m.at(at.displacement[part], MaterialStep(history, duration, start))
-                for (m, part, history), start in zip(each, before, strict=True)
+                m.at(at.displacement[part], MaterialStep(history, duration, start, warmer))
+                for (m, part, history), start, warmer in zip(each, before, heat, strict=True)
             )
             moved = (at.displacement[part] for part in self.decomposition.parts)
             responses = tuple(map(_on_bed, responses, self._beds, moved))

@@ -5,17 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import zip_longest
 
 import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._base.display import displayed
 from fenics_contact._large_deformations.rigid_surfaces import Motions, TurnedSurface, tracked_motions
+from fenics_contact._scene.fields import Ufl, evaluate
+from fenics_contact._scene.loads import ThermalStrain
 from fenics_contact._scene.scene import LoadStep, Scene
-from fenics_contact.errors import together
+from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.decomposition import Decomposition, prescribed_displacements
 from fenics_contact.feti.free_motions import FreeMotions
 from fenics_contact.feti.torn import TornSystem, build_torn_system
+from fenics_contact.materials.hyperelastic import is_nonlinear
 from fenics_contact.mesh.faces import corners_of
 from fenics_contact.mesh.quality import similarity
 from fenics_contact.qp.reductions import Vector
@@ -33,6 +37,8 @@ class Loading:
         following: Pressures that follow their surfaces, each with the part of them that acts.
         course: A load step with functions of time; None without any.
         drag: A viscous medium; None without any.
+        heat: Changes of temperature of this rank's subdomains by input node, None where materials feel none;
+            () where there are none.
     """
 
     torn: TornSystem
@@ -42,6 +48,7 @@ class Loading:
     turned: tuple[TurnedSurface, ...] = ()
     course: LoadStep | None = None
     drag: Drag | None = None
+    heat: tuple[np.ndarray | None, ...] = ()
 
     @classmethod
     def of(
@@ -63,7 +70,9 @@ class Loading:
         turned = TurnedSurface.all_of(scene, decomposition)
         torn = _without_tracked(torn, turned)
         varies = step is not None and (callable(step.loads) or callable(step.supports))
-        return cls(torn, prescribed, time, following, turned, step if varies else None)
+        with together(decomposition.comm):
+            heat = temperature_changes(scene, decomposition)
+        return cls(torn, prescribed, time, following, turned, step if varies else None, heat=heat)
 
     def between(self, first: Loading, part: float) -> Loading:
         """Return the load at a part of the way from another one to this. Collective.
@@ -84,7 +93,7 @@ class Loading:
             pairs = zip(mixed.torn.subdomains, now.torn.subdomains, strict=True)
             subdomains = tuple(replace(a, load=b.load) for a, b in pairs)
             torn = replace(mixed.torn, subdomains=subdomains)
-            mixed = replace(mixed, torn=torn, following=now.following)
+            mixed = replace(mixed, torn=torn, following=now.following, heat=now.heat)
         if callable(self.course.supports):
             torn = replace(mixed.torn, right=now.torn.right, supported=now.torn.supported)
             mixed = replace(mixed, torn=torn, prescribed=now.prescribed, turned=now.turned)
@@ -109,7 +118,9 @@ class Loading:
         time = (1.0 - part) * first.time + part * self.time
         before = {each.place: each for each in first.turned}
         turned = tuple(each.between(before.get(each.place), part) for each in self.turned)
-        return Loading(torn, prescribed, time, tuple(weighted)).with_surfaces(turned)
+        pairs = zip_longest(first.heat, self.heat)
+        heat = tuple(_between(one, other, part) for one, other in pairs)
+        return Loading(torn, prescribed, time, tuple(weighted), heat=heat).with_surfaces(turned)
 
     def with_surfaces(self, turned: tuple[TurnedSurface, ...]) -> Loading:
         """Return the load with rigid surfaces that have moved elsewhere."""
@@ -197,6 +208,42 @@ class Loading:
             matrix = sp.diags(self.drag.viscosity, format="csr")
             softening = matrix if softening is None else softening + matrix
         return force, softening
+
+
+def _between(first: np.ndarray | None, last: np.ndarray | None, part: float) -> np.ndarray | None:
+    """Return changes of temperature on the way from one to the other, None for none."""
+    if first is None:
+        return None if last is None else part * last
+    return (1.0 - part) * first + (0.0 if last is None else part * last)
+
+
+def temperature_changes(scene: Scene, decomposition: Decomposition) -> tuple[np.ndarray | None, ...]:
+    """Return the changes of temperature that nonlinear materials feel, of this rank's subdomains.
+
+    Returns values by input node, shape (n,), None where there are none; () where no subdomain has any.
+    """
+    found: list[np.ndarray | None] = []
+    for mesh in decomposition.meshes:
+        body = scene.bodies[mesh.body]
+        loads = [load for load in scene.loads if isinstance(load, ThermalStrain) and load.body == mesh.body]
+        if not loads or not any(map(is_nonlinear, body.materials)):
+            found.append(None)
+            continue
+        points = mesh.by_input_node(body.mesh.points[mesh.nodes])
+        found.append(np.sum([_change(load, points) for load in loads], axis=0))
+    return tuple(found) if any(each is not None for each in found) else ()
+
+
+def _change(load: ThermalStrain, points: np.ndarray) -> np.ndarray:
+    """Return a change of temperature at points."""
+    if isinstance(load.value, Ufl):
+        raise InvalidInputError(
+            f"nonlinear materials need temperatures at nodes, the ThermalStrain on body {load.body!r} is "
+            "given as Ufl: give a function of the points, or a number"
+        )
+    if callable(load.value):
+        return evaluate(f"ThermalStrain on body {load.body!r}", load.value, points, ())
+    return np.full(len(points), float(load.value))
 
 
 @displayed

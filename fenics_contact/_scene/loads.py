@@ -161,11 +161,13 @@ class ThermalStrain:
 
     Its work is ∫ ΔT (C : α) : ε(v). Several on one body add up. The energy of a state counts it as the work
     of a load, so that a freely expanding body has the strain energy of its expansion although it is free of
-    stress.
+    stress. In nonlinear materials it is no load: metals of small strain have the stress of ∇u − ΔT α I,
+    others that of F / θ with θ = 1 + ΔT α, of which the energy per undeformed volume is θ³ W(F / θ).
 
     Attributes:
         body: Name of the body, whose materials must have a thermal expansion.
-        temperature_change: ΔT relative to the stress-free temperature, in degrees.
+        temperature_change: ΔT relative to the stress-free temperature, in degrees; no `Ufl` where materials
+            are nonlinear.
     """
 
     body: str

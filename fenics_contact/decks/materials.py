@@ -129,17 +129,12 @@ def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> M
             for name in ("PLASTIC", "HYPERELASTIC", "NLGEOM")
             if name in parts or name == "NLGEOM" * of.large
         ]
-        if "EXPANSION" in parts and of.heated and stiff:
-            raise parts["EXPANSION"].error(
-                f"thermal expansion with {'*' * (stiff != ['NLGEOM'])}{stiff[0]} has no counterpart: "
-                "leave one of the two out"
-            )
         if of.thickness is not None and stiff:
             raise cards.card.error(
                 f"plane bodies of several thicknesses with {stiff[0]} have no counterpart: give one thickness"
             )
         if "HYPERELASTIC" in parts:
-            return _hyperelastic(parts["HYPERELASTIC"], of)
+            return _hyperelastic(parts, of)
         if "ELASTIC" not in parts:
             raise cards.card.error(
                 "needs *ELASTIC or *HYPERELASTIC behind it, has "
@@ -195,14 +190,14 @@ def _expansion(parts: Mapping[str, Card], of: Conditions, count: int) -> list[fl
 
 def _isotropic(parts: Mapping[str, Card], of: Conditions) -> Material:
     young, poisson = _row(parts["ELASTIC"], 2, of, "Young's modulus and Poisson's ratio")
-    alpha = _expansion(parts, of, 1)
     if "PLASTIC" in parts:
         return _plastic(parts, young, poisson, of)
-    expansion = None if alpha is None else alpha[0]
     if of.large:
         if of.kind == "plane stress":
             raise parts["ELASTIC"].error("plane stress with NLGEOM has no counterpart: take solid elements")
-        return StVenantKirchhoff(young, poisson)
+        return StVenantKirchhoff(young, poisson, **_heated(parts, of))
+    alpha = _expansion(parts, of, 1)
+    expansion = None if alpha is None else alpha[0]
     if of.kind in ("plane strain", "plane stress"):
         kind = PlaneStrain if of.kind == "plane strain" else PlaneStress
         return kind(young, poisson, expansion, of.thickness)
@@ -230,9 +225,16 @@ def _plastic(parts: Mapping[str, Card], young: float, poisson: float, of: Condit
         own = {"kinematic_curve": tuple((strain, stress - first) for strain, stress in rest)}
     if kind == "COMBINED":
         first, own["hardening_curve"] = _curve(parts["CYCLICHARDENING"])
+    further = own | _heated(parts, of)
     if of.large:
-        return NeoHookeanPlasticity(young, poisson, first, **own)
-    return J2Plasticity(young, poisson, first, mean_dilatation=of.dilatation, **own)
+        return NeoHookeanPlasticity(young, poisson, first, **further)
+    return J2Plasticity(young, poisson, first, mean_dilatation=of.dilatation, **further)
+
+
+def _heated(parts: Mapping[str, Card], of: Conditions) -> dict[str, Any]:
+    """Return the expansion of a nonlinear material, which costs forms of its own, where it is heated."""
+    alpha = _expansion(parts, of, 1) if of.heated else None
+    return {} if alpha is None else {"thermal_expansion": alpha[0]}
 
 
 def _curve(card: Card) -> tuple[float, Points]:
@@ -292,7 +294,8 @@ def _anisotropic(parts: Mapping[str, Card], kind: str, axes: Card | None, of: Co
     return AnisotropicElasticity(moduli, _axes(axes), thermal)  # type: ignore[arg-type]
 
 
-def _hyperelastic(card: Card, of: Conditions) -> Material:
+def _hyperelastic(parts: Mapping[str, Card], of: Conditions) -> Material:
+    card = parts["HYPERELASTIC"]
     if not of.large:
         raise card.error("needs NLGEOM in its *STEP, as rubber is for large deformations: add it")
     if of.kind == "plane stress":
@@ -310,13 +313,15 @@ def _hyperelastic(card: Card, of: Conditions) -> Material:
             raise card.error("D2, D3, ... of *HYPERELASTIC, OGDEN have no counterpart: give them as zero")
         moduli = tuple(float(2 * mu / alpha) for mu, alpha in pairs)
         bulk = _bulk(volumes[0], float(sum(pairs[:, 0])))
-        return Ogden(moduli, tuple(map(float, pairs[:, 1])), bulk, mean_dilatation=of.dilatation)
+        exponents, own = tuple(map(float, pairs[:, 1])), _heated(parts, of)
+        return Ogden(moduli, exponents, bulk, mean_dilatation=of.dilatation, **own)
     else:
         raise card.error(
             f"the model {', '.join(sorted(flags)) or 'POLYNOMIAL'} has no counterpart: NEO HOOKE, "
             "MOONEY-RIVLIN and OGDEN have"
         )
-    return MooneyRivlin(c10, c01, _bulk(d1, 2.0 * (c10 + c01)), mean_dilatation=of.dilatation)
+    bulk = _bulk(d1, 2.0 * (c10 + c01))
+    return MooneyRivlin(c10, c01, bulk, mean_dilatation=of.dilatation, **_heated(parts, of))
 
 
 def _bulk(d1: float, shear: float, poisson: float = 0.475) -> float:

@@ -157,7 +157,8 @@ class ShapeForms:
 
             def write_density(material: Material, constants: Constants) -> Expr:
                 with user_code(f"the integrand of {density.name!r}"):
-                    return density.integrand(u, x, stress_of(material, moved, constants, change), *own)
+                    stress = stress_of(material, moved, constants, change)
+                    return density.integrand(u, x, stress, *own)
 
             measure = volume_measure(cell_type, density.degree)
             form, constants = integrate(materials, cell_type, write_density, measure)

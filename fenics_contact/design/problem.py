@@ -15,7 +15,7 @@ from fenics_contact._base.libraries import MPI
 from fenics_contact._base.sparse import LAST_PLACES
 from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.problem import ContactProblem
-from fenics_contact._scene.loads import InitialStress
+from fenics_contact._scene.loads import InitialStress, ThermalStrain
 from fenics_contact._scene.scene import Scene
 from fenics_contact.design.adjoint import WeakChoice, linearise_face, require_from_rest
 from fenics_contact.design.base import SingleProblem, comm_of, with_fewest_weak_points, with_objective
@@ -116,6 +116,7 @@ def _check_differentiable(scene: Scene) -> None:
             has_mean_dilatation(each) for body in scene.bodies.values() for each in body.materials
         ),
         "pressures that do not follow their surfaces": bool(scene.following_pressures),
+        "bodies without ThermalStrain": any(isinstance(load, ThermalStrain) for load in scene.loads),
     }
     for needed, missing in reasons.items():
         if missing:

@@ -15,7 +15,7 @@ from fenics_contact import _dolfinx
 from fenics_contact._base.display import displayed
 from fenics_contact._fem.composition import Composition, composition
 from fenics_contact._fem.forms import FormLibrary
-from fenics_contact._fem.load_forms import loaded_cells, region_of
+from fenics_contact._fem.load_forms import has_work, loaded_cells, region_of
 from fenics_contact._fem.model_checks import check_kernel, kernel_of
 from fenics_contact._scene.body import Body
 from fenics_contact._scene.fields import Ufl
@@ -355,6 +355,8 @@ def assemble(
     for load in acting:
         if isinstance(load, PointForce):
             force += _at_points(load, mesh, body)
+            continue
+        if not has_work(load, parts.materials):
             continue
         facets, acted = None, None
         if isinstance(load, SurfaceLoad):

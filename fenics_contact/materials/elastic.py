@@ -28,6 +28,11 @@ def check_isotropic(young_modulus: float, poisson_ratio: float, thermal_expansio
             f"poisson_ratio must lie between -1 and 0.5 (excluded), got {poisson_ratio!r}: "
             "use 0.3 for steel; incompressible bodies need another model"
         )
+    check_expansion(thermal_expansion)
+
+
+def check_expansion(thermal_expansion: float | None) -> None:
+    """Reject an expansion that is not finite."""
     if thermal_expansion is not None and not np.isfinite(thermal_expansion):
         raise InvalidInputError(
             f"thermal_expansion must be a finite number or None, got {thermal_expansion!r}: give the "

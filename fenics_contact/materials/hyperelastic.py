@@ -14,7 +14,14 @@ from ufl.core.expr import Expr
 from fenics_contact import _dolfinx
 from fenics_contact._base.checks import checked
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.materials.elastic import Elasticity, check_isotropic, lame, numbers, strain
+from fenics_contact.materials.elastic import (
+    Elasticity,
+    check_expansion,
+    check_isotropic,
+    lame,
+    numbers,
+    strain,
+)
 
 
 class EnergyModel(Elasticity):
@@ -95,6 +102,9 @@ class Hyperelasticity(Elasticity):
     its tangent follow by UFL. W must not change when the deformed body is rotated, and F = I must be free of
     stress. `stress` and `stiffness` are the model's linear part at F = I.
 
+    A model with a `thermal_expansion` α that is not None, the last of its parameters (`expansion`), expands:
+    at a change of temperature ΔT its energy is θ³ W(F / θ) with θ = 1 + α ΔT.
+
     Example:
         >>> from dataclasses import dataclass
         >>> import ufl
@@ -117,6 +127,17 @@ class Hyperelasticity(Elasticity):
     """
 
     nonlinear: ClassVar[bool] = True
+    thermal_expansion: float | None = None
+
+    @property
+    def expands(self) -> bool:
+        """Whether α was given."""
+        return self.thermal_expansion is not None
+
+    @property
+    def expansion(self) -> tuple[float, ...]:
+        """α where it was given, else nothing: the last of the parameters."""
+        return () if self.thermal_expansion is None else (self.thermal_expansion,)
 
     @abstractmethod
     def energy(self, F: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
@@ -156,9 +177,14 @@ class Hyperelasticity(Elasticity):
         moduli, epsilon = self._moduli(3, parameters), strain(u)
         return sum(moduli[2, 2, i, j] * epsilon[i, j] for i in range(2) for j in range(2))
 
+    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return the linear part of the stress that free expansion relieves per degree, 3 x 3."""
+        i, j, k = ufl.indices(3)
+        return parameters[-1] * ufl.as_tensor(self._moduli(3, parameters)[i, j, k, k], (i, j))
+
     def transverse_thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
-        """Return zero: the model has no thermal expansion."""
-        return ufl.as_ufl(0.0)
+        """Return the same normal to the plane."""
+        return parameters[-1] * sum(self._moduli(3, parameters)[2, 2, k, k] for k in range(3))
 
     def _moduli(self, dim: int, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return ∂²W/∂F² at F = I."""
@@ -342,6 +368,7 @@ class NeoHooke(NearlyIncompressible):
         young_modulus: Young's modulus E > 0 of small strains, [force / length²].
         poisson_ratio: Poisson's ratio ν in (−1, 0.5) of small strains, dimensionless.
         mean_dilatation: Whether λ acts on the mean dilatation of each cell, against locking at ν near 0.5.
+        thermal_expansion: Thermal expansion α, stretch per degree. None for a body without.
 
     References:
         J. Bonet, R. D. Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed., Cambridge
@@ -351,15 +378,16 @@ class NeoHooke(NearlyIncompressible):
     young_modulus: float
     poisson_ratio: float
     mean_dilatation: bool = False
+    thermal_expansion: float | None = None
 
     def __post_init__(self) -> None:
         """Reject constants for which the strain energy is not positive."""
-        check_isotropic(self.young_modulus, self.poisson_ratio, None)
+        check_isotropic(self.young_modulus, self.poisson_ratio, self.thermal_expansion)
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """First Lamé parameter and shear modulus, [force / length²]."""
-        return lame(self.young_modulus, self.poisson_ratio)
+        """First Lamé parameter and shear modulus, [force / length²], and α where it was given."""
+        return (*lame(self.young_modulus, self.poisson_ratio), *self.expansion)
 
     def shape_energy(self, F: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return μ/2 (tr FᵀF − 3 − 2 ln J)."""
@@ -413,6 +441,7 @@ class MooneyRivlin(IsotropicRubber):
         c01: Constant c01, [force / length²].
         bulk_modulus: Bulk modulus K > 0, [force / length²].
         mean_dilatation: Whether K acts on the mean dilatation of each cell, against locking where K is large.
+        thermal_expansion: Thermal expansion α, stretch per degree. None for a body without.
 
     References:
         R. W. Ogden, Non-Linear Elastic Deformations, Ellis Horwood 1984, chapter 7.
@@ -422,15 +451,17 @@ class MooneyRivlin(IsotropicRubber):
     c01: float
     bulk_modulus: float
     mean_dilatation: bool = False
+    thermal_expansion: float | None = None
 
     def __post_init__(self) -> None:
         """Reject constants for which the energy of small strains is not positive."""
+        check_expansion(self.thermal_expansion)
         _check_moduli("2 (c10 + c01)", 2 * (self.c10 + self.c01), self.bulk_modulus)
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """The constants c10, c01 and K, [force / length²]."""
-        return self.c10, self.c01, self.bulk_modulus
+        """The constants c10, c01 and K, [force / length²], and α where it was given."""
+        return self.c10, self.c01, self.bulk_modulus, *self.expansion
 
     def invariant_energy(self, first: Expr, second: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return c10 (Ī₁ − 3) + c01 (Ī₂ − 3)."""
@@ -454,6 +485,7 @@ class Ogden(IsotropicRubber):
         exponents: α_p, as many, not zero.
         bulk_modulus: Bulk modulus K > 0, [force / length²].
         mean_dilatation: Whether K acts on the mean dilatation of each cell, against locking where K is large.
+        thermal_expansion: Thermal expansion α, stretch per degree. None for a body without.
 
     References:
         R. W. Ogden, Large deformation isotropic elasticity, Proc. R. Soc. Lond. A 326 (1972) 565-584.
@@ -463,9 +495,11 @@ class Ogden(IsotropicRubber):
     exponents: tuple[float, ...]
     bulk_modulus: float
     mean_dilatation: bool = False
+    thermal_expansion: float | None = None
 
     def __post_init__(self) -> None:
         """Reject constants for which the energy of small strains is not positive."""
+        check_expansion(self.thermal_expansion)
         order = "give one μ and one exponent for each term"
         count = np.size(self.shear_moduli)
         for name in ("shear_moduli", "exponents"):
@@ -479,8 +513,8 @@ class Ogden(IsotropicRubber):
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """μ_1, μ_2, ... and K, [force / length²]; the exponents are part of the form."""
-        return *self.shear_moduli, self.bulk_modulus
+        """μ_1, μ_2, ... and K, [force / length²], and α if given; the exponents are part of the form."""
+        return *self.shear_moduli, self.bulk_modulus, *self.expansion
 
     def invariant_energy(self, first: Expr, second: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return Σ μ_p/α_p (λ̄₁^α_p + λ̄₂^α_p + λ̄₃^α_p − 3)."""
@@ -491,7 +525,7 @@ class Ogden(IsotropicRubber):
 
     def volume_energy(self, J: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return K/2 (J − 1)²."""
-        return parameters[-1] / 2 * (J - 1) ** 2
+        return parameters[len(self.exponents)] / 2 * (J - 1) ** 2
 
 
 def _check_moduli(name: str, shear_modulus: float, bulk_modulus: float) -> None:
@@ -514,22 +548,24 @@ class StVenantKirchhoff(Hyperelasticity):
     Attributes:
         young_modulus: Young's modulus E > 0 of small strains, [force / length²].
         poisson_ratio: Poisson's ratio ν in (−1, 0.5) of small strains, dimensionless.
+        thermal_expansion: Thermal expansion α, stretch per degree. None for a body without.
     """
 
     young_modulus: float
     poisson_ratio: float
+    thermal_expansion: float | None = None
 
     def __post_init__(self) -> None:
         """Reject constants for which the strain energy is not positive."""
-        check_isotropic(self.young_modulus, self.poisson_ratio, None)
+        check_isotropic(self.young_modulus, self.poisson_ratio, self.thermal_expansion)
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """First Lamé parameter and shear modulus, [force / length²]."""
-        return lame(self.young_modulus, self.poisson_ratio)
+        """First Lamé parameter and shear modulus, [force / length²], and α where it was given."""
+        return (*lame(self.young_modulus, self.poisson_ratio), *self.expansion)
 
     def energy(self, F: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
-        """Return W(F) with ``parameters`` = (λ, μ)."""
-        lame_parameter, shear = parameters
+        """Return W(F) with ``parameters`` = (λ, μ, ...)."""
+        lame_parameter, shear = parameters[:2]
         E = (F.T * F - ufl.Identity(3)) / 2
         return lame_parameter / 2 * ufl.tr(E) ** 2 + shear * ufl.inner(E, E)

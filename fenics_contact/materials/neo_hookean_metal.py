@@ -42,6 +42,7 @@ class NeoHookeanPlasticity(VonMisesMetal):
             (0, σ_0), straight between them, constant beyond the last.
         kinematic_curve: Back stress by plastic strain in tension in place of C: pairs (α, β) beyond (0, 0),
             straight between them, constant beyond the last. In cycles α is all plastic strain there was.
+        thermal_expansion: Thermal expansion α, stretch per degree. None for a body without.
 
     References:
         J. C. Simo: A framework for finite strain elastoplasticity based on maximum plastic dissipation and
@@ -66,6 +67,7 @@ class NeoHookeanPlasticity(VonMisesMetal):
     saturation_rate: float = 0.0
     hardening_curve: Points = ()
     kinematic_curve: Points = ()
+    thermal_expansion: float | None = None
 
     @property
     def history_size(self) -> int:

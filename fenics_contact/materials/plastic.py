@@ -65,6 +65,9 @@ class HistoryMaterial(Elasticity):
     symmetric part alone (small strain). With `mean_dilatation`, in small strain, it gets the mean change of
     volume of each cell at all of its points, against locking where flow keeps the volume.
 
+    A model with a `thermal_expansion` α that is not None expands: `respond` gets the gradient without
+    thermal strain, (F / θ) − I of large deformations with θ = 1 + α ΔT, else ∇u − α ΔT I.
+
     `symmetric` states whether tangents are, A_ijkl = A_klij. Of others Newton's method takes the symmetric
     part, and converges linearly, the faster the smaller the rest.
 
@@ -98,6 +101,7 @@ class HistoryMaterial(Elasticity):
     finite: ClassVar[bool] = False
     symmetric: ClassVar[bool] = True
     mean_dilatation: bool = False
+    thermal_expansion: float | None = None
 
     def __init_subclass__(cls, **given: Any) -> None:
         """Reject a model that replaces the checks of what it returns.
@@ -215,9 +219,23 @@ class HistoryMaterial(Elasticity):
         """Return the stress of the linear part normal to the plane."""
         return self._stress_vector(u, parameters, 3)[2]
 
+    @property
+    def expands(self) -> bool:
+        """Whether α was given."""
+        return self.thermal_expansion is not None
+
+    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return the stress of the linear part that free expansion relieves per degree, 3 x 3."""
+        return as_tensor(self._thermal_stresses(parameters), 3)
+
     def transverse_thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
-        """Return zero: the model has no thermal expansion."""
-        return ufl.as_ufl(0.0)
+        """Return the same normal to the plane."""
+        return self._thermal_stresses(parameters)[2]
+
+    def _thermal_stresses(self, parameters: tuple[ufl.Constant, ...]) -> list[Expr]:
+        free = ufl.as_ufl(self.thermal_expansion or 0.0)
+        zero = ufl.as_ufl(0.0)
+        return symmetric_product(parameters, [free, free, free, zero, zero, zero])
 
     def _stress_vector(self, u: Expr, parameters: tuple[ufl.Constant, ...], dim: int) -> list[Expr]:
         if len(u) == 3:
@@ -243,7 +261,7 @@ class VonMisesMetal(HistoryMaterial):
 
     def __post_init__(self) -> None:
         """Reject constants without a unique answer."""
-        check_isotropic(self.young_modulus, self.poisson_ratio, None)
+        check_isotropic(self.young_modulus, self.poisson_ratio, self.thermal_expansion)
         for name, first in (("hardening_curve", self.yield_stress), ("kinematic_curve", 0.0)):
             if getattr(self, name):
                 object.__setattr__(self, name, checked_curve(name, getattr(self, name), first))
@@ -311,6 +329,7 @@ class J2Plasticity(VonMisesMetal):
             (0, σ_0), straight between them, constant beyond the last.
         kinematic_curve: Back stress by plastic strain in tension in place of C: pairs (α, β) beyond (0, 0),
             straight between them, constant beyond the last. In cycles α is all plastic strain there was.
+        thermal_expansion: Thermal expansion α, strain per degree. None for a body without.
 
     Example:
         Half the strain beyond yield is plastic where H = E:
@@ -338,6 +357,7 @@ class J2Plasticity(VonMisesMetal):
     mean_dilatation: bool = False
     hardening_curve: Points = ()
     kinematic_curve: Points = ()
+    thermal_expansion: float | None = None
 
     @property
     def history_size(self) -> int:
@@ -393,6 +413,7 @@ class FinitePlasticity(VonMisesMetal):
         saturation_rate: How fast it is approached, δ ≥ 0, per plastic strain.
         hardening_curve: Yield stress by plastic strain in place of H and δ: pairs (α, σ_y) beyond
             (0, σ_0), straight between them, constant beyond the last.
+        thermal_expansion: Thermal expansion α, stretch per degree. None for a body without.
 
     References:
         J. C. Simo: Algorithms for static and dynamic multiplicative plasticity that preserve the classical
@@ -410,6 +431,7 @@ class FinitePlasticity(VonMisesMetal):
     saturation_stress: float | None = None
     saturation_rate: float = 0.0
     hardening_curve: Points = ()
+    thermal_expansion: float | None = None
 
     def admissible(self, history: np.ndarray) -> np.ndarray:
         """Return plastic deformations that keep the volume, and α; a mean of such is a little too large."""

@@ -53,13 +53,6 @@ def test_linear_elements_with_a_letter_are_noted(tmp_path: Path) -> None:
     assert any("C3D8R are solved as C3D8, by full integration" in note for note in found.notes)
 
 
-def test_an_expansion_of_plastic_material_is_refused(tmp_path: Path) -> None:
-    plastic = STEEL + "*PLASTIC\n300., 0.\n*EXPANSION\n1.E-5\n"
-    heated = "*STEP\n*STATIC\n*TEMPERATURE\nBAR_X1, 5.\n*END STEP\n"
-    with pytest.raises(DeckError, match=r"thermal expansion with \*PLASTIC has no counterpart"):
-        read_deck(deck(tmp_path, mesh_cards({"BAR": CUBE}) + plastic + SECTION + heated))
-
-
 @pytest.mark.parametrize("normal", ["", "1., 0., 0.\n", "-1., 0., 0.\n"])
 def test_a_bolt_of_cells_with_centres_is_drawn(normal: str, tmp_path: Path) -> None:
     mesh = serendipity(quadratic(block((0, 0, 0), (4, 1, 1), (4, 1, 1))))

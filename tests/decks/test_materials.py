@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fenics_contact import ThermalStrain
 from fenics_contact.decks import DeckError, read_deck
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
@@ -31,11 +32,14 @@ STEEL = "*ELASTIC\n2.E5, 0.3\n"
 def material(
     folder: Path, cards: str, large: bool = False, mesh: str = CUBE, section: str = SECTION
 ) -> Material:
-    nlgeom = ", NLGEOM" if large else ""
-    end = f"*BOUNDARY\nBAR_X0, 1, 2\n*STEP{nlgeom}\n*STATIC\n*END STEP\n"
-    found = read_deck(deck(folder, mesh + "*MATERIAL, NAME=STEEL\n" + cards + section + end))
-    (one,) = found.scene.bodies["BAR"].materials
+    (one,) = read_deck(deck(folder, text_of(cards, large, mesh, section))).scene.bodies["BAR"].materials
     return one
+
+
+def text_of(cards: str, large: bool, mesh: str, section: str, loads: str = "") -> str:
+    nlgeom = ", NLGEOM" if large else ""
+    end = f"*BOUNDARY\nBAR_X0, 1, 2\n*STEP{nlgeom}\n*STATIC\n{loads}*END STEP\n"
+    return mesh + "*MATERIAL, NAME=STEEL\n" + cards + section + end
 
 
 @pytest.mark.parametrize(
@@ -71,6 +75,26 @@ def test_constants_become_those_of_the_models(
     cards: str, large: bool, wanted: Material, tmp_path: Path
 ) -> None:
     assert material(tmp_path, cards, large) == wanted
+
+
+@pytest.mark.parametrize(
+    ("cards", "large", "wanted"),
+    [
+        (STEEL, True, StVenantKirchhoff(2e5, 0.3, 1e-5)),
+        (STEEL + "*PLASTIC\n300., 0.\n", False, J2Plasticity(2e5, 0.3, 300.0, thermal_expansion=1e-5)),
+        (STEEL + "*PLASTIC\n300., 0.\n", True, NeoHookeanPlasticity(2e5, 0.3, 300.0, thermal_expansion=1e-5)),
+        ("*HYPERELASTIC, NEO HOOKE\n1., 0.02\n", True, MooneyRivlin(1.0, 0.0, 100.0, thermal_expansion=1e-5)),
+    ],
+)
+def test_nonlinear_materials_expand_where_they_are_heated(
+    cards: str, large: bool, wanted: Material, tmp_path: Path
+) -> None:
+    warm = "*TEMPERATURE\nBAR_X0, 50.\nBAR_X1, 50.\n"
+    text = text_of(cards + "*EXPANSION\n1.E-5\n", large, CUBE, SECTION, warm)
+    found = read_deck(deck(tmp_path, text))
+    assert found.scene.bodies["BAR"].materials == (wanted,)
+    (load,) = found.steps[0].loads
+    assert load == ThermalStrain("BAR", 50.0)
 
 
 def test_rubber_without_compressibility_is_that_of_calculix(tmp_path: Path) -> None:

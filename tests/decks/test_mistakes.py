@@ -139,12 +139,6 @@ WRONG = [
         "*BOUNDARY, T",
         r"TYPE=VELOCITY is not read",
     ),
-    (
-        "*CLOAD\nBAR_X1, 1, 10.",
-        "*TEMPERATURE\nBAR_X1, 90.\n*MATERIAL, NAME=STEEL\n*ELASTIC\n2., 0.\n*PLASTIC\n1.\n*EXPANSION\n1.",
-        "*EXPANSION",
-        r"thermal expansion with \*PLASTIC has no counterpart",
-    ),
 ]
 
 
