@@ -209,7 +209,9 @@ class HistoryMechanics:
             if means is not None:
                 given = means.averaged(given)
             end = material.answer(
-                given.reshape(-1, 3, 3), before[cells, :, :size].reshape(-1, size), step.duration
+                given.reshape(-1, 3, 3),
+                before[cells, :, :size].reshape(shape[0] * shape[1], size),
+                step.duration,
             )
             after[cells, :, :size] = end.history.reshape(*shape, size)
             nominal = stretch**2 * end.stress.reshape(*shape, 3, 3)

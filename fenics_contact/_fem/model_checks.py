@@ -78,7 +78,11 @@ def _checked_step(
         )
     other = material.answer(gradient[::-1], history[::-1], duration)
     pairs = ((end.stress, other.stress), (end.tangent, other.tangent), (end.history, other.history))
-    if not all(np.allclose(one, two[::-1], rtol=1e-9, atol=1e-12 * np.abs(one).max()) for one, two in pairs):
+    sizes = [np.abs(one).max(initial=0.0) for one, _ in pairs]
+    same = (
+        np.allclose(a, b[::-1], rtol=1e-9, atol=1e-12 * c) for (a, b), c in zip(pairs, sizes, strict=True)
+    )
+    if not all(same):
         raise InvalidInputError(
             f"respond of {name} must answer for each point by itself and alike when asked again, in "
             "reversed order its answers are others: take no sums or indices over points, and keep nothing in "

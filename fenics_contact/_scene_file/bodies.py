@@ -33,7 +33,7 @@ from fenics_contact.gallery import round as whole
 from fenics_contact.gallery.links import DesignSurface, Link
 from fenics_contact.gallery.ring import LinkShape
 from fenics_contact.materials import anisotropic as anisotropic_module
-from fenics_contact.materials import elastic, hyperelastic, neo_hookean_metal
+from fenics_contact.materials import elastic, foam, hyperelastic, neo_hookean_metal, ramberg_osgood
 from fenics_contact.materials import orthotropic as orthotropic_module
 from fenics_contact.materials import plastic as plastic_module
 from fenics_contact.materials.elastic import Material
@@ -161,6 +161,8 @@ MATERIALS = (
     table_of(hyperelastic.StVenantKirchhoff, _Material, model="st_venant_kirchhoff"),
     table_of(hyperelastic.MooneyRivlin, _Material, model="mooney_rivlin"),
     table_of(hyperelastic.Ogden, _Material, model="ogden"),
+    table_of(foam.Hyperfoam, _Material, model="hyperfoam"),
+    table_of(ramberg_osgood.RambergOsgood, _Material, model="ramberg_osgood"),
 )
 
 

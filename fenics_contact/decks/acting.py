@@ -25,6 +25,7 @@ from fenics_contact.decks.couplings import (
 )
 from fenics_contact.decks.history import Moment, Pressed, Weight
 from fenics_contact.decks.holding import Holding
+from fenics_contact.decks.initial_stress import relieved
 from fenics_contact.decks.model import Model
 from fenics_contact.decks.regions import region_names
 from fenics_contact.materials.hyperelastic import is_nonlinear
@@ -147,14 +148,19 @@ class Acting:
 
     def _stressed(self, bodies: Mapping[str, Body]) -> list[Load]:
         """Return the initial stresses of bodies."""
-        given, found = self.model.stressed, list[Load]()
-        if given is None:
-            return found
+        given, flowed, found = self.model.stressed, self.model.flowed, list[Load]()
         for part in self.model.parts_of_mesh:
-            stress = given.stress[self.model.in_cell_order(part)]
+            order, body = self.model.in_cell_order(part), bodies[part.name]
+            stress = np.zeros((len(order), 6)) if given is None else given.values[order].copy()
+            if flowed is not None:
+                for number, material in enumerate(body.materials):
+                    cells = np.flatnonzero(body.material_of_cells == number)
+                    strain = flowed.values[order][cells]
+                    if strain.any():
+                        stress[cells] += relieved(strain, material, flowed.card)
             if not stress.any():
                 continue
-            if any(map(is_nonlinear, bodies[part.name].materials)):
+            if given is not None and any(map(is_nonlinear, body.materials)):
                 raise given.card.error(
                     f"initial stresses are read for linear materials without NLGEOM, body {part.name} has "
                     f"{bodies[part.name].in_words}: leave them out"

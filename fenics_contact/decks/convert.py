@@ -32,10 +32,12 @@ from fenics_contact.decks.deck import Deck
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.anisotropic import AnisotropicElasticity
 from fenics_contact.materials.elastic import IsotropicElasticity, PlaneStrain, PlaneStress
+from fenics_contact.materials.foam import Hyperfoam
 from fenics_contact.materials.hyperelastic import MooneyRivlin, Ogden, StVenantKirchhoff
 from fenics_contact.materials.neo_hookean_metal import NeoHookeanPlasticity
 from fenics_contact.materials.orthotropic import OrthotropicElasticity, OrthotropicPlaneStress
 from fenics_contact.materials.plastic import FinitePlasticity, J2Plasticity
+from fenics_contact.materials.ramberg_osgood import RambergOsgood
 
 _MODELS: dict[type, str] = {
     IsotropicElasticity: "isotropic",
@@ -47,6 +49,8 @@ _MODELS: dict[type, str] = {
     J2Plasticity: "j2_plasticity",
     FinitePlasticity: "finite_plasticity",
     NeoHookeanPlasticity: "neo_hookean_plasticity",
+    Hyperfoam: "hyperfoam",
+    RambergOsgood: "ramberg_osgood",
     StVenantKirchhoff: "st_venant_kirchhoff",
     MooneyRivlin: "mooney_rivlin",
     Ogden: "ogden",

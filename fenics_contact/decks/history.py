@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fenics_contact.decks.initial_stress import kind_of
 from fenics_contact.decks.vocabulary import KNOWN, PRINT_CARDS, PROCEDURES
 from fenics_contact.readers.deck_cards import Card, plain
 from fenics_contact.readers.deck_mesh import DeckMesh
@@ -426,10 +427,11 @@ def _initial(cards: Sequence[Card], mesh: DeckMesh) -> np.ndarray:
     found = np.zeros(len(mesh.points))
     for card in cards:
         if card.name == "INITIALCONDITIONS":
-            if card.name_of("TYPE") == "STRESS":
+            kind = kind_of(card)
+            if kind in ("STRESS", "PLASTICSTRAIN"):
                 continue
-            if card.name_of("TYPE") != "TEMPERATURE":
-                raise card.error(f"TYPE={card.name_of('TYPE')} is not read: TEMPERATURE and STRESS are")
+            if kind != "TEMPERATURE":
+                raise card.error(f"TYPE={kind} is not read: TEMPERATURE, STRESS and PLASTIC STRAIN are")
             _assign(found, card, mesh)
     return found
 

@@ -1,4 +1,4 @@
-"""Stresses that a deck gives its elements before the first step."""
+"""Stresses and plastic strains that a deck gives its elements before the first step."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact.materials.elastic import IsotropicElasticity, Material, PlaneStrain, lame
 from fenics_contact.readers.deck_cards import Card
 from fenics_contact.readers.deck_mesh import DeckMesh
 
@@ -15,27 +16,27 @@ _IN_VOIGT = [0, 1, 2, 5, 4, 3]
 
 
 @dataclass(frozen=True, eq=False)
-class StressGiven:
-    """Initial stresses of elements.
+class TensorGiven:
+    """Initial stresses, or plastic strains, of elements.
 
     Attributes:
         card: The last card that gives some.
-        stress: By element, xx, yy, zz, yz, xz, xy, (n_elements, 6), zero where none is given.
+        values: By element, xx, yy, zz, yz, xz, xy, (n_elements, 6), zero where none is given.
     """
 
     card: Card
-    stress: np.ndarray
+    values: np.ndarray
 
 
-def read_initial_stress(
-    cards: Sequence[Card], mesh: DeckMesh, note: Callable[[Card, str], None]
-) -> StressGiven | None:
-    """Return the initial stresses of a deck, None without any.
+def read_initial(
+    cards: Sequence[Card], mesh: DeckMesh, note: Callable[[Card, str], None], kind: str = "STRESS"
+) -> TensorGiven | None:
+    """Return the initial stresses, or the PLASTICSTRAIN, of a deck, None without any.
 
-    Lines of eight entries have an element, an integration point and six stresses, as in CalculiX; others an
-    element or a set and its stresses, as in Abaqus. Elements have the mean of their points.
+    Lines of eight entries have an element, an integration point and six components, as in CalculiX; others an
+    element or a set and its components, as in Abaqus. Elements have the mean of their points.
     """
-    mine = [each for each in cards if each.name == "INITIALCONDITIONS" and each.name_of("TYPE") == "STRESS"]
+    mine = [each for each in cards if each.name == "INITIALCONDITIONS" and kind_of(each) == kind]
     if not mine:
         return None
     stress = np.zeros((len(mesh.element_numbers), 6))
@@ -56,7 +57,25 @@ def read_initial_stress(
                 values = np.zeros(6)
                 values[_IN_VOIGT[: len(numbers)]] = numbers
                 stress[mesh.elements_named(entries[0], card, row)] = values
-    return StressGiven(mine[-1], stress)
+    return TensorGiven(mine[-1], stress)
+
+
+def kind_of(card: Card) -> str:
+    """Return the type of an initial condition, without blanks."""
+    return card.name_of("TYPE").replace(" ", "")
+
+
+def relieved(strain: np.ndarray, material: Material, card: Card) -> np.ndarray:
+    """Return the stresses −C : ε of bodies that are held, of plastic strains, both (n, 6)."""
+    if not isinstance(material, IsotropicElasticity | PlaneStrain):
+        raise card.error(
+            "plastic strains are read for isotropic elastic solids or those in plane strain without NLGEOM, "
+            f"here is {type(material).__name__}: leave them out"
+        )
+    first, shear = lame(material.young_modulus, material.poisson_ratio)
+    stress = -2 * shear * strain
+    stress[:, :3] -= first * strain[:, :3].sum(axis=1, keepdims=True)
+    return stress
 
 
 def _at_points(card: Card, mesh: DeckMesh, stress: np.ndarray, note: Callable[[Card, str], None]) -> None:

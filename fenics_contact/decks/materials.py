@@ -12,11 +12,13 @@ from fenics_contact.decks.vocabulary import MATERIAL_CARDS, WITHOUT_EFFECT
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.materials.anisotropic import AnisotropicElasticity
 from fenics_contact.materials.elastic import IsotropicElasticity, Material, PlaneStrain, PlaneStress
+from fenics_contact.materials.foam import Hyperfoam
 from fenics_contact.materials.hardening import Points
 from fenics_contact.materials.hyperelastic import MooneyRivlin, Ogden, StVenantKirchhoff
 from fenics_contact.materials.neo_hookean_metal import NeoHookeanPlasticity
 from fenics_contact.materials.orthotropic import OrthotropicElasticity, OrthotropicPlaneStress, material_axes
 from fenics_contact.materials.plastic import J2Plasticity
+from fenics_contact.materials.ramberg_osgood import RambergOsgood
 from fenics_contact.readers.deck_cards import Card
 
 
@@ -126,15 +128,16 @@ def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> M
     try:
         stiff = [
             name
-            for name in ("PLASTIC", "HYPERELASTIC", "NLGEOM")
+            for name in ("PLASTIC", *WITHOUT_ELASTIC, "NLGEOM")
             if name in parts or name == "NLGEOM" * of.large
         ]
         if of.thickness is not None and stiff:
             raise cards.card.error(
                 f"plane bodies of several thicknesses with {stiff[0]} have no counterpart: give one thickness"
             )
-        if "HYPERELASTIC" in parts:
-            return _hyperelastic(parts, of)
+        for name, build in WITHOUT_ELASTIC.items():
+            if name in parts:
+                return build(parts, of)
         if "ELASTIC" not in parts:
             raise cards.card.error(
                 "needs *ELASTIC or *HYPERELASTIC behind it, has "
@@ -322,6 +325,35 @@ def _hyperelastic(parts: Mapping[str, Card], of: Conditions) -> Material:
         )
     bulk = _bulk(d1, 2.0 * (c10 + c01))
     return MooneyRivlin(c10, c01, bulk, mean_dilatation=of.dilatation, **_heated(parts, of))
+
+
+def _foam(parts: Mapping[str, Card], of: Conditions) -> Material:
+    card = parts["HYPERFOAM"]
+    _require_large_solid(card, of)
+    order = int(card.number_of("N", 1.0))
+    values = _row(card, 3 * order, of, "μ and α, and behind them ν, of each term")
+    pairs = np.array(values[: 2 * order]).reshape(-1, 2)
+    moduli, exponents = (tuple(map(float, column)) for column in pairs.T)
+    return Hyperfoam(moduli, exponents, tuple(values[2 * order :]), **_heated(parts, of))
+
+
+def _deformation(parts: Mapping[str, Card], of: Conditions) -> Material:
+    card = parts["DEFORMATIONPLASTICITY"]
+    _require_large_solid(card, of)
+    numbers = _row(card, 5, of, "E, ν, the yield stress, the exponent and the offset")
+    young, poisson, stress, exponent, offset = numbers
+    return RambergOsgood(young, poisson, stress, exponent, offset, **_heated(parts, of))
+
+
+def _require_large_solid(card: Card, of: Conditions) -> None:
+    if not of.large:
+        raise card.error("needs NLGEOM in its *STEP, as it is for large deformations: add it")
+    if of.kind == "plane stress":
+        raise card.error("has no counterpart in plane stress: take solid or plane strain elements")
+
+
+#: Cards of materials that need no *ELASTIC.
+WITHOUT_ELASTIC = {"HYPERELASTIC": _hyperelastic, "HYPERFOAM": _foam, "DEFORMATIONPLASTICITY": _deformation}
 
 
 def _bulk(d1: float, shear: float, poisson: float = 0.475) -> float:

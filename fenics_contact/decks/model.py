@@ -17,7 +17,7 @@ from fenics_contact.decks.couplings import (
     read_equations,
 )
 from fenics_contact.decks.history import History, read_history
-from fenics_contact.decks.initial_stress import read_initial_stress
+from fenics_contact.decks.initial_stress import read_initial
 from fenics_contact.decks.materials import Conditions, build_material, read_materials
 from fenics_contact.decks.regions import split_sections
 from fenics_contact.mesh.body_mesh import BodyMesh
@@ -58,7 +58,8 @@ class Model:
         self.surfaces: dict[str, Faces] = {}
         self.node_sets: dict[str, np.ndarray] = {}
         self._split()
-        self.stressed = read_initial_stress(cards, self.mesh, self.note)
+        self.stressed = read_initial(cards, self.mesh, self.note)
+        self.flowed = read_initial(cards, self.mesh, self.note, "PLASTICSTRAIN")
         self.driven = read_driven(cards, self.mesh)
         self.bolts = read_bolts(cards, self.mesh)
         self.equations = read_equations(cards, self.mesh)

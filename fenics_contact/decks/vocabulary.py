@@ -4,7 +4,8 @@ from __future__ import annotations
 
 #: Cards of a material, behind *MATERIAL.
 MATERIAL_CARDS = {
-    "ELASTIC", "PLASTIC", "CYCLICHARDENING", "HYPERELASTIC", "EXPANSION", "DENSITY", "CONDUCTIVITY",
+    "ELASTIC", "PLASTIC", "CYCLICHARDENING", "HYPERELASTIC", "HYPERFOAM",
+    "DEFORMATIONPLASTICITY", "EXPANSION", "DENSITY", "CONDUCTIVITY",
     "SPECIFICHEAT",
 }  # fmt: skip
 #: Cards of nodes, elements and sets.
@@ -67,6 +68,8 @@ PARAMETERS: dict[str, set[str]] = {
     "ELASTIC": {"TYPE"},
     "PLASTIC": {"HARDENING"},
     "CYCLICHARDENING": set(),
+    "HYPERFOAM": {"N"},
+    "DEFORMATIONPLASTICITY": set(),
     "EXPANSION": {"TYPE", "ZERO"},
     "DENSITY": set(),
     "ORIENTATION": {"NAME", "SYSTEM", "DEFINITION"},

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         Transverse,
         strain,
     )
+    from fenics_contact.materials.foam import Hyperfoam
     from fenics_contact.materials.hyperelastic import (
         EnergyModel,
         Hyperelasticity,
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
         J2Plasticity,
         MaterialResponse,
     )
+    from fenics_contact.materials.ramberg_osgood import RambergOsgood
 
 __all__ = [
     "AnisotropicElasticity",
@@ -47,6 +49,7 @@ __all__ = [
     "FinitePlasticity",
     "HistoryMaterial",
     "Hyperelasticity",
+    "Hyperfoam",
     "IsotropicElasticity",
     "J2Plasticity",
     "Material",
@@ -60,6 +63,7 @@ __all__ = [
     "OrthotropicPlaneStress",
     "PlaneStrain",
     "PlaneStress",
+    "RambergOsgood",
     "StVenantKirchhoff",
     "Thermoelastic",
     "Transverse",

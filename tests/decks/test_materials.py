@@ -12,6 +12,7 @@ from fenics_contact.decks import DeckError, read_deck
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
     AnisotropicElasticity,
+    Hyperfoam,
     IsotropicElasticity,
     J2Plasticity,
     Material,
@@ -20,6 +21,7 @@ from fenics_contact.materials import (
     Ogden,
     OrthotropicElasticity,
     OrthotropicPlaneStress,
+    RambergOsgood,
     StVenantKirchhoff,
 )
 from tests.decks.texts import SECTION, deck, mesh_cards
@@ -50,6 +52,8 @@ def text_of(cards: str, large: bool, mesh: str, section: str, loads: str = "") -
         ("*HYPERELASTIC, NEO HOOKE\n1.5, 0.02\n", True, MooneyRivlin(1.5, 0.0, 100.0)),
         ("*HYPERELASTIC, MOONEY-RIVLIN\n1.5, 0.5, 0.02\n", True, MooneyRivlin(1.5, 0.5, 100.0)),
         ("*HYPERELASTIC, OGDEN, N=2\n3., 2., 1., 4., 0.1, 0.\n", True, Ogden((3.0, 0.5), (2.0, 4.0), 20.0)),
+        ("*HYPERFOAM, N=2\n3., 2., 1., 4., 0.1, 0.\n", True, Hyperfoam((3.0, 1.0), (2.0, 4.0), (0.1, 0.0))),
+        ("*DEFORMATION PLASTICITY\n2.E5,.3,900.,12.,.4\n", True, RambergOsgood(2e5, 0.3, 900.0, 12.0, 0.4)),
         (
             STEEL + "*PLASTIC\n300., 0.\n400., 0.1\n450., 0.3\n",
             False,
@@ -143,6 +147,8 @@ def test_21_stiffnesses_are_in_their_places(tmp_path: Path) -> None:
         ("*ELASTIC, TYPE=ANISO\n1., 2., 1.\n", False, r"moduli must give a positive energy"),
         ("*DENSITY\n1.\n", False, r"needs \*ELASTIC or \*HYPERELASTIC behind it, has \*DENSITY"),
         ("*HYPERELASTIC, YEOH\n1., 0.\n", True, r"the model YEOH has no counterpart"),
+        ("*HYPERFOAM\n1., 2., 0.1\n", False, r"needs NLGEOM in its \*STEP"),
+        ("*HYPERFOAM\n1., 2., 0.6\n", True, r"poisson_ratios must lie between 0 and 0.5"),
         ("*HYPERELASTIC, OGDEN, N=2\n3., 2., 1., 4., 0.1, 0.2\n", True, r"D2, D3, \.\.\. of \*HYPERELASTIC"),
         (STEEL + "*PLASTIC\n3., 0.1\n4., 0.2\n", False, r"a table must begin at plastic strain zero"),
         (STEEL + "*PLASTIC\n3., 0.\n4., 0.2\n5., 0.1\n", False, r"plastic strains of hardening_curve must"),

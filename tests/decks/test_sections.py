@@ -55,8 +55,8 @@ def test_several_thicknesses_of_metal_that_yields_are_refused(tmp_path: Path) ->
         read_deck(deck(tmp_path, text + step("")))
 
 
-def initial(lines: str) -> str:
-    return f"*INITIAL CONDITIONS, TYPE=STRESS\n{lines}"
+def initial(lines: str, kind: str = "STRESS") -> str:
+    return f"*INITIAL CONDITIONS, TYPE={kind}\n{lines}"
 
 
 def at_points(*values: float, element: int = 1) -> str:
@@ -83,6 +83,23 @@ def test_initial_stresses_relax_between_free_ends(lines: str, tmp_path: Path) ->
         assert np.abs(state.gather_stress("BAR")).max() < 1e-6
     assert not found.notes
     np.testing.assert_allclose(again(found, tmp_path)[:, 0], moved, atol=1e-11)
+
+
+def test_plastic_strain_of_a_free_bar_is_its_strain(tmp_path: Path) -> None:
+    """Without NLGEOM; shears are those of the tensor."""
+    text = BAR + FREE_TO_CONTRACT + initial("BAR, 0.01, -0.005, -0.004\n", "PLASTIC STRAIN")
+    found = read_deck(deck(tmp_path, text + step("")))
+    (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-12)
+    points, moved = found.scene.bodies["BAR"].mesh.points, state.gather_displacement("BAR")
+    longer = [0.01, 0.005, 0.004] * np.ptp(points, axis=0)
+    np.testing.assert_allclose(np.ptp(moved, axis=0), longer, rtol=1e-7)
+    assert np.abs(state.gather_stress("BAR")).max() < 1e-5
+    with pytest.raises(DeckError, match="plastic strains are read for isotropic elastic solids"):
+        read_deck(deck(tmp_path, text + step("", ", NLGEOM")))
+    shear = BAR + FREE_TO_CONTRACT + initial("BAR, 0., 0., 0., 0.002, 0., 0.\n", "PLASTIC STRAIN")
+    (load,) = read_deck(deck(tmp_path, shear + step(""))).steps[0].loads or ()  # type: ignore[misc]
+    assert isinstance(load, InitialStress)
+    assert load.value == pytest.approx((0, 0, 0, 0, 0, -2 * 210000.0 / 2.6 * 0.002))
 
 
 def test_orders_of_components_are_those_of_the_deck(tmp_path: Path) -> None:

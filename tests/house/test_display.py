@@ -110,6 +110,7 @@ from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
     AnisotropicElasticity,
     FinitePlasticity,
+    Hyperfoam,
     J2Plasticity,
     MooneyRivlin,
     NeoHooke,
@@ -119,6 +120,7 @@ from fenics_contact.materials import (
     OrthotropicPlaneStress,
     PlaneStrain,
     PlaneStress,
+    RambergOsgood,
     StVenantKirchhoff,
 )
 from fenics_contact.mesh import Chart, MeshTransfer, refined
@@ -202,6 +204,7 @@ def objects() -> dict[str, Any]:
         MooneyRivlin(1.0, 0.0, 9.0), Ogden((1.0,), (2.0,), 9.0), StVenantKirchhoff(1.0, 0.3),
         PlaneStrain(1.0, 0.3), PlaneStress(1.0, 0.3), NeoHooke(1.0, 0.3), J2Plasticity(1.0, 0.3, 1.0),
         FinitePlasticity(1.0, 0.3, 1.0), NeoHookeanPlasticity(1.0, 0.3, 1.0),
+        Hyperfoam((1.0,), (2.0,), (0.1,)), RambergOsgood(1.0, 0.3, 1.0, 5.0, 0.4),
         J2Plasticity(1.0, 0.3, 1.0).answer(np.zeros((9, 3, 3)), np.zeros((9, 7)), 0.0), Ufl(lambda x: x[0]),
         DistanceObstacle(lambda x: x[:, 2]), RigidSphere((0, 0, 0), 1.0),
         AutomaticContact(), MovingObstacle(RigidSphere((0, 0, 0), 1.0), lambda time: (None, (time, 0, 0))),

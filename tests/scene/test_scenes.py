@@ -62,6 +62,7 @@ from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import (
     AnisotropicElasticity,
     FinitePlasticity,
+    Hyperfoam,
     IsotropicElasticity,
     J2Plasticity,
     Material,
@@ -73,6 +74,7 @@ from fenics_contact.materials import (
     OrthotropicPlaneStress,
     PlaneStrain,
     PlaneStress,
+    RambergOsgood,
     StVenantKirchhoff,
     rigid_body_modes,
 )
@@ -347,7 +349,8 @@ SAMPLES: dict[type, Any] = {
         AnisotropicElasticity(np.eye(6)),  # type: ignore[arg-type]
         NeoHooke(1.0, 0.3), MooneyRivlin(1.0, 0.5, 10.0), StVenantKirchhoff(1.0, 0.3),
         Ogden((1.0,), (2.0,), 10.0), J2Plasticity(1.0, 0.3, 0.1), FinitePlasticity(1.0, 0.3, 0.1),
-        NeoHookeanPlasticity(1.0, 0.3, 0.1),
+        NeoHookeanPlasticity(1.0, 0.3, 0.1), Hyperfoam((1.0,), (2.0,), (0.1,)),
+        RambergOsgood(1.0, 0.3, 1.0, 5.0, 0.4),
     )
 }  # fmt: skip
 
