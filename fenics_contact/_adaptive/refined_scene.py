@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from fenics_contact._base.display import displayed
 from fenics_contact._scene.scene import Scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cuts import sewn
-from fenics_contact.mesh.refinement import Refinement, refined
+from fenics_contact.mesh.refinement import Refinement, halves_together, refined
 
 
 @displayed
@@ -46,7 +47,7 @@ def refine_scene(scene: Scene, marked: Mapping[str, ArrayLike]) -> SceneRefineme
     Args:
         scene: The scene.
         marked: Body name -> marked cells, see `fenics_contact.mesh.refined`; those that are not named
-            keep their mesh.
+            keep their mesh. Quadratic quadrilaterals and hexahedra are refined all together.
 
     Raises:
         InvalidInputError: If there is no such body, its cells cannot be refined, or one of its surfaces is
@@ -60,6 +61,7 @@ def refine_scene(scene: Scene, marked: Mapping[str, ArrayLike]) -> SceneRefineme
         )
     bodies, refinements = dict(scene.bodies), {}
     for name, cells in marked.items():
-        refinements[name] = refined(sewn(bodies[name].mesh), cells)
+        mesh = sewn(bodies[name].mesh)
+        refinements[name] = refined(mesh, np.arange(mesh.n_cells) if halves_together(mesh) else cells)
         bodies[name] = replace(bodies[name], mesh=refinements[name].mesh)
     return SceneRefinement(replace(scene, bodies=bodies), refinements)

@@ -49,6 +49,7 @@ _REVOLVED = "axisymmetric "
 _TWISTING = "torsion "
 #: What the types of quadratic cells end with that are integrated by the points of linear ones.
 _REDUCED = " reduced"
+_RESISTING = " resisting"
 
 
 def revolved(cell_type: str, torsion: bool = False) -> str:
@@ -56,14 +57,22 @@ def revolved(cell_type: str, torsion: bool = False) -> str:
     return _REVOLVED + (_TWISTING if torsion else "") + cell_type
 
 
-def reduced(cell_type: str) -> str:
-    """Return the type of quadratic cells as that of cells integrated by the points of linear ones."""
-    return cell_type + _REDUCED
+def reduced(cell_type: str, resisting: bool = False) -> str:
+    """Return the type of quadratic cells as that of cells integrated by the points of linear ones.
+
+    `resisting`: whether none of their motions goes without energy.
+    """
+    return cell_type + (_RESISTING if resisting else "") + _REDUCED
 
 
 def is_reduced(cell_type: str) -> bool:
     """Return whether quadratic cells are integrated by the points of linear ones."""
     return cell_type.endswith(_REDUCED)
+
+
+def is_resisting(cell_type: str) -> bool:
+    """Return whether motions without energy of reduced cells are given some."""
+    return _RESISTING in cell_type
 
 
 def is_revolved(cell_type: str) -> bool:
@@ -83,7 +92,12 @@ def components(cell_type: str) -> int:
 
 def of_mesh(cell_type: str) -> str:
     """Return the type that the cells have in a mesh, which does not know what a body makes of them."""
-    return cell_type.removeprefix(_REVOLVED).removeprefix(_TWISTING).removesuffix(_REDUCED)
+    return (
+        cell_type.removeprefix(_REVOLVED)
+        .removeprefix(_TWISTING)
+        .removesuffix(_REDUCED)
+        .removesuffix(_RESISTING)
+    )
 
 
 def shape(cell_type: str) -> str:

@@ -34,6 +34,7 @@ from fenics_contact._fem.templates import (
     Template,
     Templates,
     Written,
+    resisting,
     scalar_constants,
     volume_measure,
 )
@@ -197,7 +198,7 @@ class FormLibrary:
             form, constants = integrate(
                 materials, cell_type, lambda m, c: m.stiffness(u, v, c), volume_measure(cell_type)
             )
-            return form, constants, ()
+            return resisting(form, cell_type), constants, ()
 
         name = ("stiffness", *(type(material) for material in materials), cell_type)
         self._templates.get(("stiffness", materials, cell_type), name, write)

@@ -96,7 +96,8 @@ class Body:
     def cell_type(self) -> str:
         """The type of its cells for forms: others if a body is one of revolution, or integration reduced."""
         cells = self.mesh.cell_type
-        cells = _dolfinx.reduced(cells) if self.integration == "reduced" else cells
+        if self.integration == "reduced":
+            cells = _dolfinx.reduced(cells, resisting=bool(self.mesh.cuts))
         return _dolfinx.revolved(cells, self.torsion) if self.axisymmetric else cells
 
     @property

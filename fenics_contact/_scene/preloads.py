@@ -168,6 +168,13 @@ class Preload:
         """Return the cut that the scene has made into the mesh of its body."""
         return mesh.cuts[self.section]
 
+    def held_pairs(self, mesh: BodyMesh) -> np.ndarray:
+        """Return the nodes behind and before the section that are unknowns, shape (n, 2)."""
+        pairs = self.cut(mesh).pairs
+        if mesh.centres is None:
+            return pairs
+        return pairs[~np.isin(pairs, mesh.centres.nodes).any(axis=1)]
+
     def normal(self, mesh: BodyMesh) -> np.ndarray:
         """Return the unit normal n, shape (dim,): that of the plane, or the mean one of the common face."""
         if isinstance(self.section, Section):
@@ -176,8 +183,8 @@ class Preload:
         return np.asarray(areas / np.linalg.norm(areas))
 
     def count(self, mesh: BodyMesh) -> int:
-        """Return the number of nodes on either side of the section."""
-        return len(self.cut(mesh).pairs)
+        """Return the number of nodes on either side of the section, without centres that follow others."""
+        return len(self.held_pairs(mesh))
 
     def area(self, mesh: BodyMesh, axisymmetric: bool = False) -> float:
         """Return the area of the section across its normal, [length^(dim - 1)], of a full revolution."""

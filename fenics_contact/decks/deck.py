@@ -35,7 +35,8 @@ from fenics_contact.decks.tables import Print, PrintTable, tables_of
 from fenics_contact.decks.vocabulary import KNOWN, NOT_YET, PARAMETERS, PROCEDURES, WITHOUT_EFFECT
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.ranks import made_once
-from fenics_contact.readers.deck_cards import Card, DeckError, Origin, read_cards
+from fenics_contact.readers.deck_assembly import read_cards
+from fenics_contact.readers.deck_cards import Card, DeckError, Instances, Origin
 from fenics_contact.readers.deck_mesh import MeshCards
 
 if TYPE_CHECKING:
@@ -62,6 +63,8 @@ class Deck:
         node_sets: Name -> numbers of nodes in the deck, ascending.
         element_sets: Name -> numbers of elements in the deck, ascending.
         mesh: Its mesh with sets and surfaces named as in the scene.
+        instances: How the numbers above are those of instances of parts, whose nodes and elements have other
+            numbers there; None without any.
     """
 
     name: str
@@ -76,6 +79,7 @@ class Deck:
     node_sets: Mapping[str, np.ndarray]
     element_sets: Mapping[str, np.ndarray]
     mesh: MeshCards = field(repr=False)
+    instances: Instances | None = field(default=None, repr=False)
     _origins: Mapping[tuple[str, str], Origin] = field(default_factory=dict, repr=False)
 
     def _facts(self) -> dict[str, Any]:
@@ -235,6 +239,7 @@ class _Builder:
             {name: np.sort(mesh.numbers[members]) for name, members in mesh.node_sets.items()},
             {name: np.sort(mesh.element_numbers[members]) for name, members in mesh.element_sets.items()},
             model.mesh_cards(),
+            model.cards[0].instances,
             model.origins,
         )
 

@@ -21,7 +21,6 @@ from fenics_contact.decks.initial_stress import read_initial
 from fenics_contact.decks.materials import Conditions, build_material, read_materials
 from fenics_contact.decks.regions import split_sections
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.serendipity_cells import completed
 from fenics_contact.readers.deck_bodies import (
     Component,
     Exterior,
@@ -121,17 +120,6 @@ class Model:
             self.node_sets,
             f"deck '{self.name}'",
         )
-        meshes = dict(self.parts.meshes)
-        for bolt in self.bolts:
-            for part in self.parts_of_mesh:
-                if (
-                    np.isin(bolt.faces.elements, part.elements).any()
-                    and meshes[part.name].centres is not None
-                ):
-                    meshes[part.name] = completed(meshes[part.name])
-                    words = f"body {part.name} is cut, its cells have 27 or 9 nodes and full integration"
-                    self.note(bolt.card, words)
-        self.parts = replace(self.parts, meshes=meshes)
 
     def in_cell_order(self, part: Component) -> np.ndarray:
         """Return the elements of a body in the order of its cells: type by type, by their names."""
@@ -141,9 +129,22 @@ class Model:
     def mesh_cards(self) -> MeshCards:
         """Return the mesh with everything that is named for the scene."""
         sections = {s.name: self.mesh.element_sets[s.name] for s in self.sections}
-        alone = {part.name: part.elements for part in self.parts_of_mesh if part.name not in sections}
-        cards = [f"*SOLID SECTION, ELSET={s.name}, MATERIAL={s.material}" for s in self.sections]
-        return MeshCards(self.mesh, {**sections, **alone}, self.surfaces, self.node_sets, cards)
+        # The section of a whole body has its name, as bodies of instances are not named by their sections.
+        bodies = {
+            self.sections[part.sections[0]].name: part
+            for part in self.parts_of_mesh
+            if len(part.sections) == 1 and part.name not in sections
+        }
+        names = {
+            name: bodies[name].name
+            if name in bodies and np.array_equal(elements, bodies[name].elements)
+            else name
+            for name, elements in sections.items()
+        }
+        sets = {names[name]: elements for name, elements in sections.items()}
+        sets |= {part.name: part.elements for part in self.parts_of_mesh if part.name not in sets}
+        cards = [f"*SOLID SECTION, ELSET={names[s.name]}, MATERIAL={s.material}" for s in self.sections]
+        return MeshCards(self.mesh, sets, self.surfaces, self.node_sets, cards)
 
     def bodies(self) -> dict[str, Body]:
         """Return the bodies with their materials."""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from fenics_contact._base.display import displayed
-from fenics_contact.readers.deck_cards import Origin
+from fenics_contact.readers.deck_cards import Instances, Origin
 
 if TYPE_CHECKING:
     from fenics_contact.results.state import State
@@ -68,6 +68,10 @@ class Printing(Protocol):
     def element_sets(self) -> Mapping[str, np.ndarray]:
         """Numbers of elements by set."""
 
+    @property
+    def instances(self) -> Instances | None:
+        """Its instances of parts."""
+
 
 @displayed
 @dataclass(frozen=True, eq=False)
@@ -78,19 +82,26 @@ class PrintTable:
         name: What it is of: "NODE PRINT U ROOT".
         columns: Names of the columns, the number of the node or element first.
         rows: One for each node or element, shape (n, columns).
+        instances: In decks with instances of parts that of each row, in whose numbers nodes and elements are
+            given; "" for what belongs to none.
     """
 
     name: str
     columns: tuple[str, ...]
     rows: np.ndarray
+    instances: tuple[str, ...] = ()
 
     def write(self, folder: Path) -> Path:
         """Write it as CSV, under its name."""
         path = folder / f"{self.name.replace(' ', '_').replace('/', '_')}.csv"
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(self.columns)
-            writer.writerows([int(number), *values] for number, *values in self.rows.tolist())
+            of = [[name] for name in self.instances] or [[]] * len(self.rows)
+            writer.writerow([*["instance"][: len(self.instances)], *self.columns])
+            writer.writerows(
+                [*own, int(number), *values]
+                for own, (number, *values) in zip(of, self.rows.tolist(), strict=True)
+            )
         return path
 
 
@@ -110,11 +121,19 @@ def tables_of(deck: Printing, state: State, step: int) -> list[PrintTable]:
         Collective on the communicator of the state.
     """
     return [
-        table
+        _told(table, deck.instances)
         for each in deck.prints
         if each.step == step and each.card in ("NODE PRINT", "EL PRINT")
         for table in _tables(deck, each, state)
     ]
+
+
+def _told(table: PrintTable, instances: Instances | None) -> PrintTable:
+    """Return a table with the numbers that nodes and elements have in their instances."""
+    if instances is None:
+        return table
+    names, own = instances.own(table.rows[:, 0])
+    return replace(table, rows=np.column_stack([own, table.rows[:, 1:]]), instances=tuple(names))
 
 
 def _tables(deck: Printing, asked: Print, state: State) -> Iterator[PrintTable]:

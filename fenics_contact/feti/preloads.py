@@ -40,7 +40,7 @@ def section_points(
     found = []
     for number, preload in enumerate(scene.preloads):
         mesh = scene.bodies[preload.body].mesh
-        behind, before = numbers.global_nodes(preload.body, preload.cut(mesh).pairs).T
+        behind, before = numbers.global_nodes(preload.body, preload.held_pairs(mesh)).T
         count, normal = len(behind), preload.normal(mesh)
         along = np.tile(normal, (count, 1))
         held = np.zeros(count, dtype=bool)

@@ -11,7 +11,8 @@ from scipy.sparse.csgraph import connected_components
 
 from fenics_contact.mesh.body_mesh import BodyMesh, Cut
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces, neighbours, shared_faces
-from fenics_contact.mesh.hanging import require_none
+from fenics_contact.mesh.hanging import Centres, require_none
+from fenics_contact.mesh.serendipity_cells import centres_of
 
 
 def nodes_between(mesh: BodyMesh, before: np.ndarray, behind: np.ndarray) -> np.ndarray:
@@ -23,11 +24,11 @@ def cut_between(mesh: BodyMesh, name: Hashable, before: np.ndarray, behind: np.n
     """Return the mesh in which cells behind a cut have nodes of their own, after all others.
 
     Cells keep their numbers, surfaces and shapes their names. Coordinates are given for the nodes before or
-    after the cut, see `BodyMesh.moved`.
+    after the cut, see `BodyMesh.moved`. Centres that followed other nodes do so on both sides.
 
     `before`, `behind`: cells on both sides, shape (n,) each.
     """
-    require_none(mesh.followers, "a section", "refine no cells there, or take simplices")
+    require_none(mesh.hanging, "a section", "refine no cells there, or take simplices")
     shared = nodes_between(mesh, before, behind)
     faces, sides = shared_faces(mesh.cells, mesh.dim)
     side = np.zeros(mesh.n_cells)
@@ -45,6 +46,7 @@ def cut_between(mesh: BodyMesh, name: Hashable, before: np.ndarray, behind: np.n
     result = BodyMesh(
         np.vstack([mesh.points, mesh.points[shared]]), cells, surfaces, mesh.grid, mesh.regions,
         coincident_nodes=True, shapes=mesh.shapes, node_sets=mesh.node_sets,
+        centres=_centres(mesh, cells, np.append(np.arange(mesh.n_nodes), shared)),
     )  # fmt: skip
     facets, _ = boundary_faces(cells, mesh.dim)
     number = match_faces(corners_of(between, mesh.dim), corners_of(facets, mesh.dim))
@@ -53,6 +55,14 @@ def cut_between(mesh: BodyMesh, name: Hashable, before: np.ndarray, behind: np.n
     chart = mesh.chart and mesh.chart.extended([shared[:, None]])
     result._set(_cuts={**mesh.cuts, name: cut}, _origin=origin, chart=chart)
     return result
+
+
+def _centres(mesh: BodyMesh, cells: np.ndarray, node: np.ndarray) -> Centres | None:
+    """Return the centres of new cells that followed in a mesh, given the old node of each new one."""
+    found = None if mesh.centres is None else centres_of(cells, mesh.dim)
+    if mesh.centres is None or found is None:
+        return None
+    return found.without(found.nodes[~np.isin(node[found.nodes], mesh.centres.nodes)])
 
 
 def closed(mesh: BodyMesh) -> BodyMesh:
@@ -81,7 +91,7 @@ def sewn(mesh: BodyMesh) -> BodyMesh:
     surfaces = {name: node[facets] for name, facets in mesh.surfaces.items()}
     result = BodyMesh(
         mesh.points[:kept], node[mesh.cells], surfaces, mesh.grid, mesh.regions, shapes=mesh.shapes,
-        node_sets=mesh.node_sets,
+        node_sets=mesh.node_sets, centres=_centres(mesh, node[mesh.cells], np.arange(kept)),
     )  # fmt: skip
     result._set(
         chart=mesh.chart and mesh.chart.of(np.arange(kept)[:, None]),

@@ -20,9 +20,11 @@ from fenics_contact.mesh.chart import Chart, kept_valid
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
 from fenics_contact.mesh.halving import halved
 from fenics_contact.mesh.hanging import HangingNodes
+from fenics_contact.mesh.linear_facets import linear_facets
 from fenics_contact.mesh.on_shapes import on_shapes, with_parts
 from fenics_contact.mesh.quadratic import with_more_nodes
 from fenics_contact.mesh.quality import thickness
+from fenics_contact.mesh.serendipity_cells import completed, serendipity
 
 _Found: TypeAlias = tuple[np.ndarray, np.ndarray, dict[str, np.ndarray], Chart | None]
 _LINEAR = {2: CELL_TYPES["triangle"], 3: CELL_TYPES["tetrahedron"]}
@@ -77,7 +79,8 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
     they are refined: every cell with a halved edge has its longest edge halved (A. Plaza, G.F. Carey, Applied
     Numerical Mathematics 32 (2000) 195-218). Linear quadrilaterals and hexahedra are halved in every
     direction into 4 or 8; nodes in the middle of edges and faces of larger cells hang (`BodyMesh.hanging`),
-    and others are halved only so that cells that share a point differ by one level.
+    and others are halved only so that cells that share a point differ by one level. Quadratic quadrilaterals
+    and hexahedra, complete or serendipity, are halved all together.
 
     New nodes on surfaces whose shape the mesh carries lie on the shape, those between two shapes or beside a
     plane on both, those of quadratic cells else on the curved facets; hanging nodes lie on the larger facet.
@@ -87,8 +90,9 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
     structured grid is lost.
 
     Args:
-        mesh: Triangles or tetrahedra, linear or quadratic; linear quadrilaterals or hexahedra.
-        marked: Numbers of cells, or a mark for every cell, shape (n_cells,) bool.
+        mesh: Triangles or tetrahedra, quadrilaterals or hexahedra, linear or quadratic.
+        marked: Numbers of cells, or a mark for every cell, shape (n_cells,) bool; all cells of quadratic
+            quadrilaterals or hexahedra.
 
     Raises:
         InvalidInputError: If the cells are of another type, no such cells exist, the mesh has nodes that
@@ -105,6 +109,8 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
     chosen = _checked_marks(mesh, marked)
     if mesh.origin is not mesh:
         return _reshaped(mesh, refined(mesh.origin, chosen))
+    if halves_together(mesh):
+        return _halved_together(mesh)
     if not CELL_TYPES[mesh.cell_type].is_simplex:
         parts = halved(mesh, chosen)
         found = parts.points, parts.cells, parts.surfaces, parts.chart
@@ -115,6 +121,41 @@ def refined(mesh: BodyMesh, marked: ArrayLike) -> Refinement:
         if mesh.chart is not None or not more.any():
             return _checked(mesh, found, None, parents, positions)
         chosen = np.union1d(chosen, np.flatnonzero(more))
+
+
+def halves_together(mesh: BodyMesh) -> bool:
+    """Return whether all cells of a mesh are halved, or none: quadratic quadrilaterals and hexahedra."""
+    kind = CELL_TYPES[mesh.cell_type]
+    return kind.order == 2 and not kind.is_simplex and not mesh.has_several_shapes
+
+
+def _halved_together(mesh: BodyMesh) -> Refinement:
+    """Halve all quadratic quadrilaterals or hexahedra; those of serendipity functions have these again."""
+    kind = CELL_TYPES[mesh.cell_type]
+    linear = CELL_TYPES[kind.shape_name]
+    pieces = mesh.cells[:, kind.pieces].reshape(-1, len(linear.nodes))
+    groups, cells = with_more_nodes(mesh.n_nodes, pieces, linear, kind)
+    parents = np.repeat(np.arange(mesh.n_cells), len(kind.pieces))
+    places = np.einsum("kv,pvi->pki", shape_values(linear, kind.nodes), kind.nodes[kind.pieces])
+    positions = np.tile(places, (mesh.n_cells, 1, 1))
+    boundary, _ = boundary_faces(cells, mesh.dim)
+    parts, shapes = with_parts(mesh)
+    surfaces = {
+        name: boundary[match_faces(linear_facets(facets, mesh.dim).rows, corners_of(boundary, mesh.dim))]
+        for name, facets in parts.items()
+    }
+    chart = mesh.chart and mesh.chart.extended(groups)
+    points = _mapped(mesh.points, mesh, parents, positions, cells) if chart is None else chart.points()
+    points[: mesh.n_nodes] = mesh.points
+    if chart is None:
+        points = on_shapes(points, cells, surfaces, shapes, np.arange(len(points)) >= mesh.n_nodes)
+    named = {name: surfaces[name] for name in mesh.surfaces}
+    fine = _checked(mesh, (points, cells, named, chart), None, parents, positions)
+    if mesh.centres is None:
+        return fine
+    freed = [name for name, facets in mesh.surfaces.items() if not np.isin(mesh.centres.nodes, facets).any()]
+    lean = serendipity(fine.mesh)
+    return replace(fine, mesh=completed(lean, *freed) if freed else lean)
 
 
 def _halved_simplices(mesh: BodyMesh, chosen: np.ndarray) -> tuple[_Found, np.ndarray, np.ndarray]:
@@ -184,11 +225,10 @@ def _carried_nodes(mesh: BodyMesh, points: np.ndarray) -> dict[str, np.ndarray]:
 
 def _checked_marks(mesh: BodyMesh, marked: ArrayLike) -> np.ndarray:
     """Return the numbers of the marked cells."""
-    kind = CELL_TYPES[mesh.cell_type]
-    if (kind.order == 2 and not kind.is_simplex) or mesh.has_several_shapes:
+    if mesh.has_several_shapes:
         raise InvalidInputError(
-            "refined needs simplices, or linear quadrilaterals or hexahedra, got "
-            f"{mesh.cells_in_words}: take linear cells of one shape, or a finer mesh of these"
+            f"refined needs cells of one shape, got {mesh.cells_in_words}: take a finer mesh of these, or "
+            "one of tetrahedra"
         )
     if mesh.coincident_nodes or mesh.cuts:
         raise InvalidInputError(
@@ -203,6 +243,11 @@ def _checked_marks(mesh: BodyMesh, marked: ArrayLike) -> np.ndarray:
         raise InvalidInputError(
             f"marked must be at least one of the cells 0 to {mesh.n_cells - 1}, or a bool for each, got "
             f"{brief(marked)}: give the cells to halve"
+        )
+    if halves_together(mesh) and len(np.unique(marks)) < mesh.n_cells:
+        raise InvalidInputError(
+            "quadratic quadrilaterals and hexahedra are refined all together, got "
+            f"{len(np.unique(marks))} of {mesh.n_cells} cells: mark all, or take linear cells or simplices"
         )
     return marks
 

@@ -17,7 +17,8 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.quadratic_nodes import with_centres
 from fenics_contact.mesh.quality import thickness
 from fenics_contact.readers.bodies import Label, TaggedMesh, bodies_of, one_array
-from fenics_contact.readers.deck_cards import Card, read_cards
+from fenics_contact.readers.deck_assembly import read_cards
+from fenics_contact.readers.deck_cards import Card
 from fenics_contact.readers.deck_mesh import Block, DeckMesh, Faces, Named, read_mesh_cards
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def read_sections(cards: Sequence[Card], mesh: DeckMesh) -> tuple[list[Section],
         if card.name == "SOLIDSECTION":
             name = card.required("ELSET")
             of_element[mesh.elements_named(name, card)] = len(sections)
-            thick = card.floats(0)[0] if card.lines else 1.0
+            thick = card.floats(0)[0] if card.lines and card.rows[0][0] else 1.0
             if not thick > 0:
                 raise card.error(f"the thickness must be above zero, got {thick:g}: correct it", 0)
             material, axes = card.required("MATERIAL"), card.name_of("ORIENTATION")
@@ -52,8 +53,8 @@ def read_sections(cards: Sequence[Card], mesh: DeckMesh) -> tuple[list[Section],
     if len(lost):
         block = mesh.blocks[mesh.block_of[lost[0]]]
         raise block.card.error(
-            f"element {mesh.element_numbers[lost[0]]} and {len(lost) - 1} others have no *SOLID SECTION: "
-            "give every element one, which names its material"
+            f"element {block.card.told(mesh.element_numbers[lost[0]])} and {len(lost) - 1} others have no "
+            "*SOLID SECTION: give every element one, which names its material"
         )
     return sections, of_element
 
@@ -94,9 +95,15 @@ def components(mesh: DeckMesh, sections: Sequence[Section], of_element: np.ndarr
 
 
 def _name(mesh: DeckMesh, elements: np.ndarray, of_sections: Sequence[str], taken: Sequence[str]) -> str:
-    """Return that of a set with just these elements, else those of the sections, with a number if taken."""
+    """Return that of an instance, or of a set with just these elements, else those of the sections.
+
+    With a number if it is taken.
+    """
+    within = {mesh.blocks[k].card.body for k in np.unique(mesh.block_of[elements]).tolist()}
     exact = [name for name, inside in mesh.element_sets.items() if np.array_equal(inside, elements)]
     best = [name for name in of_sections if name in exact] or exact or ["+".join(dict.fromkeys(of_sections))]
+    if len(within) == 1 and "" not in within:
+        best = list(within)
     free = [name for name in best if name not in taken]
     if free:
         return free[0]
@@ -121,9 +128,9 @@ class Exterior:
         """Return that of a mesh."""
         elements, sides = [], []
         for block in mesh.blocks:
-            count = len(block.element.faces)
-            elements.append(np.repeat(block.first + np.arange(len(block.nodes)), count))
-            sides.append(np.tile(np.arange(count), len(block.nodes)))
+            known = np.flatnonzero([len(face) > 0 for face in block.element.faces])
+            elements.append(np.repeat(block.first + np.arange(len(block.nodes)), len(known)))
+            sides.append(np.tile(known, len(block.nodes)))
         every = Faces(np.concatenate(elements), np.concatenate(sides))
         corners = np.full((len(every), 4), -1)
         nodes = np.full((len(every), 9), -1)
@@ -146,7 +153,7 @@ class Exterior:
         """Refuse faces that are no exterior ones, with the line of a card."""
         outer = self.holds(faces)
         if not outer.all():
-            number = self.mesh.element_numbers[faces.elements[~outer][0]]
+            number = card.told(self.mesh.element_numbers[faces.elements[~outer][0]])
             raise card.error(
                 f"{what} on the boundary of a body, a face of element {number} lies between two elements: "
                 f"{remedy}", row,
@@ -275,9 +282,11 @@ def _check_block(block: Block, points: np.ndarray) -> None:
     cells = one_array(whole, block.element.dim)
     bad = np.flatnonzero(thickness(places, cells) <= 0.0)
     if len(bad):
-        numbers = ", ".join(map(str, block.numbers[bad[:5]])) + (", ..." if len(bad) > 5 else "")
+        first = map(block.card.told, block.numbers[bad[:5]].tolist())
+        numbers = ", ".join(first) + (", ..." if len(bad) > 5 else "")
         ends = np.cumsum([line.strip().rstrip(",").count(",") + 1 for line in block.card.lines])
-        row = int(np.searchsorted(ends, bad[0] * (1 + block.element.count), side="right"))
+        width = 1 + len(block.element.written)
+        row = int(np.searchsorted(ends, block.records[bad[0]] * width, side="right"))
         raise block.card.error(
             f"every element must have a positive Jacobian, {len(bad)} of {len(cells)} of type "
             f"{block.element.name} are inverted or flat: {numbers}; see the order of their nodes, and their "
@@ -296,6 +305,8 @@ def integration_of(
     blocks = [mesh.blocks[k] for k in np.unique(mesh.block_of[part.elements])]
     for block in blocks:
         element = block.element
+        if count := {"C3D6": 2, "C3D15": 9}.get(element.name):
+            note(block.card, f"elements {element.name} are integrated in full, CalculiX takes {count} points")
         if element.variant and (element.variant != "R" or element.cell not in _REDUCED):
             plain = element.name.removesuffix(element.variant)
             note(block.card, f"elements {element.name} are solved as {plain}, by full integration")

@@ -58,6 +58,28 @@ class Origin:
 
 
 @dataclass(frozen=True, eq=False)
+class Instances:
+    """Numbers of nodes and elements of a deck with instances of parts.
+
+    Attributes:
+        names: Of the instances, in the order of the deck, behind "" for what belongs to none.
+        stride: What is added to numbers of an instance, times its place among the names.
+    """
+
+    names: Sequence[str]
+    stride: int
+
+    def offset(self, name: str) -> int:
+        """Return what is added to the numbers of an instance."""
+        return self.names.index(name) * self.stride
+
+    def own(self, numbers: np.ndarray) -> tuple[list[str], np.ndarray]:
+        """Return for numbers of the flat deck the instances, "" for none, and the numbers within these."""
+        place, rest = np.divmod(np.asarray(numbers, dtype=np.int64), self.stride)
+        return [self.names[k] for k in place.tolist()], rest
+
+
+@dataclass(frozen=True, eq=False)
 class Card:
     """A keyword, its parameters and its data.
 
@@ -66,6 +88,7 @@ class Card:
         parameters: Names in capitals without blanks -> values as written, "" for flags.
         lines: Data lines without comments and blank lines.
         first: Number of the line behind the keyword, and which of these are data lines.
+        instances: Those of the deck; None without any.
     """
 
     name: str
@@ -75,6 +98,19 @@ class Card:
     numbers: Sequence[int]
     line: int
     file: str
+    instances: Instances | None = None
+
+    @property
+    def body(self) -> str:
+        """Name of the instance of a part that it belongs to, "" for none."""
+        return ""
+
+    def told(self, number: int) -> str:
+        """Return how a node or element is called in the deck: "5", or "BOLT-1.5" of an instance."""
+        if self.instances is None or number < self.instances.stride:
+            return str(number)
+        (name,), (own,) = self.instances.own(np.array([number]))
+        return f"{name}.{own}"
 
     @property
     def origin(self) -> Origin:
@@ -197,11 +233,19 @@ def _numbers(text: str, kind: type) -> np.ndarray | None:
         return None
 
 
+def whole_numbers(card: Card) -> np.ndarray:
+    """Return the whole numbers with which the lines of nodes or elements begin, or all of elements."""
+    if card.name == "NODE":
+        return np.asarray(card.table(1)[:, 0], dtype=np.int64)
+    found = _numbers(",".join(line.strip().rstrip(",") for line in card.lines), np.int64)
+    return np.zeros(0, dtype=np.int64) if found is None else found
+
+
 #: Most files that include each other, one inside the other.
 DEEPEST = 20
 
 
-def read_cards(path: Path) -> list[Card]:
+def cards_of(path: Path) -> list[Card]:
     """Return the cards of a deck and of the files that it includes, in their order."""
     return list(_cards(path, path.parent, ()))
 

@@ -2,110 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
 
 from fenics_contact.readers.deck_cards import Card, DeckError, plain
-
-
-@dataclass(frozen=True, eq=False)
-class Element:
-    """One type of elements.
-
-    Attributes:
-        name: Its name, "C3D20R".
-        kind: "solid", "plane stress", "plane strain" or "axisymmetric".
-        cell: Name of the type of cells that has its nodes.
-        count: Number of its nodes.
-        variant: Letters behind the number: "R" for reduced integration, "I" for incompatible modes.
-    """
-
-    name: str
-    kind: str
-    cell: str
-    count: int
-    variant: str
-
-    @property
-    def dim(self) -> int:
-        """Dimension of its space."""
-        return 3 if self.kind == "solid" else 2
-
-    @property
-    def shape(self) -> str:
-        """Name of the linear cell of its shape."""
-        return re.sub(r"\d+$", "", self.cell)
-
-    @property
-    def faces(self) -> Sequence[Sequence[int]]:
-        """Positions of the corners of its faces S1, S2, ..., without regard to their sense."""
-        return _FACES[self.shape]
-
-    @cached_property
-    def face_nodes(self) -> Sequence[Sequence[int]]:
-        """Positions of all nodes of its faces: corners, then those in the middle of edges."""
-        corners = 1 + max(max(face) for face in self.faces)
-        edges, inner = _EDGES[self.shape], range(corners, self.count)
-        return [
-            [*face, *(n for n, edge in zip(inner, edges, strict=False) if set(edge) <= set(face))]
-            for face in self.faces
-        ]
-
-
-_KINDS = {"C3D": "solid", "CPS": "plane stress", "CPE": "plane strain", "CAX": "axisymmetric"}
-_CELLS = {
-    3: {
-        4: "tetrahedron",
-        10: "tetrahedron10",
-        8: "hexahedron",
-        20: "hexahedron20",
-        6: "wedge",
-        15: "wedge15",
-    },
-    2: {3: "triangle", 6: "triangle6", 4: "quadrilateral", 8: "quadrilateral8"},
-}
-#: Corners of the faces of elements as CalculiX and Abaqus number them, from zero.
-_FACES: dict[str, Sequence[Sequence[int]]] = {
-    "tetrahedron": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
-    "hexahedron": (
-        (0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0),
-    ),
-    "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
-    "triangle": ((0, 1), (1, 2), (2, 0)),
-    "quadrilateral": ((0, 1), (1, 2), (2, 3), (3, 0)),
-}  # fmt: skip
-#: Ends of the edges on which nodes beyond the corners lie, in their order.
-_EDGES: dict[str, Sequence[tuple[int, int]]] = {
-    "tetrahedron": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
-    "hexahedron": (
-        (0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7),
-    ),
-    "wedge": ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
-    "triangle": ((0, 1), (1, 2), (2, 0)),
-    "quadrilateral": ((0, 1), (1, 2), (2, 3), (3, 0)),
-}  # fmt: skip
-_TYPE = re.compile(r"(C3D|CPS|CPE|CAX)(\d+)([RIHMT]*)")
-
-
-def element_of(card: Card) -> Element:
-    """Return the type of the elements of a card."""
-    name = card.required("TYPE")
-    match = _TYPE.fullmatch(name)
-    kind = _KINDS[match.group(1)] if match else ""
-    count = int(match.group(2)) if match else 0
-    cell = _CELLS[3 if kind == "solid" else 2].get(count)
-    if match is None or cell is None:
-        raise card.error(
-            f"elements of type {name} have no counterpart: solid (C3D4, 6, 8, 10, 15, 20), plane (CPS, "
-            "CPE 3, 4, 6, 8) and axisymmetric ones (CAX) have; shells, beams, springs and others do not"
-        )
-    return Element(name, kind, cell, count, match.group(3))
+from fenics_contact.readers.deck_elements import Element, element_of, without_repeated
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +20,7 @@ class Block:
     Attributes:
         nodes: Positions of their nodes in the deck, (n, nodes of an element).
         first: Position of the first of them among all elements.
+        records: Which of the elements of the card they are, (n,).
     """
 
     element: Element
@@ -122,6 +28,7 @@ class Block:
     numbers: np.ndarray
     nodes: np.ndarray
     first: int
+    records: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +118,8 @@ class DeckMesh:
         lost = np.flatnonzero(known[found] != numbers) if len(known) else np.arange(len(numbers))
         if len(lost):
             line = int(lost[0]) if by_row else row
-            raise card.error(f"{what} {numbers[lost[0]]} is not there: correct the number, or add it", line)
+            lacking = f"{what} {card.told(numbers[lost[0]])}"
+            raise card.error(f"{lacking} is not there: correct the number, or add it", line)
         return np.asarray(found)
 
     def corners(self, faces: Faces) -> list[np.ndarray]:
@@ -245,6 +153,13 @@ class DeckMesh:
                     f"{label[:1]}1 to {label[:1]}{len(element.faces)}: correct the label",
                     row,
                 )
+            if not element.faces[side]:
+                first = card.told(self.element_numbers[elements[block_of[elements] == number][0]])
+                raise card.error(
+                    f"face {label!r} of element {first}, which lists nodes twice, is no more than an edge: "
+                    "leave it out",
+                    row,
+                )
         return Faces(elements, np.full(len(elements), side))
 
 
@@ -276,14 +191,9 @@ def read_mesh_cards(cards: Sequence[Card]) -> DeckMesh:
                 mesh.positions(numbers_of[id(card)], "node", card),
             )
         elif card.name == "ELEMENT" and card.name_of("ELSET"):
-            block = next(block for block in mesh.blocks if block.card is card)
-            _add(
-                mesh,
-                mesh.element_sets,
-                card,
-                card.name_of("ELSET"),
-                block.first + np.arange(len(block.numbers)),
-            )
+            blocks = [block for block in mesh.blocks if block.card is card]
+            first, last = blocks[0].first, blocks[-1].first + len(blocks[-1].numbers)
+            _add(mesh, mesh.element_sets, card, card.name_of("ELSET"), np.arange(first, last))
     for card in cards:
         if card.name == "NSET":
             _add(mesh, mesh.node_sets, card, card.required("NSET"), _members(mesh, card, "node"))
@@ -315,8 +225,9 @@ def _elements(mesh: DeckMesh, cards: Sequence[Card]) -> None:
         element = element_of(card)
         records = card.integers(1 + element.count)
         nodes = mesh.positions(records[:, 1:].ravel(), "node", card).reshape(-1, element.count)
-        mesh.blocks.append(Block(element, card, records[:, 0], nodes, first))
-        first += len(records)
+        for kind, mine, own in without_repeated(element, nodes, records[:, 0], card):
+            mesh.blocks.append(Block(kind, card, records[mine, 0], own, first, mine))
+            first += len(mine)
     if not first:
         raise DeckError("a deck must have elements, under *ELEMENT; it has none")
     mesh.element_numbers = np.concatenate([block.numbers for block in mesh.blocks])
@@ -324,7 +235,8 @@ def _elements(mesh: DeckMesh, cards: Sequence[Card]) -> None:
     if len(again):
         number = np.sort(mesh.element_numbers)[again[0]]
         card = [block.card for block in mesh.blocks if number in block.numbers][-1]
-        raise card.error(f"element {number} is there already: give each element a number of its own")
+        which = f"element {card.told(number)}"
+        raise card.error(f"{which} is there already: give each element a number of its own")
 
 
 def _add(mesh: DeckMesh, sets: dict[str, np.ndarray], card: Card, name: str, members: np.ndarray) -> None:
@@ -435,7 +347,8 @@ class MeshCards:
         ]
         for block in self.mesh.blocks:
             lines.append(f"*ELEMENT, TYPE={block.element.name}")
-            rows = np.column_stack([block.numbers, self.mesh.numbers[block.nodes]])
+            nodes = block.nodes[:, block.element.written]
+            rows = np.column_stack([block.numbers, self.mesh.numbers[nodes]])
             lines += [line for row in rows.tolist() for line in _wrapped(row)]
         for name, members in self.elements.items():
             lines += [f"*ELSET, ELSET={name}", *_wrapped(self.mesh.element_numbers[members].tolist())]

@@ -90,6 +90,7 @@ def test_prisms_beside_hexahedra_stretch_as_one_body(order: int, tmp_path: Path)
     found = read_deck(deck(tmp_path, text + step("*BOUNDARY\nBAR_X1, 1, 1, 0.01\n")))
     read = found.scene.bodies["BAR"].mesh
     assert read.has_several_shapes
+    assert any(f"CalculiX takes {9 if order == 2 else 2} points" in note for note in found.notes)
     rate = np.array([1.0, -0.3, -0.3]) * 0.01 / 3
     np.testing.assert_allclose(displacement(found), read.points * rate, atol=1e-12)
 

@@ -6,13 +6,26 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact import Body, ContactPair, Scene, Support, Surface, Tie, Traction, solve_scene
+from fenics_contact import (
+    Body,
+    ContactPair,
+    Preload,
+    Scene,
+    Section,
+    Support,
+    Surface,
+    Tie,
+    TotalForce,
+    Traction,
+    solve_scene,
+    solve_to,
+)
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.materials import IsotropicElasticity, NeoHooke, PlaneStrain
-from fenics_contact.mesh import bisection_partition, completed, quadratic, serendipity
+from fenics_contact.mesh import bisection_partition, completed, quadratic, refined, serendipity
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.cuts import cut_between
+from fenics_contact.mesh.cuts import sewn
 from tests.linear.graded import pulled
 from tests.linear.serendipity import bent, bent_bar, displacement_on
 from tests.linear.several_ranks import displacement_of
@@ -115,9 +128,35 @@ def test_cells_without_centres_are_refused_and_complete_ones_stay() -> None:
     assert completed(box).centres is None
     with pytest.raises(InvalidInputError, match=r"must lie where these say, node \d+ does not by 0\.1"):
         BodyMesh(box.points + 0.1 * np.eye(27)[26][:, None], box.cells, centres=box.centres)
-    two = serendipity(quadratic(block((0, 0, 0), (1, 1, 1), (2, 1, 1))))
-    with pytest.raises(InvalidInputError, match=r"a section needs complete cells, .* mesh\.completed"):
-        cut_between(two, "cut", np.array([0]), np.array([1]))
+
+
+@pytest.mark.parametrize("integration", ["full", "reduced"])
+@pytest.mark.parametrize("subdomains", [1, 4])
+def test_a_cut_bolt_keeps_its_cells(integration: str, subdomains: int) -> None:
+    """Centres follow on both sides of the section; drawn by a force it is a bar under tension."""
+    mesh = shaken(serendipity(quadratic(block((0, 0, 0), (4, 1, 1), (4, 1, 1)))), 0.03)
+    steel = IsotropicElasticity(100.0, 0.3)
+    sides = {
+        "x0": (0.0, None, None),
+        "x1": (0.0, None, None),
+        "y0": (None, 0.0, None),
+        "z0": (None, None, 0.0),
+    }
+    scene = Scene(
+        {"bar": Body(mesh, steel, integration=integration)},
+        [Support("bar", side, value) for side, value in sides.items()],
+        preloads=[Preload("bar", Section((2.0, 0.5, 0.5), (1.0, 0.0, 0.0)), force=0.5)],
+    )
+    cut = scene.bodies["bar"].mesh
+    assert len(cut.centres.nodes) == len(mesh.centres.nodes) + 1
+    assert cut.n_nodes == mesh.n_nodes + 9
+    partition = {"bar": bisection_partition(cut, subdomains)}
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=partition, tolerance=1e-8)
+    np.testing.assert_allclose(state.gather_stress("bar")[:, 0, 0], 0.5, rtol=1e-6)
+    assert next(iter(state.preloads().values())).shortening == pytest.approx(4 * 0.005, rel=1e-6)
+    whole = sewn(cut)
+    assert whole.cells_in_words == "4 serendipity hexahedra"
+    np.testing.assert_array_equal(whole.centres.nodes, mesh.centres.nodes)
 
 
 def test_subdomains_alike_share_a_matrix_where_the_same_centres_follow() -> None:
@@ -134,3 +173,45 @@ def test_subdomains_alike_share_a_matrix_where_the_same_centres_follow() -> None
         assert (one.matrix is other.matrix) == shared
         exact = mesh.points * [0.01, -0.003, -0.003]
         np.testing.assert_allclose(state.gather_displacement("bar"), exact, atol=1e-13)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("lean", [False, True])
+def test_quadratic_cells_are_halved_all_together(dim: int, lean: bool) -> None:
+    """Distorted ones: their maps are those of the coarse cells, and the finer bar is softer."""
+    whole = rectangle((0, 0), (3, 1), (3, 1)) if dim == 2 else block((0, 0, 0), (3, 1, 1), (3, 1, 1))
+    coarse = shaken(quadratic(whole), 0.03)
+    coarse = serendipity(coarse) if lean else coarse
+    fine = refined(coarse, np.arange(coarse.n_cells))
+    mesh = fine.mesh
+    assert mesh.n_cells == 2**dim * coarse.n_cells
+    assert (mesh.centres is not None) == lean
+    np.testing.assert_array_equal(fine.parents, np.repeat(np.arange(coarse.n_cells), 2**dim))
+    np.testing.assert_array_equal(mesh.points[: coarse.n_nodes], coarse.points)
+    assert mesh.volume == pytest.approx(coarse.volume, rel=1e-3 if lean else 1e-12)
+    assert {name: len(facets) for name, facets in mesh.surfaces.items()} == {
+        name: 2 ** (dim - 1) * len(facets) for name, facets in coarse.surfaces.items()
+    }
+    works = []
+    for each in (coarse, mesh):
+        material = IsotropicElasticity(100.0, 0.3) if dim == 3 else PlaneStrain(100.0, 0.3)
+        force = TotalForce("bar", "x1", (0.0, 0.1, 0.0)[:dim])
+        scene = Scene({"bar": Body(each, material)}, [Support("bar", "x0")], [force])
+        state = solve_scene(scene, MPI.COMM_SELF)
+        works.append(state.torn.load @ state.torn_displacement)
+    assert 1.0 < works[1] / works[0] < 1.06
+    with pytest.raises(InvalidInputError, match=r"are refined all together, got 1 of 3 cells: mark all"):
+        refined(coarse, [1])
+
+
+def test_a_quantity_of_serendipity_cells_gets_its_accuracy() -> None:
+    mesh = serendipity(quadratic(rectangle((0, 0), (3, 1), (3, 1))))
+    body = Body(mesh, PlaneStrain(100.0, 0.3))
+    scene = Scene({"bar": body}, [Support("bar", "x0")], [Traction("bar", "x1", (0.0, 0.1))])
+    result = solve_to(scene, "strain_energy", 0.005, MPI.COMM_SELF)
+    assert result.state.scene.bodies["bar"].mesh.cells_in_words == "192 serendipity quadrilaterals"
+    finer = refined(result.state.scene.bodies["bar"].mesh, np.arange(192)).mesh
+    finer = Body(refined(finer, np.arange(768)).mesh, PlaneStrain(100.0, 0.3))
+    state = solve_scene(Scene({"bar": finer}, scene.supports, scene.loads), MPI.COMM_SELF)
+    exact = float(state.torn.load @ state.torn_displacement) / 2.0
+    assert result.value == pytest.approx(exact, rel=0.005)

@@ -1,0 +1,215 @@
+"""Types of elements of a deck, and elements that list nodes twice."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from itertools import permutations, product
+
+import numpy as np
+
+from fenics_contact.mesh.cell_types import HEXAHEDRON, QUADRILATERAL
+from fenics_contact.mesh.collapsed import (
+    PRISM_SHAPE,
+    PYRAMID_SHAPE,
+    TETRAHEDRON_SHAPE,
+    TRIANGLE_SHAPE,
+    Shape,
+)
+from fenics_contact.readers.deck_cards import Card
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """One type of elements.
+
+    Attributes:
+        name: Its name, "C3D20R".
+        kind: "solid", "plane stress", "plane strain" or "axisymmetric".
+        cell: Name of the type of cells that has its nodes.
+        count: Number of its nodes.
+        variant: Letters behind the number: "R" for reduced integration, "I" for incompatible modes.
+    """
+
+    name: str
+    kind: str
+    cell: str
+    count: int
+    variant: str
+
+    @property
+    def dim(self) -> int:
+        """Dimension of its space."""
+        return 3 if self.kind == "solid" else 2
+
+    @property
+    def shape(self) -> str:
+        """Name of the linear cell of its shape."""
+        return re.sub(r"\d+$", "", self.cell)
+
+    @property
+    def faces(self) -> Sequence[Sequence[int]]:
+        """Positions of the corners of its faces S1, S2, ..., without regard to their sense."""
+        return _FACES[self.shape]
+
+    @property
+    def written(self) -> Sequence[int]:
+        """Positions of its nodes in the order in which the deck lists them."""
+        return range(self.count)
+
+    @cached_property
+    def face_nodes(self) -> Sequence[Sequence[int]]:
+        """Positions of all nodes of its faces: corners, then those in the middle of edges."""
+        corners = 1 + max(max(face) for face in self.faces)
+        edges, inner = _EDGES[self.shape], range(corners, self.count)
+        return [
+            [*face, *(n for n, edge in zip(inner, edges, strict=False) if set(edge) <= set(face))]
+            for face in self.faces
+        ]
+
+
+_KINDS = {"C3D": "solid", "CPS": "plane stress", "CPE": "plane strain", "CAX": "axisymmetric"}
+_CELLS = {
+    3: {
+        4: "tetrahedron",
+        10: "tetrahedron10",
+        8: "hexahedron",
+        20: "hexahedron20",
+        6: "wedge",
+        15: "wedge15",
+    },
+    2: {3: "triangle", 6: "triangle6", 4: "quadrilateral", 8: "quadrilateral8"},
+}
+#: Corners of the faces of elements as CalculiX and Abaqus number them, from zero.
+_FACES: dict[str, Sequence[Sequence[int]]] = {
+    "tetrahedron": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "hexahedron": (
+        (0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0),
+    ),
+    "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quadrilateral": ((0, 1), (1, 2), (2, 3), (3, 0)),
+}  # fmt: skip
+#: Ends of the edges on which nodes beyond the corners lie, in their order.
+_EDGES: dict[str, Sequence[tuple[int, int]]] = {
+    "tetrahedron": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
+    "hexahedron": (
+        (0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7),
+    ),
+    "wedge": ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quadrilateral": ((0, 1), (1, 2), (2, 3), (3, 0)),
+}  # fmt: skip
+_TYPE = re.compile(r"(C3D|CPS|CPE|CAX)(\d+)([RIHMT]*)")
+
+
+def element_of(card: Card) -> Element:
+    """Return the type of the elements of a card."""
+    name = card.required("TYPE")
+    match = _TYPE.fullmatch(name)
+    kind = _KINDS[match.group(1)] if match else ""
+    count = int(match.group(2)) if match else 0
+    cell = _CELLS[3 if kind == "solid" else 2].get(count)
+    if match is None or cell is None:
+        raise card.error(
+            f"elements of type {name} have no counterpart: solid (C3D4, 6, 8, 10, 15, 20), plane (CPS, "
+            "CPE 3, 4, 6, 8) and axisymmetric ones (CAX) have; shells, beams, springs and others do not"
+        )
+    return Element(name, kind, cell, count, match.group(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Collapsed(Element):
+    """Hexahedra or quadrilaterals that list nodes twice, as the prisms, pyramids, ... that they are.
+
+    Attributes:
+        onto: Position of the node that stands in each place of the element as the deck lists it; the faces
+            are those of the hexahedron or quadrilateral, empty where they are no more than an edge or a node.
+    """
+
+    onto: tuple[int, ...] = ()
+
+    @property
+    def written(self) -> Sequence[int]:
+        """Positions of its nodes in the order in which the deck lists them."""
+        return self.onto
+
+    @property
+    def faces(self) -> Sequence[Sequence[int]]:
+        """Positions of the corners of its faces."""
+        whole = _FACES["hexahedron" if self.dim == 3 else "quadrilateral"]
+        kept = (tuple(dict.fromkeys(self.onto[place] for place in face)) for face in whole)
+        return [face if len(face) >= self.dim else () for face in kept]
+
+    @property
+    def face_nodes(self) -> Sequence[Sequence[int]]:  # type: ignore[override]
+        """Positions of all nodes of its faces."""
+        return self.faces
+
+
+#: Cells of elements whose nodes may repeat.
+_WHOLE = {"hexahedron": HEXAHEDRON, "quadrilateral": QUADRILATERAL}
+_SHAPES = {3: (PRISM_SHAPE, PYRAMID_SHAPE, TETRAHEDRON_SHAPE), 2: (TRIANGLE_SHAPE,)}
+
+
+def without_repeated(
+    element: Element, nodes: np.ndarray, numbers: np.ndarray, card: Card
+) -> Iterator[tuple[Element, np.ndarray, np.ndarray]]:
+    """Yield elements of one shape: their type, which they are and their nodes, each once.
+
+    Linear hexahedra and quadrilaterals that list nodes twice, as of meshes swept around an axis, are prisms,
+    pyramids, tetrahedra and triangles: their functions and integrals are the same.
+
+    `nodes`: positions of nodes, (n, nodes of an element); `numbers`: of the elements, (n,).
+    """
+    alike = nodes[:, :, None] == nodes[:, None, :]
+    pattern, number = np.unique(alike.argmax(axis=2), axis=0, return_inverse=True)
+    number = number.ravel()
+    for k, row in enumerate(pattern):
+        mine = np.flatnonzero(number == k)
+        if len(set(row.tolist())) == element.count:
+            yield element, mine, nodes[mine]
+            continue
+        found = _collapse(element.cell, tuple(row.tolist())) if element.cell in _WHOLE else None
+        if found is None:
+            remedy = (
+                "take CPS6, CPE6, CAX6, C3D15 or C3D10"
+                if element.count > 8 or element.dim == 2
+                else ("they must be a prism, a pyramid or a tetrahedron")
+            )
+            raise card.error(
+                f"{len(mine)} elements of type {element.name} list nodes twice otherwise than "
+                f"linear ones may, first element {card.told(numbers[mine[0]])}: {remedy}"
+            )
+        shape, places, onto = found
+        cell = {"prism": "wedge"}.get(shape.name, shape.name)
+        own = nodes[mine][:, places]
+        yield Collapsed(element.name, element.kind, cell, len(places), element.variant, onto), mine, own
+
+
+@cache
+def _collapse(cell: str, pattern: tuple[int, ...]) -> tuple[Shape, list[int], tuple[int, ...]] | None:
+    """Return the shape of cells with equal nodes, the place of each own node, and the node in each place."""
+    for turn in _turns(cell):
+        seen = [pattern[place] for place in turn]
+        for shape in _SHAPES[_WHOLE[cell].dim]:
+            firsts = [seen[shape.onto.index(vertex)] for vertex in range(shape.corners)]
+            if [firsts[vertex] for vertex in shape.onto] == seen and len(set(firsts)) == shape.corners:
+                places = [turn[shape.onto.index(vertex)] for vertex in range(shape.corners)]
+                onto = dict(zip(turn, shape.onto, strict=True))
+                return shape, places, tuple(onto[place] for place in range(len(pattern)))
+    return None
+
+
+def _turns(cell: str) -> list[list[int]]:
+    """Return the orders of the vertices of a cell that rotations of it have."""
+    vertices = 2.0 * _WHOLE[cell].nodes - 1.0
+    dim, found = vertices.shape[1], []
+    for axes, signs in product(permutations(range(dim)), product((1.0, -1.0), repeat=dim)):
+        matrix = np.eye(dim)[list(axes)] * signs
+        if np.linalg.det(matrix) > 0.0:
+            away = np.abs((vertices @ matrix.T)[:, None] - vertices[None]).sum(axis=2)
+            found.append(away.argmin(axis=1).tolist())
+    return found
