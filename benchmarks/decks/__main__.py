@@ -25,11 +25,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--folder", type=Path, default=FOLDER, help="where the decks are")
     parser.add_argument("--output", type=Path, default=Path("output/benchmarks/decks"))
     parser.add_argument("--limit", type=float, default=120.0, help="longest time of a deck [s]")
+    parser.add_argument(
+        "--refine", type=int, default=0, metavar="TIMES", help="cut each hexahedron into eight, so many times"
+    )
     settings = parser.parse_args(arguments)
     names = settings.names or deck_names(settings.folder)
     found = []
     for name in names:
-        found.append(outcome(settings.folder, name, settings.limit))
+        found.append(outcome(settings.folder, name, settings.limit, times=settings.refine))
         print(found[-1].line, flush=True)
     settings.output.mkdir(parents=True, exist_ok=True)
     (settings.output / "decks.md").write_text(table(found))

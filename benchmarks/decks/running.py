@@ -16,6 +16,7 @@ from mpi4py import MPI
 
 from benchmarks.decks.calculix import Block, program, reference, run_calculix, text_of, with_requests
 from benchmarks.decks.comparing import Agreement, agreement
+from benchmarks.decks.refining import refined
 from fenics_contact.decks import read_deck
 from fenics_contact.errors import FenicsContactError
 
@@ -68,9 +69,14 @@ def deck_names(folder: Path) -> list[str]:
     return sorted({path.name.split(".inp")[0] for path in folder.glob("*.inp*")})
 
 
-def outcome(folder: Path, name: str, limit: float = 120.0, run: bool = True) -> Outcome:
-    """Solve a deck, and compare it with CalculiX, or with the reference files if that is not to run."""
+def outcome(folder: Path, name: str, limit: float = 120.0, run: bool = True, times: int = 0) -> Outcome:
+    """Solve a deck, and compare it with CalculiX, or with the reference files if that is not to run.
+
+    `times`: how often its hexahedra are cut into eight before.
+    """
     text = text_of(folder / f"{name}.inp")
+    for _ in range(times):
+        text = refined(text)
     contact = bool(re.search(r"^\*CONTACT *PAIR", text, re.IGNORECASE | re.MULTILINE))
     start = perf_counter()
     try:

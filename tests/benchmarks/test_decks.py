@@ -5,13 +5,22 @@ Decks and reference files are read where Debian's package calculix-ccx-test has 
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from benchmarks.decks.__main__ import summary, table
 from benchmarks.decks.calculix import read_dat, read_frd, with_requests
 from benchmarks.decks.comparing import Agreement
+from benchmarks.decks.refining import refined
 from benchmarks.decks.running import FOLDER, Outcome, deck_names, outcome
+from fenics_contact.decks import read_deck
+from fenics_contact.gallery import block
+from fenics_contact.mesh import quadratic
+from fenics_contact.mesh.quality import volume
+from tests.decks.texts import STEEL, deck, mesh_cards
 
 installed = pytest.mark.skipif(not FOLDER.is_dir(), reason="needs Debian's package calculix-ccx-test")
 
@@ -107,3 +116,33 @@ def test_as_many_decks_agree_as_before() -> None:
     assert len(close) >= CLOSE, sorted(apart.items())
     assert len(touching) >= TOUCHING, sorted(touching)
     assert len(near) >= NEAR, sorted(touching.items())
+
+
+@pytest.mark.parametrize("element", ["C3D8", "C3D20"])
+def test_a_refined_deck_is_the_same_body_with_more_cells(element: str, tmp_path: Path) -> None:
+    """Bent by a pressure it comes nearer to the beam of theory."""
+    mesh = block((0, 0, 0), (6, 1, 1), (4, 1, 1))
+    cards = mesh_cards({"BAR": mesh if element == "C3D8" else quadratic(mesh)}, element)
+    middle = "*ELSET, ELSET=ROW, GENERATE\n3, 4\n*NODE\n900, 9., 9., 9.\n"
+    loads = "*BOUNDARY\nBAR_X0, 1, 3\n*STEP\n*STATIC\n*DLOAD\n1, P2, 1.\n2, P2, 1.\nROW, P2, 1.\n*END STEP\n"
+    text = cards + STEEL + "*SOLID SECTION, ELSET=BAR, MATERIAL=STEEL\n" + middle + loads
+    finer = refined(text)
+    tips, volumes = [], []
+    for words in (text, finer):
+        found = read_deck(deck(tmp_path, words))
+        (state,) = found.solve(MPI.COMM_SELF, tolerance=1e-10)
+        tips.append(state.gather_displacement("BAR")[:, 2].min())
+        mesh_of = found.scene.bodies["BAR"].mesh
+        volumes.append(volume(mesh_of.points, mesh_of.cells))
+        force = state.reactions()["BAR BAR_X0"].force
+        np.testing.assert_allclose(force, [0.0, 0.0, 6.0], atol=1e-7)
+    np.testing.assert_allclose(volumes, 6.0, rtol=1e-12)
+    assert mesh_of.n_cells == 32
+    exact = -(6.0**4 / 8.0 * 12.0 + 1.2 * 6.0**2 / 2.0 * 2.6) / 210000.0  # Timoshenko's beam under 1 N/mm
+    coarse, fine = (abs(tip - exact) for tip in tips)
+    assert fine < 0.7 * coarse
+
+
+def test_only_hexahedra_are_refined() -> None:
+    with pytest.raises(ValueError, match="only hexahedra are cut into eight, the deck has C3D10"):
+        refined("*NODE\n1, 0., 0., 0.\n*ELEMENT, TYPE=C3D10\n1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1\n")
