@@ -113,8 +113,8 @@ class _Refinement:
                 old = {int(row[0]) for row in rows}
                 new = self.number > self.largest if k == first else np.zeros(len(self.number), dtype=bool)
                 chosen = np.flatnonzero(new | np.isin(self.number, list(old)))
-                table = zip(self.number[chosen], self.points[chosen], strict=True)
-                nodes = [[str(number), *(f"{x:.12g}" for x in point)] for number, point in table]
+                places = zip(self.number[chosen], self.points[chosen], strict=True)
+                nodes = [[str(number), *(f"{x:.12g}" for x in point)] for number, point in places]
             elif name == "*ELEMENT":
                 block = self.blocks[k]
                 numbers = block.first + np.arange(8 * len(block.numbers))

@@ -117,7 +117,9 @@ def regular_factor(
     if failed:
         raise InvalidInputError(
             "the stiffness of every subdomain must be positive definite up to its kernel, but its Schur "
-            f"complement loses definiteness in row {failed}: check the material and the kernel of the model"
+            f"complement loses definiteness in row {failed}: check the material and the kernel of the model; "
+            "one layer of cells by reduced integration (C3D20R in decks) that is in contact or tied may move "
+            "without energy: integrate it fully, or take two layers"
         )
     return factor, modes, float(rho)
 
