@@ -212,6 +212,7 @@ class HistoryMechanics:
                 given.reshape(-1, 3, 3),
                 before[cells, :, :size].reshape(shape[0] * shape[1], size),
                 step.duration,
+                None if heat is None else heat[cells].ravel(),
             )
             after[cells, :, :size] = end.history.reshape(*shape, size)
             nominal = stretch**2 * end.stress.reshape(*shape, 3, 3)

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from fenics_contact._base.checks import STEEPEST
 from fenics_contact._scene_file.part import Part, keys_of, table_of
 from fenics_contact._scene_file.values import (
+    NumberOrPairs,
     Pair,
     PlaceOfFile,
     Read,
@@ -33,7 +34,14 @@ from fenics_contact.gallery import round as whole
 from fenics_contact.gallery.links import DesignSurface, Link
 from fenics_contact.gallery.ring import LinkShape
 from fenics_contact.materials import anisotropic as anisotropic_module
-from fenics_contact.materials import elastic, foam, hyperelastic, neo_hookean_metal, ramberg_osgood
+from fenics_contact.materials import (
+    elastic,
+    foam,
+    hyperelastic,
+    neo_hookean_metal,
+    ramberg_osgood,
+    temperature_dependent,
+)
 from fenics_contact.materials import orthotropic as orthotropic_module
 from fenics_contact.materials import plastic as plastic_module
 from fenics_contact.materials.elastic import Material
@@ -153,6 +161,13 @@ MATERIALS = (
         _Material,
         model="orthotropic_plane_stress",
         poisson_ratio=float,
+    ),
+    table_of(
+        temperature_dependent.TemperatureDependentElasticity,
+        _Material,
+        model="temperature_dependent",
+        young_modulus=NumberOrPairs,
+        poisson_ratio=NumberOrPairs,
     ),
     table_of(plastic_module.J2Plasticity, _Material, model="j2_plasticity"),
     table_of(plastic_module.FinitePlasticity, _Material, model="finite_plasticity"),

@@ -16,6 +16,7 @@ from fenics_contact._scene_file.values import (
     CountPair,
     CountTriple,
     Names,
+    NumberOrPairs,
     Pair,
     Pairs,
     ScalarField,
@@ -25,6 +26,7 @@ from fenics_contact._scene_file.values import (
     Vector,
     VectorOrFormulas,
 )
+from fenics_contact.materials.temperature_dependent import ByTemperature
 
 _FORMULAS = "; numbers, formulas in x, y, z in quotes, or fields from files"
 SixNumbers = tuple[float, float, float, float, float, float]
@@ -41,6 +43,8 @@ IN_FILES: list[tuple[Any, Any, str]] = [
     (tuple[float, float, float] | None, Triple | None, ""),
     (SixNumbers | None, Six | None, ""),
     (tuple[SixNumbers, SixNumbers, SixNumbers, SixNumbers, SixNumbers, SixNumbers], SixBySix, ""),
+    (ByTemperature, NumberOrPairs, "; a number, or pairs [temperature, value]"),
+    (ByTemperature | None, NumberOrPairs | None, "; a number, or pairs [temperature, value]"),
     (tuple[str, ...], Names, ""),
     (tuple[int, int], CountPair, ""),
     (tuple[int, int, int], CountTriple, ""),

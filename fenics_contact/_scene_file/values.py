@@ -448,6 +448,8 @@ Six: TypeAlias = Annotated[tuple[float, ...], _row(float, 6, 6, "six finite numb
 SixBySix: TypeAlias = Annotated[
     tuple[Six, ...], _row(Six, 6, 6, "six rows of six finite numbers, each in brackets, all in brackets")
 ]
+#: A number, or pairs of a temperature and the value there.
+NumberOrPairs: TypeAlias = Annotated[Any, Read(either(list, Pairs, float))]
 CountPair: TypeAlias = Annotated[tuple[int, int], _row(_COUNT, 2, 2, f"two {_COUNTS}")]
 #: Number of control points along a curve, or along both directions of a surface.
 Net: TypeAlias = Annotated[

@@ -38,6 +38,7 @@ from fenics_contact.materials.neo_hookean_metal import NeoHookeanPlasticity
 from fenics_contact.materials.orthotropic import OrthotropicElasticity, OrthotropicPlaneStress
 from fenics_contact.materials.plastic import FinitePlasticity, J2Plasticity
 from fenics_contact.materials.ramberg_osgood import RambergOsgood
+from fenics_contact.materials.temperature_dependent import TemperatureDependentElasticity
 
 _MODELS: dict[type, str] = {
     IsotropicElasticity: "isotropic",
@@ -47,6 +48,7 @@ _MODELS: dict[type, str] = {
     AnisotropicElasticity: "anisotropic",
     OrthotropicPlaneStress: "orthotropic_plane_stress",
     J2Plasticity: "j2_plasticity",
+    TemperatureDependentElasticity: "temperature_dependent",
     FinitePlasticity: "finite_plasticity",
     NeoHookeanPlasticity: "neo_hookean_plasticity",
     Hyperfoam: "hyperfoam",

@@ -19,6 +19,7 @@ from fenics_contact.materials.neo_hookean_metal import NeoHookeanPlasticity
 from fenics_contact.materials.orthotropic import OrthotropicElasticity, OrthotropicPlaneStress, material_axes
 from fenics_contact.materials.plastic import J2Plasticity
 from fenics_contact.materials.ramberg_osgood import RambergOsgood
+from fenics_contact.materials.temperature_dependent import ByTemperature, TemperatureDependentElasticity
 from fenics_contact.readers.deck_cards import Card
 
 
@@ -110,6 +111,7 @@ class Conditions:
         large: Whether a step has NLGEOM.
         temperature: The one temperature of all steps, None where it varies.
         heated: Whether temperatures change.
+        initial: The initial temperature of all nodes, None where it varies.
         thickness: That of a plane body where the deck has several, else None.
         dilatation: Whether cells are linear hexahedra or quadrilaterals, whose changes of volume are means.
     """
@@ -120,6 +122,7 @@ class Conditions:
     heated: bool
     dilatation: bool
     thickness: float | None = None
+    initial: float | None = None
 
 
 def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> Material:
@@ -163,8 +166,9 @@ def build_material(cards: MaterialCards, axes: Card | None, of: Conditions) -> M
 def _row(card: Card, width: int, of: Conditions, what: str) -> list[float]:
     if of.temperature is None and depends_on_temperature(card, width):
         raise card.error(
-            "constants that depend on the temperature are read for one temperature of all nodes and "
-            "steps, this deck has several: give constants for the mean temperature"
+            "constants that depend on the temperature are read for isotropic elasticity in small strains, "
+            "but not in plane stress, or for one temperature of all nodes and steps, this deck has several: "
+            "give those for the mean temperature"
         )
     return row_at(card, width, of.temperature or 0.0, what)
 
@@ -181,8 +185,8 @@ def _expansion(parts: Mapping[str, Card], of: Conditions, count: int) -> list[fl
         )
     if of.temperature is None and depends_on_temperature(card, width):
         raise card.error(
-            "an expansion that depends on the temperature is not read: give the mean one of the temperatures "
-            "of the deck"
+            "an expansion that depends on the temperature is read for isotropic elasticity in small strains, "
+            "but not in plane stress: give the mean one of the temperatures of the deck"
         )
     values = row_at(card, width, of.temperature or 0.0, "an expansion")
     if count == 6:
@@ -191,7 +195,44 @@ def _expansion(parts: Mapping[str, Card], of: Conditions, count: int) -> list[fl
     return values if len(values) == count else values * count
 
 
+def _follows_temperature(parts: Mapping[str, Card], of: Conditions) -> bool:
+    """Return whether isotropic constants of a linear material change with the temperatures of the deck."""
+    if of.temperature is not None or of.large or "PLASTIC" in parts or of.kind == "plane stress":
+        return False
+    widths = {"ELASTIC": 2, "EXPANSION": 1}
+    plain = (parts["EXPANSION"].name_of("TYPE") or "ISO") == "ISO" if "EXPANSION" in parts else True
+    return plain and any(
+        name in parts and depends_on_temperature(parts[name], width) for name, width in widths.items()
+    )
+
+
+def _by_temperature(parts: Mapping[str, Card], of: Conditions) -> Material:
+    """Return isotropic elasticity whose constants follow the temperature."""
+    card = parts["ELASTIC"]
+    if of.initial is None or of.thickness is not None:
+        what = "several initial temperatures" if of.initial is None else "several thicknesses"
+        raise card.error(
+            f"constants that depend on the temperature with {what} have no counterpart: give one of them"
+        )
+    young, poisson = (_curve_of(card, 2, column) for column in range(2))
+    expansion, zero = None, 0.0
+    if "EXPANSION" in parts:
+        expansion, zero = _curve_of(parts["EXPANSION"], 1, 0), parts["EXPANSION"].number_of("ZERO")
+    return TemperatureDependentElasticity(young, poisson, expansion, of.initial, zero)
+
+
+def _curve_of(card: Card, width: int, column: int) -> ByTemperature:
+    """Return a column of a table with a temperature behind each row, a number if it is the same in all."""
+    table = _table(card, width)
+    if not np.ptp(table[:, column]):
+        return float(table[0, column])
+    table = table[np.argsort(table[:, -1], kind="stable")]
+    return tuple((float(row[-1]), float(row[column])) for row in table)
+
+
 def _isotropic(parts: Mapping[str, Card], of: Conditions) -> Material:
+    if _follows_temperature(parts, of):
+        return _by_temperature(parts, of)
     young, poisson = _row(parts["ELASTIC"], 2, of, "Young's modulus and Poisson's ratio")
     if "PLASTIC" in parts:
         return _plastic(parts, young, poisson, of)

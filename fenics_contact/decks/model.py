@@ -161,6 +161,7 @@ class Model:
                 self._temperature(),
                 self._heated(),
                 mesh.cell_type in ("hexahedron", "quadrilateral"),
+                initial=self._initial_of(part),
             )
             given = {}
             for region, section in regions_of(self.sections, part).items():
@@ -196,7 +197,8 @@ class Model:
 
         `gigapascals`: the range of metals, in which plastics and rubber in N/mm² hardly are.
         """
-        young, size = getattr(material, "young_modulus", 0.0), float(np.ptp(mesh.points, axis=0).max())
+        given, size = getattr(material, "young_modulus", 0.0), float(np.ptp(mesh.points, axis=0).max())
+        young = given if isinstance(given, float) else given[0][1]
         low, high = gigapascals
         if low <= young <= high and size >= 50.0:
             self.note(
@@ -218,6 +220,12 @@ class Model:
             moment.temperatures is not None and bool((moment.temperatures != self.history.initial).any())
             for moment in moments
         )
+
+    def _initial_of(self, part: Component) -> float | None:
+        """Return the initial temperature of a body if it is the same everywhere."""
+        nodes = self.parts.nodes[part.name]
+        found = np.unique(self.history.initial[nodes[nodes >= 0]])
+        return float(found[0]) if len(found) == 1 else None
 
     def _temperature(self) -> float | None:
         """Return the temperature if it is the same everywhere and always."""

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
         MaterialResponse,
     )
     from fenics_contact.materials.ramberg_osgood import RambergOsgood
+    from fenics_contact.materials.temperature_dependent import TemperatureDependentElasticity
 
 __all__ = [
     "AnisotropicElasticity",
@@ -65,6 +66,7 @@ __all__ = [
     "PlaneStress",
     "RambergOsgood",
     "StVenantKirchhoff",
+    "TemperatureDependentElasticity",
     "Thermoelastic",
     "Transverse",
     "material_axes",

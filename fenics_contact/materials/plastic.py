@@ -132,6 +132,22 @@ class HistoryMaterial(Elasticity):
                 with which a model that depends on it shall compute, so that it ends in NaN, too.
         """
 
+    def respond_at(
+        self, gradient: np.ndarray, history: np.ndarray, duration: float, change: np.ndarray
+    ) -> MaterialResponse:
+        """Return what `respond` does, at changes of temperature.
+
+        The default leaves them out. A model whose constants follow the temperature overrides it, and has
+        ``expands`` true, so that `ThermalStrain` may act on it.
+
+        Args:
+            gradient: As for `respond`.
+            history: As for `respond`.
+            duration: As for `respond`.
+            change: Sum of the temperature changes of the points at the end of the step, shape (n,).
+        """
+        return self.respond(gradient, history, duration)
+
     def admissible(self, history: np.ndarray) -> np.ndarray:
         """Return internal variables that points may have, near means of those of several points, (n, k).
 
@@ -140,8 +156,10 @@ class HistoryMaterial(Elasticity):
         """
         return history
 
-    def answer(self, gradient: np.ndarray, history: np.ndarray, duration: float) -> MaterialResponse:
-        """Return what `respond` does, as float64 arrays of the right shapes.
+    def answer(
+        self, gradient: np.ndarray, history: np.ndarray, duration: float, change: np.ndarray | None = None
+    ) -> MaterialResponse:
+        """Return what `respond_at` does, without a change `respond`, as float64 arrays of the right shapes.
 
         Raises:
             InvalidInputError: If it returns other shapes, or numbers that are not finite where cells are not
@@ -150,7 +168,10 @@ class HistoryMaterial(Elasticity):
         """
         name, n = type(self).__name__, len(gradient)
         with user_code(f"respond of material {name}"):
-            given = self.respond(gradient, history, duration)
+            if change is None:
+                given = self.respond(gradient, history, duration)
+            else:
+                given = self.respond_at(gradient, history, duration, change)
         shapes = {"stress": (n, 3, 3), "tangent": (n, 3, 3, 3, 3), "history": (n, self.history_size)}
         arrays = {part: np.asarray(getattr(given, part, None), dtype=np.float64) for part in shapes}
         for part, shape in shapes.items():

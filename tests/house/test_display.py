@@ -122,6 +122,7 @@ from fenics_contact.materials import (
     PlaneStress,
     RambergOsgood,
     StVenantKirchhoff,
+    TemperatureDependentElasticity,
 )
 from fenics_contact.mesh import Chart, MeshTransfer, refined
 from fenics_contact.mesh.cell_types import CELL_TYPES
@@ -212,6 +213,7 @@ def objects() -> dict[str, Any]:
         RigidCylinder((0, 0, 0), (0, 0, 1), 1.0), OrthotropicPlaneStress((2.0, 1.0), 0.1, 1.0),
         OrthotropicElasticity((3.0, 2.0, 1.0), (0.1, 0.1, 0.1), (1.0, 1.0, 1.0)),
         InitialStress("block", (1.0,) * 6),
+        TemperatureDependentElasticity(1.0, 0.3),
         AnisotropicElasticity(np.eye(6)),  # type: ignore[arg-type]
         ContactForces(lambda contact: (0.0, np.zeros(1), np.zeros((1, 2)))),
         TotalPotential() + 2.0 * VolumeIntegral("motion", lambda u, x, stress: u[0], "block"),

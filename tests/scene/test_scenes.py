@@ -76,6 +76,7 @@ from fenics_contact.materials import (
     PlaneStress,
     RambergOsgood,
     StVenantKirchhoff,
+    TemperatureDependentElasticity,
     rigid_body_modes,
 )
 
@@ -346,6 +347,7 @@ SAMPLES: dict[type, Any] = {
         DistanceObstacle(lambda x: x[:, 0]), PlaneStrain(1.0, 0.3), PlaneStress(1.0, 0.3),
         OrthotropicPlaneStress((1.0, 1.0), 0.3, 1.0),
         OrthotropicElasticity((1.0,) * 3, (0.1,) * 3, (1.0,) * 3),  # type: ignore[arg-type]
+        TemperatureDependentElasticity(1.0, 0.3),
         AnisotropicElasticity(np.eye(6)),  # type: ignore[arg-type]
         NeoHooke(1.0, 0.3), MooneyRivlin(1.0, 0.5, 10.0), StVenantKirchhoff(1.0, 0.3),
         Ogden((1.0,), (2.0,), 10.0), J2Plasticity(1.0, 0.3, 0.1), FinitePlasticity(1.0, 0.3, 0.1),

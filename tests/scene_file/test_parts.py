@@ -28,7 +28,14 @@ from fenics_contact.gallery import (
     hemisphere,
     rectangle,
 )
-from fenics_contact.materials import anisotropic, elastic, hyperelastic, orthotropic, plastic
+from fenics_contact.materials import (
+    anisotropic,
+    elastic,
+    hyperelastic,
+    orthotropic,
+    plastic,
+    temperature_dependent,
+)
 from fenics_contact.readers import gmsh_model, read_msh
 from fenics_contact.shapes import Box, Cone
 from tests.conftest import ROOT
@@ -115,6 +122,15 @@ def test_the_parts_of_a_chain_are_its_links() -> None:
             ),
         ),
         (
+            {
+                "model": "temperature_dependent", "young_modulus": [[20, 210.0], [500, 130.0]],
+                "poisson_ratio": 0.3, "mean_expansion": [[20, 1e-5], [500, 2e-5]], "initial_temperature": 20,
+            },
+            temperature_dependent.TemperatureDependentElasticity(
+                ((20.0, 210.0), (500.0, 130.0)), 0.3, ((20.0, 1e-5), (500.0, 2e-5)), 20.0
+            ),
+        ),
+        (
             {"model": "anisotropic", "moduli": np.eye(6).tolist(), "axis_1": [0, 2, 0], "axis_2": [-1, 1, 0]},
             anisotropic.AnisotropicElasticity(
                 np.eye(6), orthotropic.material_axes((0, 1, 0), (-1, 0, 0))  # type: ignore[arg-type]
@@ -155,7 +171,7 @@ def test_the_parts_of_a_chain_are_its_links() -> None:
             hyperelastic.StVenantKirchhoff(10.0, 0.2),
         ),
     ],
-    ids=["isotropic", "orthotropic", "any", "j2", "curves", "finite", "neo", "mooney", "ogden", "st_venant"],
+    ids=["isotropic", "ortho", "hot", "any", "j2", "curves", "finite", "neo", "mooney", "ogden", "st_venant"],
 )  # fmt: skip
 def test_materials_are_those_of_the_package(given: dict[str, Any], built: elastic.Material) -> None:
     assert file_of(material=given).scene.bodies["a"].material == built
