@@ -60,7 +60,7 @@ class TemperatureDependentElasticity(HistoryMaterial):
     history_size = 0
 
     def __post_init__(self) -> None:
-        """Reject tables that are none, and constants for which the strain energy is not positive."""
+        """Reject tables out of order, and constants for which the strain energy is not positive."""
         for name in ("young_modulus", "poisson_ratio", "mean_expansion"):
             given = getattr(self, name)
             if given is not None:
@@ -76,7 +76,7 @@ class TemperatureDependentElasticity(HistoryMaterial):
 
     @property
     def expands(self) -> bool:
-        """Yes: it feels temperatures."""
+        """Yes: temperatures strain it."""
         return True
 
     def free_strain(self, change: np.ndarray) -> np.ndarray:
