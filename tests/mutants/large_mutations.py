@@ -63,8 +63,8 @@ LARGE_MUTATIONS = (
     Mutation(
         "pressures that follow and are functions of time grow in proportion to it",
         "_large_deformations/loading.py",
-        "mixed = replace(mixed, torn=torn, following=now.following)",
-        "mixed = replace(mixed, torn=torn)",
+        "mixed = replace(mixed, torn=torn, following=now.following, heat=now.heat)",
+        "mixed = replace(mixed, torn=torn, heat=now.heat)",
         (
             "tests/nonlinear/test_newton_steps.py::test_a_pressure_that_is_a_function_of_time_has_its_value_at_every_part",
         ),
