@@ -34,7 +34,7 @@ from fenics_contact.errors import InfeasibleError, InvalidInputError, LoadStepEr
 from fenics_contact.feti.averages import nodal_mean_transposed, nodal_sum
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.preloads import shortening_columns, shortening_scales
-from fenics_contact.feti.torn import TornSystem
+from fenics_contact.feti.torn import TornSystem, contacts_alike
 from fenics_contact.materials.plastic import HistoryMaterial
 from fenics_contact.qp.reductions import global_sum
 from fenics_contact.qp.solution import Solution
@@ -95,7 +95,8 @@ class DeformedEquilibria:
             elif isinstance(before, DeformedState):
                 acted, known = before.load, before.equilibrium.linearisation
                 start = before.equilibrium.configuration
-                if before.torn.decomposition is not self.decomposition:
+                same = before.torn.decomposition is self.decomposition
+                if not (same and contacts_alike(scene, before.scene)):
                     (acted, start), known = self._held_otherwise(scene, before), None
         self._require_later(scene, start.time, time)
         with timer.phase("assemble"):
@@ -124,6 +125,11 @@ class DeformedEquilibria:
             words = f"{where}{failure}{hints}"
             raise LoadStepError(words, failure.history, last) from failure
         return _state_after(path, before, timer, steps)
+
+    def serves(self, scene: Scene, decomposition: Decomposition) -> bool:
+        """Return whether a scene has the meshes, the held components and the contact pairs of these."""
+        same = self.decomposition is decomposition and scene.has_meshes_of(self.scene)
+        return same and contacts_alike(scene, self.scene)
 
     def restored(self, stored: Stored, scene: Scene) -> DeformedState:
         """Build a state from what `stored_deformed` returned, with one factorisation. Collective."""
@@ -178,7 +184,7 @@ class DeformedEquilibria:
         return acted, _balanced(self._equations.evaluate_at(acted, start))
 
     def _held_otherwise(self, scene: Scene, before: DeformedState) -> tuple[Loading, Configuration]:
-        """Return what acted in a state and where it ended, with the supports of another scene. Collective.
+        """Return what acted in a state and where it ended, with supports and pairs of another. Collective.
 
         What supports carried that are released acts as forces of the state before: they fall to zero in the
         step.
@@ -192,6 +198,12 @@ class DeformedEquilibria:
                 f"a RigidSurface of a scene with nonlinear materials must be there from the first step on, "
                 f"that on surface {new[0][1]!r} of body {new[0][0]!r} is new: give it in the steps before, "
                 "too, with all components free"
+            )
+        pairs = [[(pair.slave, pair.master) for pair in each.contacts] for each in (before.scene, scene)]
+        if scene.deforms_much and any(one != other for one, other in zip(*pairs, strict=False)):
+            raise InvalidInputError(
+                "with large deformations the pairs that a load step leaves out must be the last ones of the "
+                f"scene, got {len(pairs[1])} of {len(pairs[0])}: give the scene's pairs in another order"
             )
         at = before.equilibrium.configuration
         assert at.contact is not None

@@ -1,4 +1,4 @@
-"""The state at the end of a load step on the rows of the next: its supports may hold other components."""
+"""The state at the end of a load step on the rows of the next, with other supports or contact pairs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fenics_contact._scene.supports import AnySupport, Kept, RigidSurface, Rolle
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.averages import nodal_mean_at
 from fenics_contact.feti.decomposition import Decomposition, prescribed_along
-from fenics_contact.feti.torn import TornSystem, build_torn_system
+from fenics_contact.feti.torn import TornSystem, build_torn_system, contacts_alike
 from fenics_contact.results.state import State
 
 
@@ -99,6 +99,12 @@ def _kept(support: AnySupport, scene: Scene, before: State) -> AnySupport:
         for k, each in enumerate(support.value)
     ]
     return replace(support, value=tuple(value))
+
+
+def has_rows_of(state: State, after: TornSystem) -> bool:
+    """Return whether the rows of a state are those of a system, which holds the same, with the same pairs."""
+    same = state.torn.decomposition is after.decomposition
+    return same and contacts_alike(state.scene, after.scene)
 
 
 def on_rows_of(state: State, after: TornSystem) -> tuple[TornSystem, np.ndarray]:

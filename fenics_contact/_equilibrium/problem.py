@@ -15,7 +15,7 @@ from fenics_contact._base.progress import PhaseTimer
 from fenics_contact._base.threads import one_thread
 from fenics_contact._equilibrium.carried import CarriedState
 from fenics_contact._equilibrium.followed_loads import FollowedLoads
-from fenics_contact._equilibrium.other_rows import on_rows_of, with_kept
+from fenics_contact._equilibrium.other_rows import has_rows_of, on_rows_of, with_kept
 from fenics_contact._equilibrium.starts import (
     CoarseStart,
     checked_start,
@@ -135,7 +135,7 @@ class LinearEquilibria:
             return before.slip_origin(
                 build_torn_system(scene, self._decomposition, overlap=True, previous=torn)
             )
-        if before.torn.decomposition is torn.decomposition:
+        if has_rows_of(before, torn):
             return before.torn.slip_origin(before.torn_displacement, before.solution.multiplier)
         was, multiplier = on_rows_of(before, torn)
         return was.slip_origin(before.torn_displacement, multiplier)
@@ -531,8 +531,7 @@ class ContactProblem:
         from fenics_contact._equilibrium.deformed import DeformedEquilibria
 
         equilibria, decomposition = self._deformed_equilibria, self._decomposed(scene)
-        same = equilibria is not None and equilibria.decomposition is decomposition
-        if equilibria is None or not same or not scene.has_meshes_of(equilibria.scene):
+        if equilibria is None or not equilibria.serves(scene, decomposition):
             equilibria = DeformedEquilibria(scene, decomposition, self.steps, self.timer, known=equilibria)
             self._deformed_equilibria = equilibria
         return equilibria

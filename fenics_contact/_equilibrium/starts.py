@@ -87,14 +87,15 @@ def carried_over(before: TornSystem, multiplier: np.ndarray, after: TornSystem) 
     tau = before.numbering.gather(multiplier, before.tangential_rows.ravel()).reshape(
         -1, before.components - 1
     )
-    match = _matches(before.points, after.points)
+    match = _matches(_renumbered(before, after), after.points)
     matched = match >= 0
     values = np.zeros(after.points.count)
     values[matched] = normal[match[matched]]
     friction = np.zeros((before.points.count, before.components))
     if len(before.frictional):
         friction[before.frictional] = np.einsum("na,nad->nd", tau, before.points.tangents[before.frictional])
-    in_space = np.where(matched[:, None], friction[match], 0.0) if before.points.count else friction
+    in_space = np.zeros((after.points.count, before.components))
+    in_space[matched] = friction[match[matched]]
     put_contact(after, start, values, in_space)
     return start
 
@@ -146,6 +147,16 @@ def _matches(before: ContactPoints, after: ContactPoints) -> np.ndarray:
     order = np.argsort(old)
     index = np.minimum(np.searchsorted(old[order], new), before.count - 1)
     return np.where(old[order[index]] == new, order[index], -1)
+
+
+def _renumbered(before: TornSystem, after: TornSystem) -> ContactPoints:
+    """Return the contact points of a system, numbered as those of another one that may have other pairs."""
+    old, new = ([(pair.slave, pair.master) for pair in each.scene.contacts] for each in (before, after))
+    if len(old) == len(new):
+        return before.points
+    number = np.array([new.index(pair) if pair in new else len(new) + k for k, pair in enumerate(old)])
+    pair = number[before.points.pair] if len(old) else before.points.pair
+    return replace(before.points, pair=pair)
 
 
 def put_contact(torn: TornSystem, vector: np.ndarray, normal: np.ndarray, friction: np.ndarray) -> None:

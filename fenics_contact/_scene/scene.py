@@ -13,7 +13,7 @@ from fenics_contact._base.display import displayed
 from fenics_contact._scene.automatic import AutomaticContact
 from fenics_contact._scene.contact_facets import with_free_centres
 from fenics_contact._scene.loads import Load
-from fenics_contact._scene.pairs import with_pressures
+from fenics_contact._scene.pairs import ContactPair, with_pressures
 from fenics_contact._scene.parts import SceneParts, with_discretisation
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.sections import changed_by, require_preloads, with_cuts
@@ -185,6 +185,9 @@ class LoadStep:
             scene are held at the length that they have at its start. An empty list holds all.
         fluids: Pressures of fluids at the end of the step by their names, see `FluidPressure`, [force /
             length²]; others keep theirs. None: all do.
+        contacts: The contact pairs of the step, such as those of the scene with other laws of friction or
+            closure, by ``replace(pair, friction=Coulomb(0.1))``; pairs that are left out do not act. None: as
+            they were.
 
     Raises:
         InvalidInputError: If there are functions of time, and no time, or it is not finite.
@@ -201,6 +204,7 @@ class LoadStep:
     time: float | None = None
     preloads: Sequence[Preload] | None = None
     fluids: Mapping[str, float] | None = None
+    contacts: Sequence[ContactPair] | None = None
 
     def __post_init__(self) -> None:
         """Raise if loads are functions of time and no finite time is given."""
@@ -226,6 +230,8 @@ class LoadStep:
         loads = scene.loads if self.loads is None else self.loads
         supports = scene.supports if self.supports is None else self.supports
         end = 0.0 if self.time is None else self.time
+        if self.contacts is not None:
+            scene = replace(scene, contacts=tuple(self.contacts))
         if self.preloads is not None:
             scene = replace(scene, preloads=changed_by(scene, self.preloads))
         if self.fluids is not None:

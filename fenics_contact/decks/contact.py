@@ -13,6 +13,7 @@ from fenics_contact._scene.surface_laws import ClosureLaw, ClosureTable, Exponen
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.readers.deck_cards import Card
+from fenics_contact.readers.deck_mesh import DeckMesh
 
 #: Keeps what is worth knowing of a card.
 Note: TypeAlias = Callable[[Card, str], None]
@@ -52,6 +53,8 @@ def read_interactions(cards: Sequence[Card]) -> dict[str, Interaction]:
     found: dict[str, Interaction] = {}
     now: Interaction | None = None
     for card in cards:
+        if card.name == "STEP":
+            break  # what steps change is another matter
         if card.name == "SURFACEINTERACTION":
             now = found[card.required("NAME")] = Interaction(card)
         elif card.name in ("SURFACEBEHAVIOR", "FRICTION"):
@@ -132,6 +135,29 @@ def clearances(cards: Sequence[Card]) -> dict[tuple[str, str], tuple[Card, float
     }
 
 
+def adjusted(
+    sides: Sequence[Sides], nodes_of: Callable[[Sides], np.ndarray], mesh: DeckMesh
+) -> dict[tuple[str, str], tuple[Card, float]]:
+    """Return no clearance of the pairs that ADJUST a set with all nodes of their slave.
+
+    `nodes_of`: returns the nodes of the slave.
+    """
+    found = {}
+    for of in sides:
+        name = of.card.parameters.get("ADJUST")
+        if of.tied or name is None or _is_number(name):
+            continue
+        chosen, own = mesh.nodes_named(name, of.card), nodes_of(of)
+        left = np.setdiff1d(own, chosen)
+        if len(left):
+            raise of.card.error(
+                f"ADJUST={name} must be a distance, or a set with all nodes of the slave, but {len(left)} of "
+                f"{len(own)} are not in it, such as {mesh.numbers[left[0]]}: add them"
+            )
+        found[of.slave, of.master] = of.card, 0.0
+    return found
+
+
 def near(one: BodyMesh, surface: str, other: BodyMesh, facing: str) -> bool:
     """Return whether the boxes around two surfaces, half as large again, overlap."""
     boxes = []
@@ -203,9 +229,9 @@ def _pair(
     if kind not in ("NODE TO SURFACE", "SURFACE TO SURFACE", "MORTAR", "LINMORTAR", "PGLINMORTAR"):
         raise card.error(f"TYPE={kind} is not read: NODE TO SURFACE, SURFACE TO SURFACE and MORTAR are")
     adjust = card.parameters.get("ADJUST")
-    if adjust is not None and not _is_number(adjust):
-        raise card.error(f"ADJUST={adjust} must be a distance: a set of nodes to adjust is not read")
     _, clearance = given.get((of.slave, of.master), (None, None))
+    if adjust is not None and not _is_number(adjust):
+        adjust = None  # a clearance of zero is given
     by_clearance = {} if clearance is None else {"gap" if clearance >= 0 else "interference": abs(clearance)}
     if clearance is None and adjust is None:
         by_clearance = {"interference": "measured"}  # type: ignore[dict-item]

@@ -249,6 +249,11 @@ class _Writer:
                     f"a scene file has the same components held in all steps, {step.name} holds others than "
                     "the first: run the deck, or read it in Python"
                 )
+            if step.contacts is not None:
+                raise InvalidInputError(
+                    f"a scene file has the same contact pairs in all steps, {step.name} changes them: run "
+                    "the deck, or read it in Python"
+                )
             end = float(number + 1) if step.time is None else step.time
             held = {
                 f"support {k}": self._moved(each, k, number) for k, each in enumerate(step.supports or ())

@@ -9,7 +9,7 @@ import numpy as np
 
 from fenics_contact._scene.preloads import Preload
 from fenics_contact._scene.supports import RigidSurface
-from fenics_contact.decks.history import Moment
+from fenics_contact.decks.history import History, Moment
 from fenics_contact.readers.deck_cards import Card
 from fenics_contact.readers.deck_mesh import DeckMesh, Faces
 
@@ -221,7 +221,7 @@ class LocalAxes:
     card: Card
 
 
-def read_axes(cards: Sequence[Card], mesh: DeckMesh) -> dict[int, np.ndarray]:
+def read_axes(cards: Sequence[Card], mesh: DeckMesh, history: History) -> dict[int, np.ndarray]:
     """Return the local axes of nodes by their positions, as rows."""
     found: dict[int, np.ndarray] = {}
     for card in cards:
@@ -241,12 +241,29 @@ def read_axes(cards: Sequence[Card], mesh: DeckMesh) -> dict[int, np.ndarray]:
             arms = points - first
             out = arms - np.outer(arms @ along, along)
             size = np.linalg.norm(out, axis=1)
-            if (size <= 1e-9 * np.abs(arms).max()).any():
-                raise card.error("nodes on the axis of a cylinder have no radial direction: leave them out")
-            out /= size[:, None]
+            # On the axis no direction is the radial one: any serves where both across it are held alike.
+            on_axis = size <= 1e-9 * np.abs(arms).max()
+            _check_on_axis(nodes[on_axis], card, mesh, history)
+            out[on_axis] = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+            out /= np.linalg.norm(out, axis=1)[:, None]
             axes = np.stack([out, np.cross(along, out), np.tile(along, (len(nodes), 1))], axis=1)
         found.update(zip(nodes.tolist(), axes, strict=True))
     return found
+
+
+def _check_on_axis(nodes: np.ndarray, card: Card, mesh: DeckMesh, history: History) -> None:
+    """Reject nodes on the axis of a cylinder that are held or loaded along one direction across it."""
+    for step in history.steps:
+        for moment in step.moments:
+            held, force = moment.held[nodes, :2], moment.forces[nodes, :2]
+            wrong = np.isnan(held[:, 0]) != np.isnan(held[:, 1])
+            wrong |= np.nan_to_num(held).any(axis=1) | force.any(axis=1)
+            if wrong.any():
+                raise card.error(
+                    f"node {mesh.numbers[nodes[wrong][0]]} is on the axis of the cylinder, where no "
+                    "direction is the radial one, but it is held or loaded along component 1 or 2: hold "
+                    "both at zero there, or leave it out of the set"
+                )
 
 
 def _frame(first: np.ndarray, second: np.ndarray) -> np.ndarray:

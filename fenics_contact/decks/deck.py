@@ -22,6 +22,7 @@ from fenics_contact._scene.supports import AnySupport, Roller
 from fenics_contact.decks.acting import Acting
 from fenics_contact.decks.contact import (
     Sides,
+    adjusted,
     build_pairs,
     clearances,
     read_interactions,
@@ -31,6 +32,7 @@ from fenics_contact.decks.couplings import drawn
 from fenics_contact.decks.history import Moment
 from fenics_contact.decks.holding import Holding
 from fenics_contact.decks.model import Model
+from fenics_contact.decks.pair_changes import read_changes
 from fenics_contact.decks.tables import Print, PrintTable, tables_of
 from fenics_contact.decks.vocabulary import KNOWN, NOT_YET, PARAMETERS, PROCEDURES, WITHOUT_EFFECT
 from fenics_contact.errors import InvalidInputError
@@ -209,6 +211,8 @@ class _Builder:
         for card in model.cards:
             if card.name in WITHOUT_EFFECT and card.name != "HEADING":
                 model.note(card, f"has no effect here ({WITHOUT_EFFECT[card.name]})")
+            if card.name == "NSET" and "FREQUENCY" in card.parameters:
+                model.note(card, "FREQUENCY is of output, it has no effect on a set")
         supported = self.holding.supported()
         sides = self._contact_surfaces()
         self.holding.name_surfaces()
@@ -224,7 +228,7 @@ class _Builder:
         rollers, springs = self.holding.equations()
         supports = (*supports, *rollers)
         scene = self._scene(bodies, supports, *self._pairs(sides), preloads, springs)
-        steps, step_of = self._steps(bodies, supported, loaded, preloads, rollers)
+        steps, step_of = self._steps(scene, bodies, supported, loaded, preloads, rollers)
         mesh = model.mesh
         return Deck(
             model.name,
@@ -245,6 +249,7 @@ class _Builder:
 
     def _steps(
         self,
+        scene: Scene,
         bodies: Mapping[str, Body],
         supported: Mapping[str, tuple[np.ndarray, tuple[int, ...]]],
         loaded: Mapping[int, Sequence[tuple[str, np.ndarray | None]]],
@@ -266,15 +271,28 @@ class _Builder:
                     pairs = zip(self.model.bolts, preloads, strict=True)
                     aims = [drawn(bolt, held, moment, before) for bolt, held in pairs]
                     acting = [aim for aim in aims if aim is not None]
-                steps.append(LoadStep(f"{step.name}{part}", loads, supports, moment.time, acting))
+                contacts = self._contacts_of(number, scene)
+                steps.append(
+                    LoadStep(f"{step.name}{part}", loads, supports, moment.time, acting, contacts=contacts)
+                )
                 before = moment
                 step_of.append(number)
         return tuple(steps), tuple(step_of)
+
+    def _contacts_of(self, step: int, scene: Scene) -> list[ContactPair] | None:
+        """Return the contact pairs of a step that changes them."""
+        change = self.changes[step]
+        if change is None:
+            return None
+        pairs = zip(self.sides_of_pairs, scene.contacts, strict=True)
+        found = [change.applied(of, pair, self.model.note) for of, pair in pairs]
+        return [pair for pair in found if pair is not None]
 
     def _contact_surfaces(self) -> list[Sides]:
         """Name the surfaces of contact pairs and ties."""
         self.interactions = read_interactions(self.model.cards)
         sides = read_sides(self.model.cards, self.interactions)
+        self.changes = read_changes(self.model.cards, self.interactions, sides)
         self.sides_by_name: dict[str, str] = {}
         self.alone: dict[str, str] = {}
         for each in sides:
@@ -321,22 +339,31 @@ class _Builder:
             "with its share of the faces around it as its area",
         )
 
+    def _slave_nodes(self, of: Sides) -> np.ndarray:
+        if of.slave in self.alone:
+            return self.model.node_sets[self.alone[of.slave]]
+        faces = self.model.surfaces[self.sides_by_name[of.slave]]
+        return np.unique(np.concatenate([n.ravel() for _, _, _, n in self.model.mesh.parts_of(faces)]))
+
     def _pairs(self, sides: Sequence[Sides]) -> tuple[list[ContactPair], list[Tie]]:
         found = build_pairs(
             sides,
             self.sides_by_name,
             self.model.parts.meshes,
             self.interactions,
-            clearances(self.model.cards),
+            {**adjusted(sides, self._slave_nodes, self.model.mesh), **clearances(self.model.cards)},
             self.alone,
             self.model.note,
         )
         for each, pair in found:
             kind = "tie" if isinstance(pair, Tie) else "contact"
             self.model.origins[kind, pair.place] = each.card.origin
-        return [p for _, p in found if isinstance(p, ContactPair)], [
-            p for _, p in found if isinstance(p, Tie)
-        ]
+        contacts = [(of, pair) for of, pair in found if isinstance(pair, ContactPair)]
+        # Those that some step leaves out are the last ones.
+        left_out = {pair for change in self.changes if change for pair in change.removed}
+        contacts.sort(key=lambda each: (each[0].slave, each[0].master) in left_out)
+        self.sides_of_pairs = [of for of, _ in contacts]
+        return [pair for _, pair in contacts], [pair for _, pair in found if isinstance(pair, Tie)]
 
     def _scene(
         self,

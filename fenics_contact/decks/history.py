@@ -106,7 +106,7 @@ class Step:
     """One load step of a deck.
 
     Attributes:
-        large: Whether it has NLGEOM.
+        large: Whether it has NLGEOM, or one before it.
         moments: What acts at times of it, the last one at its end.
     """
 
@@ -281,9 +281,12 @@ class _Course:
         self.temperature_by = self._by(card)
         _assign(self.temperature, card, self.mesh)
 
-    def at(self, step_time: float, period: float, start: float) -> Moment:
-        """Return what acts at a time of the step: what has no amplitude grows in proportion to the time."""
-        ramp = step_time / period
+    def at(self, step_time: float, period: float, start: float, at_once: bool = False) -> Moment:
+        """Return what acts at a time of the step.
+
+        What has no amplitude grows in proportion to the time, or is there at once.
+        """
+        ramp = 1.0 if at_once else step_time / period
         factor = np.array(
             [np.nan, *(each.at(step_time, start + step_time) for each in self.factors[1:] if each)]
         )
@@ -407,7 +410,7 @@ def read_history(cards: Sequence[Card], mesh: DeckMesh) -> History:
         elif card.name == "ENDSTEP":
             if inside is None:
                 raise card.error("there is no *STEP before it: add one, or leave it out")
-            step, start = _step(inside, course, initial, start, len(steps))
+            step, start = _step(inside, course, initial, start, steps)
             steps.append(step)
             prints += [(len(steps) - 1, each) for each in inside if each.name in PRINT_CARDS]
             inside = None
@@ -441,13 +444,16 @@ def _step(
     course: _Course,
     initial: np.ndarray,
     start: float,
-    number: int,
+    before: Sequence[Step],
 ) -> tuple[Step, float]:
     """Return a step and the time at its end."""
     head, seen, period = cards[0], set[str](), 1.0
     loaded = np.zeros(course.force.shape, dtype=bool)
     if "PERTURBATION" in head.parameters:
         raise head.error("PERTURBATION is not read: a step here has all loads, give them in full")
+    amplitude = head.name_of("AMPLITUDE") or "RAMP"
+    if amplitude not in ("RAMP", "STEP"):
+        raise head.error(f"AMPLITUDE={amplitude} is not read: RAMP and STEP are")
     static = False
     for card in cards[1:]:
         fresh = card.name not in seen
@@ -471,7 +477,10 @@ def _step(
     if not static:
         raise head.error("needs *STATIC: nothing else is solved here, add it")
     times = course.times(period, start)
-    moments = [course.at(time, period, start) for time in times]
+    moments = [course.at(time, period, start, amplitude == "STEP") for time in times]
     course.finish(moments[-1])
-    large = plain(head.parameters.get("NLGEOM", "NO")) in ("", "YES") and "NLGEOM" in head.parameters
-    return Step(head, f"step {number + 1}", large, moments), start + period
+    # Once it is there it stays.
+    large = bool(before) and before[-1].large
+    if "NLGEOM" in head.parameters:
+        large = plain(head.parameters["NLGEOM"]) in ("", "YES")
+    return Step(head, f"step {len(before) + 1}", large, moments), start + period

@@ -62,7 +62,7 @@ class Model:
         self.driven = read_driven(cards, self.mesh)
         self.bolts = read_bolts(cards, self.mesh)
         self.equations = read_equations(cards, self.mesh)
-        self.local_axes = read_axes(cards, self.mesh)
+        self.local_axes = read_axes(cards, self.mesh, self.history)
         nodes = [[each.node, each.turning] for each in self.driven] + [[bolt.node] for bolt in self.bolts]
         self.references = np.array(
             [node for several in nodes for node in several if node >= 0], dtype=np.int64

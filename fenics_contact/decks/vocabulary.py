@@ -17,7 +17,10 @@ MODEL_CARDS = {
     "COUPLING", "KINEMATIC", "DISTRIBUTING", "DISTRIBUTINGCOUPLING", "EQUATION", "PRE-TENSIONSECTION",
 }  # fmt: skip
 #: Cards of load steps that are read.
-STEP_CARDS = {"STEP", "ENDSTEP", "STATIC", "BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE"}
+STEP_CARDS = {
+    "STEP", "ENDSTEP", "STATIC", "BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE", "CHANGEFRICTION",
+    "CHANGESURFACEBEHAVIOR", "MODELCHANGE",
+}  # fmt: skip
 #: Cards that ask for results.
 PRINT_CARDS = {"NODEPRINT", "ELPRINT", "CONTACTPRINT", "NODEFILE", "ELFILE", "CONTACTFILE"}
 #: Known cards that change nothing of what is solved here, and why.
@@ -60,7 +63,7 @@ PROCEDURES = {
 PARAMETERS: dict[str, set[str]] = {
     "NODE": {"NSET", "SYSTEM"},
     "ELEMENT": {"TYPE", "ELSET"},
-    "NSET": {"NSET", "ELSET", "GENERATE", "UNSORTED"},
+    "NSET": {"NSET", "ELSET", "GENERATE", "UNSORTED", "FREQUENCY"},
     "ELSET": {"ELSET", "GENERATE"},
     "SURFACE": {"NAME", "TYPE"},
     "SOLIDSECTION": {"ELSET", "MATERIAL", "ORIENTATION", "OFFSET"},  # of layers along their thickness
@@ -88,7 +91,10 @@ PARAMETERS: dict[str, set[str]] = {
     "DISTRIBUTING": set(),
     "EQUATION": {"REMOVE"},
     "PRE-TENSIONSECTION": {"SURFACE", "NODE"},
-    "STEP": {"NLGEOM", "INC", "NAME", "PERTURBATION"},
+    "STEP": {"NLGEOM", "INC", "NAME", "PERTURBATION", "AMPLITUDE"},
+    "CHANGEFRICTION": {"INTERACTION"},
+    "CHANGESURFACEBEHAVIOR": {"INTERACTION"},
+    "MODELCHANGE": {"TYPE", "REMOVE", "ADD"},
     "STATIC": {"DIRECT", "SOLVER"},
     "BOUNDARY": {"OP", "AMPLITUDE", "TIMEDELAY", "FIXED", "TYPE"},
     "CLOAD": {"OP", "AMPLITUDE", "TIMEDELAY"},

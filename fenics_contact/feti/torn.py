@@ -580,17 +580,17 @@ def build_torn_system(
 
 def _meets_alike(scene: Scene, decomposition: Decomposition, known: TornSystem) -> bool:
     """Return whether two scenes have the same meshes, pairs and held components, whatever fluid is there."""
-    pairs = [
-        [
-            *(c if c.fluid is None else replace(c, fluid=None) for c in each.contacts),
-            *each.ties,
-            *each.springs,
-            *(p.key for p in each.preloads),
-        ]
-        for each in (scene, known.scene)
-    ]
+    rest = [[*each.ties, *each.springs, *(p.key for p in each.preloads)] for each in (scene, known.scene)]
     same = scene.has_meshes_of(known.scene) and known.decomposition is decomposition
-    return same and pairs[0] == pairs[1]
+    return same and rest[0] == rest[1] and contacts_alike(scene, known.scene)
+
+
+def contacts_alike(scene: Scene, other: Scene) -> bool:
+    """Return whether two scenes have the same contact pairs, whatever fluid is in them."""
+    pairs = [
+        [c if c.fluid is None else replace(c, fluid=None) for c in each.contacts] for each in (scene, other)
+    ]
+    return pairs[0] == pairs[1]
 
 
 def _joined(

@@ -223,7 +223,13 @@ def _elements(mesh: DeckMesh, cards: Sequence[Card]) -> None:
     first = 0
     for card in cards:
         element = element_of(card)
-        records = card.integers(1 + element.count)
+        width = 1 + element.count
+        lengths = {len(row) for row in card.rows}
+        # Preprocessors add nodes inside, of bubbles, which the other program overlooks.
+        if card.name_of("TYPE") == "C3D8I" and len(lengths) == 1 and width < max(lengths) <= width + 3:
+            records = card.integers(max(lengths))[:, :width]
+        else:
+            records = card.integers(width)
         nodes = mesh.positions(records[:, 1:].ravel(), "node", card).reshape(-1, element.count)
         for kind, mine, own in without_repeated(element, nodes, records[:, 0], card):
             mesh.blocks.append(Block(kind, card, records[mine, 0], own, first, mine))

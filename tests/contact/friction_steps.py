@@ -19,12 +19,14 @@ def sheared_block(law: Coulomb | Tresca) -> Scene:
     return Scene({"block": Body(mesh, IsotropicElasticity(1000.0, 0.3))}, contacts=[pair])
 
 
-def coulomb_reference(scene: Scene, before: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+def coulomb_reference(
+    scene: Scene, before: np.ndarray | None, friction: float = FRICTION
+) -> tuple[np.ndarray, np.ndarray]:
     """Return displacement and contact forces of one step: a fixed point of conic programs."""
     reference = ConicReference(scene)
     normal = np.full(len(reference.rows.gap), 0.5)
     for _ in range(60):
-        found = reference.solve(FRICTION * normal, before)
+        found = reference.solve(friction * normal, before)
         change = np.abs(found.normal_force - normal).max() / found.normal_force.max()
         normal = found.normal_force
         if change < 1e-9:

@@ -159,10 +159,6 @@ WRONG = [
     ("*EQUATION, REMOVE\n1\n", r"REMOVE is not read"),
     ("*TRANSFORM, NSET=BAR_X1, TYPE=S\n", r"needs TYPE=R or C and a line with two points"),
     (
-        "*TRANSFORM, NSET=BAR_X0, TYPE=C\n0., 0., 0., 1., 0., 0.\n",
-        r"nodes on the axis of a cylinder have no radial",
-    ),
-    (
         "*SURFACE, NAME=N, TYPE=NODE\n17,\n*PRE-TENSION SECTION, SURFACE=N, NODE=501\n",
         r"needs a surface of faces, 'N' has nodes",
     ),

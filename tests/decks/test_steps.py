@@ -1,4 +1,4 @@
-"""Steps of decks that hold other components than the first: *BOUNDARY with OP=NEW and FIXED."""
+"""Steps of decks: what they hold by OP=NEW and FIXED, how loads come, and what is taken as in CalculiX."""
 
 from __future__ import annotations
 
@@ -72,3 +72,54 @@ def test_what_cannot_be_kept_is_refused(tmp_path: Path) -> None:
     driven += step("*CLOAD\n501, 1, 9.\n") + step("*BOUNDARY, FIXED\n501, 1\n")
     with pytest.raises(DeckError, match=r"node 501, which drives a surface, was free before it is FIXED"):
         read_deck(deck(tmp_path, driven))
+
+
+def test_loads_of_a_step_may_be_there_at_once(tmp_path: Path) -> None:
+    turn = "*AMPLITUDE, NAME=TURN\n0., 0., 0.5, 1., 1., 0.\n"
+    loads = "*CLOAD\nBAR_X1, 1, 8.\n*CLOAD, AMPLITUDE=TURN\nBAR_X1, 2, 3.\n"
+    parts = {}
+    for how in ("STEP", "RAMP"):
+        text = BAR + turn + FREE_TO_CONTRACT + step(loads, f", AMPLITUDE={how}")
+        found = read_deck(deck(tmp_path, text, f"{how}.inp"))
+        parts[how] = [sorted(load.value for load in each.loads or ()) for each in found.steps]
+    at_once, grown = ([value for values in part for value in values] for part in parts.values())
+    assert max(value[0] for value in at_once[:1]) == 8.0
+    assert max(value[0] for value in grown[:1]) == 4.0
+    assert parts["STEP"][-1] == parts["RAMP"][-1]
+    with pytest.raises(DeckError, match=r"AMPLITUDE=WAVE is not read: RAMP and STEP are"):
+        read_deck(deck(tmp_path, text.replace("AMPLITUDE=RAMP", "AMPLITUDE=WAVE")))
+
+
+def test_large_deformations_stay_large_in_later_steps(tmp_path: Path) -> None:
+    text = BAR + FREE_TO_CONTRACT + step("*BOUNDARY\nBAR_X1, 1, 1, 0.01\n", ", NLGEOM") + step("")
+    assert read_deck(deck(tmp_path, text)).scene.deforms_much
+    with pytest.raises(DeckError, match="all steps must have NLGEOM, or none"):
+        read_deck(deck(tmp_path, text.replace("*STEP\n", "*STEP, NLGEOM=NO\n")))
+
+
+def test_nodes_on_the_axis_of_a_cylinder_are_held_across_it_as_a_whole(tmp_path: Path) -> None:
+    axis = "*TRANSFORM, NSET=BAR_X0, TYPE=C\n0., 0., 0., 0., 0., 1.\n"
+    pinned, rolling = (
+        BAR + axis + f"*BOUNDARY\nBAR_X0, 1, {last}\nBAR_Z0, 3\n" + step("*CLOAD\nBAR_X1, 1, 5.\n")
+        for last in (2, 1)
+    )
+    plain = read_deck(deck(tmp_path, pinned.replace(axis, ""))).solve(MPI.COMM_SELF)[-1]
+    turned = read_deck(deck(tmp_path, pinned, "turned.inp")).solve(MPI.COMM_SELF)[-1]
+    expected = plain.gather_displacement("BAR")
+    np.testing.assert_allclose(
+        turned.gather_displacement("BAR"), expected, atol=1e-9 * np.abs(expected).max()
+    )
+    with pytest.raises(DeckError, match=r"node 1 is on the axis of the cylinder, .* hold both at zero"):
+        read_deck(deck(tmp_path, rolling))
+
+
+def test_numbers_of_bubbles_behind_the_nodes_of_an_element_are_overlooked(tmp_path: Path) -> None:
+    text = BAR.replace("C3D8", "C3D8I") + FREE_TO_CONTRACT + step("*CLOAD\nBAR_X1, 1, 5.\n")
+    head, _, rest = text.partition("ELSET=BAR\n")
+    lines = rest.split("\n")
+    more = [f"{line}, 901, 902, 903" for line in lines[:6]] + lines[6:]
+    one, other = (
+        read_deck(deck(tmp_path, each, f"{k}.inp")).scene.bodies["BAR"].mesh
+        for k, each in enumerate((text, head + "ELSET=BAR\n" + "\n".join(more)))
+    )
+    np.testing.assert_array_equal(one.cells, other.cells)

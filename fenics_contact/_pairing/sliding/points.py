@@ -176,7 +176,8 @@ class SlidingPoints:
         left[:, :, -1] *= np.linalg.det(left @ right)[:, None]
         rotation = np.asarray(left @ right)
         rotation[np.diff(met.indptr) == 0] = np.eye(dim)
-        for index, (new, old) in enumerate(zip(self.placements, other.placements, strict=True)):
+        # A load step may leave out the last pairs, or have them again.
+        for index, (new, old) in enumerate(zip(self.placements, other.placements, strict=False)):
             if new is not None and old is not None:
                 rotation[self.points.pair == index] = new[0] @ old[0].T
         return rotation
