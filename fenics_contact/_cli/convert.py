@@ -23,13 +23,17 @@ def convert(
         Path | None,
         typer.Argument(metavar="SCENE.toml", help="The scene file, by default beside the deck."),
     ] = None,
+    statics_only: Annotated[
+        bool,
+        typer.Option("--statics-only", help="Leave out the first step that is no statics and all behind it."),
+    ] = False,
 ) -> None:
     """Write a deck as a scene file and its mesh, which have the same answer."""
     from fenics_contact.decks.convert import write_scene_file
     from fenics_contact.decks.deck import read_deck
 
     console = console_of(context)
-    read = read_deck(deck, console.comm)
+    read = read_deck(deck, console.comm, statics_only=statics_only)
     files = list[Path]()
     with together(console.comm):
         if console.comm.rank == 0:

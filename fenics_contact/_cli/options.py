@@ -113,11 +113,18 @@ def scene_command(
                 "--python/--no-python", help='Run Python files that the scene names ("file.py:Name").'
             ),
         ] = True,
+        statics_only: Annotated[
+            bool,
+            typer.Option(
+                "--statics-only",
+                help="Of a deck: leave out the first step that is no statics and all behind it.",
+            ),
+        ] = False,
     ) -> None:
         console = console_of(context)
         with show_progress(console.comm):
             overrides = [*(settings or ()), *_asked(accuracy, of)]
-            file = _read(console, scene, output, tolerance, overrides, python)
+            file = _read(console, scene, output, tolerance, overrides, python, statics_only)
             check(file)
             _show_plan(console, file, sensitivity=sensitivity)
             console.write()
@@ -161,6 +168,7 @@ def _read(
     tolerance: str | None,
     overrides: list[str],
     python: bool,
+    statics_only: bool,
 ) -> SceneFile:
     """Read a scene file with the values that options override. Collective."""
     if tolerance is not None:
@@ -172,7 +180,11 @@ def _read(
     if scene.suffix.lower() in DECKS:
         from fenics_contact.decks.file import read_deck_file
 
-        return read_deck_file(scene, console.comm, overrides)
+        return read_deck_file(scene, console.comm, overrides, statics_only)
+    if statics_only:
+        raise InvalidInputError(
+            f"--statics-only is of decks, got the scene file {str(scene)!r}: leave the option out"
+        )
     return read_scene_file(scene, console.comm, overrides=overrides, python=python)
 
 

@@ -144,7 +144,7 @@ class Deck:
         return tables_of(self, state, step)
 
 
-def read_deck(path: str | Path, comm: MPI.Comm | None = None) -> Deck:
+def read_deck(path: str | Path, comm: MPI.Comm | None = None, *, statics_only: bool = False) -> Deck:
     """Read a deck of CalculiX or Abaqus: its mesh, materials, supports, contact, loads and steps.
 
     Every card is read or is known to have no effect on what is solved; all else is refused with its line.
@@ -155,6 +155,8 @@ def read_deck(path: str | Path, comm: MPI.Comm | None = None) -> Deck:
     Args:
         path: The file, mostly ``.inp``; files that it includes are looked for in its folder.
         comm: If given, rank 0 reads the file and all ranks receive the deck.
+        statics_only: Whether the first step of another procedure, such as *FREQUENCY, or of a perturbation,
+            and all steps behind it are left out, which `Deck.notes` say. Else they are refused.
 
     Raises:
         DeckError: With card and line, if a card, an element, a set or a parameter is not known or does not
@@ -168,12 +170,15 @@ def read_deck(path: str | Path, comm: MPI.Comm | None = None) -> Deck:
         >>> deck = read_deck("bracket.inp")  # doctest: +SKIP
         >>> states = deck.solve(MPI.COMM_WORLD)  # doctest: +SKIP
     """
-    return made_once(comm, lambda: _read(Path(path)))
+    return made_once(comm, lambda: _read(Path(path), statics_only))
 
 
-def _read(path: Path) -> Deck:
+def _read(path: Path, statics_only: bool = False) -> Deck:
     require_file(path, "a deck")
-    cards = read_cards(path)
+    cards: Sequence[Card] = read_cards(path)
+    first_left = None
+    if statics_only:
+        cards, first_left = _leading_statics(cards)
     for card in cards:
         if card.name not in KNOWN and card.name not in PROCEDURES:
             raise card.error(
@@ -190,11 +195,28 @@ def _read(path: Path) -> Deck:
         if card.name in NOT_YET:
             raise card.error("this card is known, but not read yet: leave it out, or describe it in Python")
     try:
-        return _Builder(path.name, cards).deck()
+        builder = _Builder(path.name, cards)
+        if first_left is not None:
+            builder.model.note(first_left, "this step and all behind it are left out: they are no statics")
+        return builder.deck()
     except DeckError:
         raise
     except InvalidInputError as error:
         raise DeckError(str(error), path.name) from error
+
+
+def _leading_statics(cards: Sequence[Card]) -> tuple[Sequence[Card], Card | None]:
+    """Return the cards before the first step that is no statics, and its card; None without any."""
+    begin, steps = 0, 0
+    for place, card in enumerate(cards):
+        if card.name == "STEP":
+            begin, steps = place, steps + 1
+        other = card.name in PROCEDURES or (card.name == "STEP" and "PERTURBATION" in card.parameters)
+        if other and steps == 1:
+            raise card.error("the first step is no statics, so that nothing of it is left: give one that is")
+        if other and steps:
+            return cards[:begin], card
+    return cards, None
 
 
 class _Builder:

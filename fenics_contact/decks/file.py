@@ -74,7 +74,9 @@ class DeckFile(SceneFile):
         return tuple(self.deck.steps) if len(self.deck.steps) > 1 else ()
 
 
-def read_deck_file(path: Path, comm: MPI.Comm, overrides: Sequence[str]) -> DeckFile:
+def read_deck_file(
+    path: Path, comm: MPI.Comm, overrides: Sequence[str], statics_only: bool = False
+) -> DeckFile:
     """Read a deck for the command line. Collective on ``comm``."""
     for override in overrides:
         key = override.partition("=")[0].strip().partition(".")[0]
@@ -85,4 +87,4 @@ def read_deck_file(path: Path, comm: MPI.Comm, overrides: Sequence[str]) -> Deck
             )
     source = Source(path.name, path.parent, _NOTHING).with_overrides(overrides)
     document = validated(source)
-    return DeckFile(source, document, comm, read_deck(path, comm))
+    return DeckFile(source, document, comm, read_deck(path, comm, statics_only=statics_only))

@@ -450,7 +450,10 @@ def _step(
     head, seen, period = cards[0], set[str](), 1.0
     loaded = np.zeros(course.force.shape, dtype=bool)
     if "PERTURBATION" in head.parameters:
-        raise head.error("PERTURBATION is not read: a step here has all loads, give them in full")
+        raise head.error(
+            "PERTURBATION is not read: a step here has all loads, give them in full, or take the steps of "
+            "statics before it alone (statics_only=True, or --statics-only)"
+        )
     amplitude = head.name_of("AMPLITUDE") or "RAMP"
     if amplitude not in ("RAMP", "STEP"):
         raise head.error(f"AMPLITUDE={amplitude} is not read: RAMP and STEP are")
@@ -459,7 +462,10 @@ def _step(
         fresh = card.name not in seen
         seen.add(card.name)
         if card.name in PROCEDURES:
-            raise card.error("only *STATIC is solved here: take the steps of statics alone")
+            raise card.error(
+                "only *STATIC is solved here: take the steps of statics alone (statics_only=True, or "
+                "--statics-only), or leave this one out"
+            )
         if card.name == "STATIC":
             static = True
             numbers = card.floats(0) if card.lines else []

@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import Kept, Support
+from fenics_contact import _cli as cli
 from fenics_contact.decks import DeckError, read_deck
 from tests.decks.texts import BAR, FREE_TO_CONTRACT, deck, step
 
@@ -88,6 +89,38 @@ def test_loads_of_a_step_may_be_there_at_once(tmp_path: Path) -> None:
     assert parts["STEP"][-1] == parts["RAMP"][-1]
     with pytest.raises(DeckError, match=r"AMPLITUDE=WAVE is not read: RAMP and STEP are"):
         read_deck(deck(tmp_path, text.replace("AMPLITUDE=RAMP", "AMPLITUDE=WAVE")))
+
+
+OTHERS = "*STEP, PERTURBATION\n*MODAL DAMPING\n1, 2.\n*FREQUENCY\n10\n*END STEP\n" + step("")
+
+
+@pytest.mark.parametrize("others", [OTHERS, OTHERS.replace(", PERTURBATION", "")])
+def test_the_leading_static_steps_alone_are_read_if_that_is_wanted(others: str, tmp_path: Path) -> None:
+    text = BAR + FREE_TO_CONTRACT + step("*CLOAD\nBAR_X1, 1, 5.\n") * 2
+    path = deck(tmp_path, text + others)
+    with pytest.raises(DeckError):
+        read_deck(path)
+    found, whole = read_deck(path, statics_only=True), read_deck(deck(tmp_path, text, "whole.inp"))
+    assert len(found.steps) == len(whole.steps) == 2
+    (words,) = set(found.notes) - {note.replace("whole.inp", "model.inp") for note in whole.notes}
+    assert words.endswith("this step and all behind it are left out: they are no statics")
+    line = text.count("\n") + (1 if "PERTURBATION" in others else 4)
+    assert f"model.inp line {line}: this step" in words
+    with pytest.raises(DeckError, match=r"the first step is no statics, so that nothing of it is left"):
+        read_deck(deck(tmp_path, BAR + FREE_TO_CONTRACT + others, "none.inp"), statics_only=True)
+
+
+def test_the_command_line_takes_the_static_steps_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = deck(tmp_path, BAR + FREE_TO_CONTRACT + step("*CLOAD\nBAR_X1, 1, 5.\n") + OTHERS)
+    assert cli.main(MPI.COMM_SELF, ["run", str(path), "--plan"]) == 2
+    assert cli.main(MPI.COMM_SELF, ["run", str(path), "--plan", "--statics-only"]) == 0
+    assert "are left out: they are no statics" in " ".join(capsys.readouterr().out.split())
+    assert cli.main(MPI.COMM_SELF, ["convert", str(path), "--statics-only"]) == 0
+    scene = str(path.with_suffix(".toml"))
+    assert cli.main(MPI.COMM_SELF, ["run", scene, "--plan", "--statics-only"]) == 2
+    assert "--statics-only is of decks, got the scene file" in " ".join(capsys.readouterr().err.split())
 
 
 def test_large_deformations_stay_large_in_later_steps(tmp_path: Path) -> None:
