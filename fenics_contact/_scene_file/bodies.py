@@ -15,6 +15,7 @@ from fenics_contact._base.checks import STEEPEST
 from fenics_contact._scene_file.part import Part, keys_of, table_of
 from fenics_contact._scene_file.values import (
     NumberOrPairs,
+    Numbers,
     Pair,
     PlaceOfFile,
     Read,
@@ -152,6 +153,8 @@ class AnisotropicMaterial(_WithAxes):
     model: Literal["anisotropic"]
 
 
+#: Keys of models that are sums of any number of terms.
+TERMS: dict[str, Any] = dict.fromkeys(("shear_moduli", "exponents"), Numbers)
 MATERIALS = (
     IsotropicMaterial,
     OrthotropicMaterial,
@@ -175,8 +178,8 @@ MATERIALS = (
     table_of(hyperelastic.NeoHooke, _Material, model="neo_hooke"),
     table_of(hyperelastic.StVenantKirchhoff, _Material, model="st_venant_kirchhoff"),
     table_of(hyperelastic.MooneyRivlin, _Material, model="mooney_rivlin"),
-    table_of(hyperelastic.Ogden, _Material, model="ogden"),
-    table_of(foam.Hyperfoam, _Material, model="hyperfoam"),
+    table_of(hyperelastic.Ogden, _Material, model="ogden", **TERMS),
+    table_of(foam.Hyperfoam, _Material, model="hyperfoam", poisson_ratios=Numbers, **TERMS),
     table_of(ramberg_osgood.RambergOsgood, _Material, model="ramberg_osgood"),
 )
 

@@ -443,6 +443,7 @@ Pairs: TypeAlias = Annotated[
     tuple[tuple[float, float], ...],
     _row(Pair, 0, None, "pairs of finite numbers in brackets, such as [[0.02, 290.0], [0.1, 340.0]]"),
 ]
+Numbers: TypeAlias = Annotated[tuple[float, ...], _row(float, 1, None, "finite numbers in brackets")]
 Six: TypeAlias = Annotated[tuple[float, ...], _row(float, 6, 6, "six finite numbers in brackets")]
 #: A matrix of six rows and columns.
 SixBySix: TypeAlias = Annotated[

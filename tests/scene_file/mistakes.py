@@ -27,7 +27,7 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         "young_modulus = 2.1e5",
         "youngs_modulus = 2.1e5",
         "scene.toml, line 16: materials.steel.youngs_modulus is not known: did you mean 'young_modulus'? the "
-        "keys of materials.steel are model, young_modulus, poisson_ratio, thermal_expansion",
+        "keys of materials.steel are model, young_modulus, poisson_ratio, thermal_expansion, thickness",
     ),
     "a table is misspelt": (
         "[[contacts]]",
@@ -124,8 +124,8 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         'kind = "traction"\n',
         "",
         "scene.toml, line 31: loads.0 must have 'kind', one of 'traction', 'total_force', 'total_moment', "
-        "'pressure', 'body_force', 'point_force', 'gravity', 'centrifugal', 'point_mass', 'thermal', got "
-        "only body, surface, value",
+        "'pressure', 'body_force', 'point_force', 'gravity', 'centrifugal', 'point_mass', 'thermal', "
+        "'initial_stress', got only body, surface, value",
     ),
     "a formula is no arithmetic": (
         "value = [10.0, 0.0, -100.0]",

@@ -31,7 +31,9 @@ from fenics_contact.gallery import (
 from fenics_contact.materials import (
     anisotropic,
     elastic,
+    foam,
     hyperelastic,
+    neo_hookean_metal,
     orthotropic,
     plastic,
     temperature_dependent,
@@ -167,11 +169,34 @@ def test_the_parts_of_a_chain_are_its_links() -> None:
             hyperelastic.Ogden((2.0, -0.4), (1.3, -2.0), 9.0),
         ),
         (
+            {"model": "ogden", "shear_moduli": [2], "exponents": [1.3], "bulk_modulus": 9},
+            hyperelastic.Ogden((2.0,), (1.3,), 9.0),
+        ),
+        (
+            {
+                "model": "hyperfoam", "shear_moduli": [2] * 4, "exponents": [1, 2, 3, 4],
+                "poisson_ratios": [0] * 4,
+            },
+            foam.Hyperfoam((2.0,) * 4, (1.0, 2.0, 3.0, 4.0), (0.0,) * 4),
+        ),
+        (
+            {
+                "model": "neo_hookean_plasticity", "young_modulus": 9, "poisson_ratio": 0.3,
+                "yield_stress": 2, "kinematic_hardening": 1, "thermal_expansion": 1e-5,
+            },
+            neo_hookean_metal.NeoHookeanPlasticity(
+                9.0, 0.3, 2.0, kinematic_hardening=1.0, thermal_expansion=1e-5
+            ),
+        ),
+        (
             {"model": "st_venant_kirchhoff", "young_modulus": 10, "poisson_ratio": 0.2},
             hyperelastic.StVenantKirchhoff(10.0, 0.2),
         ),
     ],
-    ids=["isotropic", "ortho", "hot", "any", "j2", "curves", "finite", "neo", "mooney", "ogden", "st_venant"],
+    ids=[
+        "isotropic", "ortho", "hot", "any", "j2", "curves", "finite", "neo", "mooney", "ogden", "one term",
+        "foam", "metal", "st_venant",
+    ],
 )  # fmt: skip
 def test_materials_are_those_of_the_package(given: dict[str, Any], built: elastic.Material) -> None:
     assert file_of(material=given).scene.bodies["a"].material == built
